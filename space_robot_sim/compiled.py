@@ -1,0 +1,47 @@
+"""One decorator for every compiled function, with a disk cache that cannot go stale.
+
+Numba's own cache watches only the file a function stands in, so a change in a function it
+calls from another file goes unseen. Here the cache folder's name is a digest of the source of
+all three packages: any edit starts a fresh cache, and all processes share what one compiled.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+
+_PACKAGES = ("space_robot_sim", "space_robot_control")
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+@cache
+def cache_directory() -> Path:
+    """Folder of the compiled kernels: ``NUMBA_CACHE_DIR`` or the user's cache, by source digest."""
+    digest = hashlib.sha256()
+    root = Path(__file__).resolve().parent.parent
+    for package in _PACKAGES:
+        for source in sorted((root / package).rglob("*.py")):
+            digest.update(source.read_bytes())
+    home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    base = os.environ.get("NUMBA_CACHE_DIR") or str(Path(home) / "space_robot")
+    return Path(base) / digest.hexdigest()[:16]
+
+
+def kernel(function: _Function) -> _Function:
+    """Compile ``function`` on first call, without the GIL, cached on disk.
+
+    IEEE arithmetic is kept as written (no fast-math): the same inputs give the same bits in
+    every process, which is what makes the graph and the in-process flight agree.
+    """
+    previous = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(cache_directory())
+    try:
+        return cast(_Function, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
+    finally:
+        numba.config.CACHE_DIR = previous

@@ -1,0 +1,38 @@
+"""Exceptions that a user may meet; the command line shows their one line and exits."""
+
+from __future__ import annotations
+
+
+class SpaceRobotError(Exception):
+    """Base of this project's errors; the message says what was given, what is allowed, where."""
+
+    exit_code = 1
+
+
+class InputError(SpaceRobotError):
+    """Something the user gave cannot be used: exit code 2, nothing started."""
+
+    exit_code = 2
+
+
+class FlightError(SpaceRobotError):
+    """A flight ended before its time."""
+
+
+class DivergedError(FlightError):
+    """The state left what any actuator could have brought about."""
+
+    def __init__(self, tick: int, period: float, why: str) -> None:
+        super().__init__(f"the flight diverged at tick {tick} (t = {tick * period:.4f} s): {why}")
+        self.tick = tick
+
+
+class SingularAttitudeError(FlightError):
+    """The base has turned by 180 degrees, where the quaternion coordinates end (eta = 0)."""
+
+    def __init__(self, tick: int, eta: float) -> None:
+        super().__init__(
+            f"at tick {tick} the base attitude has eta = {eta:.1e}: J0 of eq. (1) is singular at "
+            "180 degrees, so no command exists there in these coordinates"
+        )
+        self.tick = tick

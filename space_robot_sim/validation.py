@@ -1,0 +1,81 @@
+"""YAML to checked data: every error names file, key, value given and values allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from .errors import InputError
+
+
+class Strict(BaseModel):
+    """Base of everything read from a file: unknown keys are errors, values do not change."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+Schema = TypeVar("Schema", bound=BaseModel)
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """The mapping in a YAML file.
+
+    Raises:
+        InputError: the file is missing, unreadable, not YAML, or not a mapping.
+    """
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read ({error})") from None
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f"line {mark.line + 1}: " if mark else ""
+        raise InputError(f"{path}: {line}not YAML ({getattr(error, 'problem', error)})") from None
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: a mapping was expected, got {type(content).__name__}")
+    return content
+
+
+def check(schema: type[Schema], content: Any, where: str) -> Schema:
+    """Validate ``content``; ``where`` names its file (and enclosing key) in errors.
+
+    Raises:
+        InputError: with the first fault found, in one line.
+    """
+    try:
+        return schema.model_validate(content)
+    except ValidationError as error:
+        raise InputError(_one_line(error, where)) from None
+
+
+def _one_line(error: ValidationError, where: str) -> str:
+    faults = error.errors(include_url=False)
+    first = faults[0]
+    key = ".".join(str(part) for part in first["loc"])
+    given = "" if first["type"] == "missing" else f", got {_short(first['input'])}"
+    text = first["msg"].removeprefix("Value error, ")
+    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    return f"{where}: {key + ': ' if key else ''}{text}{given}{more}"
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def one_of(given: str, allowed: Iterable[str], what: str) -> str:
+    """Return ``given`` if it is allowed.
+
+    Raises:
+        InputError: naming what was given and what is allowed.
+    """
+    names = list(allowed)
+    if given not in names:
+        raise InputError(f"unknown {what} {given!r}: choose one of {', '.join(names)}")
+    return given
