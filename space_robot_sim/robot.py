@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from .dynamics.model import Model
-from .validation import Strict, check, read_yaml
+from space_robot_msgs_py.validation import Strict, check, read_yaml
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,100 @@
+"""The nominal model in the controlled coordinates ``rho = [eps, theta]`` (22)-(26), (28).
+
+The base floats freely (``f0 = 0``), so its translation is eliminated first: with blocks
+1 = v0 and 2 = [w0, thetadot], ``H_r = H22 - H21 H11^-1 H12``, ``c_r = c2 - H21 H11^-1 c1``;
+``H11 = M E`` makes that cheap. Then ``H_S = J^-T H_r J^-1`` and
+``c_S = J^-T (c_r - H_r J^-1 Jdot J^-1 rhodot)``, with ``F_S = J^-T F`` on the right of (25).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..attitude import attitude_jacobian_inverse, rotate, rotate_back, rotation_matrix
+from ..compiled import kernel
+from .equations_of_motion import bias_force_into, mass_matrix_into
+from .model import Data, Model, allocate
+
+Array = NDArray[np.float64]
+
+
+class RhoSpaceModel(NamedTuple):
+    """Results and scratch of `rho_space_into` for n joints."""
+
+    inertia: Array
+    """(n+3, n+3) ``H_S``."""
+    bias: Array
+    """(n+3,) ``c_S``."""
+    full_inertia: Array
+    """(n+6, n+6) H."""
+    full_bias: Array
+    """(n+6,) c."""
+    to_force: Array
+    """(3, 3) ``J0^-T`` for inertial axes, the transpose of ``J0^-1``."""
+    rotation: Array
+    """(3, 3) base to inertial frame."""
+    vectors: Array
+    """(3, 3) scratch."""
+    data: Data
+
+    @classmethod
+    def allocate(cls, n: int) -> RhoSpaceModel:
+        """For ``n`` joints."""
+        return cls(
+            np.zeros((n + 3, n + 3)), np.zeros(n + 3), np.zeros((n + 6, n + 6)), np.zeros(n + 6),
+            np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), allocate(n),
+        )  # fmt: skip
+
+
+@kernel
+def rho_space_into(
+    model: Model, quaternion: Array, theta: Array, omega_base: Array, theta_rate: Array,
+    out: RhoSpaceModel,
+) -> None:  # fmt: skip
+    """Fill ``out.inertia`` and ``out.bias`` with H_S and c_S of the floating robot.
+
+    ``omega_base`` is in the base frame, as measured. Singular at eta = 0.
+    """
+    inertia, bias, full = out.inertia, out.bias, out.full_inertia
+    omega, convective, moved = out.vectors[0], out.vectors[1], out.vectors[2]
+    rotation_matrix(quaternion, out.rotation)
+    rotate(out.rotation, omega_base, omega)
+    mass_matrix_into(model, quaternion, theta, out.data, full)
+    bias_force_into(model, quaternion, theta, omega, theta_rate, out.data, out.full_bias)
+    _eliminate_translation(full, out.full_bias, inertia, bias)
+    # J0 on inertial axes is the transpose of J0 in the base frame, so its J0^-T is the latter's
+    # inverse. For a unit quaternion J0dot w0 = -|w0|^2 eps / 4.
+    attitude_jacobian_inverse(quaternion, out.to_force)
+    squared_rate = omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2]
+    for k in range(3):
+        convective[k] = -0.25 * squared_rate * quaternion[1 + k]
+    rotate_back(out.to_force, convective, moved)
+    size = bias.size
+    for i in range(size):
+        for k in range(3):
+            bias[i] -= inertia[i, k] * moved[k]
+    for j in range(size):
+        convective[:] = inertia[:3, j]
+        rotate(out.to_force, convective, inertia[:3, j])
+    for i in range(size):
+        convective[:] = inertia[i, :3]
+        rotate(out.to_force, convective, inertia[i, :3])
+    convective[:] = bias[:3]
+    rotate(out.to_force, convective, bias[:3])
+
+
+@kernel
+def _eliminate_translation(full: Array, full_bias: Array, inertia: Array, bias: Array) -> None:
+    """``H_r = H22 - H21 H12 / M``, ``c_r = c2 - H21 c1 / M``: no force on the base's CoM."""
+    total_mass = full[0, 0]
+    for i in range(bias.size):
+        bias[i] = full_bias[3 + i]
+        for k in range(3):
+            bias[i] -= full[3 + i, k] * full_bias[k] / total_mass
+        for j in range(bias.size):
+            inertia[i, j] = full[3 + i, 3 + j]
+            for k in range(3):
+                inertia[i, j] -= full[3 + i, k] * full[k, 3 + j] / total_mass

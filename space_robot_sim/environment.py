@@ -1,0 +1,100 @@
+"""What acts on the robot besides its actuators: friction, disturbances, payload (27), (61)."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from space_robot_msgs_py.validation import Strict
+
+from .compiled import kernel
+from .robot import Inertia, Robot
+
+Array = NDArray[np.float64]
+
+NonNegative = Annotated[float, Field(ge=0.0, le=1e6)]
+Frequencies = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class FrictionSettings(Strict):
+    """``f_f = f_C sign(thetadot) + f_V thetadot`` on every joint."""
+
+    coulomb: NonNegative = Field(0.02, description="Coulomb friction f_C of each joint, N m")
+    viscous: NonNegative = Field(0.2, description="viscous friction f_V of each joint, N m s/rad")
+
+
+class DisturbanceSettings(Strict):
+    """Disturbance torques: ``scale * amplitude * (sin(2 pi f1 t) + sin(2 pi f2 t))``, (61)."""
+
+    scale: NonNegative = Field(0.0, description="factor on all disturbances, k of (61)-(63)")
+    base_amplitude: NonNegative = Field(0.010, description="on base x, y, z, N m")
+    base_frequencies: Frequencies = Field([0.5, 0.75], description="of its two sines, Hz (0: none)")
+    inner_amplitude: NonNegative = Field(0.005, description="on joints 1 to 3, N m")
+    inner_frequencies: Frequencies = Field([0.25, 0.5], description="of its two sines, Hz (0: none)")
+    outer_amplitude: NonNegative = Field(0.002, description="on joints 4 and up, N m")
+    outer_frequencies: Frequencies = Field([0.25, 0.0], description="of its two sines, Hz (0: none)")
+
+
+class PayloadSettings(Strict):
+    """A payload as the last link's new mass and inertia; unknown to every controller."""
+
+    mass: NonNegative = Field(0.0, description="mass of the last link with payload, kg (0: nominal)")
+    inertia: Inertia = Field(
+        [1.0, 1.0, 1.0, 0.0, 0.0, 0.0],
+        description="Ixx, Iyy, Izz, Ixy, Ixz, Iyz of the last link with payload, kg m2",
+    )
+
+
+class Environment(NamedTuple):
+    """Friction and disturbances of one robot, as the plant's kernel reads them."""
+
+    coulomb: Array
+    """(n,) N m."""
+    viscous: Array
+    """(n,) N m s/rad."""
+    amplitude: Array
+    """(n+3,) N m: base x, y, z on inertial axes, joints."""
+    angular_frequency: Array
+    """(n+3, 2) rad/s."""
+
+    @classmethod
+    def build(
+        cls, n: int, friction: FrictionSettings, disturbance: DisturbanceSettings
+    ) -> Environment:
+        """For a robot of ``n`` joints."""
+        groups = [
+            *[(disturbance.base_amplitude, disturbance.base_frequencies)] * 3,
+            *[(disturbance.inner_amplitude, disturbance.inner_frequencies)] * min(n, 3),
+            *[(disturbance.outer_amplitude, disturbance.outer_frequencies)] * max(n - 3, 0),
+        ]
+        return cls(
+            coulomb=np.full(n, friction.coulomb),
+            viscous=np.full(n, friction.viscous),
+            amplitude=disturbance.scale * np.array([amplitude for amplitude, _ in groups]),
+            angular_frequency=2.0 * np.pi * np.array([frequencies for _, frequencies in groups]),
+        )
+
+
+def with_payload(robot: Robot, payload: PayloadSettings) -> Robot:
+    """The robot the plant integrates: nominal, or with the payload on its last link."""
+    return robot.with_last_link(payload.mass, payload.inertia) if payload.mass else robot
+
+
+@kernel
+def disturbance_torque(environment: Environment, time: float, out: Array) -> None:
+    """Write into ``out`` (n+3,) ``f_d`` at ``time``: base on inertial axes, joints; N m."""
+    frequency = environment.angular_frequency
+    for i in range(out.size):
+        amplitude = environment.amplitude[i]
+        if amplitude == 0.0:
+            out[i] = 0.0
+        else:
+            out[i] = amplitude * (np.sin(frequency[i, 0] * time) + np.sin(frequency[i, 1] * time))
+
+
+@kernel
+def friction_torque(environment: Environment, joint: int, rate: float) -> float:
+    """``f_f`` of one joint turning at ``rate``, N m; it opposes the motion."""
+    return environment.coulomb[joint] * np.sign(rate) + environment.viscous[joint] * rate
