@@ -16,17 +16,28 @@ from numpy.typing import NDArray
 from . import topics
 from .cdr import CdrBuilder
 from .definitions import decode
-from .samples import Command, ReferenceChunk, RobotState, Timebase
+from .samples import Command, RobotState, Timebase
 
 Array = NDArray[np.float64]
 
 
-def _stamp(message: Any) -> int:
+def stamp_of(message: Any) -> int:
+    """Header stamp of a decoded message, ns."""
     stamp = message.header.stamp
     return int(stamp.sec * 1_000_000_000 + stamp.nanosec)
 
 
-def _order(given: Sequence[str], expected: Sequence[str], topic: str) -> list[int]:
+def xyz(value: Any) -> tuple[float, float, float]:
+    """A Vector3 message's numbers (or a Quaternion's first three)."""
+    return value.x, value.y, value.z
+
+
+def name_order(given: Sequence[str], expected: Sequence[str], topic: str) -> list[int]:
+    """Where each expected name stands among the given ones.
+
+    Raises:
+        ValueError: other names than expected.
+    """
     if sorted(given) != sorted(expected):
         raise ValueError(f"{topic}: names {list(given)}, expected {list(expected)}")
     return [list(given).index(name) for name in expected]
@@ -71,7 +82,7 @@ class JointStateCodec:
         if self._message.load(data):
             return self._message.stamp_ns(self._stamp)
         message = decode(data, self._topic.type)
-        order = _order(message.name, self._names, self._topic.name)
+        order = name_order(message.name, self._names, self._topic.name)
         if order == sorted(order):
             self._lay_out(message.header.frame_id)  # same order: the next one is read fast
         for field in self._fields:
@@ -82,7 +93,7 @@ class JointStateCodec:
                     f"for {len(self._names)} names"
                 )
             getattr(self, field)[:] = values[order]
-        return _stamp(message)
+        return stamp_of(message)
 
 
 class StateCodec:
@@ -133,10 +144,11 @@ class StateCodec:
             message = decode(data, topics.BASE_STATE.type)
             if not (len(message.transforms) == len(message.twist) == len(message.wrench) == 1):
                 raise ValueError(f"{topics.BASE_STATE.name}: one transform, twist, wrench expected")
-            self._pose[:] = transform_values(message.transforms[0])
-            self._twist[:] = twist_values(message.twist[0])
+            pose, twist = message.transforms[0], message.twist[0]
+            self._pose[:] = (*xyz(pose.translation), *xyz(pose.rotation), pose.rotation.w)
+            self._twist[:] = (*xyz(twist.linear), *xyz(twist.angular))
             self._wrench[3:] = xyz(message.wrench[0].torque)
-            stamp_ns = _stamp(message)
+            stamp_ns = stamp_of(message)
         state.base_position[:] = self._pose[:3]
         state.quaternion[1:] = self._pose[3:6]
         state.quaternion[0] = self._pose[6]
@@ -164,112 +176,6 @@ class CommandCodec:
         """Fill ``command``."""
         command.tick = self._timebase.tick(self._axes.decode(data))
         command.torque[:] = self._axes.effort
-
-
-def xyz(value: Any) -> tuple[float, float, float]:
-    """A Vector3 message's numbers."""
-    return value.x, value.y, value.z
-
-
-def transform_values(value: Any) -> tuple[float, ...]:
-    """A Transform message's numbers: translation, quaternion x, y, z, w."""
-    return (*xyz(value.translation), *xyz(value.rotation), value.rotation.w)
-
-
-def twist_values(value: Any) -> tuple[float, ...]:
-    """A Twist message's numbers: linear, angular."""
-    return (*xyz(value.linear), *xyz(value.angular))
-
-
-class ReferenceCodec:
-    """`ReferenceChunk` of a fixed length as /reference/joints and /reference/base."""
-
-    def __init__(self, joint_names: Sequence[str], timebase: Timebase, length: int) -> None:
-        self._timebase, self._names, self._length = timebase, tuple(joint_names), length
-        n = len(joint_names)
-        builder = CdrBuilder()
-        self._joints_stamp = builder.header_slot("")
-        builder.strings(self._names)
-        builder.uint32(length)
-        rows = []
-        for _ in range(length):
-            # positions, velocities, accelerations, effort (empty), time_from_start
-            row = [builder.float64_sequence_slot(n) for _ in range(3)]
-            builder.float64_sequence_slot(0)
-            rows.append((*row, builder.stamp_slot()))
-        self._joints = builder.build()
-        q, qd, qdd, after = zip(*rows, strict=True)
-        self._q, self._qd, self._qdd = (self._joints.float64_rows(s) for s in (q, qd, qdd))
-        self._write_offsets(self._joints.stamp_rows(after))
-
-        builder = CdrBuilder()
-        self._base_stamp = builder.header_slot(topics.INERTIAL_FRAME)
-        builder.strings([topics.BASE_FRAME])
-        builder.uint32(length)
-        rows = []
-        for _ in range(length):
-            row = []
-            for width in (7, 6, 6):  # Transform[1], Twist[1], Twist[1]
-                builder.uint32(1)
-                row.append(builder.float64_slot(width))
-            rows.append((*row, builder.stamp_slot()))
-        self._base = builder.build()
-        pose, twist, accel, after = zip(*rows, strict=True)
-        self._pose, self._twist, self._accel = (
-            self._base.float64_rows(s) for s in (pose, twist, accel)
-        )
-        self._write_offsets(self._base.stamp_rows(after))
-
-    def _write_offsets(self, rows: NDArray[np.int32]) -> None:
-        for i, row in enumerate(rows):
-            row[:] = divmod(self._timebase.stamp_ns(i), 1_000_000_000)
-
-    def encode(self, chunk: ReferenceChunk) -> tuple[bytes, bytes]:
-        """The bytes of /reference/joints and /reference/base."""
-        stamp_ns = self._timebase.stamp_ns(chunk.start)
-        self._q[:], self._qd[:] = chunk.joint_positions, chunk.joint_velocities
-        self._qdd[:] = chunk.joint_accelerations
-        self._pose[:, 3:6], self._pose[:, 6] = chunk.quaternion[:, 1:], chunk.quaternion[:, 0]
-        self._twist[:, 3:], self._accel[:, 3:] = chunk.omega_base, chunk.omega_rate_base
-        self._joints.set_stamp(self._joints_stamp, stamp_ns)
-        self._base.set_stamp(self._base_stamp, stamp_ns)
-        return self._joints.to_bytes(), self._base.to_bytes()
-
-
-def decode_joint_reference(
-    data: bytes, joint_names: Sequence[str], timebase: Timebase
-) -> tuple[int, Array]:
-    """First tick and (k, 3, n) positions, velocities, accelerations of a /reference/joints.
-
-    Raises:
-        ValueError: other joints than expected, or points not one tick apart.
-    """
-    name = topics.REFERENCE_JOINTS.name
-    message = decode(data, topics.REFERENCE_JOINTS.type)
-    order = _order(message.joint_names, joint_names, name)
-    _check_spacing(message.points, timebase, name)
-    rows = [(p.positions, p.velocities, p.accelerations) for p in message.points]
-    values = np.array(rows, dtype=np.float64).reshape(len(rows), 3, len(order))
-    return timebase.tick(_stamp(message)), values[:, :, order]
-
-
-def decode_base_reference(data: bytes, timebase: Timebase) -> tuple[int, Array]:
-    """First tick and (k, 10) quaternion (w first), omega, omega rate of a /reference/base."""
-    message = decode(data, topics.REFERENCE_BASE.type)
-    _check_spacing(message.points, timebase, topics.REFERENCE_BASE.name)
-    values = np.empty((len(message.points), 10))
-    for row, point in zip(values, message.points, strict=True):
-        row[1:4], row[0] = xyz(point.transforms[0].rotation), point.transforms[0].rotation.w
-        row[4:7] = xyz(point.velocities[0].angular)
-        row[7:10] = xyz(point.accelerations[0].angular)
-    return timebase.tick(_stamp(message)), values
-
-
-def _check_spacing(points: Sequence[Any], timebase: Timebase, topic: str) -> None:
-    for i, point in enumerate(points):
-        after = point.time_from_start
-        if after.sec * 1_000_000_000 + after.nanosec != timebase.stamp_ns(i):
-            raise ValueError(f"{topic}: point {i} is not {i} ticks after its message's stamp")
 
 
 class TelemetryCodec:

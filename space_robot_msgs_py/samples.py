@@ -89,20 +89,13 @@ class ReferenceChunk:
 
     start: int
     """Tick of the first row."""
-    joint_positions: Array
-    """(k, n) rad."""
-    joint_velocities: Array
-    """(k, n) rad/s."""
-    joint_accelerations: Array
-    """(k, n) rad/s2."""
-    quaternion: Array
-    """(k, 4) ``[w, x, y, z]``, desired base attitude."""
-    omega_base: Array
-    """(k, 3) rad/s, base frame."""
-    omega_rate_base: Array
-    """(k, 3) rad/s2, base frame."""
+    joints: Array
+    """(k, 3, n) position rad, velocity rad/s, acceleration rad/s2."""
+    base: Array
+    """(k, 10) quaternion ``[w, x, y, z]``, then angular velocity rad/s and acceleration rad/s2,
+    both in the base frame."""
 
     @property
     def stop(self) -> int:
         """Tick after the last row."""
-        return self.start + len(self.joint_positions)
+        return self.start + len(self.joints)
