@@ -1,0 +1,163 @@
+"""Settings of the controller and mission nodes, and the gain sets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from space_robot_msgs_py.configuration import (
+    NodeSettings,
+    Tree,
+    config_directory,
+    named_file,
+    node_parameters,
+)
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.validation import one_of, read_yaml
+
+from .laws import ControlLaw, find_law, laws
+from .mission import MissionSettings
+
+Array = NDArray[np.float64]
+
+STRICTLY_POSITIVE = ("h_bar", "delta")
+"""Gains that divide or invert something; the others may be zero."""
+DEFAULT_SETS = "default_sets.yaml"
+
+
+class ControllerNodeSettings(NodeSettings):
+    """Parameters of controller_node; the gains stand beside them as ``<law>.<gain>``."""
+
+    node: ClassVar = "controller"
+
+    law: str = Field("tde_stc", description="control law in force, or module:Class of your own")
+    gains: str = Field(
+        "default", description="gain set of config/gains/<robot>, or a path to a file or folder"
+    )
+    telemetry_decimation: Annotated[int, Field(ge=1, le=10**6)] = Field(
+        20, description="ticks between two messages on /controller/telemetry"
+    )
+    wait_for: list[str] = Field(
+        [""], description="names of nodes that must listen before the first command"
+    )
+
+
+class MissionNodeSettings(MissionSettings, NodeSettings):
+    """Parameters of mission_node."""
+
+    node: ClassVar = "mission"
+    selectors: ClassVar = ("robot", "mission")
+
+    mission: str = Field("", description="a mission of config/missions (empty: the robot's), or a path")
+    chunk_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(
+        100, description="ticks in one message of the reference"
+    )
+    lead_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(
+        1000, description="how far the stream is kept ahead of the plant, ticks"
+    )
+
+    @classmethod
+    def layers(cls, selected: Mapping[str, str]) -> list[Path]:
+        """The mission's own file over the graph's."""
+        mission = selected["mission"] or Path(selected["robot"]).stem
+        return [*super().layers(selected), named_file("missions", mission)]
+
+
+def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
+    """The file of each law's gains by the law's name, for a robot (name or path) and a set.
+
+    ``gain_set`` is ``default``, a folder's name in ``config/gains/<robot>``, or a path to a
+    folder of ``<law>.yaml`` or to one such file.
+
+    Raises:
+        InputError: there is no such set; names the ones there are.
+    """
+    path = Path(gain_set)
+    if gain_set.endswith((".yaml", ".yml")):
+        if not path.is_file():
+            raise InputError(f"{path}: no such file")
+        return {path.stem: path}
+    if "/" in gain_set:
+        files = {file.stem: file for file in sorted(path.glob("*.yaml"))}
+        if not files:
+            raise InputError(f"{path}: no folder with gain files (<law>.yaml)")
+        return files
+    folder = config_directory() / "gains" / Path(robot).stem
+    if not folder.is_dir():
+        raise InputError(
+            f"no gains for robot {Path(robot).stem!r} in {folder.parent}: "
+            "name a folder of <law>.yaml files as gains"
+        )
+    sets = sorted(entry.name for entry in folder.iterdir() if entry.is_dir())
+    if gain_set == "default":
+        chosen = read_yaml(folder / DEFAULT_SETS)
+        return {law: folder / name / f"{law}.yaml" for law, name in chosen.items()}
+    one_of(gain_set, ["default", *sets], f"gain set of robot {Path(robot).stem!r}")
+    return {file.stem: file for file in sorted((folder / gain_set).glob("*.yaml"))}
+
+
+def read_gains(path: Path, law: type[ControlLaw], axes: int) -> dict[str, Array]:
+    """A law's gains from its section in a ROS parameter file of the controller.
+
+    Raises:
+        InputError: naming file, key, value given and values allowed.
+    """
+    tree = node_parameters(path, ControllerNodeSettings.node)
+    if not isinstance(tree.get(law.name), dict):
+        raise InputError(f"{path}: {law.name}: missing (the gains of this law)")
+    return check_gains(tree[law.name], law, axes, str(path))
+
+
+def check_gains(content: Tree, law: type[ControlLaw], axes: int, where: str) -> dict[str, Array]:
+    """Gains as (axes,) arrays; a list of one value counts for all axes.
+
+    Raises:
+        InputError: a gain is missing, unknown, of the wrong length or out of its range.
+    """
+    for name in content:
+        one_of(name, law.gain_descriptions, f"gain in {where}: {law.name}")
+    gains = {}
+    for name, description in law.gain_descriptions.items():
+        key = f"{where}: {law.name}.{name}"
+        if name not in content:
+            raise InputError(f"{key}: missing ({description})")
+        try:
+            values = np.array(content[name], dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"{key}: numbers were expected, got {content[name]!r}") from None
+        if values.shape not in ((axes,), (1,)):
+            raise InputError(
+                f"{key}: {axes} values (base x, y, z and the joints) or 1 were expected, "
+                f"got {content[name]!r}"
+            )
+        low = "above 0" if name in STRICTLY_POSITIVE else "0 or more"
+        fits = values > 0.0 if name in STRICTLY_POSITIVE else values >= 0.0
+        if not np.all(fits & np.isfinite(values)):
+            raise InputError(f"{key}: finite values {low} were expected, got {content[name]!r}")
+        gains[name] = np.ascontiguousarray(np.broadcast_to(values, axes))
+    return gains
+
+
+def build_law(name: str, settings: ControllerNodeSettings, axes: int) -> ControlLaw:
+    """A law by name (or ``module:Class``) with the gains that the settings choose.
+
+    Raises:
+        InputError: unknown law, gain set without it, or gains that do not fit.
+    """
+    law = find_law(name)
+    files = gain_files(settings.robot, settings.gains)
+    if law.name not in files:
+        raise InputError(
+            f"gains {settings.gains!r} have no file for controller {law.name!r}, "
+            f"only for {', '.join(sorted(files))}"
+        )
+    return law(read_gains(files[law.name], law, axes), settings.period)
+
+
+def available_laws(settings: ControllerNodeSettings) -> list[str]:
+    """Names of the laws of this project that the chosen gains cover."""
+    return sorted(set(gain_files(settings.robot, settings.gains)) & set(laws()))

@@ -1,0 +1,88 @@
+"""A flight as arrays, one row a tick: what the analysis reads, from a bag or from memory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .samples import RobotState, Timebase
+
+Array = NDArray[np.float64]
+
+
+@dataclass(slots=True)
+class FlightLog:
+    """Measured and desired motion and the applied torque, tick by tick from 0."""
+
+    timebase: Timebase
+    joint_names: tuple[str, ...]
+    base_position: Array
+    """(N, 3) m, inertial frame."""
+    quaternion: Array
+    """(N, 4) ``[w, x, y, z]``."""
+    base_velocity: Array
+    """(N, 3) m/s, inertial frame."""
+    omega_base: Array
+    """(N, 3) rad/s, base frame."""
+    joint_positions: Array
+    """(N, n) rad."""
+    joint_velocities: Array
+    """(N, n) rad/s."""
+    applied_torque: Array
+    """(N, n+3) N m over the interval that ended at the tick; base frame, then joints."""
+    reference_joints: Array
+    """(N, 3, n) desired position, velocity, acceleration."""
+    reference_base: Array
+    """(N, 10) desired quaternion, angular velocity, acceleration (base frame)."""
+    flight: dict[str, Any] = field(default_factory=dict)
+    """What was flown: controller, case, ..., as recorded."""
+    lost: dict[str, int] = field(default_factory=dict)
+    """Missing messages a topic."""
+
+    @classmethod
+    def allocate(cls, ticks: int, joint_names: tuple[str, ...], timebase: Timebase) -> FlightLog:
+        """A log of ``ticks`` rows of NaN."""
+        n = len(joint_names)
+        shapes = [(3,), (4,), (3,), (3,), (n,), (n,), (n + 3,), (3, n), (10,)]
+        return cls(timebase, joint_names, *(np.full((ticks, *shape), np.nan) for shape in shapes))
+
+    @property
+    def ticks(self) -> int:
+        """Number of rows."""
+        return len(self.quaternion)
+
+    @property
+    def axes(self) -> int:
+        """Controlled coordinates, n+3."""
+        return self.applied_torque.shape[1]
+
+    def put(self, state: RobotState) -> None:
+        """Copy a state into its tick's row."""
+        k = state.tick
+        self.base_position[k] = state.base_position
+        self.quaternion[k] = state.quaternion
+        self.base_velocity[k] = state.base_velocity
+        self.omega_base[k] = state.omega_base
+        self.joint_positions[k] = state.joint_positions
+        self.joint_velocities[k] = state.joint_velocities
+        self.applied_torque[k] = state.applied_torque
+
+    def state(self, tick: int) -> RobotState:
+        """The state of a tick, as the plant measured it."""
+        return RobotState(
+            tick, self.base_position[tick], self.quaternion[tick], self.base_velocity[tick],
+            self.omega_base[tick], self.joint_positions[tick], self.joint_velocities[tick],
+            self.applied_torque[tick],
+        )  # fmt: skip
+
+    def truncated(self, ticks: int) -> FlightLog:
+        """The first ``ticks`` rows."""
+        return FlightLog(
+            self.timebase, self.joint_names, self.base_position[:ticks], self.quaternion[:ticks],
+            self.base_velocity[:ticks], self.omega_base[:ticks], self.joint_positions[:ticks],
+            self.joint_velocities[:ticks], self.applied_torque[:ticks],
+            self.reference_joints[:ticks], self.reference_base[:ticks], self.flight, self.lost,
+        )  # fmt: skip

@@ -1,0 +1,43 @@
+"""Settings of the plant node: the plant's own, and how it is paced."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+from pydantic import Field
+from space_robot_msgs_py.configuration import NodeSettings, named_file
+
+from .plant import PlantSettings
+
+
+class PlantNodeSettings(PlantSettings, NodeSettings):
+    """Parameters of plant_node."""
+
+    node: ClassVar = "plant"
+    selectors: ClassVar = ("robot", "mission", "case")
+
+    mission: str = Field("", description="a mission of config/missions (empty: the robot's), or a path")
+    case: str = Field("1", description="a case of config/cases, or a path to its YAML")
+    ticks: Annotated[int, Field(ge=0, le=10**9)] = Field(
+        0, description="ticks to fly, then exit (0: until stopped)"
+    )
+    realtime: bool = Field(
+        False, description="step by the wall clock whatever happens (false: lockstep)"
+    )
+    clock_decimation: Annotated[int, Field(ge=1, le=10**6)] = Field(
+        20, description="ticks between two messages on /clock"
+    )
+    wait_for: list[str] = Field(
+        [""], description="names of nodes that must listen before the first tick"
+    )
+
+    @classmethod
+    def layers(cls, selected: Mapping[str, str]) -> list[Path]:
+        """The mission tells where the arm starts, the case what disturbs it."""
+        return [
+            *super().layers(selected),
+            named_file("missions", selected["mission"] or Path(selected["robot"]).stem),
+            named_file("cases", selected["case"]),
+        ]
