@@ -27,7 +27,9 @@ def cache_directory() -> Path:
     root = Path(__file__).resolve().parent.parent
     for package in _PACKAGES:
         for source in sorted((root / package).rglob("*.py")):
-            digest.update(source.read_bytes())
+            text = source.read_bytes()
+            if b"@kernel" in text:
+                digest.update(text)
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     base = os.environ.get("NUMBA_CACHE_DIR") or str(Path(home) / "space_robot")
     return Path(base) / digest.hexdigest()[:16]

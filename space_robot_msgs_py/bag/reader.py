@@ -17,6 +17,7 @@ from ..errors import InputError
 from ..flight_log import FlightLog
 from ..reference_codec import ReferenceCodec
 from ..samples import RobotState, Timebase
+from ..validation import read_yaml
 from .coverage import Coverage, lost_messages, message_tick
 from .recorder import FLIGHT_KEY
 
@@ -47,7 +48,7 @@ def _read(reader: Reader, path: Path) -> FlightLog:
         connection = by_topic.get(topic.name)
         if connection is None or not connection.msgcount:
             raise InputError(f"{path}: no messages on {topic.name}")
-    flight: dict[str, Any] = json.loads((reader.custom_data or {}).get(FLIGHT_KEY, "{}"))
+    flight = _description(path)
     timebase = Timebase(round(float(flight.get("period", 0.0005)) * 1e9))
     joints_connection = by_topic[topics.JOINT_STATES.name]
     first = next(iter(reader.messages([joints_connection])))[2]
@@ -58,6 +59,13 @@ def _read(reader: Reader, path: Path) -> FlightLog:
     log.lost = lost_messages(coverages)
     whole = int(np.argmin(np.append(_complete_rows(log), False)))
     return log.truncated(whole)
+
+
+def _description(path: Path) -> dict[str, Any]:
+    """What our recorder noted of the flight; empty for a bag of another recorder."""
+    information = read_yaml(path / "metadata.yaml")["rosbag2_bagfile_information"]
+    description: dict[str, Any] = json.loads((information["custom_data"] or {}).get(FLIGHT_KEY, "{}"))
+    return description
 
 
 def _fill(reader: Reader, connections: list[Connection], log: FlightLog) -> dict[str, Coverage]:

@@ -1,0 +1,177 @@
+"""The ``space-robot`` command. Heavy imports wait until a subcommand needs them."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+import click
+
+from space_robot_msgs_py.errors import SpaceRobotError
+
+
+def _options(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    def decorate(function: Any) -> Any:
+        for option in reversed(options):
+            function = option(function)
+        return function
+
+    return decorate
+
+
+flight_options = _options(
+    click.option("--controller", default="tde_stc", show_default=True,
+                 help="ctc, ctc_smc, tde_smc, tde_tsmc, tde_stc, or module:Class of your own."),
+    click.option("--case", default="1", show_default=True,
+                 help="1, 2, 3, 4-1, 4-2, or a path to a case's YAML."),
+    click.option("--gains", default="default", show_default=True,
+                 help="printed, tuned, default (printed where it flies), or a path."),
+    click.option("--robot", default="paper", show_default=True,
+                 help="paper, seven_joint, or a path to a robot's YAML."),
+    click.option("--mission", default="", help="Mission by name or path [default: the robot's]."),
+    click.option("--duration", type=float, help="Seconds to fly [default: the mission's]."),
+    click.option("--bag", type=click.Path(path_type=Path), help="Folder of the bag to write."),
+    click.option("--command-latency-ticks", type=int, default=0, show_default=True,
+                 help="Ticks by which the plant applies commands late."),
+    click.option("--friction/--no-friction", default=True, show_default=True,
+                 help="Joint friction of the case, or none."),
+    click.option("--json", "as_json", is_flag=True, help="Print the report as JSON."),
+)  # fmt: skip
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="space_robot", prog_name="space-robot")
+def cli() -> None:
+    """Fly a satellite with a robot arm: flight software on a ROS 2 graph, or in one process.
+
+    \b
+    Examples:
+      space-robot fly                               case 1 under TDE-STC, as a graph of nodes
+      space-robot fly --controller ctc --case 3     another law, another case
+      space-robot simulate --json                   the same flight without ROS
+      space-robot analyze flights/<bag>             the table of a recorded flight
+    """
+
+
+def _plan(realtime: bool = False, **options: Any) -> Any:
+    from space_robot_msgs_py.validation import check
+
+    from .flight.plan import Flight, FlightPlan
+
+    return Flight(check(FlightPlan, {**options, "realtime": realtime}, "options"))
+
+
+def _report(report: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        click.echo(json.dumps(report, indent=2))
+        return
+    from rich.console import Console
+
+    from .flight.display import print_report
+
+    print_report(report, Console())
+
+
+@cli.command()
+@flight_options
+@click.option("--realtime", is_flag=True, help="Pace by the wall clock instead of lockstep.")
+def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
+    """Fly a mission on a ROS 2 graph, record it, and print the RMS table.
+
+    Starts plant, controller, mission and recorder as processes of their own (through `ros2 run`
+    where that is installed), waits until they hear one another, follows the flight, stops them,
+    checks the bag. Set ROS_DOMAIN_ID to watch the flight from another terminal.
+
+    \b
+    Examples:
+      space-robot fly --controller tde_smc --duration 5
+      space-robot fly --case 4-2 --bag flights/heavy --json
+      space-robot fly --command-latency-ticks 2
+    """
+    from .flight.orchestrator import fly as fly_graph
+
+    flight = _plan(**options)
+    _report(fly_graph(flight, bag or flight.default_bag()), as_json)
+
+
+@cli.command()
+@flight_options
+def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
+    """Fly the same mission in this process, without ROS; the numbers are those of `fly`.
+
+    \b
+    Examples:
+      space-robot simulate --controller tde_tsmc
+      space-robot simulate --no-friction --case 2 --json
+      space-robot simulate --bag flights/in_process
+    """
+    from .analysis import analyse
+    from .flight.display import flight_progress
+    from .flight.plan import check_bag_path
+    from .flight.simulate import simulate as run
+
+    flight = _plan(**options)
+    if bag:
+        check_bag_path(bag)
+    period = flight.period
+    with flight_progress(flight.ticks * period, flight.controller.law.name) as show:
+        log = run(flight, bag, lambda tick: show(tick * period, ""))
+    _report(analyse(log), as_json)
+
+
+@cli.command()
+@click.argument("bag", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
+def analyze(bag: Path, as_json: bool) -> None:
+    """Print the RMS table of a recorded flight.
+
+    \b
+    Example:
+      space-robot analyze flights/tde_stc_case1_20261121-120000 --json
+    """
+    from space_robot_msgs_py.bag import read_flight
+
+    from .analysis import analyse
+
+    _report(analyse(read_flight(bag)), as_json)
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Entry point: one clear line on standard error instead of a traceback."""
+    try:
+        cli.main(args=arguments, prog_name="space-robot", standalone_mode=False)
+    except click.exceptions.Exit as exit_:
+        sys.exit(exit_.exit_code)
+    except click.Abort:
+        sys.exit(130)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(2)
+    except SpaceRobotError as error:
+        click.echo(f"space-robot: error: {error}", err=True)
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    sys.exit(0)
+
+
+def fly_main() -> NoReturn:
+    """``ros2 run space_robot fly``."""
+    main(["fly", *sys.argv[1:]])
+
+
+def simulate_main() -> NoReturn:
+    """``ros2 run space_robot simulate``."""
+    main(["simulate", *sys.argv[1:]])
+
+
+def analyze_main() -> NoReturn:
+    """``ros2 run space_robot analyze``."""
+    main(["analyze", *sys.argv[1:]])
+
+
+if __name__ == "__main__":
+    main()

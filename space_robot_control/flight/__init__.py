@@ -1,0 +1,1 @@
+"""Flying: one plan, in this process (`simulate`) or as a graph of nodes (`orchestrator`)."""

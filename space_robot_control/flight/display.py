@@ -1,0 +1,62 @@
+"""What a person sees of a flight: progress while it lasts, a table at its end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+UNITS = {"attitude": "-", "joints": "rad", "base_torque": "N m", "torque": "N m"}
+
+
+def _unit(key: str) -> str:
+    return next(unit for prefix, unit in UNITS.items() if key.startswith(prefix))
+
+
+def print_report(report: dict[str, Any], console: Console) -> None:
+    """The RMS and chatter table of a flight."""
+    title = (
+        f"{report['controller']}, case {report['case']}, gains {report['gains']}: "
+        f"{report['ticks']} ticks, {report['duration_s']:g} s"
+    )
+    table = Table(title=title, title_justify="left")
+    table.add_column("")
+    for column in ("unit", "RMS, mean of axes", "RMS, eq. (64)"):
+        table.add_column(column, justify="right")
+    table.add_column("variation per s", justify="right")
+    table.add_column("power > 100 Hz", justify="right")
+    variation = report["chatter"]["total_variation_per_s"]
+    power = report["chatter"]["power_above_100_hz"]
+    for key, value in report["rms"]["mean_axis"].items():
+        chatter = (f"{variation[key]:.3g}", f"{power[key]:.2e}") if key in variation else ("", "")
+        form = ".4f" if "torque" in key else ".3e"
+        table.add_row(
+            key, _unit(key), f"{value:{form}}", f"{report['rms']['eq64'][key]:{form}}", *chatter
+        )
+    console.print(table)
+    lost = {topic: count for topic, count in report["lost"].items() if count}
+    console.print(f"messages lost: {lost or 'none'}")
+
+
+@contextmanager
+def flight_progress(total_s: float, what: str) -> Iterator[Callable[[float, str], None]]:
+    """A progress line on standard error; call it with simulated seconds and a remark."""
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=24),
+        TextColumn("{task.completed:.1f}/{task.total:.1f} s simulated"),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[remark]}"),
+    )
+    with Progress(*columns, console=console, refresh_per_second=5) as progress:
+        task = progress.add_task(what, total=total_s, remark="")
+
+        def update(simulated_s: float, remark: str = "") -> None:
+            progress.update(task, completed=simulated_s, remark=remark)
+
+        yield update

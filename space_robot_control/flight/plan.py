@@ -1,0 +1,125 @@
+"""What is to be flown, checked before anything starts."""
+
+from __future__ import annotations
+
+import math
+import os
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+from space_robot_msgs_py.configuration import named_file
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.validation import Strict
+from space_robot_sim.plant import Plant
+from space_robot_sim.plant_settings import PlantNodeSettings
+from space_robot_sim.robot import Robot
+
+from ..controller import Controller
+from ..mission import Mission
+from ..settings import ControllerNodeSettings, MissionNodeSettings, build_law
+
+
+class FlightPlan(Strict):
+    """The options of ``fly`` and ``simulate``."""
+
+    controller: str = "tde_stc"
+    case: str = "1"
+    gains: str = "default"
+    robot: str = "paper"
+    mission: str = ""
+    duration: Annotated[float | None, Field(gt=0.0, le=1e6)] = None
+    command_latency_ticks: int = 0
+    friction: bool = True
+    realtime: bool = False
+    parameters: dict[str, dict[str, Any]] = {}
+    """Further parameters by node, dotted names."""
+
+    def overrides(self, node: str) -> dict[str, Any]:
+        """The parameters a node is given, by dotted name."""
+        common: dict[str, Any] = {"robot": self.robot}
+        specific: dict[str, dict[str, Any]] = {
+            PlantNodeSettings.node: {
+                "mission": self.mission,
+                "case": self.case,
+                "realtime": self.realtime,
+                "command_latency_ticks": self.command_latency_ticks,
+                **({} if self.friction else {"friction.coulomb": 0.0, "friction.viscous": 0.0}),
+            },
+            ControllerNodeSettings.node: {"law": self.controller, "gains": self.gains},
+            MissionNodeSettings.node: {"mission": self.mission},
+        }
+        return {**common, **specific.get(node, {}), **self.parameters.get(node, {})}
+
+
+class Flight:
+    """A checked plan: the settings of every node and the objects they make.
+
+    Raises:
+        InputError: anything the plan names does not exist or does not fit together.
+    """
+
+    def __init__(self, plan: FlightPlan) -> None:
+        self.plan = plan
+        self.plant_settings = PlantNodeSettings.resolve(plan.overrides(PlantNodeSettings.node))
+        self.controller_settings = ControllerNodeSettings.resolve(
+            plan.overrides(ControllerNodeSettings.node)
+        )
+        self.mission_settings = MissionNodeSettings.resolve(
+            plan.overrides(MissionNodeSettings.node)
+        )
+        self.robot = Robot.from_yaml(named_file("robots", plan.robot))
+        self.period = self.plant_settings.period
+        self.timebase = self.plant_settings.timebase
+        self.plant, self.controller, self.mission = self._build()
+        duration = self.mission.duration if plan.duration is None else plan.duration
+        if duration <= 0.0:
+            raise InputError("the mission has a single waypoint: give a duration")
+        self.ticks = max(1, math.floor(duration / self.period + 1e-6))
+
+    def _build(self) -> tuple[Plant, Controller, Mission]:
+        try:
+            plant = Plant(self.robot, self.plant_settings, self.period)
+            mission = Mission(self.robot.n, self.mission_settings, self.period)
+        except ValueError as error:
+            raise InputError(str(error)) from None
+        law = build_law(self.plan.controller, self.controller_settings, self.robot.n + 3)
+        return plant, Controller(self.robot, law, self.period), mission
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """What is flown, as it is stored in a bag."""
+        plan = self.plan
+        return {
+            "controller": self.controller.law.name,
+            "case": plan.case,
+            "gains": plan.gains,
+            "robot": self.robot.name,
+            "mission": plan.mission or self.robot.name,
+            "period": self.period,
+            "ticks": self.ticks,
+            "command_latency_ticks": self.plant_settings.command_latency_ticks,
+            "friction": plan.friction,
+            "realtime": plan.realtime,
+        }
+
+    def default_bag(self) -> Path:
+        """``flights/<controller>_case<case>_<time>`` below the current folder."""
+        stamp = datetime.now(timezone.utc).strftime("%Y%m%d-%H%M%S")
+        return Path("flights") / f"{self.controller.law.name}_case{Path(self.plan.case).stem}_{stamp}"
+
+
+def check_bag_path(path: Path) -> None:
+    """See that a bag can be made there, without making anything.
+
+    Raises:
+        InputError: it exists, or its nearest existing folder cannot be written.
+    """
+    if path.exists():
+        raise InputError(f"{path}: exists already; a bag is never overwritten")
+    parent = next(p for p in path.absolute().parents if p.exists())
+    if not parent.is_dir():
+        raise InputError(f"{path}: no bag can be written there ({parent} is not a folder)")
+    if not os.access(parent, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: no bag can be written there ({parent} is not writable)")
