@@ -7,6 +7,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
+from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ReferenceChunk
 from space_robot_msgs_py.validation import Strict
 
@@ -38,19 +39,19 @@ class Mission:
         """A mission for ``n`` joints.
 
         Raises:
-            ValueError: the waypoints do not fit the times or the joints.
+            InputError: the waypoints do not fit the times or the joints.
         """
         times = np.array(settings.waypoint_times)
         if len(settings.waypoints_deg) != n * len(times):
-            raise ValueError(
+            raise InputError(
                 f"waypoints_deg has {len(settings.waypoints_deg)} values; "
                 f"{len(times)} waypoint_times and {n} joints need {n * len(times)}"
             )
         if times[0] != 0.0 or np.any(np.diff(times) <= 0.0):
-            raise ValueError(f"waypoint_times must rise from 0, got {settings.waypoint_times}")
+            raise InputError(f"waypoint_times must rise from 0, got {settings.waypoint_times}")
         norm = float(np.linalg.norm(settings.base_quaternion))
         if norm < 1e-3:
-            raise ValueError(f"base_quaternion must not be zero, got norm {norm:g}")
+            raise InputError(f"base_quaternion must not be zero, got norm {norm:g}")
         self._times = times
         self._waypoints = np.radians(settings.waypoints_deg).reshape(len(times), n)
         self._quaternion = np.array(settings.base_quaternion) / norm

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from . import topics
 from .cdr import CdrBuilder
 from .definitions import decode
+from .errors import MessageError
 from .samples import Command, RobotState, Timebase
 
 Array = NDArray[np.float64]
@@ -36,10 +37,10 @@ def name_order(given: Sequence[str], expected: Sequence[str], topic: str) -> lis
     """Where each expected name stands among the given ones.
 
     Raises:
-        ValueError: other names than expected.
+        MessageError: other names than expected.
     """
     if sorted(given) != sorted(expected):
-        raise ValueError(f"{topic}: names {list(given)}, expected {list(expected)}")
+        raise MessageError(f"{topic}: names {list(given)}, expected {list(expected)}")
     return [list(given).index(name) for name in expected]
 
 
@@ -77,7 +78,7 @@ class JointStateCodec:
         """Fill the arrays from a message; returns its stamp in ns.
 
         Raises:
-            ValueError: other joints than expected, or an array missing.
+            MessageError: other joints than expected, or an array missing.
         """
         if self._message.load(data):
             return self._message.stamp_ns(self._stamp)
@@ -88,7 +89,7 @@ class JointStateCodec:
         for field in self._fields:
             values = getattr(message, field)
             if len(values) != len(self._names):
-                raise ValueError(
+                raise MessageError(
                     f"{self._topic.name}: {len(values)} values of {field} "
                     f"for {len(self._names)} names"
                 )
@@ -143,7 +144,7 @@ class StateCodec:
         else:
             message = decode(data, topics.BASE_STATE.type)
             if not (len(message.transforms) == len(message.twist) == len(message.wrench) == 1):
-                raise ValueError(f"{topics.BASE_STATE.name}: one transform, twist, wrench expected")
+                raise MessageError(f"{topics.BASE_STATE.name}: one transform, twist, wrench expected")
             pose, twist = message.transforms[0], message.twist[0]
             self._pose[:] = (*xyz(pose.translation), *xyz(pose.rotation), pose.rotation.w)
             self._twist[:] = (*xyz(twist.linear), *xyz(twist.angular))

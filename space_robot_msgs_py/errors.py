@@ -9,10 +9,14 @@ class SpaceRobotError(Exception):
     exit_code = 1
 
 
-class InputError(SpaceRobotError):
+class InputError(SpaceRobotError, ValueError):
     """Something the user gave cannot be used: exit code 2, nothing started."""
 
     exit_code = 2
+
+
+class MessageError(SpaceRobotError, ValueError):
+    """A message came that does not fit: other names, lengths or stamps than this graph's."""
 
 
 class FlightError(SpaceRobotError):

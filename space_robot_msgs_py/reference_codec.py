@@ -12,6 +12,7 @@ from . import topics
 from .cdr import CdrBuilder, FixedMessage, Slot
 from .codecs import name_order, stamp_of, xyz
 from .definitions import decode
+from .errors import MessageError
 from .samples import ReferenceChunk, Timebase
 
 Array = NDArray[np.float64]
@@ -112,7 +113,7 @@ class ReferenceCodec:
         """First tick and (k, 3, n) rows of a /reference/joints.
 
         Raises:
-            ValueError: other joints than expected, or points not one tick apart.
+            MessageError: other joints than expected, or points not one tick apart.
         """
         stamp_ns = self._joints.load(data)
         if stamp_ns is not None:
@@ -130,7 +131,7 @@ class ReferenceCodec:
         """First tick and (k, 10) rows of a /reference/base.
 
         Raises:
-            ValueError: points not one tick apart.
+            MessageError: points not one tick apart.
         """
         stamp_ns = self._base.load(data)
         if stamp_ns is not None:
@@ -152,4 +153,4 @@ class ReferenceCodec:
         for i, point in enumerate(points):
             after = point.time_from_start
             if after.sec * 1_000_000_000 + after.nanosec != self._timebase.stamp_ns(i):
-                raise ValueError(f"{topic}: point {i} is not {i} ticks after its message's stamp")
+                raise MessageError(f"{topic}: point {i} is not {i} ticks after its message's stamp")

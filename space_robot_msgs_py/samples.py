@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import MessageError
+
 Array = NDArray[np.float64]
 
 
@@ -33,11 +35,11 @@ class Timebase(NamedTuple):
         """The tick of a stamp.
 
         Raises:
-            ValueError: the stamp is not a whole number of ticks.
+            MessageError: the stamp is not a whole number of ticks.
         """
         tick, rest = divmod(stamp_ns, self.period_ns)
         if rest:
-            raise ValueError(
+            raise MessageError(
                 f"stamp {stamp_ns} ns is not a whole number of {self.period_ns} ns ticks: "
                 "do all nodes have the same period?"
             )

@@ -9,28 +9,45 @@ BASE_FRAME = "base"
 
 
 class Topic(NamedTuple):
-    """One topic. ``per_tick``: one message a tick, so a gap in its stamps is a loss."""
+    """One topic of the graph."""
 
     name: str
     type: str
     depth: int
     """History kept, in messages. Shallow queues lose data at 2 kHz (keep seconds of traffic)."""
+    listeners: tuple[str, ...]
+    """Nodes of the graph that subscribe to it."""
+    per_tick: bool = False
+    """One message a tick, so a gap in its stamps is a loss."""
     transient_local: bool = False
     """Late joiners get the last ``depth`` messages."""
-    per_tick: bool = False
 
 
-JOINT_STATES = Topic("/joint_states", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
-BASE_STATE = Topic("/base/state", "sensor_msgs/msg/MultiDOFJointState", 10_000, per_tick=True)
-COMMAND = Topic("/command", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
+JOINT_STATES = Topic(
+    "/joint_states", "sensor_msgs/msg/JointState", 10_000, ("controller", "recorder"),
+    per_tick=True,
+)  # fmt: skip
+BASE_STATE = Topic(
+    "/base/state", "sensor_msgs/msg/MultiDOFJointState", 10_000, ("controller", "recorder"),
+    per_tick=True,
+)  # fmt: skip
+COMMAND = Topic(
+    "/command", "sensor_msgs/msg/JointState", 10_000, ("plant", "recorder"), per_tick=True
+)
 REFERENCE_JOINTS = Topic(
-    "/reference/joints", "trajectory_msgs/msg/JointTrajectory", 200, transient_local=True
-)
+    "/reference/joints", "trajectory_msgs/msg/JointTrajectory", 200, ("controller", "recorder"),
+    transient_local=True,
+)  # fmt: skip
 REFERENCE_BASE = Topic(
-    "/reference/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 200, transient_local=True
+    "/reference/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 200,
+    ("controller", "recorder"), transient_local=True,
+)  # fmt: skip
+TELEMETRY = Topic(
+    "/controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, ("recorder",)
 )
-TELEMETRY = Topic("/controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000)
-CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock", 1, transient_local=True)
+CLOCK = Topic(
+    "/clock", "rosgraph_msgs/msg/Clock", 1_000, ("mission", "recorder"), transient_local=True
+)
 
 ALL = (JOINT_STATES, BASE_STATE, COMMAND, REFERENCE_JOINTS, REFERENCE_BASE, TELEMETRY, CLOCK)
 BY_NAME = {topic.name: topic for topic in ALL}

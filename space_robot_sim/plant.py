@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
-from space_robot_msgs_py.errors import DivergedError
+from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_msgs_py.validation import Strict
 
@@ -63,17 +63,17 @@ class Plant:
         """Place the robot at rest.
 
         Raises:
-            ValueError: the initial configuration does not fit the robot.
+            InputError: the initial configuration does not fit the robot.
         """
         n = robot.n
         if len(settings.initial_joints_deg) != n:
-            raise ValueError(
+            raise InputError(
                 f"initial_joints_deg has {len(settings.initial_joints_deg)} values, "
                 f"robot {robot.name!r} has {n} joints"
             )
         norm = float(np.linalg.norm(settings.initial_quaternion))
         if norm < 1e-3:
-            raise ValueError(f"initial_quaternion must not be zero, got norm {norm:g}")
+            raise InputError(f"initial_quaternion must not be zero, got norm {norm:g}")
         self.robot = with_payload(robot, settings.payload)
         self.environment = Environment.build(n, settings.friction, settings.disturbance)
         self.period = period

@@ -79,11 +79,8 @@ class Flight:
         self.ticks = max(1, math.floor(duration / self.period + 1e-6))
 
     def _build(self) -> tuple[Plant, Controller, Mission]:
-        try:
-            plant = Plant(self.robot, self.plant_settings, self.period)
-            mission = Mission(self.robot.n, self.mission_settings, self.period)
-        except ValueError as error:
-            raise InputError(str(error)) from None
+        plant = Plant(self.robot, self.plant_settings, self.period)
+        mission = Mission(self.robot.n, self.mission_settings, self.period)
         law = build_law(self.plan.controller, self.controller_settings, self.robot.n + 3)
         return plant, Controller(self.robot, law, self.period), mission
 

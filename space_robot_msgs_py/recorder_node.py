@@ -1,0 +1,81 @@
+"""recorder_node: every message of the graph into a bag."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import Annotated, ClassVar, NoReturn
+
+from pydantic import Field
+
+from . import topics
+from .bag import BagRecorder
+from .configuration import NodeSettings
+from .errors import InputError
+from .ros.endpoints import In, TakenByLoop
+from .ros.shell import Shell, run_node
+
+SILENCE_S = 0.3
+"""Told to stop, the recorder leaves when nothing has come for this long."""
+QUEUE_DEPTH = 20_000
+
+
+class RecorderNodeSettings(NodeSettings):
+    """Parameters of recorder_node."""
+
+    node: ClassVar = "recorder"
+
+    bag: str = Field("", description="folder of the bag to write; it must not exist (empty: bag_<time>)")
+    flight: str = Field("{}", description="what is flown, as a JSON object; stored with the bag")
+    drain_period: Annotated[float, Field(ge=0.0005, le=0.1)] = Field(
+        0.005, description="time between two rounds of emptying the queues, s"
+    )
+
+
+class RecorderLoop:
+    """Empties the queues of all topics in turn; deep queues bridge the time between rounds."""
+
+    def __init__(self, shell: Shell, settings: RecorderNodeSettings) -> None:
+        self._shell, self._settings = shell, settings
+        try:
+            flight = json.loads(settings.flight)
+        except json.JSONDecodeError as error:
+            raise InputError(f"recorder parameters: flight: not JSON ({error})") from None
+        path = Path(settings.bag or time.strftime("bag_%Y%m%d-%H%M%S"))
+        self._recorder = BagRecorder(path, {"period": settings.period, **flight}, settings.timebase)
+        group = TakenByLoop()
+        self._inputs = [In(shell.node, topic, group, QUEUE_DEPTH) for topic in topics.ALL]
+        shell.log(f"recording to {path}")
+
+    def run(self) -> None:
+        """Record until told to stop and everything sent has come; then close the bag."""
+        try:
+            last_arrival = time.monotonic()
+            while not self._shell.stopping or time.monotonic() - last_arrival < SILENCE_S:
+                if self._drain():
+                    last_arrival = time.monotonic()
+                self._shell.serve()
+                time.sleep(self._settings.drain_period)
+        finally:
+            self._recorder.close()
+        received = sum(c.received for c in self._recorder.coverages.values())
+        lost = {name: count for name, count in self._recorder.lost.items() if count}
+        self._shell.log(f"{received} messages received, missing: {lost or 0}")
+
+    def _drain(self) -> int:
+        count = 0
+        for entry in self._inputs:
+            while (data := entry.take()) is not None:
+                self._recorder.record(entry.topic, data)
+                count += 1
+        return count
+
+
+def main() -> NoReturn:
+    """Entry point of recorder_node."""
+    run_node(RecorderNodeSettings, RecorderLoop)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""The nodes' common shell: process, parameters, publishers and subscriptions of the loop."""

@@ -1,0 +1,131 @@
+"""Publishers and subscriptions for a loop that takes messages itself.
+
+The executor costs more than the loop's whole work, so the loop's subscriptions are kept out of
+it (`TakenByLoop`) and taken by hand as raw bytes; the executor only serves parameters.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from ..topics import Topic
+
+SPIN_S = 50e-6
+"""How long a wait takes and yields before it sleeps in the wait set."""
+
+
+class TakenByLoop(CallbackGroup):
+    """Keeps its subscriptions out of every executor."""
+
+    def can_execute(self, entity: Any) -> bool:
+        return False
+
+    def beginning_execution(self, entity: Any) -> bool:
+        return False
+
+    def ending_execution(self, entity: Any) -> None:
+        pass
+
+
+def message_type(name: str) -> Any:
+    """The Python class of a ``package/msg/Type``."""
+    package, _, type_name = name.partition("/msg/")
+    return getattr(importlib.import_module(f"{package}.msg"), type_name)
+
+
+def qos(topic: Topic) -> QoSProfile:
+    """Reliable, with the topic's depth and durability."""
+    durable = DurabilityPolicy.TRANSIENT_LOCAL if topic.transient_local else None
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=topic.depth,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=durable or DurabilityPolicy.VOLATILE,
+    )
+
+
+class Out:
+    """A publisher of serialized messages."""
+
+    def __init__(self, node: Node, topic: Topic) -> None:
+        self.topic = topic
+        self._node = node
+        self._publisher = node.create_publisher(message_type(topic.type), topic.name, qos(topic))
+        self.publish = self._publisher.publish
+        """Send serialized bytes."""
+
+    def missing_listeners(self, names: Sequence[str]) -> list[str]:
+        """Which of the named nodes that listen to this topic are not connected yet."""
+        wanted = [name for name in names if name in self.topic.listeners]
+        infos = self._node.get_subscriptions_info_by_topic(self.topic.name)
+        missing = [name for name in wanted if name not in {info.node_name for info in infos}]
+        if not missing and self._publisher.get_subscription_count() < len(wanted):
+            return wanted  # discovered, but not all matched with this publisher yet
+        return missing
+
+    def flush(self, timeout_s: float) -> None:
+        """Wait until all listeners have acknowledged everything sent."""
+        from rclpy.duration import Duration
+
+        self._publisher.wait_for_all_acked(Duration(seconds=timeout_s))
+
+
+class In:
+    """A subscription whose messages the loop takes itself, serialized."""
+
+    def __init__(self, node: Node, topic: Topic, group: TakenByLoop, depth: int = 0) -> None:
+        self.topic = topic
+        profile = qos(topic)
+        profile.depth = depth or topic.depth
+        self._subscription = node.create_subscription(
+            message_type(topic.type), topic.name, lambda message: None, profile,
+            raw=True, callback_group=group,
+        )  # fmt: skip
+        self.handle = self._subscription.handle
+        self._type = self._subscription.msg_type
+
+    def take(self) -> bytes | None:
+        """The next message, if there is one."""
+        with self.handle:
+            taken = self.handle.take_message(self._type, True)
+        return None if taken is None else taken[0]
+
+
+class Waiter:
+    """Waits until a subscription has something to take."""
+
+    def __init__(self, node: Node, *inputs: In) -> None:
+        self._handles = [entry.handle for entry in inputs]
+        with node.context.handle:
+            self._set = _rclpy.WaitSet(len(inputs), 0, 0, 0, 0, 0, node.context.handle)
+
+    def wait(self, timeout_s: float) -> None:
+        """Sleep until a message is there or the time is over."""
+        self._set.clear_entities()
+        for handle in self._handles:
+            self._set.add_subscription(handle)
+        self._set.wait(max(1, int(timeout_s * 1e9)))
+
+
+def take_or_wait(entry: In, waiter: Waiter, timeout_s: float) -> bytes | None:
+    """The next message of ``entry``: look and yield for a moment, then sleep, then look again."""
+    data = entry.take()
+    if data is not None:
+        return data
+    until = time.perf_counter() + SPIN_S
+    while time.perf_counter() < until:
+        os.sched_yield()
+        data = entry.take()
+        if data is not None:
+            return data
+    waiter.wait(timeout_s)
+    return entry.take()
