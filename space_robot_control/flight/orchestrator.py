@@ -1,0 +1,158 @@
+"""A flight as a graph of real nodes: start, wait, follow, stop, check, report."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from space_robot_msgs_py.bag import read_flight
+from space_robot_msgs_py.errors import FlightError
+from space_robot_msgs_py.ros.process_environment import DEFAULTS
+from space_robot_sim.compiled import cache_directory
+
+from ..analysis import analyse
+from .display import flight_progress
+from .domain import ros_domain
+from .plan import Flight, FlightPlan, check_bag_path
+from .processes import MODULES, Graph
+from .simulate import simulate
+
+POLL_S = 0.1
+READY_TIMEOUT_S = 60.0
+STALL_TIMEOUT_S = 60.0
+
+
+class Interrupted(FlightError):
+    """The user stopped the flight."""
+
+    exit_code = 130
+
+
+def fly(flight: Flight, bag: Path) -> dict[str, Any]:
+    """Fly on a ROS 2 graph and return the report of the recorded bag.
+
+    Raises:
+        InputError: the bag cannot be made; nothing was started.
+        FlightError: a node died, the graph stalled, messages were lost, or the user stopped it;
+            the bag is closed and no process left.
+    """
+    check_bag_path(bag)
+    try:
+        import rclpy  # noqa: F401
+    except ImportError as error:
+        raise FlightError(
+            f"rclpy cannot be imported ({error}): source your ROS 2 Jazzy, or install the [ros] "
+            "extra; `space-robot simulate` flies without"
+        ) from None
+    compile_kernels(flight.plan)
+    with ros_domain() as domain, _stop_signals() as stopped:
+        environment = {**DEFAULTS, **os.environ, "ROS_DOMAIN_ID": str(domain)}
+        _say(f"flying on ROS_DOMAIN_ID={domain}, recording to {bag}")
+        begin = time.monotonic()
+        try:
+            with Graph(_parameters(flight, bag), environment) as graph:
+                _follow(graph, flight, domain, stopped)
+        except FlightError as error:
+            kept = f"; what was flown is in {bag}" if (bag / "metadata.yaml").exists() else ""
+            raise type(error)(f"{error}{kept}") from None
+        _say(f"flown and recorded in {time.monotonic() - begin:.1f} s, start-up included")
+    report = analyse(read_flight(bag))
+    _check(report, flight)
+    return report
+
+
+def compile_kernels(plan: FlightPlan) -> None:
+    """Fly a few ticks in this process if nothing has been compiled yet, so the nodes find it."""
+    if any(cache_directory().glob("*/*.nbi")):
+        return
+    _say("compiling the kernels (once, about half a minute) ...")
+    for law in ("tde_stc", "ctc"):
+        short = plan.model_copy(update={"controller": law, "gains": "default", "duration": 0.002})
+        simulate(Flight(short))
+
+
+def _parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
+    plan = flight.plan
+    parameters = {node: plan.overrides(node) for node in MODULES}
+    parameters["plant"] |= {
+        "ticks": flight.ticks,
+        "wait_for": ["controller", "mission", "recorder"],
+    }
+    parameters["controller"] |= {"wait_for": ["plant", "recorder"]}
+    parameters["recorder"] |= {
+        "bag": str(bag.absolute()),
+        "flight": json.dumps(flight.description),
+    }
+    return parameters
+
+
+def _follow(graph: Graph, flight: Flight, domain: int, stopped: list[int]) -> None:
+    """Show the flight until the plant has ended it."""
+    from .monitor import Monitor
+
+    total_s = flight.ticks * flight.period
+    monitor = Monitor(domain)
+    first_tick_at = None
+    last_time, last_change = 0.0, time.monotonic()
+    patience = READY_TIMEOUT_S
+    try:
+        with flight_progress(total_s, flight.controller.law.name) as show:
+            show(0.0, "waiting for the nodes")
+            while not graph.check():
+                if stopped:
+                    raise Interrupted(f"stopped at {monitor.simulated_s:.2f} s")
+                time.sleep(POLL_S)
+                monitor.poll()
+                now = time.monotonic()
+                if monitor.simulated_s > last_time or (first_tick_at is None and monitor.errors):
+                    first_tick_at = first_tick_at or now
+                    last_time, last_change, patience = monitor.simulated_s, now, STALL_TIMEOUT_S
+                    show(last_time, _remark(monitor.errors, last_time, now - first_tick_at))
+                elif now - last_change > patience:
+                    words = "\n".join(f"{n}:\n{p.last_words()}" for n, p in graph.nodes.items())
+                    raise FlightError(
+                        f"no progress for {patience:.0f} s at {last_time:.2f} s:\n{words}"
+                    )
+            show(total_s, "")
+    finally:
+        monitor.close()
+
+
+def _remark(errors: tuple[float, float] | None, simulated_s: float, wall_s: float) -> str:
+    speed = f"{simulated_s / wall_s:.1f}x real time, " if wall_s > 0.5 else ""
+    if errors is None:
+        return speed
+    return f"{speed}errors: attitude {errors[0]:.1e}, joints {errors[1]:.1e} rad"
+
+
+def _check(report: dict[str, Any], flight: Flight) -> None:
+    lost = {topic: count for topic, count in report["lost"].items() if count}
+    if lost:
+        raise FlightError(f"the recorder lost messages: {lost}")
+    if report["ticks"] != flight.ticks:
+        raise FlightError(f"the bag holds {report['ticks']} whole ticks of {flight.ticks}")
+
+
+@contextmanager
+def _stop_signals() -> Iterator[list[int]]:
+    """A list that SIGINT and SIGTERM fill; the nodes, in groups of their own, do not get them."""
+    arrived: list[int] = []
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    previous = {n: signal.signal(n, lambda n, frame: arrived.append(n)) for n in numbers}
+    try:
+        yield arrived
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+
+
+def _say(text: str) -> None:
+    click.echo(text, err=True)

@@ -1,0 +1,137 @@
+"""The nodes as processes: started, watched, stopped, never left behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from space_robot_msgs_py.errors import FlightError
+
+PACKAGE = "space_robot"
+MODULES = {
+    "plant": "space_robot_sim.plant_node",
+    "controller": "space_robot_control.controller_node",
+    "mission": "space_robot_control.mission_node",
+    "recorder": "space_robot_msgs_py.recorder_node",
+}
+LAST_WORDS = 5
+
+
+def has_ros2_run() -> bool:
+    """Whether the ``ros2`` command is there and knows this package's executables."""
+    prefixes = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    return shutil.which("ros2") is not None and any(
+        (Path(prefix) / "share/ament_index/resource_index/packages" / PACKAGE).exists()
+        and os.access(Path(prefix) / "lib" / PACKAGE / "plant_node", os.X_OK)
+        for prefix in prefixes
+        if prefix
+    )
+
+
+def node_command(node: str, parameters: Mapping[str, Any]) -> list[str]:
+    """The command line of a node: through ``ros2 run`` where that works, else directly."""
+    command = (
+        ["ros2", "run", PACKAGE, f"{node}_node"]
+        if has_ros2_run()
+        else [sys.executable, "-m", MODULES[node]]
+    )
+    if parameters:
+        command.append("--ros-args")
+    for name, value in parameters.items():
+        command += ["-p", f"{name}:={json.dumps(value)}"]  # JSON is YAML, which ROS reads
+    return command
+
+
+class NodeProcess:
+    """One node in a process group of its own, its output kept in a file."""
+
+    def __init__(self, node: str, parameters: Mapping[str, Any], environment: Mapping[str, str]):
+        self.node = node
+        self._output = tempfile.TemporaryFile()  # noqa: SIM115  (closed in `close`)
+        self._process = subprocess.Popen(
+            node_command(node, parameters),
+            stdin=subprocess.DEVNULL, stdout=self._output, stderr=subprocess.STDOUT,
+            env=dict(environment), start_new_session=True,
+        )  # fmt: skip
+
+    @property
+    def exit_code(self) -> int | None:
+        """None while it runs."""
+        return self._process.poll()
+
+    def last_words(self) -> str:
+        """The end of what it printed."""
+        self._output.seek(0)
+        lines = self._output.read().decode(errors="replace").strip().splitlines()
+        return "\n".join(f"  {line}" for line in lines[-LAST_WORDS:]) or "  (it said nothing)"
+
+    def signal(self, number: int) -> None:
+        """Send a signal to the whole group: ``ros2 run`` would keep it to itself."""
+        try:
+            os.killpg(self._process.pid, number)
+        except ProcessLookupError:
+            pass
+
+    def stop(self, patience_s: float = 10.0) -> None:
+        """Ask it to end, insist, then force; returns when its group is gone."""
+        for number, wait_s in ((signal.SIGINT, patience_s), (signal.SIGTERM, 2.0)):
+            if self.exit_code is not None:
+                break
+            self.signal(number)
+            try:
+                self._process.wait(wait_s)
+            except subprocess.TimeoutExpired:
+                continue
+        self.signal(signal.SIGKILL)
+        self._process.wait()
+
+    def close(self) -> None:
+        """Let go of its output."""
+        self._output.close()
+
+
+class Graph:
+    """The processes of one flight; leaving the context leaves none behind."""
+
+    def __init__(self, parameters: Mapping[str, Mapping[str, Any]], environment: Mapping[str, str]):
+        self._parameters, self._environment = parameters, environment
+        self.nodes: dict[str, NodeProcess] = {}
+
+    def __enter__(self) -> Graph:
+        try:
+            for node, parameters in self._parameters.items():
+                self.nodes[node] = NodeProcess(node, parameters, self._environment)
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        # the recorder last: it takes what the others still say
+        for node in sorted(self.nodes.values(), key=lambda process: process.node == "recorder"):
+            node.stop()
+        for node in self.nodes.values():
+            node.close()
+
+    def check(self) -> bool:
+        """Whether the plant has flown to its end.
+
+        Raises:
+            FlightError: a node has died; with its last words.
+        """
+        for name, node in self.nodes.items():
+            code = node.exit_code
+            if code is not None and (code != 0 or name != "plant"):
+                time.sleep(0.1)  # let it finish its last line
+                ended = f"with exit code {code}" if code >= 0 else f"by signal {-code}"
+                raise FlightError(f"{name} ended {ended} before the flight did:\n{node.last_words()}")
+        return self.nodes["plant"].exit_code == 0
