@@ -7,11 +7,11 @@ from typing import Any, NoReturn
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.codecs import CommandCodec, StateCodec, TelemetryCodec
-from space_robot_msgs_py.configuration import named_file
+from space_robot_msgs_py.configuration import named_file, nest
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 from space_robot_msgs_py.reference_codec import ReferenceCodec
 from space_robot_msgs_py.ros.endpoints import In, Out, TakenByLoop, Waiter, take_or_wait
-from space_robot_msgs_py.ros.parameters import declare
+from space_robot_msgs_py.ros.parameters import overrides
 from space_robot_msgs_py.ros.shell import Shell, run_node
 from space_robot_msgs_py.samples import RobotState
 from space_robot_sim.robot import Robot
@@ -32,14 +32,14 @@ class Laws:
         for name in names:
             wanted = settings.law if name == find_law(settings.law).name else name
             law = build_law(wanted, settings, axes)
-            given = {
-                gain: list(declare(
-                    shell.node, f"{name}.{gain}", law.gains[gain].tolist(),
-                    ParameterDescriptor(description=description),
-                ))
-                for gain, description in law.gain_descriptions.items()
-            }  # fmt: skip
-            law.gains = check_gains(given, type(law), axes, "controller parameters")
+            given = overrides(shell.node, [f"{name}.{gain}" for gain in law.gain_descriptions])
+            tree = {**law.gains, **nest(given).get(name, {})}
+            law.gains = check_gains(tree, type(law), axes, "controller parameters")
+            for gain, description in law.gain_descriptions.items():
+                shell.node.declare_parameter(
+                    f"{name}.{gain}", law.gains[gain].tolist(),
+                    ParameterDescriptor(description=description), ignore_override=True,
+                )  # fmt: skip
             self._laws[name] = law
         self.chosen = self._laws[find_law(settings.law).name]
         self._shell = shell

@@ -96,7 +96,7 @@ def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
     if gain_set == "default":
         chosen = read_yaml(folder / DEFAULT_SETS)
         return {law: folder / name / f"{law}.yaml" for law, name in chosen.items()}
-    one_of(gain_set, ["default", *sets], f"gain set of robot {Path(robot).stem!r}")
+    one_of(gain_set, ["default", *sets], "gain set", f" of robot {Path(robot).stem!r}")
     return {file.stem: file for file in sorted((folder / gain_set).glob("*.yaml"))}
 
 
@@ -119,7 +119,7 @@ def check_gains(content: Tree, law: type[ControlLaw], axes: int, where: str) -> 
         InputError: a gain is missing, unknown, of the wrong length or out of its range.
     """
     for name in content:
-        one_of(name, law.gain_descriptions, f"gain in {where}: {law.name}")
+        one_of(name, law.gain_descriptions, f"gain of {law.name}", f" in {where}")
     gains = {}
     for name, description in law.gain_descriptions.items():
         key = f"{where}: {law.name}.{name}"

@@ -15,7 +15,9 @@ from .errors import InputError
 class Strict(BaseModel):
     """Base of everything read from a file: unknown keys are errors, values do not change."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, coerce_numbers_to_str=True
+    )
 
 
 Schema = TypeVar("Schema", bound=BaseModel)
@@ -69,7 +71,7 @@ def _short(value: Any) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
 
 
-def one_of(given: str, allowed: Iterable[str], what: str) -> str:
+def one_of(given: str, allowed: Iterable[str], what: str, context: str = "") -> str:
     """Return ``given`` if it is allowed.
 
     Raises:
@@ -77,5 +79,5 @@ def one_of(given: str, allowed: Iterable[str], what: str) -> str:
     """
     names = list(allowed)
     if given not in names:
-        raise InputError(f"unknown {what} {given!r}: choose one of {', '.join(names)}")
+        raise InputError(f"unknown {what} {given!r}{context}: choose one of {', '.join(names)}")
     return given

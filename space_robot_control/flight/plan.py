@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-import os
 from datetime import datetime, timezone
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -62,6 +62,7 @@ class Flight:
 
     def __init__(self, plan: FlightPlan) -> None:
         self.plan = plan
+        self.robot = Robot.from_yaml(named_file("robots", plan.robot))
         self.plant_settings = PlantNodeSettings.resolve(plan.overrides(PlantNodeSettings.node))
         self.controller_settings = ControllerNodeSettings.resolve(
             plan.overrides(ControllerNodeSettings.node)
@@ -69,7 +70,6 @@ class Flight:
         self.mission_settings = MissionNodeSettings.resolve(
             plan.overrides(MissionNodeSettings.node)
         )
-        self.robot = Robot.from_yaml(named_file("robots", plan.robot))
         self.period = self.plant_settings.period
         self.timebase = self.plant_settings.timebase
         self.plant, self.controller, self.mission = self._build()
@@ -116,7 +116,10 @@ def check_bag_path(path: Path) -> None:
     if path.exists():
         raise InputError(f"{path}: exists already; a bag is never overwritten")
     parent = next(p for p in path.absolute().parents if p.exists())
-    if not parent.is_dir():
-        raise InputError(f"{path}: no bag can be written there ({parent} is not a folder)")
-    if not os.access(parent, os.W_OK | os.X_OK):
-        raise InputError(f"{path}: no bag can be written there ({parent} is not writable)")
+    try:
+        with TemporaryDirectory(dir=parent):
+            pass
+    except OSError as error:
+        raise InputError(
+            f"{path}: no bag can be written there ({parent}: {error.strerror})"
+        ) from None

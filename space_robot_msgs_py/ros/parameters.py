@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 
-from ..configuration import NodeSettings, flatten, leaves, nest
+from ..configuration import NodeSettings, flatten, leaves
 from ..errors import InputError
-from ..validation import check
 
 Schema = TypeVar("Schema", bound=NodeSettings)
 
@@ -37,38 +36,28 @@ def descriptor(field: Any, read_only: bool) -> ParameterDescriptor:
     return result
 
 
-def declare(node: Node, name: str, default: Any, description: ParameterDescriptor) -> Any:
-    """Declare one parameter and return its value (the user's override, or the default).
+def declare_settings(node: Node, schema: type[Schema], changeable: tuple[str, ...] = ()) -> Schema:
+    """Resolve a schema with the user's parameters over its files, and declare every setting.
+
+    All are read-only but the ``changeable`` ones. The schema has checked types and ranges
+    before, with clearer words than ROS has.
 
     Raises:
-        InputError: the override has the wrong type or is out of range.
-    """
-    try:
-        return node.declare_parameter(name, default, description).value
-    except (InvalidParameterTypeException, InvalidParameterValueException) as error:
-        raise InputError(f"{node.get_name()} parameters: {name}: {error}") from None
-
-
-def declare_settings(
-    node: Node, schema: type[Schema], changeable: tuple[str, ...] = ()
-) -> Schema:
-    """Declare every setting of ``schema`` and return their values.
-
-    The selectors come first: they name the files that hold the defaults of the rest. All are
-    read-only but the ``changeable`` ones.
-
-    Raises:
-        InputError: a file or an override is wrong.
+        InputError: a file or a parameter is wrong.
     """
     fields = dict(leaves(schema))
-    overrides = node._parameter_overrides
-    base = schema.resolve({k: overrides[k].value for k in schema.selectors if k in overrides})
-    values = {}
-    for name, default in flatten(base.model_dump()):
-        description = descriptor(fields[name], name not in changeable)
-        # an empty array has no type of its own in ROS
-        values[name] = declare(node, name, default or [""] if default == [] else default, description)
-    return check(schema, nest({k: _plain(v) for k, v in values.items()}), _where(node))
+    settings = schema.resolve(overrides(node, fields))
+    for name, value in flatten(settings.model_dump()):
+        node.declare_parameter(
+            name, value, descriptor(fields[name], name not in changeable), ignore_override=True
+        )
+    return settings
+
+
+def overrides(node: Node, names: Iterable[str]) -> dict[str, Any]:
+    """What the user gave for these parameters, on the command line or in a parameter file."""
+    given = node._parameter_overrides
+    return {name: _plain(given[name].value) for name in names if name in given}
 
 
 def refuse_unknown(node: Node) -> None:
@@ -81,13 +70,9 @@ def refuse_unknown(node: Node) -> None:
     for name in node._parameter_overrides:
         if name not in allowed and not name.startswith("qos_overrides."):
             raise InputError(
-                f"{_where(node)}: unknown parameter {name!r}: choose one of {', '.join(allowed)}"
+                f"{node.get_name()} parameters: unknown parameter {name!r}: choose one of {', '.join(allowed)}"
             )
 
 
 def _plain(value: Any) -> Any:
     return list(value) if hasattr(value, "typecode") else value
-
-
-def _where(node: Node) -> str:
-    return f"{node.get_name()} parameters"

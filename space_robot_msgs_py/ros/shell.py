@@ -18,7 +18,7 @@ from rclpy.node import Node  # noqa: E402
 from rclpy.signals import SignalHandlerOptions  # noqa: E402
 
 from ..configuration import NodeSettings  # noqa: E402
-from ..errors import SpaceRobotError  # noqa: E402
+from ..errors import InputError, SpaceRobotError  # noqa: E402
 from .endpoints import Out  # noqa: E402
 from .parameters import declare_settings, refuse_unknown  # noqa: E402
 
@@ -88,7 +88,11 @@ def run_node(
     failure with one line on standard error.
     """
     code = 0
-    rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    except Exception as error:  # RCLError is private; whatever it is, the arguments are at fault
+        print(f"{schema.node}: error: {str(error).splitlines()[0]}", file=sys.stderr)
+        sys.exit(InputError.exit_code)
     node = rclpy.create_node(schema.node)
     try:
         shell = Shell(node)
