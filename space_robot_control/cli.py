@@ -45,7 +45,7 @@ flight_options = _options(
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="space_robot", prog_name="space-robot")
 def cli() -> None:
-    """Fly a satellite with a robot arm: flight software on a ROS 2 graph, or in one process.
+    r"""Fly a satellite with a robot arm: flight software on a ROS 2 graph, or in one process.
 
     \b
     Examples:
@@ -79,7 +79,7 @@ def _report(report: dict[str, Any], as_json: bool) -> None:
 @flight_options
 @click.option("--realtime", is_flag=True, help="Pace by the wall clock instead of lockstep.")
 def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
-    """Fly a mission on a ROS 2 graph, record it, and print the RMS table.
+    r"""Fly a mission on a ROS 2 graph, record it, and print the RMS table.
 
     Starts plant, controller, mission and recorder as processes of their own (through `ros2 run`
     where that is installed), waits until they hear one another, follows the flight, stops them,
@@ -100,7 +100,7 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
 @cli.command()
 @flight_options
 def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
-    """Fly the same mission in this process, without ROS; the numbers are those of `fly`.
+    r"""Fly the same mission in this process, without ROS; the numbers are those of `fly`.
 
     \b
     Examples:
@@ -126,7 +126,7 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
 @click.argument("bag", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
 def analyze(bag: Path, as_json: bool) -> None:
-    """Print the RMS table of a recorded flight.
+    r"""Print the RMS table of a recorded flight.
 
     \b
     Example:

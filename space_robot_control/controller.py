@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+
 from space_robot_msgs_py.errors import SingularAttitudeError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.attitude import SINGULAR_ETA, attitude_jacobian_inverse

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NoReturn
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.codecs import CommandCodec, StateCodec, TelemetryCodec
 from space_robot_msgs_py.configuration import named_file, nest
@@ -90,8 +91,8 @@ class ControllerLoop:
         node, group = shell.node, TakenByLoop()
         self._command_out = Out(node, topics.COMMAND)
         self._telemetry_out = Out(node, topics.TELEMETRY)
-        self._joints_in = In(node, topics.JOINT_STATES, group)
-        self._base_in = In(node, topics.BASE_STATE, group)
+        self._joints_in = In(node, topics.JOINT_STATES, group, prompt=True)
+        self._base_in = In(node, topics.BASE_STATE, group, prompt=True)
         self._reference_joints_in = In(node, topics.REFERENCE_JOINTS, group)
         self._reference_base_in = In(node, topics.REFERENCE_BASE, group)
         self._base_waiter = Waiter(node, self._base_in)

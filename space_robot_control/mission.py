@@ -7,6 +7,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
+
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ReferenceChunk
 from space_robot_msgs_py.validation import Strict
@@ -64,7 +65,7 @@ class Mission:
 
     def chunk(self, start: int, length: int) -> ReferenceChunk:
         """The reference of ``length`` ticks from tick ``start`` on."""
-        time = np.arange(start, start + length) * self._period
+        time = np.arange(start, start + length, dtype=np.float64) * self._period
         base = np.zeros((length, 10))
         base[:, :4] = self._quaternion
         return ReferenceChunk(start, self._joints(time), base)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+
 from space_robot_msgs_py.samples import ReferenceChunk
 
 Array = NDArray[np.float64]
@@ -45,9 +46,7 @@ class ReferenceBuffer:
         return self._joints[i], self._base[i]
 
     @staticmethod
-    def _store(
-        target: Array, ticks: NDArray[np.int64], start: int, rows: Array
-    ) -> None:
+    def _store(target: Array, ticks: NDArray[np.int64], start: int, rows: Array) -> None:
         arriving = np.arange(start, start + len(rows))
         places = arriving % len(ticks)
         newer = arriving >= ticks[places]  # a repeated old chunk must not push out a newer one

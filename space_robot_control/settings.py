@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
+
 from space_robot_msgs_py.configuration import (
     NodeSettings,
     Tree,
@@ -52,7 +53,9 @@ class MissionNodeSettings(MissionSettings, NodeSettings):
     node: ClassVar = "mission"
     selectors: ClassVar = ("robot", "mission")
 
-    mission: str = Field("", description="a mission of config/missions (empty: the robot's), or a path")
+    mission: str = Field(
+        "", description="a mission of config/missions (empty: the robot's), or a path"
+    )
     chunk_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(
         100, description="ticks in one message of the reference"
     )

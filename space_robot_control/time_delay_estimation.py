@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+
 from space_robot_sim.compiled import kernel
 
 Array = NDArray[np.float64]
@@ -36,7 +37,9 @@ class TimeDelayEstimator:
         The first tick, and one after a gap, has no pair: the last one is kept.
         """
         if self._tick is not None and tick == self._tick + 1:
-            pair(applied_force, rate, self._rate, self._period, self.applied_force, self.acceleration)
+            pair(
+                applied_force, rate, self._rate, self._period, self.applied_force, self.acceleration
+            )
         self._tick = tick
         self._rate[:] = rate
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+
 from space_robot_sim.attitude import attitude_jacobian, rotate, rotate_back
 from space_robot_sim.compiled import kernel
 

@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,8 @@ _BODY = len(_ENCAPSULATION)
 _STAMP = struct.Struct("<iI")
 
 
-class Slot(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Slot:
     """Where a run of numbers stands: body offset and count of float64, or of int32 words."""
 
     offset: int
@@ -102,7 +104,7 @@ class FixedMessage:
         start = -(room.ctypes.data + _BODY) % 8  # the float64 inside must be aligned in memory
         self._buffer = room[start : start + size]
         self._buffer[:] = np.frombuffer(_ENCAPSULATION + body, dtype=np.uint8)
-        self._memory = memoryview(self._buffer)
+        self._memory = memoryview(self._buffer.data)
         self._size = size
         edges = [0, *(_BODY + edge for pair in variable for edge in pair), size]
         self._constant = [
@@ -124,10 +126,10 @@ class FixedMessage:
         """(rows, 2) view on equally spaced stamps: seconds, nanoseconds."""
         return self._rows(slots, np.dtype(np.int32))
 
-    def _rows(self, slots: Sequence[Slot], dtype: np.dtype) -> NDArray:  # type: ignore[type-arg]
-        first, count = slots[0]
+    def _rows(self, slots: Sequence[Slot], dtype: np.dtype[Any]) -> NDArray[Any]:
+        first, count = slots[0].offset, slots[0].count
         stride = slots[1].offset - first if len(slots) > 1 else dtype.itemsize * count
-        if any(slot != (first + i * stride, count) for i, slot in enumerate(slots)):
+        if any(slot != Slot(first + i * stride, count) for i, slot in enumerate(slots)):
             raise ValueError("the slots are not equally spaced")
         start = _BODY + first
         stop = start + stride * (len(slots) - 1) + dtype.itemsize * count
@@ -150,7 +152,7 @@ class FixedMessage:
         return self._memory.tobytes()
 
     def load(self, data: bytes) -> bool:
-        """Take the numbers out of ``data``; False, and nothing taken, if it is laid out otherwise."""
+        """Take the numbers out of ``data``; False, and nothing taken, if its layout differs."""
         if len(data) < self._size:  # foreign writers may leave bytes behind the message
             return False
         for start, stop, expected in self._constant:

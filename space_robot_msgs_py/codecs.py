@@ -144,7 +144,9 @@ class StateCodec:
         else:
             message = decode(data, topics.BASE_STATE.type)
             if not (len(message.transforms) == len(message.twist) == len(message.wrench) == 1):
-                raise MessageError(f"{topics.BASE_STATE.name}: one transform, twist, wrench expected")
+                raise MessageError(
+                    f"{topics.BASE_STATE.name}: one transform, twist, wrench expected"
+                )
             pose, twist = message.transforms[0], message.twist[0]
             self._pose[:] = (*xyz(pose.translation), *xyz(pose.rotation), pose.rotation.w)
             self._twist[:] = (*xyz(twist.linear), *xyz(twist.angular))

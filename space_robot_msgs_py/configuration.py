@@ -67,7 +67,9 @@ def node_parameters(path: Path, node: str) -> Tree:
     merged: Tree = {}
     for name, content in read_yaml(path).items():
         if not isinstance(content, dict) or list(content) != ["ros__parameters"]:
-            raise InputError(f"{path}: {name}: 'ros__parameters' was expected below the node's name")
+            raise InputError(
+                f"{path}: {name}: 'ros__parameters' was expected below the node's name"
+            )
         if name.strip("/") in ("**", node):
             merged = merge(merged, nest(content["ros__parameters"] or {}))
     return merged

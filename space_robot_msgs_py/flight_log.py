@@ -47,7 +47,8 @@ class FlightLog:
         """A log of ``ticks`` rows of NaN."""
         n = len(joint_names)
         shapes = [(3,), (4,), (3,), (3,), (n,), (n,), (n + 3,), (3, n), (10,)]
-        return cls(timebase, joint_names, *(np.full((ticks, *shape), np.nan) for shape in shapes))
+        columns: list[Any] = [np.full((ticks, *shape), np.nan) for shape in shapes]
+        return cls(timebase, joint_names, *columns)
 
     @property
     def ticks(self) -> int:
@@ -57,7 +58,7 @@ class FlightLog:
     @property
     def axes(self) -> int:
         """Controlled coordinates, n+3."""
-        return self.applied_torque.shape[1]
+        return int(self.applied_torque.shape[1])
 
     def put(self, state: RobotState) -> None:
         """Copy a state into its tick's row."""

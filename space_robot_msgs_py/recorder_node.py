@@ -26,7 +26,9 @@ class RecorderNodeSettings(NodeSettings):
 
     node: ClassVar = "recorder"
 
-    bag: str = Field("", description="folder of the bag to write; it must not exist (empty: bag_<time>)")
+    bag: str = Field(
+        "", description="folder of the bag to write; it must not exist (empty: bag_<time>)"
+    )
     flight: str = Field("{}", description="what is flown, as a JSON object; stored with the bag")
     drain_period: Annotated[float, Field(ge=0.0005, le=0.1)] = Field(
         0.005, description="time between two rounds of emptying the queues, s"

@@ -42,9 +42,7 @@ REFERENCE_BASE = Topic(
     "/reference/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 200,
     ("controller", "recorder"), transient_local=True,
 )  # fmt: skip
-TELEMETRY = Topic(
-    "/controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, ("recorder",)
-)
+TELEMETRY = Topic("/controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, ("recorder",))
 CLOCK = Topic(
     "/clock", "rosgraph_msgs/msg/Clock", 1_000, ("mission", "recorder"), transient_local=True
 )

@@ -19,7 +19,7 @@ SINGULAR_ETA = 1e-6
 
 @kernel
 def rotation_matrix(quaternion: Array, out: Array) -> None:
-    """Write into ``out`` (3, 3) the rotation that takes base-frame vectors to the inertial frame."""
+    """Write into ``out`` (3, 3) the rotation from the base frame to the inertial frame."""
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     out[0, 0] = 1.0 - 2.0 * (y * y + z * z)
     out[0, 1] = 2.0 * (x * y - w * z)
@@ -34,7 +34,7 @@ def rotation_matrix(quaternion: Array, out: Array) -> None:
 
 @kernel
 def quaternion_rate(quaternion: Array, omega_inertial: Array, out: Array) -> None:
-    """Write into ``out`` (4,) the rate of ``quaternion``, angular velocity in the inertial frame."""
+    """Write into ``out`` (4,) the rate of ``quaternion``."""
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     p, q, r = omega_inertial[0], omega_inertial[1], omega_inertial[2]
     out[0] = -0.5 * (x * p + y * q + z * r)

@@ -17,6 +17,7 @@ from typing import Any, TypeVar, cast
 import numba
 
 _PACKAGES = ("space_robot_sim", "space_robot_control")
+config: Any = numba.config
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
@@ -41,9 +42,9 @@ def kernel(function: _Function) -> _Function:
     IEEE arithmetic is kept as written (no fast-math): the same inputs give the same bits in
     every process, which is what makes the graph and the in-process flight agree.
     """
-    previous = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(cache_directory())
+    previous = config.CACHE_DIR
+    config.CACHE_DIR = str(cache_directory())
     try:
         return cast(_Function, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
     finally:
-        numba.config.CACHE_DIR = previous
+        config.CACHE_DIR = previous

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+
 from space_robot_msgs_py.samples import RobotState
 
 from .attitude import rotation_matrix

@@ -7,6 +7,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
+
 from space_robot_msgs_py.validation import Strict
 
 from .compiled import kernel
@@ -32,15 +33,21 @@ class DisturbanceSettings(Strict):
     base_amplitude: NonNegative = Field(0.010, description="on base x, y, z, N m")
     base_frequencies: Frequencies = Field([0.5, 0.75], description="of its two sines, Hz (0: none)")
     inner_amplitude: NonNegative = Field(0.005, description="on joints 1 to 3, N m")
-    inner_frequencies: Frequencies = Field([0.25, 0.5], description="of its two sines, Hz (0: none)")
+    inner_frequencies: Frequencies = Field(
+        [0.25, 0.5], description="of its two sines, Hz (0: none)"
+    )
     outer_amplitude: NonNegative = Field(0.002, description="on joints 4 and up, N m")
-    outer_frequencies: Frequencies = Field([0.25, 0.0], description="of its two sines, Hz (0: none)")
+    outer_frequencies: Frequencies = Field(
+        [0.25, 0.0], description="of its two sines, Hz (0: none)"
+    )
 
 
 class PayloadSettings(Strict):
     """A payload as the last link's new mass and inertia; unknown to every controller."""
 
-    mass: NonNegative = Field(0.0, description="mass of the last link with payload, kg (0: nominal)")
+    mass: NonNegative = Field(
+        0.0, description="mass of the last link with payload, kg (0: nominal)"
+    )
     inertia: Inertia = Field(
         [1.0, 1.0, 1.0, 0.0, 0.0, 0.0],
         description="Ixx, Iyy, Izz, Ixy, Ixz, Iyz of the last link with payload, kg m2",
@@ -97,4 +104,5 @@ def disturbance_torque(environment: Environment, time: float, out: Array) -> Non
 @kernel
 def friction_torque(environment: Environment, joint: int, rate: float) -> float:
     """``f_f`` of one joint turning at ``rate``, N m; it opposes the motion."""
-    return environment.coulomb[joint] * np.sign(rate) + environment.viscous[joint] * rate
+    torque: float = environment.coulomb[joint] * np.sign(rate) + environment.viscous[joint] * rate
+    return torque

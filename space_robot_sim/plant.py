@@ -8,6 +8,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
+
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_msgs_py.validation import Strict

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, ClassVar
 
 from pydantic import Field
+
 from space_robot_msgs_py.configuration import NodeSettings, named_file
 
 from .plant import PlantSettings
@@ -18,7 +19,9 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
     node: ClassVar = "plant"
     selectors: ClassVar = ("robot", "mission", "case")
 
-    mission: str = Field("", description="a mission of config/missions (empty: the robot's), or a path")
+    mission: str = Field(
+        "", description="a mission of config/missions (empty: the robot's), or a path"
+    )
     case: str = Field("1", description="a case of config/cases, or a path to its YAML")
     ticks: Annotated[int, Field(ge=0, le=10**9)] = Field(
         0, description="ticks to fly, then exit (0: until stopped)"

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from .dynamics.model import Model
 from space_robot_msgs_py.validation import Strict, check, read_yaml
+
+from .dynamics.model import Model
 
 Array = NDArray[np.float64]
 
@@ -148,7 +149,7 @@ class Robot:
             joint_names=tuple(link.name for link in links),
             mass=np.array([file.base.mass, *(link.mass for link in links)]),
             inertia=np.array(
-                [inertia_tensor(body.inertia) for body in (file.base, *links)], dtype=np.float64
+                [inertia_tensor(i) for i in (file.base.inertia, *(k.inertia for k in links))]
             ),
             com=np.array([[0.0, 0.0, 0.0], *(link.com for link in links)]),
             alpha=np.radians([link.alpha_deg for link in links]),
@@ -181,6 +182,6 @@ class Robot:
 
 
 def _exact_at_right_angles(values: Array) -> Array:
-    """cos and sin of multiples of 90 degrees without the rounding error of pi."""
+    """Cos and sin of multiples of 90 degrees without the rounding error of pi."""
     rounded = np.round(values)
     return np.where(np.abs(values - rounded) < 1e-15, rounded, values)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from space_robot_msgs_py.flight_log import FlightLog
 
 Array = NDArray[np.float64]

@@ -15,10 +15,12 @@ class Monitor:
     def __init__(self, domain: int) -> None:
         set_defaults()
         import rclpy
+        from rclpy.context import Context
         from rclpy.signals import SignalHandlerOptions
+
         from space_robot_msgs_py.ros.endpoints import In, TakenByLoop
 
-        self._context = rclpy.Context()
+        self._context = Context()
         rclpy.init(
             args=[], context=self._context, domain_id=domain,
             signal_handler_options=SignalHandlerOptions.NO,

@@ -30,7 +30,7 @@ READY_TIMEOUT_S = 60.0
 STALL_TIMEOUT_S = 60.0
 
 
-class Interrupted(FlightError):
+class InterruptedFlightError(FlightError):
     """The user stopped the flight."""
 
     exit_code = 130
@@ -108,7 +108,7 @@ def _follow(graph: Graph, flight: Flight, domain: int, stopped: list[int]) -> No
             show(0.0, "waiting for the nodes")
             while not graph.check():
                 if stopped:
-                    raise Interrupted(f"stopped at {monitor.simulated_s:.2f} s")
+                    raise InterruptedFlightError(f"stopped at {monitor.simulated_s:.2f} s")
                 time.sleep(POLL_S)
                 monitor.poll()
                 now = time.monotonic()

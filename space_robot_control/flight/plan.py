@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 from pydantic import Field
+
 from space_robot_msgs_py.configuration import named_file
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.validation import Strict
@@ -33,7 +34,7 @@ class FlightPlan(Strict):
     command_latency_ticks: int = 0
     friction: bool = True
     realtime: bool = False
-    parameters: dict[str, dict[str, Any]] = {}
+    parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """Further parameters by node, dotted names."""
 
     def overrides(self, node: str) -> dict[str, Any]:
@@ -104,7 +105,9 @@ class Flight:
     def default_bag(self) -> Path:
         """``flights/<controller>_case<case>_<time>`` below the current folder."""
         stamp = datetime.now(timezone.utc).strftime("%Y%m%d-%H%M%S")
-        return Path("flights") / f"{self.controller.law.name}_case{Path(self.plan.case).stem}_{stamp}"
+        return (
+            Path("flights") / f"{self.controller.law.name}_case{Path(self.plan.case).stem}_{stamp}"
+        )
 
 
 def check_bag_path(path: Path) -> None:

@@ -11,6 +11,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -76,10 +77,8 @@ class NodeProcess:
 
     def signal(self, number: int) -> None:
         """Send a signal to the whole group: ``ros2 run`` would keep it to itself."""
-        try:
+        with suppress(ProcessLookupError):
             os.killpg(self._process.pid, number)
-        except ProcessLookupError:
-            pass
 
     def stop(self, patience_s: float = 10.0) -> None:
         """Ask it to end, insist, then force; returns when its group is gone."""
@@ -133,5 +132,7 @@ class Graph:
             if code is not None and (code != 0 or name != "plant"):
                 time.sleep(0.1)  # let it finish its last line
                 ended = f"with exit code {code}" if code >= 0 else f"by signal {-code}"
-                raise FlightError(f"{name} ended {ended} before the flight did:\n{node.last_words()}")
+                raise FlightError(
+                    f"{name} ended {ended} before the flight did:\n{node.last_words()}"
+                )
         return self.nodes["plant"].exit_code == 0

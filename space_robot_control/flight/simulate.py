@@ -104,5 +104,3 @@ def simulate(
                 progress(tick)
     progress(flight.ticks)
     return log
-
-

@@ -24,7 +24,11 @@ def laws() -> dict[str, type[ControlLaw]]:
     found: dict[str, type[ControlLaw]] = {}
     for module in pkgutil.iter_modules(__path__):
         for value in vars(importlib.import_module(f"{__name__}.{module.name}")).values():
-            if isinstance(value, type) and issubclass(value, ControlLaw) and value is not ControlLaw:
+            if (
+                isinstance(value, type)
+                and issubclass(value, ControlLaw)
+                and value is not ControlLaw
+            ):
                 found[value.name] = value
     return found
 

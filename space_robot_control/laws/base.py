@@ -61,7 +61,7 @@ class ControlLaw(ABC):
         """Whether the law adds N_hat."""
         return "h_bar" in cls.gain_descriptions
 
-    def reset(self) -> None:
+    def reset(self) -> None:  # noqa: B027  (a law without memory has nothing to do)
         """Forget the past (integrals, last errors): called when the law is switched on."""
 
     @abstractmethod

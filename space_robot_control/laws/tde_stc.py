@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+
 from space_robot_sim.compiled import kernel
 
 from .base import ControlLaw, Signals
@@ -14,9 +15,9 @@ Array = NDArray[np.float64]
 
 
 class TimeDelaySuperTwisting(ControlLaw):
-    """``F_S = Hbar u_STC + N_hat`` with ``s = edot + lambda e`` and
+    """``F_S = Hbar u_STC + N_hat``, ``s = edot + lambda e``.
 
-    ``u_STC = rhodd_d + lambda edot + K_1 |s|^1/2 sign(s) + integral of K_2 sign(s)``.
+    ``u_STC = rhodd_d + lambda edot + K_1 |s|^1/2 sign(s) + psi``, psi the integral of K_2 sign(s).
     """
 
     name = "tde_stc"
@@ -46,7 +47,7 @@ def time_delay_super_twisting(
     h_bar: Array, lam: Array, k_1: Array, k_2: Array, period: float, e: Array, edot: Array,
     rhodd_d: Array, n_hat: Array, psi: Array, s: Array, u: Array, force: Array,
 ) -> None:  # fmt: skip
-    """Write (38) into ``s``, advance ``psi`` of (40), write (42) into ``u``, (41) into ``force``."""
+    """Write (38) into ``s``, advance ``psi`` (40), write (42) into ``u``, (41) into ``force``."""
     for i in range(e.size):
         s[i] = edot[i] + lam[i] * e[i]
         psi[i] += k_2[i] * np.sign(s[i]) * period

@@ -64,13 +64,16 @@ def _read(reader: Reader, path: Path) -> FlightLog:
 def _description(path: Path) -> dict[str, Any]:
     """What our recorder noted of the flight; empty for a bag of another recorder."""
     information = read_yaml(path / "metadata.yaml")["rosbag2_bagfile_information"]
-    description: dict[str, Any] = json.loads((information["custom_data"] or {}).get(FLIGHT_KEY, "{}"))
+    description: dict[str, Any] = json.loads(
+        (information["custom_data"] or {}).get(FLIGHT_KEY, "{}")
+    )
     return description
 
 
 def _fill(reader: Reader, connections: list[Connection], log: FlightLog) -> dict[str, Coverage]:
-    states, references = StateCodec(log.joint_names, log.timebase), ReferenceCodec(
-        log.joint_names, log.timebase
+    states, references = (
+        StateCodec(log.joint_names, log.timebase),
+        ReferenceCodec(log.joint_names, log.timebase),
     )
     state = RobotState.allocate(len(log.joint_names))
     coverages = {c.topic: Coverage(topics.BY_NAME[c.topic]) for c in connections}

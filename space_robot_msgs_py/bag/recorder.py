@@ -51,6 +51,4 @@ class BagRecorder:
             name: {"received": c.received, "missing": lost, "repeated": c.repeated}
             for (name, c), lost in zip(self.coverages.items(), self.lost.values(), strict=True)
         }
-        self._writer.close(
-            {FLIGHT_KEY: json.dumps(self._flight), COVERAGE_KEY: json.dumps(counts)}
-        )
+        self._writer.close({FLIGHT_KEY: json.dumps(self._flight), COVERAGE_KEY: json.dumps(counts)})

@@ -19,7 +19,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from ..topics import Topic
 
-SPIN_S = 50e-6
+SPIN_S = 300e-6
 """How long a wait takes and yields before it sleeps in the wait set."""
 
 
@@ -27,13 +27,15 @@ class TakenByLoop(CallbackGroup):
     """Keeps its subscriptions out of every executor."""
 
     def can_execute(self, entity: Any) -> bool:
+        """Never."""
         return False
 
     def beginning_execution(self, entity: Any) -> bool:
+        """Never."""
         return False
 
     def ending_execution(self, entity: Any) -> None:
-        pass
+        """Nothing to end."""
 
 
 def message_type(name: str) -> Any:
@@ -82,9 +84,14 @@ class Out:
 class In:
     """A subscription whose messages the loop takes itself, serialized."""
 
-    def __init__(self, node: Node, topic: Topic, group: TakenByLoop, depth: int = 0) -> None:
+    def __init__(
+        self, node: Node, topic: Topic, group: TakenByLoop, depth: int = 0, prompt: bool = False
+    ) -> None:
+        """``prompt``: best effort, twice as fast; its owner must notice a loss and ask again."""
         self.topic = topic
         profile = qos(topic)
+        if prompt:
+            profile.reliability = ReliabilityPolicy.BEST_EFFORT
         profile.depth = depth or topic.depth
         self._subscription = node.create_subscription(
             message_type(topic.type), topic.name, lambda message: None, profile,
@@ -105,8 +112,9 @@ class Waiter:
 
     def __init__(self, node: Node, *inputs: In) -> None:
         self._handles = [entry.handle for entry in inputs]
-        with node.context.handle:
-            self._set = _rclpy.WaitSet(len(inputs), 0, 0, 0, 0, 0, node.context.handle)
+        context: Any = node.context.handle
+        with context:
+            self._set = _rclpy.WaitSet(len(inputs), 0, 0, 0, 0, 0, context)
 
     def wait(self, timeout_s: float) -> None:
         """Sleep until a message is there or the time is over."""

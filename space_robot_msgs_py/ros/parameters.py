@@ -70,7 +70,8 @@ def refuse_unknown(node: Node) -> None:
     for name in node._parameter_overrides:
         if name not in allowed and not name.startswith("qos_overrides."):
             raise InputError(
-                f"{node.get_name()} parameters: unknown parameter {name!r}: choose one of {', '.join(allowed)}"
+                f"{node.get_name()} parameters: unknown parameter {name!r}: "
+                f"choose one of {', '.join(allowed)}"
             )
 
 

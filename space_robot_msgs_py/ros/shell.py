@@ -13,6 +13,7 @@ from .process_environment import set_defaults
 set_defaults()
 
 import rclpy  # noqa: E402  (the environment must be set before)
+import rclpy.utilities  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from rclpy.signals import SignalHandlerOptions  # noqa: E402
@@ -80,7 +81,7 @@ def run_node(
     schema: type[Schema],
     loop: Callable[[Shell, Schema], Loop],
     changeable: tuple[str, ...] = (),
-    arguments: Sequence[str] | None = None,
+    arguments: list[str] | None = None,
 ) -> NoReturn:
     """Run a node until its loop returns, then exit.
 
@@ -105,6 +106,5 @@ def run_node(
         code = error.exit_code
     finally:
         node.destroy_node()
-        rclpy.try_shutdown()
+        rclpy.utilities.try_shutdown()
     sys.exit(code)
-

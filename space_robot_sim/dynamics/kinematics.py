@@ -37,7 +37,9 @@ def forward_kinematics(model: Model, quaternion: Array, theta: Array, data: Data
             )
         for r in range(3):
             data.com[i, r] = data.joint[i, r] + (
-                own[r, 0] * model.com[i, 0] + own[r, 1] * model.com[i, 1] + own[r, 2] * model.com[i, 2]
+                own[r, 0] * model.com[i, 0]
+                + own[r, 1] * model.com[i, 1]
+                + own[r, 2] * model.com[i, 2]
             )
         rotate_inertia(own, model.inertia[i], data.inertia[i])
         p, s = data.joint[i], data.motion[i]
@@ -50,9 +52,21 @@ def forward_kinematics(model: Model, quaternion: Array, theta: Array, data: Data
 def rotate_inertia(rotation: Array, inertia: Array, out: Array) -> None:
     """``out = R I R^T``; symmetric, so only the upper half is computed."""
     for r in range(3):
-        x = rotation[r, 0] * inertia[0, 0] + rotation[r, 1] * inertia[1, 0] + rotation[r, 2] * inertia[2, 0]
-        y = rotation[r, 0] * inertia[0, 1] + rotation[r, 1] * inertia[1, 1] + rotation[r, 2] * inertia[2, 1]
-        z = rotation[r, 0] * inertia[0, 2] + rotation[r, 1] * inertia[1, 2] + rotation[r, 2] * inertia[2, 2]
+        x = (
+            rotation[r, 0] * inertia[0, 0]
+            + rotation[r, 1] * inertia[1, 0]
+            + rotation[r, 2] * inertia[2, 0]
+        )
+        y = (
+            rotation[r, 0] * inertia[0, 1]
+            + rotation[r, 1] * inertia[1, 1]
+            + rotation[r, 2] * inertia[2, 1]
+        )
+        z = (
+            rotation[r, 0] * inertia[0, 2]
+            + rotation[r, 1] * inertia[1, 2]
+            + rotation[r, 2] * inertia[2, 2]
+        )
         for c in range(r, 3):
             value = x * rotation[c, 0] + y * rotation[c, 1] + z * rotation[c, 2]
             out[r, c] = value

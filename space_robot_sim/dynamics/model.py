@@ -22,7 +22,7 @@ class Model(NamedTuple):
     inertia: Array
     """(n+1, 3, 3) inertia about each body's CoM, on its own axes."""
     com: Array
-    """(n+1, 3) ``a_i``: from the body's frame origin to its CoM, in its frame; zero for the base."""
+    """(n+1, 3) ``a_i``: from the body's frame origin to its CoM, in its frame; the base's zero."""
     joint_x: Array
     """(n,) DH ``a_{i-1}``: along x of the previous frame to the next joint's axis."""
     joint_z: Array

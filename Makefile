@@ -1,0 +1,63 @@
+# Everything happens in .venv; nothing outside this folder changes. `make help` lists the targets.
+
+PYTHON ?= python3
+VENV := .venv
+PACKAGES := space_robot_control space_robot_msgs_py space_robot_sim
+PIP_INSTALL := $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check
+
+# A ROS sourced in this terminal must not mix with the one in .venv.
+unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH PYTHONHOME PYTHONPATH
+unexport RMW_IMPLEMENTATION
+# Discovery stays on this machine; no shared memory that a killed process could leave behind.
+export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
+
+.PHONY: help setup fly test lint clean
+
+help:
+	@echo "make setup               .venv with the package and ROS 2 Jazzy"
+	@echo "make fly [ARGS=...]      fly case 1 under TDE-STC, e.g. make fly ARGS='--controller ctc'"
+	@echo "make test [ARGS=...]     style, types and tests; ARGS go to pytest"
+	@echo "make lint                style and types only"
+	@echo "make clean               delete .venv and what was built or cached here"
+	@echo "PYTHON=python3.12 chooses the Python (3.10 to 3.13) of a new .venv."
+
+setup: $(VENV)/.flies
+
+fly: $(VENV)/.flies
+	@$(VENV)/bin/space-robot fly --controller tde_stc --case 1 $(ARGS)
+
+test: lint
+	$(VENV)/bin/python -m pytest $(ARGS)
+
+lint: $(VENV)/.tests
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/mypy
+
+clean:
+	rm -rf $(VENV) build install log *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	find $(PACKAGES) tests -name __pycache__ -prune -exec rm -rf {} +
+
+# Stamps: what is installed in .venv, renewed when the packaging changes.
+$(VENV)/.flies: setup.py setup.cfg pyproject.toml | $(VENV)/.made
+	@echo "installing space_robot and ROS 2 into $(VENV): a minute or two, once"
+	@$(PIP_INSTALL) --editable '.[ros]'
+	@touch $@
+
+$(VENV)/.tests: setup.py setup.cfg pyproject.toml | $(VENV)/.made
+	@echo "installing space_robot, ROS 2 and the tests' tools into $(VENV): some minutes, once"
+	@$(PIP_INSTALL) --editable '.[ros,test]'
+	@touch $(VENV)/.flies $@
+
+$(VENV)/.made:
+	@command -v $(PYTHON) >/dev/null || \
+	  { echo "error: no $(PYTHON) here: install Python 3.10 to 3.13" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 13))' || \
+	  { echo "error: Python 3.10 to 3.13 is needed, $(PYTHON) is $$($(PYTHON) -V 2>&1):" \
+	    "try make PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
+	  { echo "error: $(PYTHON) cannot make virtual environments:" \
+	    "sudo apt install python3-venv" >&2; exit 1; }
+	@$(PYTHON) -m venv --clear $(VENV)
+	@touch $@

@@ -1,0 +1,64 @@
+"""Packaging for pip and colcon (ament_python); pyproject.toml only configures the tools."""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = "space_robot"
+
+# What `ros2 run` starts: scripts of three lines. As data files they land in lib/space_robot,
+# where it looks, whether pip or colcon installs them.
+EXECUTABLES = [str(path) for path in sorted(Path("resource/executables").iterdir())]
+
+CONFIG = [
+    (f"share/{NAME}/{path.parent}", [str(path)]) for path in sorted(Path("config").rglob("*.yaml"))
+]
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Test bed for the flight software of space robots, on ROS 2",
+    license="Apache-2.0",
+    maintainer="space_robot maintainers",
+    maintainer_email="maintainers@space-robot.example.org",
+    packages=find_packages(include=[f"{NAME}_*"]),
+    python_requires=">=3.10,<3.14",
+    install_requires=[
+        "click>=8.1",
+        "mcap>=1.1",
+        "numba>=0.58.1",
+        "numpy>=1.26,<3",
+        "pydantic>=2.5",
+        "pyyaml>=6",
+        "rich>=13",
+        "rosbags>=0.10",
+        "scipy>=1.11.4",
+        "typing_extensions>=4.8",
+    ],
+    extras_require={
+        # ROS 2 Jazzy from wheels; never a requirement, for apt's ROS must stay untouched
+        "ros": [
+            "ros-jazzy-common-interfaces",
+            "ros-jazzy-rclpy",
+            "ros-rmw-fastrtps-cpp==8.4.3",  # Jazzy's: newer ones belong to other distributions
+        ],
+        "test": [
+            "hypothesis",
+            "mujoco",
+            "mypy",
+            "pin",
+            "pytest",
+            "pytest-xdist",
+            "ruff",
+            "scipy-stubs",
+            "types-PyYAML",
+        ],
+    },
+    entry_points={"console_scripts": ["space-robot = space_robot_control.cli:main"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"lib/{NAME}", EXECUTABLES),
+        *CONFIG,
+    ],
+)

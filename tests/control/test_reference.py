@@ -1,0 +1,138 @@
+"""The ring of reference rows: whatever order they come in, the right row at its tick."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from space_robot_control.reference import ReferenceBuffer
+from space_robot_msgs_py.samples import ReferenceChunk
+
+CAPACITY = 32
+
+
+def chunk(start: int, length: int, n: int = 2, version: float = 0.0) -> ReferenceChunk:
+    """Rows that tell their tick."""
+    ticks = np.arange(start, start + length, dtype=float)
+    joints = ticks[:, None, None] + np.array([0.0, 0.1, 0.2])[:, None] + np.arange(n) * 1e-3
+    return ReferenceChunk(start, joints + version, np.tile(ticks[:, None], 10) + 0.5 + version)
+
+
+def assert_holds(buffer: ReferenceBuffer, tick: int) -> None:
+    expected = chunk(tick, 1)
+    assert buffer.covers(tick)
+    joints, base = buffer.at(tick)
+    np.testing.assert_array_equal(joints, expected.joints[0])
+    np.testing.assert_array_equal(base, expected.base[0])
+
+
+def test_new_buffer_covers_nothing() -> None:
+    buffer = ReferenceBuffer(2, CAPACITY)
+    assert not any(buffer.covers(tick) for tick in range(3 * CAPACITY))
+
+
+@pytest.mark.xfail(strict=True, reason="-1 marks empty rows and is taken for a tick")
+def test_new_buffer_does_not_cover_tick_minus_one() -> None:
+    assert not ReferenceBuffer(2, CAPACITY).covers(-1)
+
+
+def test_rows_are_found_at_their_ticks() -> None:
+    buffer = ReferenceBuffer(3, CAPACITY)
+    buffer.add(chunk(100, 10, n=3))
+    for tick in range(100, 110):
+        np.testing.assert_array_equal(buffer.at(tick)[0], chunk(tick, 1, n=3).joints[0])
+    assert not buffer.covers(99)
+    assert not buffer.covers(110)
+    assert not buffer.covers(100 + CAPACITY)
+    assert not buffer.covers(100 - CAPACITY)
+
+
+def test_a_tick_is_covered_when_both_parts_are_there() -> None:
+    """They come as two messages."""
+    for first, second in (("add_joints", "add_base"), ("add_base", "add_joints")):
+        buffer, whole = ReferenceBuffer(2, CAPACITY), chunk(5, 4)
+        rows = {"add_joints": whole.joints, "add_base": whole.base}
+        getattr(buffer, first)(5, rows[first])
+        assert not buffer.covers(6)
+        getattr(buffer, second)(5, rows[second][:2])
+        assert_holds(buffer, 6)
+        assert not buffer.covers(7)
+
+
+def test_ring_forgets_a_row_when_a_newer_one_needs_its_place() -> None:
+    buffer = ReferenceBuffer(2, CAPACITY)
+    for start in range(0, 10 * CAPACITY, 5):
+        buffer.add(chunk(start, 5))
+    newest = 10 * CAPACITY + 4 - (10 * CAPACITY - 1) % 5
+    held = [tick for tick in range(newest + 2 * CAPACITY) if buffer.covers(tick)]
+    assert len(held) == CAPACITY
+    assert held == list(range(held[0], held[0] + CAPACITY))
+    for tick in held:
+        assert_holds(buffer, tick)
+
+
+def test_a_repeated_old_chunk_does_not_push_out_a_newer_one() -> None:
+    """Transient-local topics repeat the past to late joiners."""
+    buffer, old = ReferenceBuffer(2, CAPACITY), chunk(0, 8)
+    buffer.add(old)
+    buffer.add(chunk(CAPACITY, 4))
+    buffer.add(old)
+    for tick in (CAPACITY, CAPACITY + 3, 4, 7):
+        assert_holds(buffer, tick)
+    assert not buffer.covers(0)
+    assert not buffer.covers(3)
+
+
+def test_a_tick_sent_again_is_overwritten() -> None:
+    """A changed plan: the last word counts."""
+    buffer = ReferenceBuffer(2, CAPACITY)
+    buffer.add(chunk(0, 8, version=1000.0))
+    buffer.add(chunk(4, 4))
+    assert_holds(buffer, 4)
+    assert buffer.at(3)[1][0] == 1003.5
+
+
+def test_a_chunk_longer_than_the_ring_leaves_its_end() -> None:
+    buffer = ReferenceBuffer(2, CAPACITY)
+    buffer.add(chunk(10, 3 * CAPACITY))
+    stop = 10 + 3 * CAPACITY
+    assert not buffer.covers(stop - CAPACITY - 1)
+    for tick in range(stop - CAPACITY, stop):
+        assert_holds(buffer, tick)
+
+
+def test_an_empty_chunk_changes_nothing() -> None:
+    buffer = ReferenceBuffer(2, CAPACITY)
+    buffer.add(chunk(3, 0))
+    assert not buffer.covers(3)
+
+
+@given(st.permutations(range(0, CAPACITY, 4)), st.integers(0, 10**6))
+def test_order_of_arrival_does_not_matter_within_the_ring(order: list[int], begin: int) -> None:
+    """Also wherever the ring's seam lies."""
+    buffer = ReferenceBuffer(2, CAPACITY)
+    for offset in order:
+        buffer.add(chunk(begin + offset, 4))
+    for tick in range(begin, begin + CAPACITY):
+        assert_holds(buffer, tick)
+    assert not buffer.covers(begin + CAPACITY)
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 5 * CAPACITY), st.integers(1, 2 * CAPACITY)), max_size=12)
+)
+def test_what_is_covered_is_always_right_and_the_newest_always_covered(
+    arrivals: list[tuple[int, int]],
+) -> None:
+    """Any sequence of chunks: place i holds the newest tick that fell on it."""
+    buffer, newest = ReferenceBuffer(2, CAPACITY), {}
+    for start, length in arrivals:
+        buffer.add(chunk(start, length))
+        for tick in range(start, start + length):
+            newest[tick % CAPACITY] = max(tick, newest.get(tick % CAPACITY, 0))
+    for tick in range(8 * CAPACITY):
+        assert buffer.covers(tick) == (newest.get(tick % CAPACITY) == tick)
+        if buffer.covers(tick):
+            assert_holds(buffer, tick)

@@ -1,0 +1,94 @@
+"""N_hat of (35), (36): exact where force and acceleration belong together."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numpy.typing import NDArray
+
+from space_robot_control.time_delay_estimation import TimeDelayEstimator
+
+Array = NDArray[np.float64]
+
+PERIOD = 5e-4
+
+
+def vectors(size: int, low: float = -100.0, high: float = 100.0) -> st.SearchStrategy[Array]:
+    return arrays(np.float64, size, elements=st.floats(low, high, width=32))
+
+
+@st.composite
+def pairs(draw: st.DrawFn) -> tuple[Array, ...]:
+    """h_bar, N, rate at a tick, and the acceleration until the next."""
+    axes = draw(st.integers(4, 12))
+    h_bar = draw(vectors(axes, 0.125, 100.0))
+    return h_bar, draw(vectors(axes)), draw(vectors(axes, -5.0, 5.0)), draw(vectors(axes))
+
+
+@given(pairs(), st.integers(0, 10**7))
+def test_estimate_recovers_n_of_a_consistent_pair(pair: tuple[Array, ...], tick: int) -> None:
+    """With F = Hbar rhodd + N over the interval, N_hat = N to rounding."""
+    h_bar, n, rate, acceleration = pair
+    estimator = TimeDelayEstimator(len(n), PERIOD)
+    estimator.observe(tick, np.zeros(len(n)), rate)
+    estimator.observe(tick + 1, h_bar * acceleration + n, rate + acceleration * PERIOD)
+    np.testing.assert_allclose(estimator.acceleration, acceleration, atol=1e-9)
+    np.testing.assert_allclose(estimator.estimate(h_bar), n, atol=1e-9 * h_bar.max() + 1e-12)
+
+
+@given(pairs())
+def test_estimate_follows_the_last_pair_only(pair: tuple[Array, ...]) -> None:
+    """A long past makes no difference to the bits."""
+    h_bar, n, rate, acceleration = pair
+    long, short = (TimeDelayEstimator(len(n), PERIOD) for _ in range(2))
+    for tick in range(5):
+        long.observe(tick, n * tick, acceleration * tick)
+    for estimator in (long, short):
+        estimator.observe(5, n, rate)
+        estimator.observe(6, n + 1.0, acceleration)
+    np.testing.assert_array_equal(long.estimate(h_bar), short.estimate(h_bar))
+
+
+def observed(*ticks: tuple[int, float, float]) -> TimeDelayEstimator:
+    """An estimator of two axes that saw (tick, force, rate)."""
+    estimator = TimeDelayEstimator(2, PERIOD)
+    for tick, force, rate in ticks:
+        estimator.observe(tick, np.full(2, force), np.full(2, rate))
+    return estimator
+
+
+def test_first_tick_has_no_pair_and_gives_zero() -> None:
+    """Whatever force and rate it reports."""
+    estimator = observed((1234, 50.0, 3.0))
+    np.testing.assert_array_equal(estimator.estimate(np.ones(2)), np.zeros(2))
+
+
+def test_gap_in_ticks_keeps_the_last_pair() -> None:
+    """Over several intervals one force and one difference do not belong together."""
+    before = observed((0, 0.0, 0.0), (1, 5.0, 0.001)).estimate(np.full(2, 2.0))
+    np.testing.assert_allclose(before, 5.0 - 2.0 * 2.0)
+    for late in (3, 1, 0):
+        after = observed((0, 0.0, 0.0), (1, 5.0, 0.001), (late, 99.0, 0.5))
+        np.testing.assert_array_equal(after.estimate(np.full(2, 2.0)), before)
+
+
+def test_pairs_are_formed_anew_after_a_gap() -> None:
+    """From the rate at the tick that ended the gap."""
+    estimator = observed((0, 0.0, 0.0), (1, 5.0, 0.001), (7, 99.0, 0.5), (8, 6.0, 0.5005))
+    np.testing.assert_allclose(estimator.acceleration, 1.0, rtol=1e-9)
+    np.testing.assert_allclose(estimator.estimate(np.full(2, 2.0)), 4.0, rtol=1e-9)
+
+
+def test_estimator_keeps_copies_of_what_it_is_shown() -> None:
+    """The nodes overwrite their arrays in place."""
+    force, rate = np.array([1.0, 2.0]), np.array([0.1, 0.2])
+    estimator = TimeDelayEstimator(2, PERIOD)
+    estimator.observe(0, force, rate)
+    force += 3.0
+    rate += 0.001
+    estimator.observe(1, force, rate)
+    force[:] = rate[:] = np.nan
+    # forces 4 and 5, acceleration 0.001 / PERIOD = 2
+    np.testing.assert_allclose(estimator.estimate(np.array([1.0, 3.0])), [2.0, -1.0], rtol=1e-9)

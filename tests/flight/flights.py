@@ -1,0 +1,38 @@
+"""Running ``space-robot`` in tests as a user would, in ROS domains of their own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from space_robot_msgs_py.ros.process_environment import DEFAULTS
+
+COMMAND = [sys.executable, "-m", "space_robot_control.cli"]
+
+
+def ros_environment() -> dict[str, str]:
+    """Discovery on this machine only; the orchestrator picks a free domain."""
+    environment = {**os.environ, **DEFAULTS}
+    environment.pop("ROS_DOMAIN_ID", None)
+    return environment
+
+
+def space_robot(*arguments: str, timeout: float = 150.0) -> subprocess.CompletedProcess[str]:
+    """Run ``space-robot`` as a user would."""
+    return subprocess.run(
+        [*COMMAND, *arguments], capture_output=True, text=True, timeout=timeout, check=False,
+        env=ros_environment(),
+    )  # fmt: skip
+
+
+@dataclass
+class Flown:
+    """A finished graph flight."""
+
+    report: dict[str, Any]
+    bag: Path
+    standard_error: str

@@ -1,0 +1,156 @@
+"""Nodes started one by one, as with ``ros2 run``: any order, live parameters, clear refusals."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from flights import ros_environment
+
+from space_robot_control.flight.domain import ros_domain
+from space_robot_control.flight.processes import MODULES
+from space_robot_msgs_py.bag import read_flight
+from space_robot_msgs_py.ros.process_environment import set_defaults
+
+set_defaults()
+rclpy = pytest.importorskip("rclpy")
+
+Start = Callable[..., "subprocess.Popen[str]"]
+
+
+@pytest.fixture
+def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    with ros_domain() as number:
+        yield number
+
+
+@pytest.fixture
+def start(domain: int) -> Iterator[Start]:
+    """Start nodes in a domain of their own; what still runs at the end is stopped."""
+    running: list[subprocess.Popen[str]] = []
+
+    def run(node: str, **parameters: object) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", MODULES[node]]
+        if parameters:
+            command.append("--ros-args")
+        for name, value in parameters.items():
+            command += ["-p", f"{name.replace('__', '.')}:={value}"]
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            env={**ros_environment(), "ROS_DOMAIN_ID": str(domain)},
+        )  # fmt: skip
+        running.append(process)
+        return process
+
+    yield run
+    for process in running:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+def _end(process: subprocess.Popen[str], number: int = signal.SIGINT) -> int:
+    process.send_signal(number)
+    process.communicate(timeout=30)
+    return process.returncode
+
+
+def test_start_up_in_any_order(start: Start, tmp_path: Path) -> None:
+    """Plant first and recorder last: nothing moves until all are there, nothing is lost."""
+    plant = start("plant", ticks=300, wait_for="[controller, recorder]")
+    time.sleep(2.0)
+    controller = start("controller", wait_for="[plant, recorder]")
+    time.sleep(1.0)
+    mission = start("mission")
+    recorder = start("recorder", bag=tmp_path / "bag")
+    output, _ = plant.communicate(timeout=90)
+    assert plant.returncode == 0, output
+    assert [_end(mission), _end(controller), _end(recorder)] == [0, 0, 0]
+    log = read_flight(tmp_path / "bag")
+    assert log.ticks == 300
+    assert not any(log.lost.values())
+
+
+def test_controller_can_be_replaced_in_flight(start: Start, tmp_path: Path) -> None:
+    """Lockstep holds the plant while no controller is there; the next one takes over."""
+    recorder = start("recorder", bag=tmp_path / "bag")
+    mission = start("mission")
+    plant = start("plant", ticks=3000, wait_for="[recorder]")
+    first = start("controller", wait_for="[recorder, plant]")
+    file = tmp_path / "bag" / "bag_0.mcap"
+    until = time.monotonic() + 60.0
+    while time.monotonic() < until and not (file.exists() and file.stat().st_size > 50_000):
+        time.sleep(0.02)
+    first.kill()
+    start("controller", law="ctc")
+    output, _ = plant.communicate(timeout=90)
+    assert plant.returncode == 0, output
+    assert [_end(mission), _end(recorder)] == [0, 0]
+    assert read_flight(tmp_path / "bag").ticks == 3000
+
+
+def test_law_and_gains_change_in_flight(start: Start, domain: int) -> None:
+    from rcl_interfaces.srv import SetParameters
+    from rclpy.parameter import Parameter
+
+    mission, controller, plant = start("mission"), start("controller"), start("plant")
+    context = rclpy.Context()
+    rclpy.init(args=[], context=context, domain_id=domain)
+    executor = rclpy.executors.SingleThreadedExecutor(context=context)
+    node = rclpy.create_node(f"test_{os.getpid()}", context=context)
+    executor.add_node(node)
+    try:
+        client = node.create_client(SetParameters, "/controller/set_parameters")
+        assert client.wait_for_service(30.0)
+
+        def change(name: str, value: object) -> tuple[bool, str]:
+            request = SetParameters.Request()
+            request.parameters = [Parameter(name, value=value).to_parameter_msg()]
+            future = client.call_async(request)
+            executor.spin_until_future_complete(future, 30.0)
+            result = future.result().results[0]
+            return result.successful, result.reason
+
+        assert change("law", "tde_tsmc") == (True, "")
+        assert change("tde_tsmc.k_1", [0.5]) == (True, "")
+        refused, reason = change("law", "pid")
+        assert not refused
+        assert "choose one of" in reason
+        refused, reason = change("tde_tsmc.h_bar", [-1.0])
+        assert not refused
+        assert "above 0" in reason
+        assert change("robot", "seven_joint")[0] is False  # read-only
+    finally:
+        node.destroy_node()
+        context.try_shutdown()
+    assert plant.poll() is None
+    assert [_end(plant), _end(controller), _end(mission)] == [0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("node", "parameters", "said"),
+    [
+        ("plant", {"command_latency_ticks": -1}, "greater than or equal to 0, got -1"),
+        ("plant", {"comand_latency_ticks": 1}, "unknown parameter 'comand_latency_ticks'"),
+        ("plant", {"case": 9}, "unknown case '9': choose one of 1, 2"),
+        ("controller", {"law": "pid"}, "unknown controller 'pid'"),
+        ("controller", {"tde_stc__k_1": "[1.0, 2.0]"}, "9 values (base x, y, z and the joints)"),
+        ("mission", {"waypoint_times": "[0.0]"}, "waypoints_deg has 18 values"),
+        ("recorder", {"bag": "/proc/no/bag"}, "no bag can be written there"),
+    ],
+)
+def test_node_refuses_bad_parameters(
+    start: Start, node: str, parameters: dict[str, object], said: str
+) -> None:
+    process = start(node, **parameters)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert said in output
+    assert "Traceback" not in output

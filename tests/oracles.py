@@ -1,0 +1,158 @@
+"""Independent programs to compare with: Pinocchio, MuJoCo, SciPy, and plain NumPy formulas."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+if TYPE_CHECKING:
+    from random_robots import State
+
+    from space_robot_sim.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+def skew(v: ArrayLike) -> Array:
+    """``skew(v) @ w = v x w``."""
+    x, y, z = np.asarray(v)
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def rotation_of(quaternion: ArrayLike) -> Rotation:
+    """SciPy's rotation of ``[w, x, y, z]``."""
+    return Rotation.from_quat(np.asarray(quaternion), scalar_first=True)
+
+
+def turned(quaternion: ArrayLike, angle_inertial: ArrayLike) -> Array:
+    """``quaternion`` turned by a rotation vector on inertial axes, on the same side."""
+    product = Rotation.from_rotvec(np.asarray(angle_inertial)) * rotation_of(quaternion)
+    result = product.as_quat(scalar_first=True)
+    return result if result @ np.asarray(quaternion) >= 0.0 else -result
+
+
+def attitude_jacobian_inertial(quaternion: ArrayLike) -> Array:
+    """``J0 = (eta E - skew(eps)) / 2``: epsdot from the angular velocity on inertial axes."""
+    q = np.asarray(quaternion)
+    return 0.5 * (q[0] * np.eye(3) - skew(q[1:]))
+
+
+def attitude_jacobian_base(quaternion: ArrayLike) -> Array:
+    """(1): ``J0 = (eta E + skew(eps)) / 2``, epsdot from the angular velocity in the base frame."""
+    return attitude_jacobian_inertial(quaternion).T
+
+
+def pinocchio_model(robot: Robot) -> pin.Model:
+    """The same robot in Pinocchio, without gravity: a free-flyer and n joints about z."""
+    model = pin.Model()
+    identity = pin.SE3.Identity()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), identity, "base")
+    model.appendBodyToJoint(
+        joint, pin.Inertia(robot.mass[0], np.zeros(3), robot.inertia[0]), identity
+    )
+    for i in range(robot.n):
+        twist = pin.SE3(Rotation.from_euler("x", robot.alpha[i]).as_matrix(), np.zeros(3))
+        placement = twist * pin.SE3(np.eye(3), np.array([robot.a[i], 0.0, robot.d[i]]))
+        joint = model.addJoint(joint, pin.JointModelRZ(), placement, f"joint{i + 1}")
+        inertia = pin.Inertia(robot.mass[i + 1], robot.com[i + 1], robot.inertia[i + 1])
+        model.appendBodyToJoint(joint, inertia, identity)
+    model.gravity = pin.Motion.Zero()
+    return model
+
+
+def pinocchio_state(state: State, position: ArrayLike = (0.0, 0.0, 0.0)) -> tuple[Array, Array]:
+    """Configuration and velocity as Pinocchio wants them: base twist in the base frame."""
+    q = state.quaternion
+    back = rotation_of(q).as_matrix().T
+    configuration = np.concatenate([np.asarray(position), q[1:], q[:1], state.theta])
+    return configuration, np.concatenate([back @ state.v0, back @ state.w0, state.rate])
+
+
+def to_base_axes(quaternion: ArrayLike, size: int) -> Array:
+    """blkdiag(R^T, R^T, E): base parts of a generalised vector from inertial to base axes."""
+    matrix = np.eye(size)
+    matrix[:3, :3] = matrix[3:6, 3:6] = rotation_of(quaternion).as_matrix().T
+    return matrix
+
+
+def pinocchio_mass_matrix(robot: Robot, state: State, position: ArrayLike = (0, 0, 0)) -> Array:
+    """H of (7) by composite rigid bodies."""
+    model = pinocchio_model(robot)
+    upper = np.triu(pin.crba(model, model.createData(), pinocchio_state(state, position)[0]))
+    to_base = to_base_axes(state.quaternion, robot.n + 6)
+    return to_base.T @ (upper + np.triu(upper, 1).T) @ to_base
+
+
+def pinocchio_bias_force(robot: Robot, state: State, position: ArrayLike = (0, 0, 0)) -> Array:
+    """c of (7) by recursive Newton-Euler, where the base CoM's acceleration is zero."""
+    model = pinocchio_model(robot)
+    configuration, velocity = pinocchio_state(state, position)
+    spatial = np.zeros(robot.n + 6)
+    spatial[:3] = -np.cross(velocity[3:6], velocity[:3])
+    force = pin.rnea(model, model.createData(), configuration, velocity, spatial)
+    return to_base_axes(state.quaternion, robot.n + 6).T @ force
+
+
+def pinocchio_forward_dynamics(robot: Robot, state: State, force: Array) -> Array:
+    """``[v0dot, w0dot, thetadd]`` on inertial axes by Pinocchio's articulated bodies."""
+    model = pinocchio_model(robot)
+    return pinocchio_acceleration(model, model.createData(), state, force)
+
+
+def pinocchio_acceleration(model: Any, data: Any, state: State, force: Array) -> Array:
+    """`pinocchio_forward_dynamics` with a model made before."""
+    configuration, velocity = pinocchio_state(state)
+    to_base = to_base_axes(state.quaternion, force.size)
+    spatial = pin.aba(model, data, configuration, velocity, to_base @ force).copy()
+    spatial[:3] += np.cross(velocity[3:6], velocity[:3])
+    return to_base.T @ spatial
+
+
+def mujoco_model(robot: Robot) -> mujoco.MjModel:
+    """The same robot in MuJoCo, without gravity: a free joint and n hinges about z."""
+
+    def numbers(values: Sequence[float] | Array) -> str:
+        return " ".join(repr(float(value)) for value in values)
+
+    def inertial(body: int) -> str:
+        tensor = robot.inertia[body]
+        full = [tensor[ij] for ij in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+        return (
+            f'<inertial pos="{numbers(robot.com[body])}" mass="{float(robot.mass[body])!r}" '
+            f'fullinertia="{numbers(full)}"/>'
+        )
+
+    text = f'<body name="base"><freejoint/>{inertial(0)}'
+    for i in range(robot.n):
+        twist = Rotation.from_euler("x", robot.alpha[i])
+        offset = np.array([robot.a[i], 0, 0]) + twist.apply([0, 0, robot.d[i]])
+        text += (
+            f'<body pos="{numbers(offset)}" quat="{numbers(twist.as_quat(scalar_first=True))}">'
+            f'<joint type="hinge" axis="0 0 1"/>{inertial(i + 1)}'
+        )
+    text += "</body>" * (robot.n + 1)
+    return mujoco.MjModel.from_xml_string(
+        f'<mujoco><option gravity="0 0 0"/><worldbody>{text}</worldbody></mujoco>'
+    )
+
+
+def mujoco_forward_dynamics(robot: Robot, state: State, force: Array) -> Array:
+    """``[v0dot, w0dot, thetadd]`` on inertial axes by MuJoCo."""
+    model = mujoco_model(robot)
+    data = mujoco.MjData(model)
+    rotation = rotation_of(state.quaternion).as_matrix()
+    data.qpos[3:7], data.qpos[7:] = state.quaternion, state.theta
+    data.qvel[:3], data.qvel[6:] = state.v0, state.rate
+    data.qvel[3:6] = rotation.T @ state.w0  # MuJoCo: base turn in the base frame, the rest inertial
+    data.qfrc_applied[:] = force
+    data.qfrc_applied[3:6] = rotation.T @ force[3:6]
+    mujoco.mj_forward(model, data)
+    acceleration = data.qacc.copy()
+    acceleration[3:6] = rotation @ acceleration[3:6]
+    return acceleration
