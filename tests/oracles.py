@@ -27,13 +27,19 @@ def skew(v: ArrayLike) -> Array:
 
 def rotation_of(quaternion: ArrayLike) -> Rotation:
     """SciPy's rotation of ``[w, x, y, z]``."""
-    return Rotation.from_quat(np.asarray(quaternion), scalar_first=True)
+    return Rotation.from_quat(np.roll(quaternion, -1))
+
+
+def quaternion_of(rotation: Rotation) -> Array:
+    """``[w, x, y, z]`` of SciPy's rotation."""
+    return np.roll(rotation.as_quat(), 1)
 
 
 def turned(quaternion: ArrayLike, angle_inertial: ArrayLike) -> Array:
     """``quaternion`` turned by a rotation vector on inertial axes, on the same side."""
-    product = Rotation.from_rotvec(np.asarray(angle_inertial)) * rotation_of(quaternion)
-    result = product.as_quat(scalar_first=True)
+    result = quaternion_of(
+        Rotation.from_rotvec(np.asarray(angle_inertial)) * rotation_of(quaternion)
+    )
     return result if result @ np.asarray(quaternion) >= 0.0 else -result
 
 
@@ -45,7 +51,7 @@ def attitude_jacobian_inertial(quaternion: ArrayLike) -> Array:
 
 def attitude_jacobian_base(quaternion: ArrayLike) -> Array:
     """(1): ``J0 = (eta E + skew(eps)) / 2``, epsdot from the angular velocity in the base frame."""
-    return attitude_jacobian_inertial(quaternion).T
+    return np.ascontiguousarray(attitude_jacobian_inertial(quaternion).T)
 
 
 def pinocchio_model(robot: Robot) -> pin.Model:
@@ -133,7 +139,7 @@ def mujoco_model(robot: Robot) -> mujoco.MjModel:
         twist = Rotation.from_euler("x", robot.alpha[i])
         offset = np.array([robot.a[i], 0, 0]) + twist.apply([0, 0, robot.d[i]])
         text += (
-            f'<body pos="{numbers(offset)}" quat="{numbers(twist.as_quat(scalar_first=True))}">'
+            f'<body pos="{numbers(offset)}" quat="{numbers(quaternion_of(twist))}">'
             f'<joint type="hinge" axis="0 0 1"/>{inertial(i + 1)}'
         )
     text += "</body>" * (robot.n + 1)

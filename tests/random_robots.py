@@ -38,7 +38,7 @@ def random_quaternion(rng: np.random.Generator) -> Array:
 def random_inertia(rng: np.random.Generator, scale: float) -> list[float]:
     """``[Ixx, Iyy, Izz, Ixy, Ixz, Iyz]`` of a solid body: second moments on turned axes."""
     second = rng.uniform(0.1, 1.0, 3) * scale
-    axes = Rotation.random(rng=rng).as_matrix()
+    axes = Rotation.from_quat(rng.normal(size=4)).as_matrix()
     tensor = axes @ np.diag(second.sum() - second) @ axes.T
     return [float(tensor[ij]) for ij in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
 

@@ -60,6 +60,7 @@ def power_above(values: Array, period: float, frequency: float = CHATTER_FREQUEN
     window = np.hanning(len(values))[:, np.newaxis]  # keeps slow motion from leaking upwards
     power = np.abs(np.fft.rfft(window * values, axis=0)) ** 2
     f = np.fft.rfftfreq(len(values), period)
+    power[(f > 0.0) & (f < 0.5 / period * (1.0 - 1e-12))] *= 2.0  # the negative frequencies' half
     total = np.sum(power, axis=0)
     high = np.sum(power[f > frequency], axis=0)
     return float(np.mean(np.divide(high, total, out=np.zeros_like(high), where=total > 0.0)))

@@ -9,7 +9,7 @@ from typing import Any
 import yaml
 from mcap.writer import CompressionType, Writer
 
-from ..definitions import jazzy
+from ..definitions import definition, jazzy
 from ..errors import InputError
 from ..topics import Topic
 
@@ -70,8 +70,8 @@ class BagWriter:
         self._start_ns, self._end_ns = 2**63 - 1, 0
 
     def _register(self, topic: Topic) -> int:
-        definition, _ = jazzy().generate_msgdef(topic.type, ros_version=2)
-        schema = self._writer.register_schema(topic.type, "ros2msg", definition.encode())
+        text = definition(topic.type).encode()
+        schema = self._writer.register_schema(topic.type, "ros2msg", text)
         return self._writer.register_channel(
             topic.name,
             "cdr",

@@ -27,9 +27,7 @@ class History:
 
     def __init__(self, axes: int, seed: int) -> None:
         rng = np.random.default_rng(seed)
-        self.e, self.edot, self.rhodd_d, self.n_hat, self.bias = rng.normal(
-            size=(5, TICKS, axes)
-        )
+        self.e, self.edot, self.rhodd_d, self.n_hat, self.bias = rng.normal(size=(5, TICKS, axes))
         # errors of all sizes, some of them zero: sign, root and boundary layer matter there
         self.e *= 10.0 ** rng.uniform(-6.0, 0.0, self.e.shape)
         self.edot *= 10.0 ** rng.uniform(-6.0, 0.0, self.edot.shape)

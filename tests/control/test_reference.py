@@ -120,9 +120,7 @@ def test_order_of_arrival_does_not_matter_within_the_ring(order: list[int], begi
     assert not buffer.covers(begin + CAPACITY)
 
 
-@given(
-    st.lists(st.tuples(st.integers(0, 5 * CAPACITY), st.integers(1, 2 * CAPACITY)), max_size=12)
-)
+@given(st.lists(st.tuples(st.integers(0, 5 * CAPACITY), st.integers(1, 2 * CAPACITY)), max_size=12))
 def test_what_is_covered_is_always_right_and_the_newest_always_covered(
     arrivals: list[tuple[int, int]],
 ) -> None:

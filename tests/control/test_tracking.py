@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from oracles import attitude_jacobian_base, rotation_of
+from oracles import attitude_jacobian_base, quaternion_of, rotation_of
 from random_robots import random_quaternion
 from scipy.spatial.transform import Rotation
 
@@ -41,7 +41,7 @@ def errors_of(quaternion: Array, theta: Array, rate: Array, joints: Array, base:
 def epsilon_along(base: Array, time: float) -> Array:
     """Vector part of the desired quaternion a little later, by SciPy's rotations."""
     angle = base[4:7] * time + base[7:] * (0.5 * time * time)  # on base axes
-    later = (rotation_of(base[:4]) * Rotation.from_rotvec(angle)).as_quat(scalar_first=True)
+    later = quaternion_of(rotation_of(base[:4]) * Rotation.from_rotvec(angle))
     return later[1:] if later @ base[:4] > 0.0 else -later[1:]
 
 

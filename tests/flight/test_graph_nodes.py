@@ -98,12 +98,13 @@ def test_controller_can_be_replaced_in_flight(start: Start, tmp_path: Path) -> N
 
 def test_law_and_gains_change_in_flight(start: Start, domain: int) -> None:
     from rcl_interfaces.srv import SetParameters
+    from rclpy.executors import SingleThreadedExecutor
     from rclpy.parameter import Parameter
 
     mission, controller, plant = start("mission"), start("controller"), start("plant")
     context = rclpy.Context()
     rclpy.init(args=[], context=context, domain_id=domain)
-    executor = rclpy.executors.SingleThreadedExecutor(context=context)
+    executor = SingleThreadedExecutor(context=context)
     node = rclpy.create_node(f"test_{os.getpid()}", context=context)
     executor.add_node(node)
     try:

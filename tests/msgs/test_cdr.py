@@ -19,9 +19,7 @@ names = st.lists(st.text(st.characters(codec="utf-8", exclude_characters="\0")),
 stamps = st.integers(-(2**31) * 10**9, (2**31 - 1) * 10**9)
 
 
-def joint_state(
-    frame: str, joints: list[str], count: int
-) -> tuple[FixedMessage, Slot, list[Slot]]:
+def joint_state(frame: str, joints: list[str], count: int) -> tuple[FixedMessage, Slot, list[Slot]]:
     """A JointState laid out by hand: stamp, then position, velocity, effort."""
     builder = CdrBuilder()
     stamp = builder.header_slot(frame)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from random_samples import TIMEBASE, joint_names
 from rosbags.typesys import Stores, get_typestore
 
 from space_robot_msgs_py import topics
@@ -19,12 +20,7 @@ from space_robot_msgs_py.samples import ReferenceChunk, Timebase
 Array = NDArray[np.float64]
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
-TIMEBASE = Timebase(500_000)
 JOINTS, BASE = topics.REFERENCE_JOINTS.type, topics.REFERENCE_BASE.type
-
-
-def joint_names(n: int) -> list[str]:
-    return [f"j{'x' * (i * n % 5)}{i}" for i in range(n)]
 
 
 def random_chunk(n: int, length: int, seed: int = 0, start: int = 100) -> ReferenceChunk:
@@ -226,10 +222,10 @@ def test_a_start_between_ticks_is_an_error() -> None:
 def test_incomplete_trajectories_are_message_errors(fault: str) -> None:
     """As for a JointState that lacks an array."""
     names, chunk = ["a", "b"], random_chunk(2, 3)
-    codec = ReferenceCodec(names, TIMEBASE)
+    codec, ragged = ReferenceCodec(names, TIMEBASE), [[np.ones(2), np.ones(0), np.ones(2)]]
     decode, data = {
         "no points": (codec.decode_joints, Foreign.joints(names, chunk.joints[:0])),
-        "ragged": (codec.decode_joints, Foreign.joints(names, [[np.ones(2), np.ones(0), np.ones(2)]])),
+        "ragged": (codec.decode_joints, Foreign.joints(names, ragged)),
         "no base points": (codec.decode_base, Foreign.base(chunk.base[:0])),
         "no accelerations": (codec.decode_base, Foreign.base(chunk.base, accelerations=False)),
     }[fault]

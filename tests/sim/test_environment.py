@@ -40,9 +40,7 @@ def equation_61(n: int, k: float, t: float) -> Array:
     return np.array([*[base] * 3, *[inner] * 3, *[outer] * 6][: n + 3])
 
 
-@given(
-    st.integers(1, 9), st.sampled_from([0.0, 1.0, 2.0, 3.0]), st.floats(0.0, 30.0, width=32)
-)
+@given(st.integers(1, 9), st.sampled_from([0.0, 1.0, 2.0, 3.0]), st.floats(0.0, 30.0, width=32))
 def test_disturbance_is_equation_61(n: int, scale: float, time: float) -> None:
     """At any time, for all cases' amplitudes and any number of joints."""
     np.testing.assert_allclose(

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from numpy.typing import NDArray
-from oracles import pinocchio_bias_force, pinocchio_mass_matrix, rotation_of, to_base_axes, turned
+from oracles import (
+    pinocchio_bias_force,
+    pinocchio_mass_matrix,
+    quaternion_of,
+    rotation_of,
+    to_base_axes,
+    turned,
+)
 from random_robots import Case, State, cases, random_quaternion, random_state
 
 from space_robot_sim import Robot, bias_force, forward_dynamics, mass_matrix
@@ -158,9 +165,9 @@ def test_turning_the_whole_robot_turns_the_base_blocks_only(case: Case) -> None:
     """Attitude p*q and R(p) w0: H and c turn their base parts by R(p), joint parts stay."""
     robot, s, rng = case
     turn = rotation_of(random_quaternion(rng))
-    quaternion = (turn * rotation_of(s.quaternion)).as_quat(scalar_first=True)
+    quaternion = quaternion_of(turn * rotation_of(s.quaternion))
     moved = s._replace(quaternion=quaternion, w0=turn.apply(s.w0))
-    spread = to_base_axes(turn.as_quat(scalar_first=True), robot.n + 6).T
+    spread = to_base_axes(quaternion_of(turn), robot.n + 6).T
     assert_relative(inertia_of(robot, moved), spread @ inertia_of(robot, s) @ spread.T, 1e-13)
     assert_relative(bias_of(robot, moved), spread @ bias_of(robot, s), 1e-12)
 

@@ -251,9 +251,7 @@ def test_payload_slows_the_wrist_down(paper_robot: Robot) -> None:
 @pytest.mark.parametrize(
     ("torque", "why"), [(np.nan, "not finite"), (1e300, "finite|rad/s"), (1e9, "rad/s")]
 )
-def test_divergence_is_an_error_with_its_tick(
-    paper_robot: Robot, torque: float, why: str
-) -> None:
+def test_divergence_is_an_error_with_its_tick(paper_robot: Robot, torque: float, why: str) -> None:
     plant = plant_of(paper_robot)
     fly(plant, np.zeros((7, 9)))
     with pytest.raises(DivergedError, match=why) as caught:

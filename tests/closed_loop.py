@@ -1,0 +1,75 @@
+"""Plant, controller and mission in one process, with the gains of Table IV."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_control.controller import Controller
+from space_robot_control.laws import ControlLaw, find_law
+from space_robot_control.mission import Mission, MissionSettings
+from space_robot_control.reference import ReferenceBuffer
+from space_robot_sim import Robot
+from space_robot_sim.plant import Plant, PlantSettings
+
+Array = NDArray[np.float64]
+
+PERIOD = 5e-4
+PAPER_DEG = [[0, 120, 220, 0, -10, 0], [15, 110, 185, 45, 10, -25], [30, 100, 150, 90, 30, -50]]
+
+H_BAR = [50.0] * 3 + [5.0] * 3 + [0.5] * 3
+GAINS: dict[str, dict[str, list[float]]] = {
+    "ctc": {"k_p": [1e4] * 9, "k_d": [200.0] * 9},  # 100 rad/s, critically damped
+    # Table IV
+    "tde_smc": {"h_bar": H_BAR, "lambda": [1.0] * 9, "g": [0.1] * 6 + [0.01] * 3},
+    "tde_tsmc": {
+        "h_bar": H_BAR, "k_p": [10.0] * 3 + [8.0] * 3 + [2.0] * 3, "k_d": [2.0] * 6 + [0.5] * 3,
+        "k_1": [2.0] * 9,
+    },
+    "tde_stc": {
+        "h_bar": H_BAR, "lambda": [1.0] * 9, "k_1": [0.02] * 3 + [0.2] * 3 + [0.4, 0.2, 0.2],
+        "k_2": [8e-5] * 3 + [3e-3] * 3 + [4e-3, 2e-3, 2e-3],
+    },
+}  # fmt: skip
+
+
+def law_of(name: str) -> ControlLaw:
+    return find_law(name)({key: np.array(v) for key, v in GAINS[name].items()}, PERIOD)
+
+
+class Loop:
+    """Plant, controller and mission in one process; a test may bend what passes between them."""
+
+    def __init__(self, robot: Robot, law: ControlLaw, degrees: Any = None, **plant: Any) -> None:
+        waypoints = PAPER_DEG if degrees is None else degrees
+        flat = np.asarray(waypoints, dtype=float).ravel().tolist()
+        plant = {"initial_joints_deg": flat[: robot.n], **plant}
+        mission = MissionSettings(waypoint_times=[0.0, 15.0, 30.0], waypoints_deg=flat)
+        self.plant = Plant(robot, PlantSettings(**plant), PERIOD)
+        self.controller = Controller(robot, law, PERIOD)
+        self.mission = Mission(robot.n, mission, PERIOD)
+        self.references = ReferenceBuffer(robot.n)
+        self.own_output_as_applied = False
+        self.flipped = False
+        self._last = np.zeros(robot.n + 3)
+
+    def fly(self, ticks: int) -> tuple[Array, Array]:
+        """Errors and torques, (ticks, m) each."""
+        errors, torques = [], []
+        for _ in range(ticks):
+            tick, state = self.plant.tick, self.plant.state
+            if not self.references.covers(tick):
+                self.references.add(self.mission.chunk(tick, 100))
+            if self.own_output_as_applied:
+                state.applied_torque[:] = self._last
+            if self.flipped:
+                state.quaternion *= -1.0
+            command = self.controller.update(state, *self.references.at(tick))
+            assert command.tick == tick
+            self._last[:] = command.torque
+            errors.append(self.controller.signals.error.copy())
+            torques.append(command.torque.copy())
+            self.plant.step(command)
+        return np.array(errors), np.array(torques)
