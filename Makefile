@@ -3,7 +3,7 @@
 PYTHON ?= python3
 VENV := .venv
 PACKAGES := space_robot_control space_robot_msgs_py space_robot_sim
-PIP_INSTALL := $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check
+PIP_INSTALL := $(VENV)/bin/python -m pip install -qq --disable-pip-version-check
 
 # A ROS sourced in this terminal must not mix with the one in .venv.
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH PYTHONHOME PYTHONPATH
@@ -60,4 +60,5 @@ $(VENV)/.made:
 	  { echo "error: $(PYTHON) cannot make virtual environments:" \
 	    "sudo apt install python3-venv" >&2; exit 1; }
 	@$(PYTHON) -m venv --clear $(VENV)
+	@$(PIP_INSTALL) --upgrade pip  # 23.0 needs minutes to resolve [ros,test]
 	@touch $@

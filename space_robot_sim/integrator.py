@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .attitude import quaternion_rate, rotate, rotation_matrix
+from .attitude import quaternion_rate, rotate, rotate_back, rotation_matrix
 from .compiled import kernel
 from .dynamics import Data, Model, allocate, forward_dynamics_into
 from .environment import Environment, disturbance_torque, friction_torque
@@ -84,3 +84,36 @@ def rk4_step(
     norm = np.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5] + x[6] * x[6])
     for i in range(3, 7):
         x[i] /= norm
+
+
+@kernel
+def measure(
+    x: Array, rotation: Array, position: Array, quaternion: Array, velocity: Array,
+    omega_base: Array, theta: Array, theta_rate: Array,
+) -> float:  # fmt: skip
+    """Write what the sensors see of ``x``; returns the fastest rate, rad/s (NaN if any is).
+
+    ``rotation`` (3, 3) is scratch.
+    """
+    n = theta.size
+    position[:] = x[:3]
+    quaternion[:] = x[3:7]
+    theta[:] = x[7 : 7 + n]
+    velocity[:] = x[7 + n : 10 + n]
+    rotation_matrix(quaternion, rotation)
+    rotate_back(rotation, x[10 + n : 13 + n], omega_base)
+    theta_rate[:] = x[13 + n :]
+    fastest = 0.0
+    for i in range(10 + n, x.size):
+        if not abs(x[i]) <= fastest:  # also true of NaN
+            fastest = abs(x[i])
+            if np.isnan(fastest):
+                break
+    return fastest
+
+
+@kernel
+def saturate(torque: Array, limit: Array, out: Array) -> None:
+    """``out = torque`` within ``+-limit``."""
+    for i in range(out.size):
+        out[i] = min(max(torque[i], -limit[i]), limit[i])

@@ -13,7 +13,6 @@ from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_msgs_py.validation import Strict
 
-from .attitude import rotate_back, rotation_matrix
 from .environment import (
     DisturbanceSettings,
     Environment,
@@ -21,7 +20,7 @@ from .environment import (
     PayloadSettings,
     with_payload,
 )
-from .integrator import Stages, rk4_step
+from .integrator import Stages, measure, rk4_step, saturate
 from .robot import Robot
 
 Array = NDArray[np.float64]
@@ -106,7 +105,7 @@ class Plant:
             due = self._late.popleft()
         else:
             due = command.torque
-        np.clip(due, -self._limit, self._limit, out=applied)
+        saturate(due, self._limit, applied)
         tick = self.state.tick
         rk4_step(
             self.robot.model, self.environment, self._x, applied, tick * self.period, self.period,
@@ -114,20 +113,13 @@ class Plant:
         )  # fmt: skip
         self.state.tick = tick + 1
         self._measure()
-        self._check()
 
     def _measure(self) -> None:
-        x, n, state = self._x, self.robot.n, self.state
-        state.base_position[:] = x[:3]
-        state.quaternion[:] = x[3:7]
-        state.joint_positions[:] = x[7 : 7 + n]
-        state.base_velocity[:] = x[7 + n : 10 + n]
-        rotation_matrix(state.quaternion, self._rotation)
-        rotate_back(self._rotation, x[10 + n : 13 + n], state.omega_base)
-        state.joint_velocities[:] = x[13 + n :]
-
-    def _check(self) -> None:
-        fastest = float(np.abs(self._x[10 + self.robot.n :]).max())
+        state = self.state
+        fastest = measure(
+            self._x, self._rotation, state.base_position, state.quaternion, state.base_velocity,
+            state.omega_base, state.joint_positions, state.joint_velocities,
+        )  # fmt: skip
         if not fastest <= RATE_LIMIT:
             why = "the state is not finite" if np.isnan(fastest) else f"{fastest:.3g} rad/s"
-            raise DivergedError(self.state.tick, self.period, why)
+            raise DivergedError(state.tick, self.period, why)

@@ -21,11 +21,17 @@ def ros_environment() -> dict[str, str]:
     return environment
 
 
-def space_robot(*arguments: str, timeout: float = 150.0) -> subprocess.CompletedProcess[str]:
+def space_robot(
+    *arguments: str, timeout: float = 150.0, python_path: Path | None = None
+) -> subprocess.CompletedProcess[str]:
     """Run ``space-robot`` as a user would."""
+    environment = ros_environment()
+    if python_path:
+        paths = [str(python_path), environment.get("PYTHONPATH", "")]
+        environment["PYTHONPATH"] = os.pathsep.join(path for path in paths if path)
     return subprocess.run(
         [*COMMAND, *arguments], capture_output=True, text=True, timeout=timeout, check=False,
-        env=ros_environment(),
+        env=environment,
     )  # fmt: skip
 
 
