@@ -31,7 +31,7 @@ setup(
         "pydantic>=2.5",
         "pyyaml>=6",
         "rich>=13",
-        "rosbags>=0.10",
+        "rosbags>=0.11",
         "scipy>=1.11.4",
         "typing_extensions>=4.8",
     ],
