@@ -29,6 +29,7 @@ class Controller:
         self._model = robot.model
         self._estimator = TimeDelayEstimator(axes, period)
         self._nominal = RhoSpaceModel.allocate(robot.n)
+        self._quaternion = np.zeros(4)
         self._rate = np.zeros(axes)
         self._jacobian = np.zeros((3, 3))
         self._last_jacobian_inverse = 2.0 * np.eye(3)
@@ -70,19 +71,25 @@ class Controller:
         Raises:
             SingularAttitudeError: the base has turned by 180 degrees.
         """
-        eta = float(state.quaternion[0])
+        quaternion = self._quaternion
+        if float(state.quaternion @ quaternion) < 0.0:
+            # the same attitude from the other side: rho and its rates must not jump
+            np.negative(state.quaternion, out=quaternion)
+        else:
+            quaternion[:] = state.quaternion
+        eta = float(quaternion[0])
         if not abs(eta) > SINGULAR_ETA:
             raise SingularAttitudeError(state.tick, eta)
         measured_rate(
-            state.quaternion, state.omega_base, state.joint_velocities, self._jacobian, self._rate
+            quaternion, state.omega_base, state.joint_velocities, self._jacobian, self._rate
         )
         # the applied torque acted from the last tick on, so that tick's J0 turns it into F_S
         force_from_torque(self._last_jacobian_inverse, state.applied_torque, self._applied_force)
-        attitude_jacobian_inverse(state.quaternion, self._last_jacobian_inverse)
+        attitude_jacobian_inverse(quaternion, self._last_jacobian_inverse)
         self._estimator.observe(state.tick, self._applied_force, self._rate)
         signals, law = self.signals, self._law
         tracking_errors(
-            state.quaternion, state.joint_positions, self._rate, joints, base,
+            quaternion, state.joint_positions, self._rate, joints, base,
             self._desired_jacobian, signals.error, signals.error_rate,
             signals.acceleration_desired,
         )  # fmt: skip
@@ -90,7 +97,7 @@ class Controller:
             signals.n_hat = self._estimator.estimate(law.gains["h_bar"])
         if law.uses_model:
             rho_space_into(
-                self._model, state.quaternion, state.joint_positions, state.omega_base,
+                self._model, quaternion, state.joint_positions, state.omega_base,
                 state.joint_velocities, self._nominal,
             )  # fmt: skip
         command = self._command

@@ -9,6 +9,9 @@ from space_robot_msgs_py.samples import ReferenceChunk
 
 Array = NDArray[np.float64]
 
+EMPTY = np.iinfo(np.int64).min
+"""Tick of a row that holds nothing; older than any."""
+
 
 class ReferenceBuffer:
     """A ring of reference rows by tick; the joints' and the base's part may come apart.
@@ -19,8 +22,8 @@ class ReferenceBuffer:
     def __init__(self, n: int, capacity: int = 16_384) -> None:
         self._joints = np.zeros((capacity, 3, n))
         self._base = np.zeros((capacity, 10))
-        self._joint_tick = np.full(capacity, -1, dtype=np.int64)
-        self._base_tick = np.full(capacity, -1, dtype=np.int64)
+        self._joint_tick = np.full(capacity, EMPTY, dtype=np.int64)
+        self._base_tick = np.full(capacity, EMPTY, dtype=np.int64)
 
     def add(self, chunk: ReferenceChunk) -> None:
         """Take both parts of a chunk."""

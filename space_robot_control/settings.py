@@ -33,7 +33,7 @@ DEFAULT_SETS = "default_sets.yaml"
 class ControllerNodeSettings(NodeSettings):
     """Parameters of controller_node; the gains stand beside them as ``<law>.<gain>``."""
 
-    node: ClassVar = "controller"
+    node: ClassVar[str] = "controller"
 
     law: str = Field("tde_stc", description="control law in force, or module:Class of your own")
     gains: str = Field(
@@ -50,8 +50,8 @@ class ControllerNodeSettings(NodeSettings):
 class MissionNodeSettings(MissionSettings, NodeSettings):
     """Parameters of mission_node."""
 
-    node: ClassVar = "mission"
-    selectors: ClassVar = ("robot", "mission")
+    node: ClassVar[str] = "mission"
+    selectors: ClassVar[tuple[str, ...]] = ("robot", "mission")
 
     mission: str = Field(
         "", description="a mission of config/missions (empty: the robot's), or a path"

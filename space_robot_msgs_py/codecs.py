@@ -143,6 +143,7 @@ class StateCodec:
             stamp_ns = self._base.stamp_ns(self._stamp)
         else:
             message = decode(data, topics.BASE_STATE.type)
+            name_order(message.joint_names, [topics.BASE_FRAME], topics.BASE_STATE.name)
             if not (len(message.transforms) == len(message.twist) == len(message.wrench) == 1):
                 raise MessageError(
                     f"{topics.BASE_STATE.name}: one transform, twist, wrench expected"

@@ -8,8 +8,9 @@ The nodes and the in-process flight resolve them here, so both fly the same numb
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from inspect import isclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, get_origin
 
 from pydantic import BaseModel, Field
 from typing_extensions import Self
@@ -152,7 +153,7 @@ def leaves(schema: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, Any
     """Dotted name and pydantic field of every setting of a schema."""
     for name, field in schema.model_fields.items():
         inner = field.annotation
-        if isinstance(inner, type) and issubclass(inner, BaseModel):
+        if get_origin(inner) is None and isclass(inner) and issubclass(inner, BaseModel):
             yield from leaves(inner, f"{prefix}{name}.")
         else:
             yield prefix + name, field

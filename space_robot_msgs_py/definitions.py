@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import struct
 import sys
 from functools import cache
 from pathlib import Path
@@ -11,6 +12,8 @@ from typing import Any
 
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
+
+from .errors import MessageError
 
 _FIELD = re.compile(r"^([A-Za-z]\w*(?:/[A-Z]\w*)?)(?:\[.*?\])?\s+[a-z]\w*", re.MULTILINE)
 
@@ -22,8 +25,20 @@ def jazzy() -> Typestore:
 
 
 def decode(data: bytes, type_name: str) -> Any:
-    """Any message of Jazzy from its CDR bytes (slow; the codecs are the fast way)."""
-    return jazzy().deserialize_cdr(data, type_name)
+    """Any message of Jazzy from its CDR bytes (slow; the codecs are the fast way).
+
+    Bytes behind the message are let pass: rclpy's own serializer leaves some.
+
+    Raises:
+        MessageError: the bytes are no message of this type.
+    """
+    definition = jazzy().get_msgdef(type_name)
+    parse = {b"\0\1": definition.deserialize_cdr_le, b"\0\0": definition.deserialize_cdr_be}
+    try:
+        message, _ = parse[data[:2]](data[4:], 0, definition.cls, jazzy())
+    except (KeyError, struct.error, IndexError, ValueError) as error:
+        raise MessageError(f"not a {type_name}: {error}") from None
+    return message
 
 
 @cache

@@ -24,7 +24,7 @@ QUEUE_DEPTH = 20_000
 class RecorderNodeSettings(NodeSettings):
     """Parameters of recorder_node."""
 
-    node: ClassVar = "recorder"
+    node: ClassVar[str] = "recorder"
 
     bag: str = Field(
         "", description="folder of the bag to write; it must not exist (empty: bag_<time>)"

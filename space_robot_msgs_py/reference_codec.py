@@ -122,9 +122,13 @@ class ReferenceCodec:
         message = decode(data, topic.type)
         order = name_order(message.joint_names, self._names, topic.name)
         self._check_spacing(message.points, topic.name)
-        self._lay_out_joints(len(message.points))
         rows = [(p.positions, p.velocities, p.accelerations) for p in message.points]
-        values = np.array(rows, dtype=np.float64).reshape(len(rows), 3, len(order))
+        if any(len(column) != len(order) for row in rows for column in row):
+            raise MessageError(
+                f"{topic.name}: a point lacks positions, velocities or accelerations of some joint"
+            )
+        values = np.array(rows, dtype=np.float64)
+        self._lay_out_joints(len(rows))
         return self._timebase.tick(stamp_of(message)), values[:, :, order]
 
     def decode_base(self, data: bytes) -> tuple[int, Array]:
@@ -139,17 +143,24 @@ class ReferenceCodec:
             rows = np.hstack([pose[:, 6:], pose[:, 3:6], velocity[:, 3:], acceleration[:, 3:]])
             return self._timebase.tick(stamp_ns), rows
         message = decode(data, topics.REFERENCE_BASE.type)
+        name_order(message.joint_names, [topics.BASE_FRAME], topics.REFERENCE_BASE.name)
         self._check_spacing(message.points, topics.REFERENCE_BASE.name)
-        self._lay_out_base(len(message.points))
         values = np.empty((len(message.points), 10))
         for row, point in zip(values, message.points, strict=True):
+            if not (point.transforms and point.velocities and point.accelerations):
+                raise MessageError(
+                    f"{topics.REFERENCE_BASE.name}: a point lacks pose, velocity or acceleration"
+                )
             rotation = point.transforms[0].rotation
             row[0], row[1:4] = rotation.w, xyz(rotation)
             row[4:7] = xyz(point.velocities[0].angular)
             row[7:10] = xyz(point.accelerations[0].angular)
+        self._lay_out_base(len(values))
         return self._timebase.tick(stamp_of(message)), values
 
     def _check_spacing(self, points: Sequence[Any], topic: str) -> None:
+        if not points:
+            raise MessageError(f"{topic}: a trajectory without points")
         for i, point in enumerate(points):
             after = point.time_from_start
             if after.sec * 1_000_000_000 + after.nanosec != self._timebase.stamp_ns(i):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -20,6 +20,22 @@ class Strict(BaseModel):
     )
 
 
+class _UniqueKeyLoader(yaml.SafeLoader):
+    """Takes a key that occurs twice for the mistake it is."""
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        seen = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if key in seen:
+                raise yaml.constructor.ConstructorError(
+                    problem=f"the key {key!r} occurs twice", problem_mark=key_node.start_mark
+                )
+            seen.add(key)
+        mapping: dict[Any, Any] = super().construct_mapping(node, deep)
+        return mapping
+
+
 Schema = TypeVar("Schema", bound=BaseModel)
 
 
@@ -30,7 +46,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
         InputError: the file is missing, unreadable, not YAML, or not a mapping.
     """
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        content = yaml.load(path.read_text(encoding="utf-8"), Loader=_UniqueKeyLoader)
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
     except (OSError, UnicodeDecodeError) as error:
@@ -53,17 +69,33 @@ def check(schema: type[Schema], content: Any, where: str) -> Schema:
     try:
         return schema.model_validate(content)
     except ValidationError as error:
-        raise InputError(_one_line(error, where)) from None
+        raise InputError(_one_line(error, schema, where)) from None
 
 
-def _one_line(error: ValidationError, where: str) -> str:
-    faults = error.errors(include_url=False)
+def _one_line(error: ValidationError, schema: type[BaseModel], where: str) -> str:
+    # a misspelt key shows as one missing and one unknown: the unknown one is the cause
+    faults = sorted(
+        error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden"
+    )
     first = faults[0]
     key = ".".join(str(part) for part in first["loc"])
     given = "" if first["type"] == "missing" else f", got {_short(first['input'])}"
     text = first["msg"].removeprefix("Value error, ")
+    if first["type"] == "extra_forbidden":
+        allowed = _allowed_keys(schema, first["loc"][:-1])
+        text, given = f"unknown key{given}: choose one of {', '.join(allowed)}", ""
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return f"{where}: {key + ': ' if key else ''}{text}{given}{more}"
+
+
+def _allowed_keys(schema: Any, location: tuple[int | str, ...]) -> list[str]:
+    """Names of the fields of the model that stands at a location within ``schema``."""
+    for step in location:
+        if isinstance(step, str):
+            schema = schema.model_fields[step].annotation
+        while not hasattr(schema, "model_fields"):  # Annotated, list
+            schema = get_args(schema)[0]
+    return sorted(schema.model_fields)
 
 
 def _short(value: Any) -> str:

@@ -83,7 +83,9 @@ class Plant:
         self._x[7 : 7 + n] = np.radians(settings.initial_joints_deg)
         self._stages = Stages.allocate(n)
         self._rotation = np.zeros((3, 3))
-        self._late = deque(np.zeros(n + 3) for _ in range(settings.command_latency_ticks))
+        self._late: deque[Array] = deque(
+            np.zeros(n + 3) for _ in range(settings.command_latency_ticks)
+        )
         self._limit = np.full(n + 3, settings.joint_torque_limit or np.inf)
         self._limit[:3] = settings.base_torque_limit or np.inf
         self._measure()

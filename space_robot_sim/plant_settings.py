@@ -16,8 +16,8 @@ from .plant import PlantSettings
 class PlantNodeSettings(PlantSettings, NodeSettings):
     """Parameters of plant_node."""
 
-    node: ClassVar = "plant"
-    selectors: ClassVar = ("robot", "mission", "case")
+    node: ClassVar[str] = "plant"
+    selectors: ClassVar[tuple[str, ...]] = ("robot", "mission", "case")
 
     mission: str = Field(
         "", description="a mission of config/missions (empty: the robot's), or a path"

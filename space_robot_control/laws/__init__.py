@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 from functools import cache
+from inspect import isabstract, isclass
 
 from space_robot_msgs_py.errors import InputError
 
@@ -24,11 +25,7 @@ def laws() -> dict[str, type[ControlLaw]]:
     found: dict[str, type[ControlLaw]] = {}
     for module in pkgutil.iter_modules(__path__):
         for value in vars(importlib.import_module(f"{__name__}.{module.name}")).values():
-            if (
-                isinstance(value, type)
-                and issubclass(value, ControlLaw)
-                and value is not ControlLaw
-            ):
+            if _is_law(value):
                 found[value.name] = value
     return found
 
@@ -47,8 +44,13 @@ def find_law(name: str) -> type[ControlLaw]:
         raise InputError(f"unknown controller {name!r}: {allowed}")
     try:
         law = getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
+    except (ImportError, AttributeError, ValueError) as error:
         raise InputError(f"controller {name!r} cannot be imported ({error}): {allowed}") from None
-    if not (isinstance(law, type) and issubclass(law, ControlLaw)):
+    if not _is_law(law):
         raise InputError(f"controller {name!r} is not a ControlLaw: {allowed}")
-    return law
+    found: type[ControlLaw] = law
+    return found
+
+
+def _is_law(value: object) -> bool:
+    return isclass(value) and issubclass(value, ControlLaw) and not isabstract(value)

@@ -18,7 +18,7 @@ class ComputedTorque(ControlLaw):
     """``F_S = H_S u_PD + c_S``, ``u_PD = rhodd_d + K_D edot + K_P e``."""
 
     name = "ctc"
-    gain_descriptions: ClassVar = {
+    gain_descriptions: ClassVar[dict[str, str]] = {
         "k_p": "K_P of (31), 1/s2",
         "k_d": "K_D of (31), 1/s",
     }

@@ -19,7 +19,7 @@ class ComputedTorqueSlidingMode(ControlLaw):
     """``F_S = H_S (rhodd_d + lambda edot) + c_S + g sat(s, Delta)``, ``s = edot + lambda e``."""
 
     name = "ctc_smc"
-    gain_descriptions: ClassVar = {
+    gain_descriptions: ClassVar[dict[str, str]] = {
         "lambda": "slope of the sliding surface (38), 1/s",
         "g": "switching gain of (57), N m",
         "delta": "half-width Delta of the boundary layer (58), rad/s",

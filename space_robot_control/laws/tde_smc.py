@@ -18,7 +18,7 @@ class TimeDelaySlidingMode(ControlLaw):
     """``F_S = Hbar (rhodd_d + lambda edot) + N_hat + g sign(s)``, ``s = edot + lambda e``."""
 
     name = "tde_smc"
-    gain_descriptions: ClassVar = {
+    gain_descriptions: ClassVar[dict[str, str]] = {
         "h_bar": "constant inertia Hbar of (33), kg m2",
         "lambda": "slope of the sliding surface (38), 1/s",
         "g": "switching gain of (59), N m",

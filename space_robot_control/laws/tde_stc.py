@@ -21,7 +21,7 @@ class TimeDelaySuperTwisting(ControlLaw):
     """
 
     name = "tde_stc"
-    gain_descriptions: ClassVar = {
+    gain_descriptions: ClassVar[dict[str, str]] = {
         "h_bar": "constant inertia Hbar of (33), kg m2",
         "lambda": "slope of the sliding surface (38), 1/s",
         "k_1": "K_1 of (40)",

@@ -21,7 +21,7 @@ class TimeDelayTerminalSlidingMode(ControlLaw):
     """
 
     name = "tde_tsmc"
-    gain_descriptions: ClassVar = {
+    gain_descriptions: ClassVar[dict[str, str]] = {
         "h_bar": "constant inertia Hbar of (33), kg m2",
         "k_p": "K_P of (31), 1/s2",
         "k_d": "K_D of (31), 1/s",

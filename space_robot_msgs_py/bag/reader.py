@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Reader, ReaderError
 
@@ -103,8 +104,8 @@ def _fill(reader: Reader, connections: list[Connection], log: FlightLog) -> dict
     return coverages
 
 
-def _complete_rows(log: FlightLog) -> np.ndarray:
+def _complete_rows(log: FlightLog) -> NDArray[np.bool_]:
     columns = (log.joint_positions, log.quaternion, log.reference_joints, log.reference_base)
     rows = [np.isfinite(column.reshape(log.ticks, -1)).all(axis=1) for column in columns]
-    complete: np.ndarray = np.logical_and.reduce(rows)
+    complete: NDArray[np.bool_] = np.logical_and.reduce(rows)
     return complete

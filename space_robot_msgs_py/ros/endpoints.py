@@ -84,14 +84,9 @@ class Out:
 class In:
     """A subscription whose messages the loop takes itself, serialized."""
 
-    def __init__(
-        self, node: Node, topic: Topic, group: TakenByLoop, depth: int = 0, prompt: bool = False
-    ) -> None:
-        """``prompt``: best effort, twice as fast; its owner must notice a loss and ask again."""
+    def __init__(self, node: Node, topic: Topic, group: TakenByLoop, depth: int = 0) -> None:
         self.topic = topic
         profile = qos(topic)
-        if prompt:
-            profile.reliability = ReliabilityPolicy.BEST_EFFORT
         profile.depth = depth or topic.depth
         self._subscription = node.create_subscription(
             message_type(topic.type), topic.name, lambda message: None, profile,

@@ -94,7 +94,6 @@ def test_both_signs_of_the_measurement_give_the_same_torque(paper_robot: Robot, 
     np.testing.assert_array_equal(errors_other * np.array([-1.0] * 3 + [1.0] * 6), errors)
 
 
-@pytest.mark.xfail(strict=True, reason="rhodot's difference and psi span the change of sign")
 def test_measurement_that_changes_sign_in_flight_gives_no_jolt(paper_robot: Robot) -> None:
     """q and -q are one attitude, so a sensor may pass from one to the other at any tick."""
     loop = Loop(paper_robot, law_of("tde_stc"), initial_quaternion=[0.9999, 0.005, 0.01, -0.005])

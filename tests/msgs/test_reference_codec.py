@@ -164,9 +164,6 @@ def test_foreign_trajectories_are_read_by_name_and_with_fields_not_used() -> Non
     assert_decodes_to(codec, ReferenceCodec(names, TIMEBASE).encode(own), own)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="rosbags refuses the bytes that rclpy's serialize_message leaves behind"
-)
 def test_trajectory_serialized_by_rclpy_is_read() -> None:
     """Empty efforts make its size estimate too large by 8 bytes a point."""
     serialization = pytest.importorskip("rclpy.serialization")
@@ -217,7 +214,6 @@ def test_a_start_between_ticks_is_an_error() -> None:
             decode(message)
 
 
-@pytest.mark.xfail(strict=True, reason="numpy's and Python's own errors come through")
 @pytest.mark.parametrize("fault", ["no points", "ragged", "no base points", "no accelerations"])
 def test_incomplete_trajectories_are_message_errors(fault: str) -> None:
     """As for a JointState that lacks an array."""

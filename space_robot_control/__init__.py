@@ -1,0 +1,1 @@
+"""The flight software: control laws, controller, mission, and how flights are flown and judged."""
