@@ -24,8 +24,8 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 @cache
 def cache_directory() -> Path:
     """Folder of the compiled kernels: ``NUMBA_CACHE_DIR`` or the user's cache, by source digest."""
-    digest = hashlib.sha256()
     root = Path(__file__).resolve().parent.parent
+    digest = hashlib.sha256(str(root).encode())  # Numba keeps installations apart, so do we
     for package in _PACKAGES:
         for source in sorted((root / package).rglob("*.py")):
             text = source.read_bytes()

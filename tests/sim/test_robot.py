@@ -141,7 +141,10 @@ FAULTS: dict[str, tuple[Edit, list[str]]] = {
         in_link(1, "com", [1.0, 2.0, 3.0, 4.0]),
         ["robot.links.1.com", "at most 3", "[1.0, 2.0, 3.0, 4.0]"],
     ),
-    "unknown key": (in_link(0, "weight", 5.0), ["robot.links.0.weight", "5.0", "not permitted"]),
+    "unknown key": (
+        in_link(0, "weight", 5.0),
+        ["robot.links.0.weight", "5.0", "unknown key", "choose one of a, alpha_deg, com, d"],
+    ),
     "missing key": (without("robot", "links", 1, "mass"), ["robot.links.1.mass", "required"]),
     "no links": (
         lambda content: content["robot"].__setitem__("links", []),
