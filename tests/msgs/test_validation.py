@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from pydantic import Field
 
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.validation import Strict, check, one_of, read_yaml
@@ -17,7 +18,7 @@ class Inner(Strict):
 
 class Outer(Strict):
     inner: Inner
-    several: list[Inner] = []
+    several: list[Inner] = Field(default_factory=list)
 
 
 def test_misspelt_key_is_named_before_the_one_it_leaves_missing() -> None:
