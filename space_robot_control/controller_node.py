@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NoReturn
 
+import numpy as np
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 
 from space_robot_msgs_py import topics
@@ -46,6 +47,13 @@ class Laws:
         self._shell = shell
         shell.node.add_on_set_parameters_callback(self._on_set)
 
+    def warm_up(self, robot: Robot) -> None:
+        """Load every law's compiled code, so that no first tick and no swap comes late."""
+        rest = RobotState.allocate(robot.n)
+        for law in self._laws.values():
+            controller = Controller(robot, law, self._settings.period)
+            controller.update(rest, np.zeros((3, robot.n)), np.eye(10)[0])
+
     def _on_set(self, parameters: list[Any]) -> SetParametersResult:
         """Check all changes first, then make them; the loop sees them at its next tick."""
         gains = {name: dict(law.gains) for name, law in self._laws.items()}
@@ -80,6 +88,7 @@ class ControllerLoop:
         self._shell, self._settings = shell, settings
         robot = Robot.from_yaml(named_file("robots", settings.robot))
         self._laws = Laws(shell, settings, robot.n + 3)
+        self._laws.warm_up(robot)
         self._controller = Controller(robot, self._laws.chosen, settings.period)
         self._references = ReferenceBuffer(robot.n)
         timebase = settings.timebase
@@ -107,7 +116,9 @@ class ControllerLoop:
         shell.wait_for_listeners(outputs, self._settings.wait_for)
         while not shell.stopping:
             tick = self._take_state()
-            if tick is not None and self._have_reference(tick):
+            if tick is None:
+                self._take_references()  # ahead of need
+            elif self._have_reference(tick):
                 self._answer_tick(tick)
             shell.serve()
         for output in outputs:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -41,6 +41,8 @@ class FlightLog:
     """What was flown: controller, case, ..., as recorded."""
     lost: dict[str, int] = field(default_factory=dict)
     """Missing messages a topic."""
+    unanswered: int = 0
+    """Ticks without a command of their own (by the wall clock only)."""
 
     @classmethod
     def allocate(cls, ticks: int, joint_names: tuple[str, ...], timebase: Timebase) -> FlightLog:
@@ -81,9 +83,8 @@ class FlightLog:
 
     def truncated(self, ticks: int) -> FlightLog:
         """The first ``ticks`` rows."""
-        return FlightLog(
-            self.timebase, self.joint_names, self.base_position[:ticks], self.quaternion[:ticks],
-            self.base_velocity[:ticks], self.omega_base[:ticks], self.joint_positions[:ticks],
-            self.joint_velocities[:ticks], self.applied_torque[:ticks],
-            self.reference_joints[:ticks], self.reference_base[:ticks], self.flight, self.lost,
-        )  # fmt: skip
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        rows: dict[str, Any] = {
+            k: v[:ticks] for k, v in values.items() if isinstance(v, np.ndarray)
+        }
+        return replace(self, **rows)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from typing import NoReturn
 
+import numpy as np
+
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.codecs import ClockCodec, CommandCodec, StateCodec
 from space_robot_msgs_py.configuration import named_file
@@ -29,6 +31,8 @@ class PlantLoop:
         self._shell, self._settings = shell, settings
         robot = Robot.from_yaml(named_file("robots", settings.robot))
         self._plant = Plant(robot, settings, settings.period)
+        at_rest = Command(0, np.zeros(robot.n + 3))
+        Plant(robot, settings, settings.period).step(at_rest)  # loads the compiled code
         timebase = settings.timebase
         self._timebase = timebase
         self._states = StateCodec(robot.joint_names, timebase)

@@ -97,4 +97,5 @@ def analyse(log: FlightLog) -> dict[str, Any]:
             "power_above_100_hz": chatter(power_above),
         },
         "lost": log.lost,
+        "unanswered_ticks": log.unanswered,
     }

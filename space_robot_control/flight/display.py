@@ -40,6 +40,8 @@ def print_report(report: dict[str, Any], console: Console) -> None:
     console.print(table)
     lost = {topic: count for topic, count in report["lost"].items() if count}
     console.print(f"messages lost: {lost or 'none'}")
+    if report["unanswered_ticks"]:
+        console.print(f"ticks the controller did not answer in time: {report['unanswered_ticks']}")
 
 
 @contextmanager

@@ -56,7 +56,23 @@ class Coverage:
         return (self.last - self.first) // (self.unit or 1) + 1 - self.received
 
 
-def lost_messages(coverages: Mapping[str, Coverage]) -> dict[str, int]:
-    """Missing messages a topic; the flight's length is that of the longest per-tick topic."""
-    last_tick = max((c.last for c in coverages.values() if c.topic.per_tick), default=-1)
-    return {name: coverage.missing(last_tick) for name, coverage in coverages.items()}
+def lost_messages(coverages: Mapping[str, Coverage], realtime: bool = False) -> dict[str, int]:
+    """Missing messages a topic; the flight's length is that of the longest per-tick topic.
+
+    By the wall clock (``realtime``) a tick without a command (and its telemetry) is one the
+    controller did not answer (`unanswered_ticks`), not a lost message.
+    """
+    last_tick = _last_tick(coverages)
+    lost = {name: coverage.missing(last_tick) for name, coverage in coverages.items()}
+    if realtime:
+        lost |= dict.fromkeys({topics.COMMAND.name, topics.TELEMETRY.name} & lost.keys(), 0)
+    return lost
+
+
+def unanswered_ticks(coverages: Mapping[str, Coverage]) -> int:
+    """Ticks without a command."""
+    return coverages[topics.COMMAND.name].missing(_last_tick(coverages))
+
+
+def _last_tick(coverages: Mapping[str, Coverage]) -> int:
+    return max((c.last for c in coverages.values() if c.topic.per_tick), default=-1)

@@ -19,7 +19,7 @@ from ..flight_log import FlightLog
 from ..reference_codec import ReferenceCodec
 from ..samples import RobotState, Timebase
 from ..validation import read_yaml
-from .coverage import Coverage, lost_messages, message_tick
+from .coverage import Coverage, lost_messages, message_tick, unanswered_ticks
 from .recorder import FLIGHT_KEY
 
 REQUIRED = (
@@ -57,7 +57,9 @@ def _read(reader: Reader, path: Path) -> FlightLog:
     log = FlightLog.allocate(joints_connection.msgcount, names, timebase)
     log.flight = flight
     coverages = _fill(reader, list(by_topic.values()), log)
-    log.lost = lost_messages(coverages)
+    log.lost = lost_messages(coverages, bool(flight.get("realtime")))
+    if topics.COMMAND.name in coverages:
+        log.unanswered = unanswered_ticks(coverages)
     whole = int(np.argmin(np.append(_complete_rows(log), False)))
     return log.truncated(whole)
 

@@ -43,7 +43,7 @@ class BagRecorder:
     @property
     def lost(self) -> dict[str, int]:
         """Missing messages a topic, so far."""
-        return lost_messages(self.coverages)
+        return lost_messages(self.coverages, bool(self._flight.get("realtime")))
 
     def close(self) -> None:
         """Make the bag whole, with the flight's description and the counts in its metadata."""

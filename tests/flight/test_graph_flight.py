@@ -115,6 +115,8 @@ def test_late_commands_are_applied_late_in_the_graph(fly: Callable[..., Flown]) 
 def test_wall_clock_flight_flies_every_tick(fly: Callable[..., Flown]) -> None:
     flown = fly(*SHORT, "--realtime")
     assert flown.report["ticks"] == 1000
+    assert not any(flown.report["lost"].values())
+    assert 0 <= flown.report["unanswered_ticks"] < 1000
     assert flown.report["rms"]["mean_axis"]["attitude"] < 1e-3
 
 
