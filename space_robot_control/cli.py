@@ -109,6 +109,7 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
       space-robot simulate --bag flights/in_process
     """
     from .analysis import analyse
+    from .flight.compilation import compile_kernels
     from .flight.display import flight_progress
     from .flight.plan import check_bag_path
     from .flight.simulate import simulate as run
@@ -116,6 +117,7 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
     flight = _plan(**options)
     if bag:
         check_bag_path(bag)
+    compile_kernels()
     period = flight.period
     with flight_progress(flight.ticks * period, flight.controller.law.name) as show:
         log = run(flight, bag, lambda tick: show(tick * period, ""))

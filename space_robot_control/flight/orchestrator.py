@@ -16,14 +16,13 @@ import click
 from space_robot_msgs_py.bag import read_flight
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.ros.process_environment import DEFAULTS
-from space_robot_sim.compiled import cache_directory
 
 from ..analysis import analyse
+from .compilation import compile_kernels
 from .display import flight_progress
 from .domain import ros_domain
-from .plan import Flight, FlightPlan, check_bag_path
+from .plan import Flight, check_bag_path
 from .processes import MODULES, Graph
-from .simulate import simulate
 
 POLL_S = 0.1
 READY_TIMEOUT_S = 60.0
@@ -52,7 +51,7 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
             f"rclpy cannot be imported ({error}): source your ROS 2 Jazzy, or install the [ros] "
             "extra; `space-robot simulate` flies without"
         ) from None
-    compile_kernels(flight.plan)
+    compile_kernels()
     with ros_domain() as domain, _stop_signals() as stopped:
         environment = {**DEFAULTS, **os.environ, "ROS_DOMAIN_ID": str(domain)}
         _say(f"flying on ROS_DOMAIN_ID={domain}, recording to {bag}")
@@ -67,16 +66,6 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
     report = analyse(read_flight(bag))
     _check(report, flight)
     return report
-
-
-def compile_kernels(plan: FlightPlan) -> None:
-    """Fly a few ticks in this process if nothing has been compiled yet, so the nodes find it."""
-    if any(cache_directory().glob("*/*.nbi")):
-        return
-    _say("compiling the kernels (once, about half a minute) ...")
-    for law in ("tde_stc", "ctc"):
-        short = plan.model_copy(update={"controller": law, "gains": "default", "duration": 0.002})
-        simulate(Flight(short))
 
 
 def _parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
