@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 from pathlib import Path
 from typing import Annotated, ClassVar, NoReturn
@@ -19,6 +20,8 @@ from .ros.shell import Shell, run_node
 SILENCE_S = 0.3
 """Told to stop, the recorder leaves when nothing has come for this long."""
 QUEUE_DEPTH = 20_000
+NICENESS = 10
+"""The loop goes first where cores are short; the queues hold seconds of traffic."""
 
 
 class RecorderNodeSettings(NodeSettings):
@@ -52,6 +55,7 @@ class RecorderLoop:
 
     def run(self) -> None:
         """Record until told to stop and everything sent has come; then close the bag."""
+        os.nice(NICENESS)
         try:
             last_arrival = time.monotonic()
             while not self._shell.stopping or time.monotonic() - last_arrival < SILENCE_S:

@@ -25,7 +25,9 @@ from .parameters import declare_settings, refuse_unknown  # noqa: E402
 
 Schema = TypeVar("Schema", bound=NodeSettings)
 
-SERVICE_PERIOD_S = 0.02
+SERVICE_PERIOD_S = 0.1
+"""A look for parameter calls takes a millisecond, a whole tick's time: not too often."""
+LISTENER_PERIOD_S = 0.02
 REMIND_S = 5.0
 
 
@@ -74,7 +76,7 @@ class Shell:
                 waiting = ", ".join(f"{', '.join(v)} on {k}" for k, v in missing.items() if v)
                 self.log(f"waiting for {waiting}")
             self.serve()
-            time.sleep(SERVICE_PERIOD_S)
+            time.sleep(LISTENER_PERIOD_S)
 
 
 def run_node(
