@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+from abc import ABCMeta
 from functools import cache
-from inspect import isabstract, isclass
+from inspect import isabstract
 
 from space_robot_msgs_py.errors import InputError
 
@@ -53,4 +54,4 @@ def find_law(name: str) -> type[ControlLaw]:
 
 
 def _is_law(value: object) -> bool:
-    return isclass(value) and issubclass(value, ControlLaw) and not isabstract(value)
+    return isinstance(value, ABCMeta) and issubclass(value, ControlLaw) and not isabstract(value)
