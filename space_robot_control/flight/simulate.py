@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
+
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag import BagRecorder
 from space_robot_msgs_py.codecs import ClockCodec, CommandCodec, StateCodec, TelemetryCodec
@@ -85,6 +87,7 @@ def simulate(
     log = FlightLog.allocate(flight.ticks, flight.robot.joint_names, flight.timebase)
     log.flight = flight.description
     log.lost = {topic.name: 0 for topic in topics.ALL}
+    log.telemetry = np.full((flight.ticks, 4, log.axes), np.nan)
     with _recording(flight, bag) as messages:
         for tick in range(flight.ticks):
             if tick % chunk_ticks == 0:
@@ -97,6 +100,7 @@ def simulate(
             log.put(state)
             log.reference_joints[tick], log.reference_base[tick] = joints, base
             command = controller.update(state, joints, base)
+            log.telemetry[tick] = controller.telemetry()
             if messages:
                 messages.tick(state, command)
             plant.step(command)
