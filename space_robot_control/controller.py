@@ -2,20 +2,52 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.errors import SingularAttitudeError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.attitude import SINGULAR_ETA, attitude_jacobian_inverse
+from space_robot_sim.compiled import kernel
+from space_robot_sim.dynamics import Model
 from space_robot_sim.dynamics.rho_space import RhoSpaceModel, rho_space_into
+from space_robot_sim.records import Record, assign, nested, shaped
 from space_robot_sim.robot import Robot
 
 from .laws import ControlLaw, Signals
-from .time_delay_estimation import TimeDelayEstimator
+from .time_delay_estimation import TimeDelayPair, observe, time_delay_estimate
 from .tracking import force_from_torque, measured_rate, torque_from_force, tracking_errors
 
 Array = NDArray[np.float64]
+Block = NDArray[Any]
+
+
+class ControllerMemory(Record):
+    """What the controller knows and remembers, apart from its law."""
+
+    model: Model = nested(Model)
+    """The nominal robot."""
+    nominal: RhoSpaceModel = nested(RhoSpaceModel)
+    pair: TimeDelayPair = nested(TimeDelayPair)
+    quaternion: Array = shaped(lambda n: (4,))
+    """The measured one or its negative: the same attitude, but rho must not jump."""
+    rate: Array = shaped(lambda n: (n + 3,))
+    """rhodot."""
+    jacobian: Array = shaped(lambda n: (3, 3))
+    """J0."""
+    last_jacobian_inverse: Array = shaped(lambda n: (3, 3))
+    """J0^-1 of the last tick."""
+    desired_jacobian: Array = shaped(lambda n: (3, 3))
+    """Scratch."""
+    applied_force: Array = shaped(lambda n: (n + 3,))
+    """F_S over the last interval."""
+    error: Array = shaped(lambda n: (n + 3,))
+    error_rate: Array = shaped(lambda n: (n + 3,))
+    acceleration_desired: Array = shaped(lambda n: (n + 3,))
+    n_hat: Array = shaped(lambda n: (n + 3,))
+    """These four as in `Signals`."""
 
 
 class Controller:
@@ -25,24 +57,20 @@ class Controller:
     """
 
     def __init__(self, robot: Robot, law: ControlLaw, period: float) -> None:
-        axes = robot.n + 3
-        self._model = robot.model
-        self._estimator = TimeDelayEstimator(axes, period)
-        self._nominal = RhoSpaceModel.allocate(robot.n)
-        self._quaternion = np.zeros(4)
-        self._rate = np.zeros(axes)
-        self._jacobian = np.zeros((3, 3))
-        self._last_jacobian_inverse = 2.0 * np.eye(3)
-        self._desired_jacobian = np.zeros((3, 3))
-        self._applied_force = np.zeros(axes)
-        self._command = Command(-1, np.zeros(axes))
+        self.period = period
+        self.block = ControllerMemory.block(robot.n)
+        """The controller's `ControllerMemory`, for compiled loops."""
+        memory: ControllerMemory = self.block[0]
+        assign(memory, model=robot.model, last_jacobian_inverse=2.0 * np.eye(3))
+        self._command = Command(-1, np.zeros(robot.n + 3))
+        self._jacobian = memory.jacobian
         self.signals = Signals(
-            error=np.zeros(axes),
-            error_rate=np.zeros(axes),
-            acceleration_desired=np.zeros(axes),
-            n_hat=np.zeros(axes),
-            inertia=self._nominal.inertia,
-            bias=self._nominal.bias,
+            error=memory.error,
+            error_rate=memory.error_rate,
+            acceleration_desired=memory.acceleration_desired,
+            n_hat=memory.n_hat,
+            inertia=memory.nominal.inertia,
+            bias=memory.nominal.bias,
         )
         self.law = law
 
@@ -71,37 +99,15 @@ class Controller:
         Raises:
             SingularAttitudeError: the base has turned by 180 degrees.
         """
-        quaternion = self._quaternion
-        if float(state.quaternion @ quaternion) < 0.0:
-            # the same attitude from the other side: rho and its rates must not jump
-            np.negative(state.quaternion, out=quaternion)
-        else:
-            quaternion[:] = state.quaternion
-        eta = float(quaternion[0])
+        law, command = self._law, self._command
+        eta = sense(
+            self.block, state.tick, state.quaternion, state.omega_base, state.joint_positions,
+            state.joint_velocities, state.applied_torque, joints, base, law.h_bar, law.uses_model,
+            self.period,
+        )  # fmt: skip
         if not abs(eta) > SINGULAR_ETA:
             raise SingularAttitudeError(state.tick, eta)
-        measured_rate(
-            quaternion, state.omega_base, state.joint_velocities, self._jacobian, self._rate
-        )
-        # the applied torque acted from the last tick on, so that tick's J0 turns it into F_S
-        force_from_torque(self._last_jacobian_inverse, state.applied_torque, self._applied_force)
-        attitude_jacobian_inverse(quaternion, self._last_jacobian_inverse)
-        self._estimator.observe(state.tick, self._applied_force, self._rate)
-        signals, law = self.signals, self._law
-        tracking_errors(
-            quaternion, state.joint_positions, self._rate, joints, base,
-            self._desired_jacobian, signals.error, signals.error_rate,
-            signals.acceleration_desired,
-        )  # fmt: skip
-        if law.uses_time_delay_estimate():
-            signals.n_hat = self._estimator.estimate(law.gains["h_bar"])
-        if law.uses_model:
-            rho_space_into(
-                self._model, quaternion, state.joint_positions, state.omega_base,
-                state.joint_velocities, self._nominal,
-            )  # fmt: skip
-        command = self._command
-        torque_from_force(self._jacobian, law.force(signals), command.torque)
+        torque_from_force(self._jacobian, law.force(self.signals), command.torque)
         command.tick = state.tick
         return command
 
@@ -109,3 +115,57 @@ class Controller:
         """s, u, N_hat and e of the last tick, (m,) each."""
         law = self._law
         return law.sliding_surface, law.pseudo_acceleration, self.signals.n_hat, self.signals.error
+
+
+@kernel
+def sense(
+    block: Block, tick: int, quaternion: Array, omega_base: Array, joint_positions: Array,
+    joint_velocities: Array, applied_torque: Array, joints: Array, base: Array, h_bar: Array,
+    uses_model: bool, period: float,
+) -> float:  # fmt: skip
+    """`form_signals` for callers from Python."""
+    eta: float = form_signals(
+        block[0], tick, quaternion, omega_base, joint_positions, joint_velocities, applied_torque,
+        joints, base, h_bar, uses_model, period,
+    )  # fmt: skip
+    return eta
+
+
+@kernel
+def form_signals(
+    memory: ControllerMemory, tick: int, quaternion: Array, omega_base: Array,
+    joint_positions: Array, joint_velocities: Array, applied_torque: Array, joints: Array,
+    base: Array, h_bar: Array, uses_model: bool, period: float,
+) -> float:  # fmt: skip
+    """Turn a measured state and a reference row into the law's signals.
+
+    ``h_bar`` is empty for a law without time-delay estimate.
+
+    Returns:
+        eta; where it is singular (or NaN) nothing was done.
+    """
+    near, rate, dot = memory.quaternion, memory.rate, 0.0
+    for k in range(4):
+        dot += quaternion[k] * near[k]
+    side = -1.0 if dot < 0.0 else 1.0
+    eta: float = side * quaternion[0]
+    if not abs(eta) > SINGULAR_ETA:
+        return eta
+    for k in range(4):
+        near[k] = side * quaternion[k]
+    measured_rate(near, omega_base, joint_velocities, memory.jacobian, rate)
+    # the applied torque acted from the last tick on, so that tick's J0 turns it into F_S
+    force_from_torque(memory.last_jacobian_inverse, applied_torque, memory.applied_force)
+    attitude_jacobian_inverse(near, memory.last_jacobian_inverse)
+    observe(memory.pair, tick, memory.applied_force, rate, period)
+    tracking_errors(
+        near, joint_positions, rate, joints, base, memory.desired_jacobian,
+        memory.error, memory.error_rate, memory.acceleration_desired,
+    )  # fmt: skip
+    if h_bar.size > 0:
+        time_delay_estimate(memory.pair, h_bar, memory.n_hat)
+    if uses_model:
+        rho_space_into(
+            memory.model, near, joint_positions, omega_base, joint_velocities, memory.nominal
+        )
+    return eta

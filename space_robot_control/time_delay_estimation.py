@@ -13,55 +13,45 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_sim.compiled import kernel
+from space_robot_sim.records import Record, shaped
 
 Array = NDArray[np.float64]
 
 
-class TimeDelayEstimator:
-    """Stores the last applied force and the acceleration it caused, per axis."""
+class TimeDelayPair(Record):
+    """The last applied force and the acceleration it caused, per axis."""
 
-    def __init__(self, axes: int, period: float) -> None:
-        self._period = period
-        self._tick: int | None = None
-        self._rate = np.zeros(axes)
-        self.applied_force = np.zeros(axes)
-        """(m,) F_S over the last interval."""
-        self.acceleration = np.zeros(axes)
-        """(m,) mean rhodd over the last interval."""
-        self.n_hat = np.zeros(axes)
-        """(m,) the last estimate."""
-
-    def observe(self, tick: int, applied_force: Array, rate: Array) -> None:
-        """Take the pair of the interval that ended at ``tick``.
-
-        The first tick, and one after a gap, has no pair: the last one is kept.
-        """
-        if self._tick is not None and tick == self._tick + 1:
-            pair(
-                applied_force, rate, self._rate, self._period, self.applied_force, self.acceleration
-            )
-        self._tick = tick
-        self._rate[:] = rate
-
-    def estimate(self, h_bar: Array) -> Array:
-        """N_hat (m,) for a constant diagonal inertia ``h_bar`` (m,); valid until the next call."""
-        time_delay_estimate(self.applied_force, h_bar, self.acceleration, self.n_hat)
-        return self.n_hat
+    seen: float = shaped(lambda n: ())
+    """Whether any tick has been observed, 0 or 1."""
+    tick: float = shaped(lambda n: ())
+    """The last tick observed."""
+    rate: Array = shaped(lambda n: (n + 3,))
+    """rhodot at that tick."""
+    applied_force: Array = shaped(lambda n: (n + 3,))
+    """F_S over the last interval."""
+    acceleration: Array = shaped(lambda n: (n + 3,))
+    """Mean rhodd over the last interval."""
 
 
 @kernel
-def pair(
-    force: Array, rate: Array, last_rate: Array, period: float, force_out: Array,
-    acceleration: Array,
-) -> None:  # fmt: skip
-    """Keep the applied force and the backward difference of ``rate``."""
-    for i in range(force.size):
-        force_out[i] = force[i]
-        acceleration[i] = (rate[i] - last_rate[i]) / period
+def observe(
+    pair: TimeDelayPair, tick: int, applied_force: Array, rate: Array, period: float
+) -> None:
+    """Take force and rate (m,) of the interval that ended at ``tick``.
+
+    The first tick, and one after a gap, has no pair: the last one is kept.
+    """
+    if pair.seen == 1.0 and tick == pair.tick + 1.0:
+        for i in range(rate.size):
+            pair.applied_force[i] = applied_force[i]
+            pair.acceleration[i] = (rate[i] - pair.rate[i]) / period
+    pair.seen = 1.0
+    pair.tick = tick
+    pair.rate[:] = rate
 
 
 @kernel
-def time_delay_estimate(force: Array, h_bar: Array, acceleration: Array, n_hat: Array) -> None:
-    """(36)."""
-    for i in range(force.size):
-        n_hat[i] = force[i] - h_bar[i] * acceleration[i]
+def time_delay_estimate(pair: TimeDelayPair, h_bar: Array, n_hat: Array) -> None:
+    """(36) for a constant diagonal inertia ``h_bar`` (m,)."""
+    for i in range(n_hat.size):
+        n_hat[i] = pair.applied_force[i] - h_bar[i] * pair.acceleration[i]

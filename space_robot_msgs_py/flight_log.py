@@ -43,8 +43,10 @@ class FlightLog:
     """Missing messages a topic."""
     unanswered: int = 0
     """Ticks without a command of their own (by the wall clock only)."""
+    commanded_torque: Array | None = None
+    """(N, n+3) N m, the controller's answer to the tick; of flights in this process only."""
     telemetry: Array | None = None
-    """(N, 4, n+3) s, u, N_hat, e of the controller, of flights in this process only."""
+    """(N, 4, n+3) s, u, N_hat, e of the controller; of flights in this process only."""
 
     @classmethod
     def allocate(cls, ticks: int, joint_names: tuple[str, ...], timebase: Timebase) -> FlightLog:

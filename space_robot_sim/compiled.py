@@ -48,3 +48,18 @@ def kernel(function: _Function) -> _Function:
         return cast(_Function, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
     finally:
         config.CACHE_DIR = previous
+
+
+@cache
+def function_pointer(function: Callable[..., Any], signature: Any) -> Any:
+    """A kernel as a value that a compiled loop can be given, as one type for all of them.
+
+    A loop then need not be compiled again for every function it may call.
+    """
+    previous = config.CACHE_DIR
+    config.CACHE_DIR = str(cache_directory())
+    try:
+        compiled: Any = function
+        return numba.cfunc(signature, cache=True, error_model="numpy")(compiled.py_func)
+    finally:
+        config.CACHE_DIR = previous

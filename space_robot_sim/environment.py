@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from pydantic import Field
 from space_robot_msgs_py.validation import Strict
 
 from .compiled import kernel
+from .records import Record, assign, shaped
 from .robot import Inertia, Robot
 
 Array = NDArray[np.float64]
@@ -54,17 +55,17 @@ class PayloadSettings(Strict):
     )
 
 
-class Environment(NamedTuple):
+class Environment(Record):
     """Friction and disturbances of one robot, as the plant's kernel reads them."""
 
-    coulomb: Array
-    """(n,) N m."""
-    viscous: Array
-    """(n,) N m s/rad."""
-    amplitude: Array
-    """(n+3,) N m: base x, y, z on inertial axes, joints."""
-    angular_frequency: Array
-    """(n+3, 2) rad/s."""
+    coulomb: Array = shaped(lambda n: (n,))
+    """N m."""
+    viscous: Array = shaped(lambda n: (n,))
+    """N m s/rad."""
+    amplitude: Array = shaped(lambda n: (n + 3,))
+    """N m: base x, y, z on inertial axes, joints."""
+    angular_frequency: Array = shaped(lambda n: (n + 3, 2))
+    """rad/s."""
 
     @classmethod
     def build(
@@ -76,12 +77,13 @@ class Environment(NamedTuple):
             *[(disturbance.inner_amplitude, disturbance.inner_frequencies)] * min(n, 3),
             *[(disturbance.outer_amplitude, disturbance.outer_frequencies)] * max(n - 3, 0),
         ]
-        return cls(
-            coulomb=np.full(n, friction.coulomb),
-            viscous=np.full(n, friction.viscous),
+        environment = cls.allocate(n)
+        assign(
+            environment, coulomb=friction.coulomb, viscous=friction.viscous,
             amplitude=disturbance.scale * np.array([amplitude for amplitude, _ in groups]),
             angular_frequency=2.0 * np.pi * np.array([frequencies for _, frequencies in groups]),
-        )
+        )  # fmt: skip
+        return environment
 
 
 def with_payload(robot: Robot, payload: PayloadSettings) -> Robot:

@@ -2,43 +2,34 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
-from .attitude import quaternion_rate, rotate, rotate_back, rotation_matrix
+from .attitude import quaternion_rate, rotate, rotation_matrix
 from .compiled import kernel
-from .dynamics import Data, Model, allocate, forward_dynamics_into
+from .dynamics import Data, Model, forward_dynamics_into
 from .environment import Environment, disturbance_torque, friction_torque
+from .records import Record, nested, shaped
 
 Array = NDArray[np.float64]
 
 
-class Stages(NamedTuple):
+class Stages(Record):
     """Scratch of the integrator.
 
     A state ``x`` (2n+13,) is ``[r0 (3), quaternion (4), theta (n), v0 (3), w0 (3), thetadot (n)]``,
     velocities on inertial axes.
     """
 
-    stage: Array
-    """(2n+13,) state at which the current stage is evaluated."""
-    slope: Array
-    """(4, 2n+13) time derivatives."""
-    force: Array
-    """(n+6,) generalised force, base part on inertial axes."""
-    disturbance: Array
-    """(n+3,) f_d."""
-    data: Data
-
-    @classmethod
-    def allocate(cls, n: int) -> Stages:
-        """For ``n`` joints."""
-        size = 2 * n + 13
-        return cls(
-            np.zeros(size), np.zeros((4, size)), np.zeros(n + 6), np.zeros(n + 3), allocate(n)
-        )
+    stage: Array = shaped(lambda n: (2 * n + 13,))
+    """State at which the current stage is evaluated."""
+    slope: Array = shaped(lambda n: (4, 2 * n + 13))
+    """Time derivatives."""
+    force: Array = shaped(lambda n: (n + 6,))
+    """Generalised force, base part on inertial axes."""
+    disturbance: Array = shaped(lambda n: (n + 3,))
+    """f_d."""
+    data: Data = nested(Data)
 
 
 @kernel
@@ -84,36 +75,3 @@ def rk4_step(
     norm = np.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5] + x[6] * x[6])
     for i in range(3, 7):
         x[i] /= norm
-
-
-@kernel
-def measure(
-    x: Array, rotation: Array, position: Array, quaternion: Array, velocity: Array,
-    omega_base: Array, theta: Array, theta_rate: Array,
-) -> float:  # fmt: skip
-    """Write what the sensors see of ``x``; returns the fastest rate, rad/s (NaN if any is).
-
-    ``rotation`` (3, 3) is scratch.
-    """
-    n = theta.size
-    position[:] = x[:3]
-    quaternion[:] = x[3:7]
-    theta[:] = x[7 : 7 + n]
-    velocity[:] = x[7 + n : 10 + n]
-    rotation_matrix(quaternion, rotation)
-    rotate_back(rotation, x[10 + n : 13 + n], omega_base)
-    theta_rate[:] = x[13 + n :]
-    fastest = 0.0
-    for i in range(10 + n, x.size):
-        if not abs(x[i]) <= fastest:  # also true of NaN
-            fastest = abs(x[i])
-            if np.isnan(fastest):
-                break
-    return fastest
-
-
-@kernel
-def saturate(torque: Array, limit: Array, out: Array) -> None:
-    """``out = torque`` within ``+-limit``."""
-    for i in range(out.size):
-        out[i] = min(max(torque[i], -limit[i]), limit[i])

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,9 @@ from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_msgs_py.validation import Strict
 
+from .attitude import rotate_back, rotation_matrix
+from .compiled import kernel
+from .dynamics import Model
 from .environment import (
     DisturbanceSettings,
     Environment,
@@ -20,10 +22,12 @@ from .environment import (
     PayloadSettings,
     with_payload,
 )
-from .integrator import Stages, measure, rk4_step, saturate
+from .integrator import Stages, rk4_step
+from .records import Record, assign, nested, shaped
 from .robot import Robot
 
 Array = NDArray[np.float64]
+Block = NDArray[Any]
 
 RATE_LIMIT = 1e4
 """rad/s; a body that turns faster has left the physics (a diverged loop)."""
@@ -52,6 +56,28 @@ class PlantSettings(Strict):
     )
 
 
+class PlantMemory(Record):
+    """All that a step of the plant reads and writes."""
+
+    model: Model = nested(Model)
+    environment: Environment = nested(Environment)
+    stages: Stages = nested(Stages)
+    x: Array = shaped(lambda n: (2 * n + 13,))
+    """The state, see `Stages`."""
+    limit: Array = shaped(lambda n: (n + 3,))
+    """Largest torque on each axis, N m."""
+    rotation: Array = shaped(lambda n: (3, 3))
+    """Scratch."""
+    base_position: Array = shaped(lambda n: (3,))
+    quaternion: Array = shaped(lambda n: (4,))
+    base_velocity: Array = shaped(lambda n: (3,))
+    omega_base: Array = shaped(lambda n: (3,))
+    joint_positions: Array = shaped(lambda n: (n,))
+    joint_velocities: Array = shaped(lambda n: (n,))
+    applied_torque: Array = shaped(lambda n: (n + 3,))
+    """The measurements, as `RobotState` describes them."""
+
+
 class Plant:
     """Integrates the robot at a fixed period; a command is held over one tick.
 
@@ -75,20 +101,23 @@ class Plant:
         if norm < 1e-3:
             raise InputError(f"initial_quaternion must not be zero, got norm {norm:g}")
         self.robot = with_payload(robot, settings.payload)
-        self.environment = Environment.build(n, settings.friction, settings.disturbance)
         self.period = period
-        self.state = RobotState.allocate(n)
-        self._x = np.zeros(2 * n + 13)
-        self._x[3:7] = np.array(settings.initial_quaternion) / norm
-        self._x[7 : 7 + n] = np.radians(settings.initial_joints_deg)
-        self._stages = Stages.allocate(n)
-        self._rotation = np.zeros((3, 3))
-        self._late: deque[Array] = deque(
-            np.zeros(n + 3) for _ in range(settings.command_latency_ticks)
-        )
-        self._limit = np.full(n + 3, settings.joint_torque_limit or np.inf)
-        self._limit[:3] = settings.base_torque_limit or np.inf
-        self._measure()
+        self.block = PlantMemory.block(n)
+        """The plant's `PlantMemory`, for compiled loops."""
+        self.late = np.zeros((settings.command_latency_ticks, n + 3))
+        """Ring of the commands that are still on their way."""
+        memory: PlantMemory = self.block[0]
+        environment = Environment.build(n, settings.friction, settings.disturbance)
+        assign(memory, model=self.robot.model, environment=environment)
+        memory.x[3:7] = np.array(settings.initial_quaternion) / norm
+        memory.x[7 : 7 + n] = np.radians(settings.initial_joints_deg)
+        memory.limit[:] = settings.joint_torque_limit or np.inf
+        memory.limit[:3] = settings.base_torque_limit or np.inf
+        self.state = RobotState(
+            0, memory.base_position, memory.quaternion, memory.base_velocity, memory.omega_base,
+            memory.joint_positions, memory.joint_velocities, memory.applied_torque,
+        )  # fmt: skip
+        measure(memory)
 
     @property
     def tick(self) -> int:
@@ -101,27 +130,62 @@ class Plant:
         Raises:
             DivergedError: the state is no longer finite, or turns faster than `RATE_LIMIT`.
         """
-        applied = self.state.applied_torque
-        if self._late:
-            self._late.append(command.torque.copy())
-            due = self._late.popleft()
-        else:
-            due = command.torque
-        saturate(due, self._limit, applied)
         tick = self.state.tick
-        rk4_step(
-            self.robot.model, self.environment, self._x, applied, tick * self.period, self.period,
-            self._stages,
-        )  # fmt: skip
+        fastest = step(self.block, self.late, command.torque, tick, self.period)
         self.state.tick = tick + 1
-        self._measure()
-
-    def _measure(self) -> None:
-        state = self.state
-        fastest = measure(
-            self._x, self._rotation, state.base_position, state.quaternion, state.base_velocity,
-            state.omega_base, state.joint_positions, state.joint_velocities,
-        )  # fmt: skip
         if not fastest <= RATE_LIMIT:
-            why = "the state is not finite" if np.isnan(fastest) else f"{fastest:.3g} rad/s"
-            raise DivergedError(state.tick, self.period, why)
+            raise self.diverged(fastest)
+
+    def diverged(self, fastest: float) -> DivergedError:
+        """What to raise when the fastest rate after a step is ``fastest``."""
+        why = "the state is not finite" if np.isnan(fastest) else f"{fastest:.3g} rad/s"
+        return DivergedError(self.tick, self.period, why)
+
+
+@kernel
+def step(block: Block, late: Array, torque: Array, tick: int, period: float) -> float:
+    """`advance` for callers from Python."""
+    fastest: float = advance(block[0], late, torque, tick, period)
+    return fastest
+
+
+@kernel
+def advance(memory: PlantMemory, late: Array, torque: Array, tick: int, period: float) -> float:
+    """Apply ``torque`` (n+3,), or the one due from the ring ``late``, from ``tick`` to the next.
+
+    Returns:
+        The fastest rate then, see `measure`.
+    """
+    applied, limit = memory.applied_torque, memory.limit
+    latency = late.shape[0]
+    for i in range(applied.size):
+        due = torque[i]
+        if latency > 0:
+            due = late[tick % latency, i]
+            late[tick % latency, i] = torque[i]
+        applied[i] = min(max(due, -limit[i]), limit[i])
+    rk4_step(
+        memory.model, memory.environment, memory.x, applied, tick * period, period, memory.stages
+    )
+    fastest: float = measure(memory)
+    return fastest
+
+
+@kernel
+def measure(memory: PlantMemory) -> float:
+    """Write what the sensors see; returns the fastest rate, rad/s (NaN if any is)."""
+    x, n = memory.x, memory.joint_positions.size
+    memory.base_position[:] = x[:3]
+    memory.quaternion[:] = x[3:7]
+    memory.joint_positions[:] = x[7 : 7 + n]
+    memory.base_velocity[:] = x[7 + n : 10 + n]
+    rotation_matrix(memory.quaternion, memory.rotation)
+    rotate_back(memory.rotation, x[10 + n : 13 + n], memory.omega_base)
+    memory.joint_velocities[:] = x[13 + n :]
+    fastest = 0.0
+    for i in range(10 + n, x.size):
+        if not abs(x[i]) <= fastest:  # also true of NaN
+            fastest = abs(x[i])
+            if np.isnan(fastest):
+                break
+    return fastest

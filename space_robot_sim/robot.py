@@ -14,6 +14,7 @@ from pydantic import AfterValidator, Field
 from space_robot_msgs_py.validation import Strict, check, read_yaml
 
 from .dynamics.model import Model
+from .records import assign
 
 Array = NDArray[np.float64]
 
@@ -170,15 +171,14 @@ class Robot:
     @cached_property
     def model(self) -> Model:
         """The numbers in the form the compiled algorithms read."""
-        return Model(
-            mass=self.mass,
-            inertia=np.ascontiguousarray(self.inertia),
-            com=np.ascontiguousarray(self.com),
-            joint_x=self.a,
-            joint_z=self.d,
+        model = Model.allocate(self.n)
+        assign(
+            model, mass=self.mass, inertia=self.inertia, com=self.com,
+            joint_x=self.a, joint_z=self.d,
             twist_cos=_exact_at_right_angles(np.cos(self.alpha)),
             twist_sin=_exact_at_right_angles(np.sin(self.alpha)),
-        )
+        )  # fmt: skip
+        return model
 
 
 def _exact_at_right_angles(values: Array) -> Array:

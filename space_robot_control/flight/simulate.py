@@ -13,12 +13,13 @@ from space_robot_msgs_py.bag import BagRecorder
 from space_robot_msgs_py.codecs import ClockCodec, CommandCodec, StateCodec, TelemetryCodec
 from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_msgs_py.reference_codec import ReferenceCodec
-from space_robot_msgs_py.samples import Command, ReferenceChunk, RobotState
+from space_robot_msgs_py.samples import Command
 
-from ..reference import ReferenceBuffer
+from ..closed_loop import close_loop
 from .plan import Flight
 
-PROGRESS_TICKS = 2000
+STRETCH_TICKS = 2000
+"""Ticks flown between two looks at the world outside."""
 
 
 class Messages:
@@ -33,24 +34,26 @@ class Messages:
         self._telemetry = TelemetryCodec(robot.axis_names)
         self._clock = ClockCodec()
 
-    def reference(self, chunk: ReferenceChunk) -> None:
-        """What the mission sends."""
-        joints, base = self._references.encode(chunk)
-        self._recorder.record(topics.REFERENCE_JOINTS, joints)
-        self._recorder.record(topics.REFERENCE_BASE, base)
-
-    def tick(self, state: RobotState, command: Command) -> None:
-        """What plant and controller send in a tick."""
-        record, tick, flight = self._recorder.record, state.tick, self._flight
-        joints, base = self._states.encode(state)
-        record(topics.JOINT_STATES, joints)
-        record(topics.BASE_STATE, base)
-        record(topics.COMMAND, self._commands.encode(command))
-        if tick % flight.plant_settings.clock_decimation == 0:
-            record(topics.CLOCK, self._clock.encode(flight.timebase.stamp_ns(tick)))
-        if tick % flight.controller_settings.telemetry_decimation == 0:
-            rows = flight.controller.telemetry()
-            record(topics.TELEMETRY, self._telemetry.encode(tick, rows))
+    def stretch(self, log: FlightLog, start: int, stop: int) -> None:
+        """What mission, plant and controller send in the ticks ``start`` to ``stop``."""
+        assert log.commanded_torque is not None
+        assert log.telemetry is not None
+        record, flight = self._recorder.record, self._flight
+        chunk_ticks = flight.mission_settings.chunk_ticks
+        for tick in range(start, stop):
+            if tick % chunk_ticks == 0:
+                joints, base = self._references.encode(flight.mission.chunk(tick, chunk_ticks))
+                record(topics.REFERENCE_JOINTS, joints)
+                record(topics.REFERENCE_BASE, base)
+            joints, base = self._states.encode(log.state(tick))
+            record(topics.JOINT_STATES, joints)
+            record(topics.BASE_STATE, base)
+            record(topics.COMMAND, self._commands.encode(Command(tick, log.commanded_torque[tick])))
+            if tick % flight.plant_settings.clock_decimation == 0:
+                record(topics.CLOCK, self._clock.encode(flight.timebase.stamp_ns(tick)))
+            if tick % flight.controller_settings.telemetry_decimation == 0:
+                s, u, n_hat, e = log.telemetry[tick]
+                record(topics.TELEMETRY, self._telemetry.encode(tick, (s, u, n_hat, e)))
 
 
 @contextmanager
@@ -81,30 +84,20 @@ def simulate(
         FlightError: the flight diverged or met a singular attitude; the bag is closed.
         InputError: the bag cannot be written.
     """
-    plant, controller, mission = flight.plant, flight.controller, flight.mission
-    chunk_ticks = flight.mission_settings.chunk_ticks
-    references = ReferenceBuffer(flight.robot.n)
-    log = FlightLog.allocate(flight.ticks, flight.robot.joint_names, flight.timebase)
+    plant, controller, ticks = flight.plant, flight.controller, flight.ticks
+    log = FlightLog.allocate(ticks, flight.robot.joint_names, flight.timebase)
     log.flight = flight.description
     log.lost = {topic.name: 0 for topic in topics.ALL}
-    log.telemetry = np.full((flight.ticks, 4, log.axes), np.nan)
+    log.commanded_torque = np.full_like(log.applied_torque, np.nan)
+    log.telemetry = np.full((ticks, 4, log.axes), np.nan)
+    reference = flight.mission.chunk(0, ticks)
+    log.reference_joints[:], log.reference_base[:] = reference.joints, reference.base
     with _recording(flight, bag) as messages:
-        for tick in range(flight.ticks):
-            if tick % chunk_ticks == 0:
-                chunk = mission.chunk(tick, chunk_ticks)
-                references.add(chunk)
-                if messages:
-                    messages.reference(chunk)
-            joints, base = references.at(tick)
-            state = plant.state
-            log.put(state)
-            log.reference_joints[tick], log.reference_base[tick] = joints, base
-            command = controller.update(state, joints, base)
-            log.telemetry[tick] = controller.telemetry()
+        for start in range(0, ticks, STRETCH_TICKS):
+            progress(start)
+            stop = min(start + STRETCH_TICKS, ticks)
+            close_loop(plant, controller, log, start, stop)
             if messages:
-                messages.tick(state, command)
-            plant.step(command)
-            if tick % PROGRESS_TICKS == 0:
-                progress(tick)
-    progress(flight.ticks)
+                messages.stretch(log, start, stop)
+    progress(ticks)
     return log

@@ -15,9 +15,9 @@ from inspect import isabstract
 
 from space_robot_msgs_py.errors import InputError
 
-from .base import ControlLaw, Signals
+from .base import CompiledLaw, ControlLaw, Signals
 
-__all__ = ["ControlLaw", "Signals", "find_law", "laws"]
+__all__ = ["CompiledLaw", "ControlLaw", "Signals", "find_law", "laws"]
 
 
 @cache

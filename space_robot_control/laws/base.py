@@ -34,9 +34,9 @@ class Signals:
 class ControlLaw(ABC):
     """One control law on m = n+3 axes at a fixed period.
 
-    A new law is a subclass with a ``name``, its gains, and `force`. A law with a gain ``h_bar``
-    is given the time-delay estimate for it; one with ``uses_model`` the nominal model (never the
-    payload, friction or disturbance).
+    A new law is a subclass with a ``name``, its gains, and `force` (or, as `CompiledLaw`, a
+    kernel). A law with a gain ``h_bar`` is given the time-delay estimate for it; one with
+    ``uses_model`` the nominal model (never the payload, friction or disturbance).
     """
 
     name: ClassVar[str]
@@ -46,15 +46,30 @@ class ControlLaw(ABC):
 
     def __init__(self, gains: Mapping[str, Array], period: float) -> None:
         """``gains``: an (m,) array for each of ``gain_descriptions``; ``period`` in s."""
-        self.gains = {name: np.ascontiguousarray(gains[name]) for name in self.gain_descriptions}
+        names = list(self.gain_descriptions)
+        axes = len(gains[names[0]])
         self.period = period
-        axes = len(next(iter(self.gains.values())))
+        self.gain_matrix = np.zeros((len(names), axes))
+        """The gains, a row each in the order of ``gain_descriptions``."""
+        has_estimate = self.uses_time_delay_estimate()
+        self.h_bar = self.gain_matrix[names.index("h_bar")] if has_estimate else np.zeros(0)
+        """(m,) Hbar of the time-delay estimate; empty if the law has none."""
+        self.gains = gains
         self.sliding_surface = np.zeros(axes)
         """s of the last tick; stays zero for a law without one."""
         self.pseudo_acceleration = np.zeros(axes)
         """u of the last tick, rad/s2 (eps: 1/s2)."""
-        self._force = np.zeros(axes)
         self.reset()
+
+    @property
+    def gains(self) -> Mapping[str, Array]:
+        """(m,) array of each gain by name."""
+        return dict(zip(self.gain_descriptions, self.gain_matrix, strict=True))
+
+    @gains.setter
+    def gains(self, gains: Mapping[str, Array]) -> None:
+        for row, name in zip(self.gain_matrix, self.gain_descriptions, strict=True):
+            row[:] = gains[name]
 
     @classmethod
     def uses_time_delay_estimate(cls) -> bool:
@@ -67,3 +82,50 @@ class ControlLaw(ABC):
     @abstractmethod
     def force(self, signals: Signals) -> Array:
         """The generalised force F_S (m,), valid until the next call."""
+
+
+class CompiledLaw(ControlLaw):
+    """A law whose equation is a kernel, so that whole flights run in compiled code."""
+
+    memory_rows: ClassVar[int] = 0
+    """Rows of ``memory`` that belong to the law, after s, u and F_S."""
+
+    def __init__(self, gains: Mapping[str, Array], period: float) -> None:
+        """See `ControlLaw`."""
+        axes = len(next(iter(gains.values())))
+        self.memory = np.zeros((3 + self.memory_rows, axes))
+        super().__init__(gains, period)
+        self.sliding_surface, self.pseudo_acceleration = self.memory[0], self.memory[1]
+
+    @staticmethod
+    @abstractmethod
+    def kernel(
+        e: Array, edot: Array, rhodd_d: Array, n_hat: Array, h_s: Array, c_s: Array,
+        gains: Array, memory: Array, period: float,
+    ) -> None:  # fmt: skip
+        """One tick of the law: a `kernel` of exactly these arguments.
+
+        Args:
+            e: (m,) ``rho_d - rho``, and so on as in `Signals`.
+            edot: (m,).
+            rhodd_d: (m,).
+            n_hat: (m,).
+            h_s: (m, m).
+            c_s: (m,).
+            gains: ``gain_matrix``, a row a gain.
+            memory: rows s, u and F_S to be written, then the law's own.
+            period: s.
+        """
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self.memory[:] = 0.0
+
+    def force(self, signals: Signals) -> Array:
+        """Run the kernel."""
+        self.kernel(
+            signals.error, signals.error_rate, signals.acceleration_desired, signals.n_hat,
+            signals.inertia, signals.bias, self.gain_matrix, self.memory, self.period,
+        )  # fmt: skip
+        force: Array = self.memory[2]
+        return force

@@ -9,37 +9,19 @@ from numpy.typing import NDArray
 
 from space_robot_sim.compiled import kernel
 
-from .base import ControlLaw, Signals
+from .base import CompiledLaw
 
 Array = NDArray[np.float64]
 
 
-class ComputedTorque(ControlLaw):
-    """``F_S = H_S u_PD + c_S``, ``u_PD = rhodd_d + K_D edot + K_P e``."""
-
-    name = "ctc"
-    gain_descriptions: ClassVar[dict[str, str]] = {
-        "k_p": "K_P of (31), 1/s2",
-        "k_d": "K_D of (31), 1/s",
-    }
-    uses_model = True
-
-    def force(self, signals: Signals) -> Array:
-        """(30)."""
-        computed_torque(
-            self.gains["k_p"], self.gains["k_d"], signals.error, signals.error_rate,
-            signals.acceleration_desired, signals.inertia, signals.bias,
-            self.pseudo_acceleration, self._force,
-        )  # fmt: skip
-        return self._force
-
-
 @kernel
 def computed_torque(
-    k_p: Array, k_d: Array, e: Array, edot: Array, rhodd_d: Array, h_s: Array, c_s: Array,
-    u: Array, force: Array,
+    e: Array, edot: Array, rhodd_d: Array, n_hat: Array, h_s: Array, c_s: Array,
+    gains: Array, memory: Array, period: float,
 ) -> None:  # fmt: skip
-    """Write (31) into ``u`` and (30) into ``force``."""
+    """(31), (30)."""
+    k_p, k_d = gains[0], gains[1]
+    u, force = memory[1], memory[2]
     for i in range(e.size):
         u[i] = rhodd_d[i] + k_d[i] * edot[i] + k_p[i] * e[i]
     inverse_dynamics(h_s, c_s, u, force)
@@ -52,3 +34,15 @@ def inverse_dynamics(h_s: Array, c_s: Array, u: Array, force: Array) -> None:
         force[i] = c_s[i]
         for j in range(u.size):
             force[i] += h_s[i, j] * u[j]
+
+
+class ComputedTorque(CompiledLaw):
+    """``F_S = H_S u_PD + c_S``, ``u_PD = rhodd_d + K_D edot + K_P e``."""
+
+    name = "ctc"
+    gain_descriptions: ClassVar[dict[str, str]] = {
+        "k_p": "K_P of (31), 1/s2",
+        "k_d": "K_D of (31), 1/s",
+    }
+    uses_model = True
+    kernel = staticmethod(computed_torque)

@@ -9,39 +9,20 @@ from numpy.typing import NDArray
 
 from space_robot_sim.compiled import kernel
 
-from .base import ControlLaw, Signals
+from .base import CompiledLaw
 from .ctc import inverse_dynamics
 
 Array = NDArray[np.float64]
 
 
-class ComputedTorqueSlidingMode(ControlLaw):
-    """``F_S = H_S (rhodd_d + lambda edot) + c_S + g sat(s, Delta)``, ``s = edot + lambda e``."""
-
-    name = "ctc_smc"
-    gain_descriptions: ClassVar[dict[str, str]] = {
-        "lambda": "slope of the sliding surface (38), 1/s",
-        "g": "switching gain of (57), N m",
-        "delta": "half-width Delta of the boundary layer (58), rad/s",
-    }
-    uses_model = True
-
-    def force(self, signals: Signals) -> Array:
-        """(57)."""
-        computed_torque_sliding_mode(
-            self.gains["lambda"], self.gains["g"], self.gains["delta"], signals.error,
-            signals.error_rate, signals.acceleration_desired, signals.inertia, signals.bias,
-            self.sliding_surface, self.pseudo_acceleration, self._force,
-        )  # fmt: skip
-        return self._force
-
-
 @kernel
 def computed_torque_sliding_mode(
-    lam: Array, g: Array, delta: Array, e: Array, edot: Array, rhodd_d: Array, h_s: Array,
-    c_s: Array, s: Array, u: Array, force: Array,
+    e: Array, edot: Array, rhodd_d: Array, n_hat: Array, h_s: Array, c_s: Array,
+    gains: Array, memory: Array, period: float,
 ) -> None:  # fmt: skip
-    """Write (38) into ``s``, the acceleration wanted into ``u``, (57) into ``force``."""
+    """(38), the acceleration wanted, (57)."""
+    lam, g, delta = gains[0], gains[1], gains[2]
+    s, u, force = memory[0], memory[1], memory[2]
     for i in range(e.size):
         s[i] = edot[i] + lam[i] * e[i]
         u[i] = rhodd_d[i] + lam[i] * edot[i]
@@ -54,3 +35,16 @@ def computed_torque_sliding_mode(
 def saturation(s: float, delta: float) -> float:
     """(58): the sign outside the boundary layer of half-width ``delta``, linear inside."""
     return np.sign(s) if abs(s) > delta else s / delta
+
+
+class ComputedTorqueSlidingMode(CompiledLaw):
+    """``F_S = H_S (rhodd_d + lambda edot) + c_S + g sat(s, Delta)``, ``s = edot + lambda e``."""
+
+    name = "ctc_smc"
+    gain_descriptions: ClassVar[dict[str, str]] = {
+        "lambda": "slope of the sliding surface (38), 1/s",
+        "g": "switching gain of (57), N m",
+        "delta": "half-width Delta of the boundary layer (58), rad/s",
+    }
+    uses_model = True
+    kernel = staticmethod(computed_torque_sliding_mode)

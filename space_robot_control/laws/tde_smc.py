@@ -9,12 +9,26 @@ from numpy.typing import NDArray
 
 from space_robot_sim.compiled import kernel
 
-from .base import ControlLaw, Signals
+from .base import CompiledLaw
 
 Array = NDArray[np.float64]
 
 
-class TimeDelaySlidingMode(ControlLaw):
+@kernel
+def time_delay_sliding_mode(
+    e: Array, edot: Array, rhodd_d: Array, n_hat: Array, h_s: Array, c_s: Array,
+    gains: Array, memory: Array, period: float,
+) -> None:  # fmt: skip
+    """(38), the acceleration wanted, (59)."""
+    h_bar, lam, g = gains[0], gains[1], gains[2]
+    s, u, force = memory[0], memory[1], memory[2]
+    for i in range(e.size):
+        s[i] = edot[i] + lam[i] * e[i]
+        u[i] = rhodd_d[i] + lam[i] * edot[i]
+        force[i] = h_bar[i] * u[i] + n_hat[i] + g[i] * np.sign(s[i])
+
+
+class TimeDelaySlidingMode(CompiledLaw):
     """``F_S = Hbar (rhodd_d + lambda edot) + N_hat + g sign(s)``, ``s = edot + lambda e``."""
 
     name = "tde_smc"
@@ -23,24 +37,4 @@ class TimeDelaySlidingMode(ControlLaw):
         "lambda": "slope of the sliding surface (38), 1/s",
         "g": "switching gain of (59), N m",
     }
-
-    def force(self, signals: Signals) -> Array:
-        """(59)."""
-        time_delay_sliding_mode(
-            self.gains["h_bar"], self.gains["lambda"], self.gains["g"], signals.error,
-            signals.error_rate, signals.acceleration_desired, signals.n_hat,
-            self.sliding_surface, self.pseudo_acceleration, self._force,
-        )  # fmt: skip
-        return self._force
-
-
-@kernel
-def time_delay_sliding_mode(
-    h_bar: Array, lam: Array, g: Array, e: Array, edot: Array, rhodd_d: Array, n_hat: Array,
-    s: Array, u: Array, force: Array,
-) -> None:  # fmt: skip
-    """Write (38) into ``s``, the acceleration wanted into ``u``, (59) into ``force``."""
-    for i in range(e.size):
-        s[i] = edot[i] + lam[i] * e[i]
-        u[i] = rhodd_d[i] + lam[i] * edot[i]
-        force[i] = h_bar[i] * u[i] + n_hat[i] + g[i] * np.sign(s[i])
+    kernel = staticmethod(time_delay_sliding_mode)

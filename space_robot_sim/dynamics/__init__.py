@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .equations_of_motion import bias_force_into, mass_matrix_into
 from .forward_dynamics import forward_dynamics_into
-from .model import Data, Model, allocate
+from .model import Data, Model
 
 if TYPE_CHECKING:
     from ..robot import Robot
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 __all__ = [
-    "Data", "Model", "allocate", "bias_force", "bias_force_into", "forward_dynamics",
+    "Data", "Model", "bias_force", "bias_force_into", "forward_dynamics",
     "forward_dynamics_into", "mass_matrix", "mass_matrix_into",
 ]  # fmt: skip
 
@@ -59,7 +59,7 @@ def mass_matrix(robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: Array
     n = robot.n
     out = np.empty((n + 6, n + 6))
     theta = _vector(joint_positions, n, "joint_positions")
-    mass_matrix_into(robot.model, _quaternion(quaternion_wxyz), theta, allocate(n), out)
+    mass_matrix_into(robot.model, _quaternion(quaternion_wxyz), theta, Data.allocate(n), out)
     return out
 
 
@@ -93,7 +93,7 @@ def bias_force(
         _vector(joint_positions, n, "joint_positions"),
         _vector(w0_inertial, 3, "w0_inertial"),
         _vector(joint_velocities, n, "joint_velocities"),
-        allocate(n),
+        Data.allocate(n),
         out,
     )
     return out
@@ -117,7 +117,7 @@ def forward_dynamics(
         _vector(w0_inertial, 3, "w0_inertial"),
         _vector(joint_velocities, n, "joint_velocities"),
         _vector(force, n + 6, "force"),
-        allocate(n),
+        Data.allocate(n),
         out,
     )
     return out

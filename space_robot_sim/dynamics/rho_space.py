@@ -8,45 +8,36 @@ The base floats freely (``f0 = 0``), so its translation is eliminated first: wit
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..attitude import attitude_jacobian_inverse, rotate, rotate_back, rotation_matrix
 from ..compiled import kernel
+from ..records import Record, nested, shaped
 from .equations_of_motion import bias_force_into, mass_matrix_into
-from .model import Data, Model, allocate
+from .model import Data, Model
 
 Array = NDArray[np.float64]
 
 
-class RhoSpaceModel(NamedTuple):
+class RhoSpaceModel(Record):
     """Results and scratch of `rho_space_into` for n joints."""
 
-    inertia: Array
-    """(n+3, n+3) ``H_S``."""
-    bias: Array
-    """(n+3,) ``c_S``."""
-    full_inertia: Array
-    """(n+6, n+6) H."""
-    full_bias: Array
-    """(n+6,) c."""
-    to_force: Array
-    """(3, 3) ``J0^-T`` for inertial axes, the transpose of ``J0^-1``."""
-    rotation: Array
-    """(3, 3) base to inertial frame."""
-    vectors: Array
-    """(3, 3) scratch."""
-    data: Data
-
-    @classmethod
-    def allocate(cls, n: int) -> RhoSpaceModel:
-        """For ``n`` joints."""
-        return cls(
-            np.zeros((n + 3, n + 3)), np.zeros(n + 3), np.zeros((n + 6, n + 6)), np.zeros(n + 6),
-            np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), allocate(n),
-        )  # fmt: skip
+    inertia: Array = shaped(lambda n: (n + 3, n + 3))
+    """``H_S``."""
+    bias: Array = shaped(lambda n: (n + 3,))
+    """``c_S``."""
+    full_inertia: Array = shaped(lambda n: (n + 6, n + 6))
+    """H."""
+    full_bias: Array = shaped(lambda n: (n + 6,))
+    """c."""
+    to_force: Array = shaped(lambda n: (3, 3))
+    """``J0^-T`` for inertial axes, the transpose of ``J0^-1``."""
+    rotation: Array = shaped(lambda n: (3, 3))
+    """Base to inertial frame."""
+    vectors: Array = shaped(lambda n: (3, 3))
+    """Scratch."""
+    data: Data = nested(Data)
 
 
 @kernel
