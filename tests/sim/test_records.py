@@ -1,0 +1,64 @@
+"""Records: one memory, seen by Python and by kernels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from space_robot_sim.compiled import kernel
+from space_robot_sim.records import Record, assign, nested, shaped
+
+Array = NDArray[np.float64]
+
+
+class Inner(Record):
+    matrix: Array = shaped(lambda n: (n + 1, 3))
+
+
+class Outer(Record):
+    vector: Array = shaped(lambda n: (2 * n,))
+    scalar: float = shaped(lambda n: ())
+    inner: Inner = nested(Inner)
+
+
+@kernel
+def fill(record: Outer) -> int:
+    record.vector[:] = 2.0
+    record.scalar = 3.0
+    record.inner.matrix[1, 2] = 4.0
+    return record.inner.matrix.shape[0]
+
+
+@pytest.mark.parametrize("n", [1, 6])
+def test_a_kernel_writes_what_python_reads(n: int) -> None:
+    block = Outer.block(n)
+    record: Outer = block[0]
+    view = record.vector
+    assert fill(record) == n + 1
+    np.testing.assert_array_equal(view, np.full(2 * n, 2.0))
+    assert block[0].scalar == 3.0
+    assert record.inner.matrix[1, 2] == 4.0
+    assert np.count_nonzero(record.inner.matrix) == 1
+
+
+def test_allocated_records_are_zero_and_share_nothing() -> None:
+    one, other = Outer.allocate(3), Outer.allocate(3)
+    fill(one)
+    assert not other.vector.any()
+    assert other.inner.matrix.shape == (4, 3)
+
+
+def test_assign_copies_arrays_and_records() -> None:
+    record, inner = Outer.allocate(2), Inner.allocate(2)
+    inner.matrix[:] = 5.0
+    assign(record, inner=inner, vector=[1.0, 2.0, 3.0, 4.0], scalar=6.0)
+    inner.matrix[:] = 0.0
+    assert record.inner.matrix.min() == 5.0
+    assert record.vector.tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert record.scalar == 6.0
+
+
+def test_assigning_to_an_unknown_field_is_an_error() -> None:
+    with pytest.raises(ValueError, match="no field of name mass"):
+        assign(Outer.allocate(2), mass=1.0)
