@@ -12,6 +12,8 @@ import click
 
 from space_robot_msgs_py.errors import SpaceRobotError
 
+from .commands.reproduce import reproduce
+
 
 def _options(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     def decorate(function: Any) -> Any:
@@ -53,6 +55,7 @@ def cli() -> None:
       space-robot fly --controller ctc --case 3     another law, another case
       space-robot simulate --json                   the same flight without ROS
       space-robot analyze flights/<bag>             the table of a recorded flight
+      space-robot reproduce                         the paper's Table V and figures, flown again
     """
 
 
@@ -139,6 +142,9 @@ def analyze(bag: Path, as_json: bool) -> None:
     from .analysis import analyse
 
     _report(analyse(read_flight(bag)), as_json)
+
+
+cli.add_command(reproduce)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

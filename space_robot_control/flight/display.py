@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from rich.console import Console
@@ -62,3 +62,25 @@ def flight_progress(total_s: float, what: str) -> Iterator[Callable[[float, str]
             progress.update(task, completed=simulated_s, remark=remark)
 
         yield update
+
+
+@contextmanager
+def counting_progress(what: str) -> Iterator[Callable[[int], Callable[[], None]]]:
+    """A progress line for things that are done one by one; see `reproduce` for its use."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=24),
+        TextColumn("{task.completed:.0f}/{task.total:.0f}"),
+        TimeElapsedColumn(),
+    )
+    with ExitStack() as stack:
+
+        def begin(total: int) -> Callable[[], None]:
+            console = Console(stderr=True)
+            progress = stack.enter_context(
+                Progress(*columns, console=console, refresh_per_second=5)
+            )
+            task = progress.add_task(what, total=total)
+            return lambda: progress.advance(task)
+
+        yield begin

@@ -1,0 +1,1 @@
+"""Subcommands of ``space-robot`` with a file of their own."""

@@ -1,0 +1,68 @@
+"""``report.html``: everything on one self-contained page."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jinja2
+from markdown_it import MarkdownIt
+
+from space_robot_msgs_py.configuration import config_directory
+
+from .claims import Claim
+from .table import Block
+
+
+class Picture(NamedTuple):
+    """A figure of the report."""
+
+    caption: str
+    path: Path
+
+    @property
+    def data(self) -> str:
+        """The PNG as a data URI."""
+        return "data:image/png;base64," + base64.b64encode(self.path.read_bytes()).decode()
+
+
+class Chapter(NamedTuple):
+    """Pictures under one heading."""
+
+    title: str
+    pictures: list[Picture]
+
+
+def render(
+    provenance: dict[str, Any],
+    parameters: dict[str, Any],
+    claims: Sequence[Claim],
+    tables: Sequence[Block],
+    chapters: Sequence[Chapter],
+) -> str:
+    """The page as HTML without references to anything outside itself.
+
+    Raises:
+        InputError: the package's data files are not installed.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("space_robot_control.reproduction", "templates"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    parameter_texts = {name: json.dumps(value, indent=1) for name, value in parameters.items()}
+    return environment.get_template("report.html.j2").render(
+        provenance=provenance, parameters=parameter_texts, claims=claims, tables=tables,
+        chapters=chapters, errata=errata(),
+    )  # fmt: skip
+
+
+def errata() -> str:
+    """``docs/errata.md`` as HTML, from the source tree or where it was installed."""
+    path = config_directory().parent / "docs" / "errata.md"
+    return str(MarkdownIt("commonmark").enable("table").render(path.read_text("utf-8")))
