@@ -62,26 +62,24 @@ class Environment(Record):
     """N m."""
     viscous: Array = shaped(lambda n: (n,))
     """N m s/rad."""
-    amplitude: Array = shaped(lambda n: (n + 3,))
-    """N m: base x, y, z on inertial axes, joints."""
-    angular_frequency: Array = shaped(lambda n: (n + 3, 2))
-    """rad/s."""
+    amplitude: Array = shaped(lambda n: (3,))
+    """N m on the base (inertial axes), on joints 1 to 3, on joints 4 and up."""
+    angular_frequency: Array = shaped(lambda n: (3, 2))
+    """rad/s, of the same."""
 
     @classmethod
     def build(
         cls, n: int, friction: FrictionSettings, disturbance: DisturbanceSettings
     ) -> Environment:
         """For a robot of ``n`` joints."""
-        groups = [
-            *[(disturbance.base_amplitude, disturbance.base_frequencies)] * 3,
-            *[(disturbance.inner_amplitude, disturbance.inner_frequencies)] * min(n, 3),
-            *[(disturbance.outer_amplitude, disturbance.outer_frequencies)] * max(n - 3, 0),
-        ]
+        d = disturbance
+        amplitudes = [d.base_amplitude, d.inner_amplitude, d.outer_amplitude]
+        frequencies = [d.base_frequencies, d.inner_frequencies, d.outer_frequencies]
         environment = cls.allocate(n)
         assign(
             environment, coulomb=friction.coulomb, viscous=friction.viscous,
-            amplitude=disturbance.scale * np.array([amplitude for amplitude, _ in groups]),
-            angular_frequency=2.0 * np.pi * np.array([frequencies for _, frequencies in groups]),
+            amplitude=d.scale * np.array(amplitudes),
+            angular_frequency=2.0 * np.pi * np.array(frequencies),
         )  # fmt: skip
         return environment
 
@@ -95,12 +93,14 @@ def with_payload(robot: Robot, payload: PayloadSettings) -> Robot:
 def disturbance_torque(environment: Environment, time: float, out: Array) -> None:
     """Write into ``out`` (n+3,) ``f_d`` at ``time``: base on inertial axes, joints; N m."""
     frequency = environment.angular_frequency
-    for i in range(out.size):
-        amplitude = environment.amplitude[i]
-        if amplitude == 0.0:
-            out[i] = 0.0
-        else:
-            out[i] = amplitude * (np.sin(frequency[i, 0] * time) + np.sin(frequency[i, 1] * time))
+    for group in range(3):
+        first, last = 3 * group, out.size if group == 2 else min(3 * group + 3, out.size)
+        amplitude, torque = environment.amplitude[group], 0.0
+        if amplitude != 0.0:
+            wave = np.sin(frequency[group, 0] * time) + np.sin(frequency[group, 1] * time)
+            torque = amplitude * wave
+        for i in range(first, last):
+            out[i] = torque
 
 
 @kernel

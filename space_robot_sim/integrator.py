@@ -34,17 +34,16 @@ class Stages(Record):
 
 @kernel
 def state_derivative(
-    model: Model, environment: Environment, x: Array, torque: Array, time: float,
+    model: Model, environment: Environment, x: Array, torque: Array, disturbance: Array,
     stages: Stages, out: Array,
 ) -> None:  # fmt: skip
     """Write xdot into ``out``: (27) with ``torque`` (n+3,) fixed in the *base* frame and f0 = 0."""
     n = model.mass.size - 1
     quaternion, theta = x[3:7], x[7 : 7 + n]
     v0, w0, rate = x[7 + n : 10 + n], x[10 + n : 13 + n], x[13 + n :]
-    force, disturbance = stages.force, stages.disturbance
-    disturbance_torque(environment, time, disturbance)
-    rotation_matrix(quaternion, stages.data.rotation[0])
-    rotate(stages.data.rotation[0], torque[:3], force[3:6])
+    force = stages.force
+    rotation_matrix(quaternion, stages.data.rotation)
+    rotate(stages.data.rotation, torque[:3], force[3:6])
     for k in range(3):
         force[k] = 0.0
         force[3 + k] -= disturbance[k]
@@ -63,13 +62,16 @@ def rk4_step(
 ) -> None:  # fmt: skip
     """Advance ``x`` in place from ``time`` by ``period``; the quaternion is made unit again."""
     size = x.size
-    slope, stage = stages.slope, stages.stage
-    state_derivative(model, environment, x, torque, time, stages, slope[0])
-    for k in range(1, 4):
-        step = period if k == 3 else 0.5 * period
-        for i in range(size):
-            stage[i] = x[i] + step * slope[k - 1, i]
-        state_derivative(model, environment, stage, torque, time + step, stages, slope[k])
+    slope, stage, disturbance = stages.slope, stages.stage, stages.disturbance
+    stage[:] = x
+    for k in range(4):
+        step = 0.0 if k == 0 else (period if k == 3 else 0.5 * period)
+        if k != 2:  # the two stages in the middle are at one time
+            disturbance_torque(environment, time + step, disturbance)
+        if k > 0:
+            for i in range(size):
+                stage[i] = x[i] + step * slope[k - 1, i]
+        state_derivative(model, environment, stage, torque, disturbance, stages, slope[k])
     for i in range(size):
         x[i] += period / 6.0 * (slope[0, i] + 2.0 * (slope[1, i] + slope[2, i]) + slope[3, i])
     norm = np.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5] + x[6] * x[6])

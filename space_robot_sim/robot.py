@@ -25,6 +25,13 @@ def inertia_tensor(values: list[float]) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
+def inertia_elements(tensors: Array) -> Array:
+    """The inverse of `inertia_tensor`, for (..., 3, 3) tensors."""
+    t = tensors
+    moments = [t[..., 0, 0], t[..., 1, 1], t[..., 2, 2]]
+    return np.stack([*moments, t[..., 0, 1], t[..., 0, 2], t[..., 1, 2]], axis=-1)
+
+
 def _physical_inertia(values: list[float]) -> list[float]:
     moments = np.linalg.eigvalsh(inertia_tensor(values))
     if moments[0] <= 0.0:
@@ -173,7 +180,7 @@ class Robot:
         """The numbers in the form the compiled algorithms read."""
         model = Model.allocate(self.n)
         assign(
-            model, mass=self.mass, inertia=self.inertia, com=self.com,
+            model, mass=self.mass, inertia=inertia_elements(self.inertia), com=self.com,
             joint_x=self.a, joint_z=self.d,
             twist_cos=_exact_at_right_angles(np.cos(self.alpha)),
             twist_sin=_exact_at_right_angles(np.sin(self.alpha)),

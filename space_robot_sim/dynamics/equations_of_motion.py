@@ -11,7 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import kernel
-from .kinematics import forward_kinematics, spatial_inertias, spatial_velocities
+from .algebra import (
+    add,
+    add_symmetric,
+    cross,
+    dot,
+    scale,
+    store,
+    symmetric,
+    transform_symmetric,
+    vector,
+)
+from .kinematics import forward_kinematics, spatial_velocities
 from .model import Data, Model
 
 Array = NDArray[np.float64]
@@ -19,61 +30,56 @@ Array = NDArray[np.float64]
 
 @kernel
 def mass_matrix_into(model: Model, quaternion: Array, theta: Array, data: Data, out: Array) -> None:
-    """Write into ``out`` (n+6, n+6) the inertia matrix H, (8)-(10).
-
-    Composite bodies: the momentum of all bodies from link j outwards, per unit rate of joint j,
-    gives H's column j; its base rows are ``J_Tw`` and ``H_wphi``, its joint rows ``H_M``.
-    """
+    """Write into ``out`` (n+6, n+6) the inertia matrix H, (8)-(10)."""
     forward_kinematics(model, quaternion, theta, data)
-    spatial_inertias(model, data)
-    n = model.mass.size - 1
-    inertia = data.spatial_inertia
-    for i in range(n, 0, -1):
-        for r in range(6):
-            for c in range(6):
-                inertia[i - 1, r, c] += inertia[i, r, c]
-    for r in range(6):
-        for c in range(6):
-            out[r, c] = inertia[0, (r + 3) % 6, (c + 3) % 6]  # the paper puts v0 before w0
-    for j in range(1, n + 1):
-        column, axis = data.momentum[j], data.motion[j]
-        for r in range(6):
-            total = 0.0
-            for c in range(6):
-                total += inertia[j, r, c] * axis[c]
-            column[r] = total
-        for r in range(6):
-            out[(r + 3) % 6, 5 + j] = out[5 + j, (r + 3) % 6] = column[r]
-        for i in range(1, j + 1):
-            total = 0.0
-            for r in range(6):
-                total += data.motion[i, r] * column[r]
-            out[5 + i, 5 + j] = out[5 + j, 5 + i] = total
+    composite_bodies(model, data, out)
 
 
 @kernel
-def bias_wrenches(model: Model, data: Data) -> None:
-    """Fill ``data.bias`` with each body's ``v x* I v``: (15), (16) at zero spatial acceleration."""
-    for i in range(model.mass.size):
-        v, r, out = data.velocity[i], data.com[i], data.bias[i]
-        w0, w1, w2 = v[0], v[1], v[2]
-        # velocity of the CoM, then m w x v and the gyroscopic moment w x I w
-        c0 = v[3] + w1 * r[2] - w2 * r[1]
-        c1 = v[4] + w2 * r[0] - w0 * r[2]
-        c2 = v[5] + w0 * r[1] - w1 * r[0]
-        f0 = model.mass[i] * (w1 * c2 - w2 * c1)
-        f1 = model.mass[i] * (w2 * c0 - w0 * c2)
-        f2 = model.mass[i] * (w0 * c1 - w1 * c0)
-        inertia = data.inertia[i]
-        h0 = inertia[0, 0] * w0 + inertia[0, 1] * w1 + inertia[0, 2] * w2
-        h1 = inertia[1, 0] * w0 + inertia[1, 1] * w1 + inertia[1, 2] * w2
-        h2 = inertia[2, 0] * w0 + inertia[2, 1] * w1 + inertia[2, 2] * w2
-        out[0] = w1 * h2 - w2 * h1 + r[1] * f2 - r[2] * f1
-        out[1] = w2 * h0 - w0 * h2 + r[2] * f0 - r[0] * f2
-        out[2] = w0 * h1 - w1 * h0 + r[0] * f1 - r[1] * f0
-        out[3] = f0
-        out[4] = f1
-        out[5] = f2
+def composite_bodies(model: Model, data: Data, out: Array) -> None:
+    """H after `forward_kinematics`.
+
+    The momentum of all bodies from link j outwards, per unit rate of joint j, gives H's column
+    j; its base rows are ``J_Tw`` and ``H_wphi``, its joint rows ``H_M``.
+    """
+    mass = 0.0
+    moment = (0.0, 0.0, 0.0)
+    inertia = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for j in range(model.mass.size - 1, -1, -1):
+        mass += model.mass[j]
+        moment = add(moment, vector(data.first_moment[j], 0))
+        inertia = add_symmetric(inertia, symmetric(data.inertia[j]))
+        if j == 0:
+            break
+        turning, moving = vector(data.motion[j], 0), vector(data.motion[j], 3)
+        linear = add(scale(moving, mass), cross(turning, moment))
+        angular = add(transform_symmetric(inertia, turning), cross(moment, moving))
+        column = out[5 + j]
+        store(linear, column, 0)
+        store(angular, column, 3)
+        for i in range(1, j + 1):
+            axis, arm = vector(data.motion[i], 0), vector(data.motion[i], 3)
+            column[5 + i] = dot(axis, angular) + dot(arm, linear)
+    for r in range(6):  # the paper puts v0 before w0
+        for c in range(6):
+            out[r, c] = 0.0
+    xx, yy, zz, xy, xz, yz = inertia
+    for k in range(3):
+        out[k, k] = mass
+    out[3, 3], out[4, 4], out[5, 5] = xx, yy, zz
+    out[3, 4] = out[4, 3] = xy
+    out[3, 5] = out[5, 3] = xz
+    out[4, 5] = out[5, 4] = yz
+    # -M r_0S~: the first moment of the whole
+    out[0, 4] = out[4, 0] = moment[2]
+    out[1, 3] = out[3, 1] = -moment[2]
+    out[0, 5] = out[5, 0] = -moment[1]
+    out[2, 3] = out[3, 2] = moment[1]
+    out[1, 5] = out[5, 1] = moment[0]
+    out[2, 4] = out[4, 2] = -moment[0]
+    for j in range(6, out.shape[0]):
+        for i in range(j):
+            out[i, j] = out[j, i]
 
 
 @kernel
@@ -81,29 +87,38 @@ def bias_force_into(
     model: Model, quaternion: Array, theta: Array, omega_inertial: Array, theta_rate: Array,
     data: Data, out: Array,
 ) -> None:  # fmt: skip
-    """Write into ``out`` (n+6,) ``c = f_NE(qdd = 0)``, (11)-(20).
+    """Write into ``out`` (n+6,) ``c = f_NE(qdd = 0)``, (11)-(20)."""
+    forward_kinematics(model, quaternion, theta, data)
+    spatial_velocities(model, omega_inertial, theta_rate, data)
+    newton_euler(model, data, out)
+
+
+@kernel
+def newton_euler(model: Model, data: Data, out: Array) -> None:
+    """C after `forward_kinematics` and `spatial_velocities`.
 
     Outwards the accelerations (13), (14), inwards the forces (17), (18) with the sign of the
     child's moment corrected, then (19).
     """
-    forward_kinematics(model, quaternion, theta, data)
-    spatial_velocities(model, omega_inertial, theta_rate, data)
-    spatial_inertias(model, data)
-    bias_wrenches(model, data)
-    n = model.mass.size - 1
-    for k in range(6):
-        data.acceleration[0, k] = 0.0
-    for i in range(1, n + 1):
-        for k in range(6):
-            data.acceleration[i, k] = data.acceleration[i - 1, k] + data.coriolis[i, k]
-        for r in range(6):
-            for c in range(6):
-                data.bias[i, r] += data.spatial_inertia[i, r, c] * data.acceleration[i, c]
-    for i in range(n, 0, -1):
-        total = 0.0
-        for k in range(6):
-            total += data.motion[i, k] * data.bias[i, k]
-            data.bias[i - 1, k] += data.bias[i, k]
-        out[5 + i] = total
-    for k in range(6):
-        out[(k + 3) % 6] = data.bias[0, k]
+    turning = (0.0, 0.0, 0.0)
+    moving = (0.0, 0.0, 0.0)
+    for i in range(1, model.mass.size):
+        turning = add(turning, vector(data.coriolis[i], 0))
+        moving = add(moving, vector(data.coriolis[i], 3))
+        moment = vector(data.first_moment[i], 0)
+        linear = add(scale(moving, model.mass[i]), cross(turning, moment))
+        angular = add(
+            transform_symmetric(symmetric(data.inertia[i]), turning), cross(moment, moving)
+        )
+        store(add(vector(data.bias[i], 0), angular), data.bias[i], 0)
+        store(add(vector(data.bias[i], 3), linear), data.bias[i], 3)
+    moment = (0.0, 0.0, 0.0)
+    force = (0.0, 0.0, 0.0)
+    for i in range(model.mass.size - 1, -1, -1):
+        moment = add(moment, vector(data.bias[i], 0))
+        force = add(force, vector(data.bias[i], 3))
+        if i > 0:
+            axis, arm = vector(data.motion[i], 0), vector(data.motion[i], 3)
+            out[5 + i] = dot(axis, moment) + dot(arm, force)
+    store(force, out, 0)
+    store(moment, out, 3)

@@ -1,7 +1,8 @@
 """Accelerations from forces, ``qdd = H^-1 (F - c)``, by the articulated-body algorithm.
 
 Featherstone's recursion, linear in the number of joints. With every quantity on inertial axes
-about one origin the usual changes of frame between links vanish.
+about one origin the usual changes of frame between links vanish. A spatial inertia is held in
+three blocks: ``[[J, G], [G^T, M]]``, angular part first, J and M symmetric.
 """
 
 from __future__ import annotations
@@ -10,8 +11,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import kernel
-from .equations_of_motion import bias_wrenches
-from .kinematics import forward_kinematics, spatial_inertias, spatial_velocities
+from .algebra import (
+    Matrix,
+    Symmetric,
+    Vector,
+    add,
+    add_symmetric,
+    dot,
+    inverse_symmetric,
+    outer_subtracted,
+    outer_subtracted_general,
+    scale,
+    skew_added,
+    store,
+    subtract,
+    symmetric,
+    transform,
+    transform_symmetric,
+    transform_transposed,
+    vector,
+)
+from .kinematics import forward_kinematics, spatial_velocities
 from .model import Data, Model
 
 Array = NDArray[np.float64]
@@ -28,68 +48,79 @@ def forward_dynamics_into(
     """
     forward_kinematics(model, quaternion, theta, data)
     spatial_velocities(model, omega_inertial, theta_rate, data)
-    spatial_inertias(model, data)
-    bias_wrenches(model, data)
-    n = model.mass.size - 1
-    for i in range(n, 0, -1):
-        _articulate(data, i, force[5 + i])
-    for k in range(6):
-        data.acceleration[0, k] = force[(k + 3) % 6] - data.bias[0, k]
-    solve_positive_definite(data.spatial_inertia[0], data.acceleration[0])
-    for i in range(1, n + 1):
-        rate = data.scalar[i, 1]
-        for k in range(6):
-            data.acceleration[i, k] = data.acceleration[i - 1, k] + data.coriolis[i, k]
-            rate -= data.momentum[i, k] * data.acceleration[i, k]
-        rate /= data.scalar[i, 0]
+    # inwards: what each link's parent feels of it, free about its joint
+    inertia = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    coupling = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    mass = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    moment, linear = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for i in range(model.mass.size - 1, -1, -1):
+        inertia = add_symmetric(inertia, symmetric(data.inertia[i]))
+        coupling = skew_added(coupling, vector(data.first_moment[i], 0))
+        m = model.mass[i]
+        mass = (mass[0] + m, mass[1] + m, mass[2] + m, mass[3], mass[4], mass[5])
+        moment = add(moment, vector(data.bias[i], 0))
+        linear = add(linear, vector(data.bias[i], 3))
+        if i == 0:
+            break
+        axis, arm = vector(data.motion[i], 0), vector(data.motion[i], 3)
+        angular = add(transform_symmetric(inertia, axis), transform(coupling, arm))
+        straight = add(transform_transposed(coupling, axis), transform_symmetric(mass, arm))
+        inverse = 1.0 / (dot(axis, angular) + dot(arm, straight))
+        driving = (force[5 + i] - dot(axis, moment) - dot(arm, linear)) * inverse
+        share_angular, share_straight = scale(angular, inverse), scale(straight, inverse)
+        store(share_angular, data.share[i], 0)
+        store(share_straight, data.share[i], 3)
+        data.driving[i] = driving
+        inertia = outer_subtracted(inertia, share_angular, angular)
+        coupling = outer_subtracted_general(coupling, share_angular, straight)
+        mass = outer_subtracted(mass, share_straight, straight)
+        turning, moving = vector(data.coriolis[i], 0), vector(data.coriolis[i], 3)
+        moment = add(moment, scale(angular, driving))
+        moment = add(moment, transform_symmetric(inertia, turning))
+        moment = add(moment, transform(coupling, moving))
+        linear = add(linear, scale(straight, driving))
+        linear = add(linear, transform_transposed(coupling, turning))
+        linear = add(linear, transform_symmetric(mass, moving))
+    # the base floats: no joint to the ground
+    turning, moving = solve_spatial(
+        inertia, coupling, mass,
+        subtract(vector(force, 3), moment), subtract(vector(force, 0), linear),
+    )  # fmt: skip
+    store(moving, out, 0)
+    store(turning, out, 3)
+    # outwards
+    for i in range(1, model.mass.size):
+        turning = add(turning, vector(data.coriolis[i], 0))
+        moving = add(moving, vector(data.coriolis[i], 3))
+        rate = data.driving[i] - dot(vector(data.share[i], 0), turning)
+        rate -= dot(vector(data.share[i], 3), moving)
         out[5 + i] = rate
-        for k in range(6):
-            data.acceleration[i, k] += data.motion[i, k] * rate
-    for k in range(6):
-        out[k] = data.acceleration[0, (k + 3) % 6]
+        turning = add(turning, scale(vector(data.motion[i], 0), rate))
+        moving = add(moving, scale(vector(data.motion[i], 3), rate))
 
 
 @kernel
-def _articulate(data: Data, i: int, torque: float) -> None:
-    """Pass link i's articulated inertia and bias, free about its joint, on to its parent."""
-    inertia, axis, momentum = data.spatial_inertia[i], data.motion[i], data.momentum[i]
-    bias, coriolis = data.bias[i], data.coriolis[i]
-    free, driving = 0.0, torque
-    for r in range(6):
-        total = 0.0
-        for c in range(6):
-            total += inertia[r, c] * axis[c]
-        momentum[r] = total
-        free += axis[r] * total
-        driving -= axis[r] * bias[r]
-    data.scalar[i, 0] = free
-    data.scalar[i, 1] = driving
-    parent, parent_bias = data.spatial_inertia[i - 1], data.bias[i - 1]
-    for r in range(6):
-        share = momentum[r] / free
-        total = bias[r] + share * driving
-        for c in range(6):
-            rest = inertia[r, c] - share * momentum[c]
-            total += rest * coriolis[c]
-            parent[r, c] += rest
-        parent_bias[r] += total
-
-
-@kernel
-def solve_positive_definite(matrix: Array, vector: Array) -> None:
-    """``vector <- matrix^-1 vector`` by Cholesky; ``matrix``'s lower half becomes its factor."""
-    size = vector.size
-    for i in range(size):
-        for j in range(i + 1):
-            total = matrix[i, j]
-            for k in range(j):
-                total -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = np.sqrt(total) if i == j else total / matrix[j, j]
-    for i in range(size):
-        for k in range(i):
-            vector[i] -= matrix[i, k] * vector[k]
-        vector[i] /= matrix[i, i]
-    for i in range(size - 1, -1, -1):
-        for k in range(i + 1, size):
-            vector[i] -= matrix[k, i] * vector[k]
-        vector[i] /= matrix[i, i]
+def solve_spatial(
+    inertia: Symmetric, coupling: Matrix, mass: Symmetric, moment: Vector, force: Vector
+) -> tuple[Vector, Vector]:
+    """Angular and linear acceleration of a body with a spatial inertia under a wrench."""
+    lightness = inverse_symmetric(mass)
+    g = coupling
+    rows = (
+        transform_symmetric(lightness, (g[0], g[1], g[2])),
+        transform_symmetric(lightness, (g[3], g[4], g[5])),
+        transform_symmetric(lightness, (g[6], g[7], g[8])),
+    )
+    # Schur complement J - G M^-1 G^T
+    complement = (
+        inertia[0] - dot(rows[0], (g[0], g[1], g[2])),
+        inertia[1] - dot(rows[1], (g[3], g[4], g[5])),
+        inertia[2] - dot(rows[2], (g[6], g[7], g[8])),
+        inertia[3] - dot(rows[0], (g[3], g[4], g[5])),
+        inertia[4] - dot(rows[0], (g[6], g[7], g[8])),
+        inertia[5] - dot(rows[1], (g[6], g[7], g[8])),
+    )
+    lever = (dot(rows[0], force), dot(rows[1], force), dot(rows[2], force))
+    turning = transform_symmetric(inverse_symmetric(complement), subtract(moment, lever))
+    moving = transform_symmetric(lightness, subtract(force, transform_transposed(g, turning)))
+    return turning, moving

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from ..attitude import attitude_jacobian_inverse, rotate, rotate_back, rotation_matrix
 from ..compiled import kernel
 from ..records import Record, nested, shaped
-from .equations_of_motion import bias_force_into, mass_matrix_into
+from .equations_of_motion import composite_bodies, newton_euler
+from .kinematics import forward_kinematics, spatial_velocities
 from .model import Data, Model
 
 Array = NDArray[np.float64]
@@ -53,8 +54,10 @@ def rho_space_into(
     omega, convective, moved = out.vectors[0], out.vectors[1], out.vectors[2]
     rotation_matrix(quaternion, out.rotation)
     rotate(out.rotation, omega_base, omega)
-    mass_matrix_into(model, quaternion, theta, out.data, full)
-    bias_force_into(model, quaternion, theta, omega, theta_rate, out.data, out.full_bias)
+    forward_kinematics(model, quaternion, theta, out.data)
+    composite_bodies(model, out.data, full)
+    spatial_velocities(model, omega, theta_rate, out.data)
+    newton_euler(model, out.data, out.full_bias)
     _eliminate_translation(full, out.full_bias, inertia, bias)
     # J0 on inertial axes is the transpose of J0 in the base frame, so its J0^-T is the latter's
     # inverse. For a unit quaternion J0dot w0 = -|w0|^2 eps / 4.

@@ -10,7 +10,7 @@ from oracles import mujoco_forward_dynamics, pinocchio_forward_dynamics
 from random_robots import Case, State, cases, random_robot, random_state
 
 from space_robot_sim import Robot, bias_force, forward_dynamics, mass_matrix
-from space_robot_sim.dynamics.forward_dynamics import solve_positive_definite
+from space_robot_sim.dynamics.forward_dynamics import solve_spatial
 
 Array = NDArray[np.float64]
 
@@ -87,10 +87,14 @@ def test_only_a_force_on_the_base_moves_the_centre_of_mass(case: Case) -> None:
 
 @given(cases(max_joints=3))
 @settings(max_examples=20)
-def test_solve_positive_definite_agrees_with_numpy(case: Case) -> None:
+def test_solve_spatial_agrees_with_numpy(case: Case) -> None:
     root = case.rng.normal(size=(6, 6))
     matrix = root @ root.T + 0.1 * np.eye(6)
-    vector = case.rng.normal(size=6)
-    solution = vector.copy()
-    solve_positive_definite(matrix.copy(), solution)
-    np.testing.assert_allclose(solution, np.linalg.solve(matrix, vector), rtol=1e-8, atol=1e-10)
+    moment, force = case.rng.normal(size=(2, 3))
+    j, g, m = matrix[:3, :3], matrix[:3, 3:], matrix[3:, 3:]
+    upper = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
+    solution = solve_spatial(
+        tuple(j[upper]), tuple(g.ravel()), tuple(m[upper]), tuple(moment), tuple(force)
+    )
+    expected = np.linalg.solve(matrix, np.concatenate([moment, force]))
+    np.testing.assert_allclose(np.concatenate(solution), expected, rtol=1e-8, atol=1e-10)

@@ -1,0 +1,151 @@
+"""Algebra of three-vectors and of symmetric and general 3 x 3 matrices, as tuples.
+
+Tuples live in registers: the compiler need not ask which arrays overlap, as it must for views.
+A symmetric matrix is ``(xx, yy, zz, xy, xz, yz)``, a general one nine numbers row by row.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import kernel
+
+Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
+Symmetric = tuple[float, float, float, float, float, float]
+Matrix = tuple[float, float, float, float, float, float, float, float, float]
+
+
+@kernel
+def vector(row: Array, start: int) -> Vector:
+    """Three numbers of ``row`` from ``start`` on."""
+    return row[start], row[start + 1], row[start + 2]
+
+
+@kernel
+def store(a: Vector, row: Array, start: int) -> None:
+    """Write ``a`` into ``row`` from ``start`` on."""
+    row[start], row[start + 1], row[start + 2] = a
+
+
+@kernel
+def add(a: Vector, b: Vector) -> Vector:
+    """``a + b``."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@kernel
+def subtract(a: Vector, b: Vector) -> Vector:
+    """``a - b``."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@kernel
+def scale(a: Vector, factor: float) -> Vector:
+    """``a * factor``."""
+    return a[0] * factor, a[1] * factor, a[2] * factor
+
+
+@kernel
+def dot(a: Vector, b: Vector) -> float:
+    """``a . b``."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def cross(a: Vector, b: Vector) -> Vector:
+    """``a x b``."""
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+@kernel
+def symmetric(row: Array) -> Symmetric:
+    """The six numbers of ``row``."""
+    return row[0], row[1], row[2], row[3], row[4], row[5]
+
+
+@kernel
+def add_symmetric(a: Symmetric, b: Symmetric) -> Symmetric:
+    """``a + b``."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]
+
+
+@kernel
+def outer_subtracted(s: Symmetric, a: Vector, b: Vector) -> Symmetric:
+    """``s - a b^T`` for parallel ``a`` and ``b``."""
+    return (
+        s[0] - a[0] * b[0], s[1] - a[1] * b[1], s[2] - a[2] * b[2],
+        s[3] - a[0] * b[1], s[4] - a[0] * b[2], s[5] - a[1] * b[2],
+    )  # fmt: skip
+
+
+@kernel
+def transform_symmetric(s: Symmetric, a: Vector) -> Vector:
+    """``s a``."""
+    return (
+        s[0] * a[0] + s[3] * a[1] + s[4] * a[2],
+        s[3] * a[0] + s[1] * a[1] + s[5] * a[2],
+        s[4] * a[0] + s[5] * a[1] + s[2] * a[2],
+    )
+
+
+@kernel
+def transform(m: Matrix, a: Vector) -> Vector:
+    """``m a``."""
+    return (
+        m[0] * a[0] + m[1] * a[1] + m[2] * a[2],
+        m[3] * a[0] + m[4] * a[1] + m[5] * a[2],
+        m[6] * a[0] + m[7] * a[1] + m[8] * a[2],
+    )
+
+
+@kernel
+def transform_transposed(m: Matrix, a: Vector) -> Vector:
+    """``m^T a``."""
+    return (
+        m[0] * a[0] + m[3] * a[1] + m[6] * a[2],
+        m[1] * a[0] + m[4] * a[1] + m[7] * a[2],
+        m[2] * a[0] + m[5] * a[1] + m[8] * a[2],
+    )
+
+
+@kernel
+def skew_added(m: Matrix, a: Vector) -> Matrix:
+    """``m + skew(a)``, ``skew(a) b = a x b``."""
+    return (
+        m[0], m[1] - a[2], m[2] + a[1],
+        m[3] + a[2], m[4], m[5] - a[0],
+        m[6] - a[1], m[7] + a[0], m[8],
+    )  # fmt: skip
+
+
+@kernel
+def outer_subtracted_general(m: Matrix, a: Vector, b: Vector) -> Matrix:
+    """``m - a b^T``."""
+    return (
+        m[0] - a[0] * b[0], m[1] - a[0] * b[1], m[2] - a[0] * b[2],
+        m[3] - a[1] * b[0], m[4] - a[1] * b[1], m[5] - a[1] * b[2],
+        m[6] - a[2] * b[0], m[7] - a[2] * b[1], m[8] - a[2] * b[2],
+    )  # fmt: skip
+
+
+@kernel
+def inverse_symmetric(s: Symmetric) -> Symmetric:
+    """``s^-1`` of a positive definite matrix, by cofactors."""
+    xx = s[1] * s[2] - s[5] * s[5]
+    xy = s[4] * s[5] - s[3] * s[2]
+    xz = s[3] * s[5] - s[4] * s[1]
+    factor = 1.0 / (s[0] * xx + s[3] * xy + s[4] * xz)
+    return (
+        xx * factor,
+        (s[0] * s[2] - s[4] * s[4]) * factor,
+        (s[0] * s[1] - s[3] * s[3]) * factor,
+        xy * factor,
+        xz * factor,
+        (s[3] * s[4] - s[0] * s[5]) * factor,
+    )
