@@ -85,6 +85,10 @@ class FlightLog:
             self.applied_torque[tick],
         )  # fmt: skip
 
+    def reference(self, tick: int) -> tuple[Array, Array]:
+        """The joints' (3, n) and the base's (10,) row of a tick."""
+        return self.reference_joints[tick], self.reference_base[tick]
+
     def truncated(self, ticks: int) -> FlightLog:
         """The first ``ticks`` rows."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -17,6 +18,8 @@ from typing import Any, TypeVar, cast
 import numba
 
 _PACKAGES = ("space_robot_sim", "space_robot_control")
+_OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+_njit: Any = numba.njit
 config: Any = numba.config
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -29,7 +32,7 @@ def cache_directory() -> Path:
     for package in _PACKAGES:
         for source in sorted((root / package).rglob("*.py")):
             text = source.read_bytes()
-            if b"@kernel" in text:
+            if b"@kernel" in text or b"@subroutine" in text:
                 digest.update(text)
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     base = os.environ.get("NUMBA_CACHE_DIR") or str(Path(home) / "space_robot")
@@ -42,12 +45,13 @@ def kernel(function: _Function) -> _Function:
     IEEE arithmetic is kept as written (no fast-math): the same inputs give the same bits in
     every process, which is what makes the graph and the in-process flight agree.
     """
-    previous = config.CACHE_DIR
-    config.CACHE_DIR = str(cache_directory())
-    try:
-        return cast(_Function, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
-    finally:
-        config.CACHE_DIR = previous
+    with _our_cache():
+        return cast(_Function, _njit(cache=True, **_OPTIONS)(function))
+
+
+def subroutine(function: _Function) -> _Function:
+    """A small part of kernels, callable from them only: it compiles in half the time."""
+    return cast(_Function, _njit(no_cpython_wrapper=True, **_OPTIONS)(function))
 
 
 @cache
@@ -56,10 +60,17 @@ def function_pointer(function: Callable[..., Any], signature: Any) -> Any:
 
     A loop then need not be compiled again for every function it may call.
     """
+    compiled: Any = function
+    with _our_cache():
+        return numba.cfunc(signature, cache=True, error_model="numpy")(compiled.py_func)
+
+
+@contextmanager
+def _our_cache() -> Iterator[None]:
+    """Numba reads the folder when it decorates."""
     previous = config.CACHE_DIR
     config.CACHE_DIR = str(cache_directory())
     try:
-        compiled: Any = function
-        return numba.cfunc(signature, cache=True, error_model="numpy")(compiled.py_func)
+        yield
     finally:
         config.CACHE_DIR = previous

@@ -23,5 +23,8 @@ def compile_kernels() -> None:
         return
     click.echo("compiling the dynamics and the laws (once, about half a minute) ...", err=True)
     for law in laws():
-        simulate(Flight(FlightPlan(controller=law, duration=0.002)))
+        flight = Flight(FlightPlan(controller=law, duration=0.002))
+        log = simulate(flight)
+        # and the entries of the nodes
+        flight.plant.step(flight.controller.update(log.state(0), *log.reference(0)))
     mark.touch()

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import kernel
+from ..compiled import subroutine
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -17,43 +17,43 @@ Symmetric = tuple[float, float, float, float, float, float]
 Matrix = tuple[float, float, float, float, float, float, float, float, float]
 
 
-@kernel
+@subroutine
 def vector(row: Array, start: int) -> Vector:
     """Three numbers of ``row`` from ``start`` on."""
     return row[start], row[start + 1], row[start + 2]
 
 
-@kernel
+@subroutine
 def store(a: Vector, row: Array, start: int) -> None:
     """Write ``a`` into ``row`` from ``start`` on."""
     row[start], row[start + 1], row[start + 2] = a
 
 
-@kernel
+@subroutine
 def add(a: Vector, b: Vector) -> Vector:
     """``a + b``."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@kernel
+@subroutine
 def subtract(a: Vector, b: Vector) -> Vector:
     """``a - b``."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@kernel
+@subroutine
 def scale(a: Vector, factor: float) -> Vector:
     """``a * factor``."""
     return a[0] * factor, a[1] * factor, a[2] * factor
 
 
-@kernel
+@subroutine
 def dot(a: Vector, b: Vector) -> float:
     """``a . b``."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@kernel
+@subroutine
 def cross(a: Vector, b: Vector) -> Vector:
     """``a x b``."""
     return (
@@ -63,19 +63,19 @@ def cross(a: Vector, b: Vector) -> Vector:
     )
 
 
-@kernel
+@subroutine
 def symmetric(row: Array) -> Symmetric:
     """The six numbers of ``row``."""
     return row[0], row[1], row[2], row[3], row[4], row[5]
 
 
-@kernel
+@subroutine
 def add_symmetric(a: Symmetric, b: Symmetric) -> Symmetric:
     """``a + b``."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]
 
 
-@kernel
+@subroutine
 def outer_subtracted(s: Symmetric, a: Vector, b: Vector) -> Symmetric:
     """``s - a b^T`` for parallel ``a`` and ``b``."""
     return (
@@ -84,7 +84,7 @@ def outer_subtracted(s: Symmetric, a: Vector, b: Vector) -> Symmetric:
     )  # fmt: skip
 
 
-@kernel
+@subroutine
 def transform_symmetric(s: Symmetric, a: Vector) -> Vector:
     """``s a``."""
     return (
@@ -94,7 +94,7 @@ def transform_symmetric(s: Symmetric, a: Vector) -> Vector:
     )
 
 
-@kernel
+@subroutine
 def transform(m: Matrix, a: Vector) -> Vector:
     """``m a``."""
     return (
@@ -104,7 +104,7 @@ def transform(m: Matrix, a: Vector) -> Vector:
     )
 
 
-@kernel
+@subroutine
 def transform_transposed(m: Matrix, a: Vector) -> Vector:
     """``m^T a``."""
     return (
@@ -114,7 +114,7 @@ def transform_transposed(m: Matrix, a: Vector) -> Vector:
     )
 
 
-@kernel
+@subroutine
 def skew_added(m: Matrix, a: Vector) -> Matrix:
     """``m + skew(a)``, ``skew(a) b = a x b``."""
     return (
@@ -124,7 +124,7 @@ def skew_added(m: Matrix, a: Vector) -> Matrix:
     )  # fmt: skip
 
 
-@kernel
+@subroutine
 def outer_subtracted_general(m: Matrix, a: Vector, b: Vector) -> Matrix:
     """``m - a b^T``."""
     return (
@@ -134,7 +134,7 @@ def outer_subtracted_general(m: Matrix, a: Vector, b: Vector) -> Matrix:
     )  # fmt: skip
 
 
-@kernel
+@subroutine
 def inverse_symmetric(s: Symmetric) -> Symmetric:
     """``s^-1`` of a positive definite matrix, by cofactors."""
     xx = s[1] * s[2] - s[5] * s[5]
