@@ -25,6 +25,7 @@ setup(
     python_requires=">=3.10,<3.14",
     install_requires=[
         "click>=8.1",
+        "matplotlib>=3.8",
         "mcap>=1.1",
         "numba>=0.58.1",
         "numpy>=1.26,<3",

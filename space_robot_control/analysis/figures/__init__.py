@@ -1,0 +1,11 @@
+"""Pictures of flights for print: 180 mm wide, from flight logs to matplotlib figures.
+
+Nothing here uses pyplot or leaves a trace in matplotlib's settings, so pictures may be drawn in
+worker processes. The same log gives the same bytes.
+"""
+
+from .comparison import chatter, junctions
+from .files import save_figure
+from .single_flight import control_results, desired_joints
+
+__all__ = ["chatter", "control_results", "desired_joints", "junctions", "save_figure"]

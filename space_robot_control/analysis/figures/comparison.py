@@ -1,0 +1,113 @@
+"""Pictures of several flights together: is a law's command smooth, or does it switch?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
+
+from space_robot_msgs_py.flight_log import FlightLog
+
+from ..metrics import CHATTER_FREQUENCY
+from .lines import mark_moments, scattered_marks
+from .quantity import power_of_ten
+from .side_by_side import Stretch, draw_side_by_side, grid_height
+from .single_flight import BASE_AXES, JUNCTION_HALF_WIDTH
+from .spectrum import power_spectral_density
+from .style import (
+    LEFT,
+    PAGE_WIDTH,
+    RIGHT,
+    TIME_AXIS,
+    Look,
+    house_style,
+    legend_above,
+    legend_height,
+    page,
+    panel,
+)
+from .waypoints import junction_ticks
+
+CHATTER_STRETCH = 0.05
+"""s of base torque that are shown tick by tick."""
+
+_WIDTH = PAGE_WIDTH - LEFT - RIGHT
+
+
+@house_style()
+def junctions(logs: Mapping[str, FlightLog]) -> Figure:
+    """The base torque x of all laws round the first junction of the mission's segments.
+
+    All panels have one scale. A law that swings much farther than most does not set it: it is cut
+    off at the panel's edges, and its heading says how far it goes.
+
+    Args:
+        logs: flights of one mission by the name of the law.
+    """
+    moments = [log.timebase.period * t for log in logs.values() for t in junction_ticks(log)[:1]]
+    if not moments:
+        return page(12.0, "None of these flights passes a junction of two segments.")
+    stretch = Stretch(
+        "base torque x", slice(0, 1), min(moments), -JUNCTION_HALF_WIDTH, JUNCTION_HALF_WIDTH
+    )
+    columns, height = min(2, len(logs)), 38.0
+    figure = page(1.0 + grid_height(len(logs), columns, height))
+    for axes in draw_side_by_side(figure, 1.0, height, columns, logs, stretch):
+        mark_moments(axes, np.zeros(1))
+    return figure
+
+
+@house_style()
+def chatter(logs: Mapping[str, FlightLog]) -> Figure:
+    """A short stretch of base torque on one scale, and the spectrum of the whole flight.
+
+    The stretch begins at a quarter of the longest flight: when the arm is fastest, if the mission
+    has two segments. Scale and headings are those of :func:`junctions`.
+
+    Args:
+        logs: flights of one mission by the name of the law.
+    """
+    moment = max(log.ticks * log.timebase.period for log in logs.values()) / 4.0
+    stretch = Stretch("base torque", slice(0, 3), moment, 0.0, CHATTER_STRETCH)
+    columns = math.ceil(len(logs) / math.ceil(len(logs) / 4))
+    height, spectrum_height = 32.0, 72.0
+    top = 1.0 + legend_height(BASE_AXES, _WIDTH)
+    spectrum_top = top + grid_height(len(logs), columns, height)
+    spectrum_top += 2.0 + legend_height(list(logs), _WIDTH)
+    figure = page(spectrum_top + spectrum_height + TIME_AXIS)
+    draw_side_by_side(figure, top, height, columns, logs, stretch, steps=True)
+    legend_above(figure, LEFT, top, BASE_AXES, _WIDTH, dashed=False)
+    names = _draw_spectra(panel(figure, LEFT, spectrum_top, _WIDTH, spectrum_height), logs)
+    legend_above(figure, LEFT, spectrum_top, names, _WIDTH, dashed=True)
+    return figure
+
+
+def _draw_spectra(axes: Axes, logs: Mapping[str, FlightLog]) -> list[str]:
+    """Draw the base torque's spectra on logarithmic scales; the lines' names for the legend."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    names = []
+    for index, (name, log) in enumerate(logs.items()):
+        frequency, density = power_spectral_density(log.applied_torque[:, :3], log.timebase.period)
+        names.append(name if len(frequency) else f"{name}: too short")
+        if not len(frequency):
+            continue
+        look = Look.of(index)
+        even = np.geomspace(frequency[0], frequency[-1], 1000)
+        marks = np.searchsorted(frequency, even[scattered_marks(len(even), index, len(logs))])
+        axes.plot(
+            frequency, density,
+            color=look.colour, linestyle=look.dashes, marker=look.marker, markevery=marks.tolist(),
+        )  # fmt: skip
+    mark_moments(axes, np.array([CHATTER_FREQUENCY]))
+    axes.set_xlabel("frequency (Hz)")
+    axes.set_ylabel("PSD of base torque, x + y + z ((N m)²/Hz)")
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda f, _: f"{f:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda p, _: power_of_ten(round(math.log10(p)))))
+    axes.yaxis.set_minor_locator(NullLocator())
+    return names
