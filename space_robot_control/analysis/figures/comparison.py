@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
+from numpy.typing import NDArray
 
 from space_robot_msgs_py.flight_log import FlightLog
 
@@ -31,6 +32,8 @@ from .style import (
     panel,
 )
 from .waypoints import junction_ticks
+
+Array = NDArray[np.float64]
 
 CHATTER_STRETCH = 0.05
 """s of base torque that are shown tick by tick."""
@@ -75,30 +78,36 @@ def chatter(logs: Mapping[str, FlightLog]) -> Figure:
     stretch = Stretch("base torque", slice(0, 3), moment, 0.0, CHATTER_STRETCH)
     columns = math.ceil(len(logs) / math.ceil(len(logs) / 4))
     height, spectrum_height = 32.0, 72.0
+    spectra = _spectra(logs)
     top = 1.0 + legend_height(BASE_AXES, _WIDTH)
     spectrum_top = top + grid_height(len(logs), columns, height)
-    spectrum_top += 2.0 + legend_height(list(logs), _WIDTH)
+    spectrum_top += 2.0 + legend_height(list(spectra), _WIDTH)
     figure = page(spectrum_top + spectrum_height + TIME_AXIS)
     draw_side_by_side(figure, top, height, columns, logs, stretch, steps=True)
     legend_above(figure, LEFT, top, BASE_AXES, _WIDTH, dashed=False)
-    names = _draw_spectra(panel(figure, LEFT, spectrum_top, _WIDTH, spectrum_height), logs)
-    legend_above(figure, LEFT, spectrum_top, names, _WIDTH, dashed=True)
+    _draw_spectra(panel(figure, LEFT, spectrum_top, _WIDTH, spectrum_height), spectra)
+    legend_above(figure, LEFT, spectrum_top, list(spectra), _WIDTH, dashed=True)
     return figure
 
 
-def _draw_spectra(axes: Axes, logs: Mapping[str, FlightLog]) -> list[str]:
-    """Draw the base torque's spectra on logarithmic scales; the lines' names for the legend."""
+def _spectra(logs: Mapping[str, FlightLog]) -> dict[str, tuple[Array, Array]]:
+    """Frequency and density of the base torque by the name of the law for the legend."""
+    spectra = {}
+    for name, log in logs.items():
+        spectrum = power_spectral_density(log.applied_torque[:, :3], log.timebase.period)
+        spectra[name if len(spectrum[0]) else f"{name}: too short"] = spectrum
+    return spectra
+
+
+def _draw_spectra(axes: Axes, spectra: Mapping[str, tuple[Array, Array]]) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
-    names = []
-    for index, (name, log) in enumerate(logs.items()):
-        frequency, density = power_spectral_density(log.applied_torque[:, :3], log.timebase.period)
-        names.append(name if len(frequency) else f"{name}: too short")
-        if not len(frequency):
+    for index, (frequency, density) in enumerate(spectra.values()):
+        if len(frequency) == 0:
             continue
         look = Look.of(index)
         even = np.geomspace(frequency[0], frequency[-1], 1000)
-        marks = np.searchsorted(frequency, even[scattered_marks(len(even), index, len(logs))])
+        marks = np.searchsorted(frequency, even[scattered_marks(len(even), index, len(spectra))])
         axes.plot(
             frequency, density,
             color=look.colour, linestyle=look.dashes, marker=look.marker, markevery=marks.tolist(),
@@ -110,4 +119,3 @@ def _draw_spectra(axes: Axes, logs: Mapping[str, FlightLog]) -> list[str]:
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.yaxis.set_major_formatter(FuncFormatter(lambda p, _: power_of_ten(round(math.log10(p)))))
     axes.yaxis.set_minor_locator(NullLocator())
-    return names

@@ -46,6 +46,7 @@ _SETTINGS: Any = {
     "axes.linewidth": 0.6,
     "axes.labelpad": 2.0,
     "axes.titlepad": 3.0,
+    "axes.titley": 1.0,  # else each title looks for a place of its own, which takes time
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.xmargin": 0.01,
