@@ -22,9 +22,12 @@ setup(
     maintainer="space_robot maintainers",
     maintainer_email="maintainers@space-robot.example.org",
     packages=find_packages(include=[f"{NAME}_*"]),
+    package_data={"space_robot_control.reproduction": ["templates/*.j2"]},
     python_requires=">=3.10,<3.14",
     install_requires=[
         "click>=8.1",
+        "jinja2>=3.1",
+        "markdown-it-py>=3",
         "matplotlib>=3.8",
         "mcap>=1.1",
         "numba>=0.58.1",
@@ -60,6 +63,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         (f"lib/{NAME}", EXECUTABLES),
+        (f"share/{NAME}/docs", ["docs/errata.md"]),  # part of the report of `reproduce`
         *CONFIG,
     ],
 )

@@ -166,19 +166,9 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     sys.exit(0)
 
 
-def fly_main() -> NoReturn:
-    """``ros2 run space_robot fly``."""
-    main(["fly", *sys.argv[1:]])
-
-
-def simulate_main() -> NoReturn:
-    """``ros2 run space_robot simulate``."""
-    main(["simulate", *sys.argv[1:]])
-
-
-def analyze_main() -> NoReturn:
-    """``ros2 run space_robot analyze``."""
-    main(["analyze", *sys.argv[1:]])
+def run(command: str) -> NoReturn:
+    """``ros2 run space_robot COMMAND``."""
+    main([command, *sys.argv[1:]])
 
 
 if __name__ == "__main__":
