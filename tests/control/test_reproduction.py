@@ -87,12 +87,6 @@ def test_table_v_has_seventeen_rows() -> None:
     assert len(ROWS) == 17
     cases = [row.case for row in ROWS if row.controller == "tde_stc"]
     assert cases == ["1", "2", "3", "4-1", "4-2"]
-        "1",
-        "2",
-        "3",
-        "4-1",
-        "4-2",
-    ]
     assert Row.parse("tde_stc/4-2") in ROWS
 
 
