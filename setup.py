@@ -47,6 +47,7 @@ setup(
             "ros-rmw-fastrtps-cpp==8.4.3",  # Jazzy's: newer ones belong to other distributions
         ],
         "test": [
+            "cvxpy",
             "hypothesis",
             "mujoco",
             "mypy",
