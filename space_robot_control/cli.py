@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -12,36 +12,9 @@ import click
 
 from space_robot_msgs_py.errors import SpaceRobotError
 
+from .commands.options import OPTIONS, flight_options
 from .commands.reproduce import reproduce
-
-
-def _options(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    def decorate(function: Any) -> Any:
-        for option in reversed(options):
-            function = option(function)
-        return function
-
-    return decorate
-
-
-flight_options = _options(
-    click.option("--controller", default="tde_stc", show_default=True,
-                 help="ctc, ctc_smc, tde_smc, tde_tsmc, tde_stc, or module:Class of your own."),
-    click.option("--case", default="1", show_default=True,
-                 help="1, 2, 3, 4-1, 4-2, or a path to a case's YAML."),
-    click.option("--gains", default="default", show_default=True,
-                 help="printed, tuned, default (printed where it flies), or a path."),
-    click.option("--robot", default="paper", show_default=True,
-                 help="paper, seven_joint, or a path to a robot's YAML."),
-    click.option("--mission", default="", help="Mission by name or path [default: the robot's]."),
-    click.option("--duration", type=float, help="Seconds to fly [default: the mission's]."),
-    click.option("--bag", type=click.Path(path_type=Path), help="Folder of the bag to write."),
-    click.option("--command-latency-ticks", type=int, default=0, show_default=True,
-                 help="Ticks by which the plant applies commands late."),
-    click.option("--friction/--no-friction", default=True, show_default=True,
-                 help="Joint friction of the case, or none."),
-    click.option("--json", "as_json", is_flag=True, help="Print the report as JSON."),
-)  # fmt: skip
+from .commands.stability import stability
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -79,7 +52,7 @@ def _report(report: dict[str, Any], as_json: bool) -> None:
 
 
 @cli.command()
-@flight_options
+@flight_options(*OPTIONS)
 @click.option("--realtime", is_flag=True, help="Pace by the wall clock instead of lockstep.")
 def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     r"""Fly a mission on a ROS 2 graph, record it, and print the RMS table.
@@ -101,7 +74,7 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
 
 
 @cli.command()
-@flight_options
+@flight_options(*OPTIONS)
 def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
     r"""Fly the same mission in this process, without ROS; the numbers are those of `fly`.
 
@@ -145,6 +118,7 @@ def analyze(bag: Path, as_json: bool) -> None:
 
 
 cli.add_command(reproduce)
+cli.add_command(stability)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -16,38 +12,15 @@ from matplotlib.figure import Figure
 from ..stability.circle_criterion import transfer_function
 from ..stability.study import Study
 from ..stability.super_twisting import SuperTwisting
+from .files import save_figure
+from .style import house_style
 
 BLACK, BLUE, ORANGE, GREY = "#000000", "#0072B2", "#D55E00", "#707070"
 """Of Okabe and Ito, told apart by the colour-blind and in grey print."""
-RESOLUTION = 150
-"""dpi of the PNG."""
 PAGE_WIDTH = 180.0
 """mm; A4 less its margins."""
 POINTS = 1500
 """Points of a line; more would only make the SVG larger."""
-
-_SETTINGS: Any = {
-    "font.family": "DejaVu Sans",  # comes with matplotlib
-    "font.size": 8.0,
-    "axes.titlesize": 8.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "#E4E4E4",
-    "grid.linewidth": 0.5,
-    "lines.linewidth": 1.0,
-    "legend.frameon": False,
-    "svg.hashsalt": "space_robot",  # else the names in an SVG are drawn by lot
-}
-
-
-@contextmanager
-def _house_style() -> Iterator[None]:
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_SETTINGS)
-        yield
 
 
 def draw(study: Study, folder: Path) -> list[Path]:
@@ -58,20 +31,10 @@ def draw(study: Study, folder: Path) -> list[Path]:
         "nyquist": nyquist(study.super_twisting, study.axis_names),
         "lyapunov": lyapunov(study.super_twisting, study.axis_names),
     }
-    return [file for name, figure in figures.items() for file in save(figure, folder / name)]
+    return [file for name, figure in figures.items() for file in save_figure(figure, folder / name)]
 
 
-@_house_style()
-def save(figure: Figure, stem: Path) -> tuple[Path, Path]:
-    """Write ``stem``.png and ``stem``.svg, of equal figures the same bytes at any time."""
-    stem.parent.mkdir(parents=True, exist_ok=True)
-    png, svg = (stem.with_name(stem.name + suffix) for suffix in (".png", ".svg"))
-    figure.savefig(png, dpi=RESOLUTION, metadata={"Software": None})
-    figure.savefig(svg, metadata={"Date": None, "Creator": None})
-    return png, svg
-
-
-@_house_style()
+@house_style()
 def nyquist(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
     """G(j omega) of each distinct pair of gains, with the circles of (73).
 
@@ -121,7 +84,7 @@ def _nyquist_panel(
     panel.locator_params(nbins=5)
 
 
-@_house_style()
+@house_style()
 def lyapunov(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
     """V(t) of (47) in the flight from the initial error, each axis with its bound (55).
 
