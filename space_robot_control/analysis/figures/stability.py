@@ -13,12 +13,10 @@ from ..stability.circle_criterion import transfer_function
 from ..stability.study import Study
 from ..stability.super_twisting import SuperTwisting
 from .files import save_figure
-from .style import house_style
+from .style import PAGE_WIDTH, house_style
 
 BLACK, BLUE, ORANGE, GREY = "#000000", "#0072B2", "#D55E00", "#707070"
 """Of Okabe and Ito, told apart by the colour-blind and in grey print."""
-PAGE_WIDTH = 180.0
-"""mm; A4 less its margins."""
 POINTS = 1500
 """Points of a line; more would only make the SVG larger."""
 
