@@ -1,0 +1,89 @@
+"""What the documents name exists: functions, files, commands and options."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import pytest
+
+from space_robot_control.cli import cli
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PREFIXES = (
+    "", "space_robot_control.", "space_robot_msgs_py.", "space_robot_sim.",
+    "space_robot_sim.dynamics.",
+)  # fmt: skip
+DOTTED = re.compile(r"`([A-Za-z_]\w*(?:\.\w+)+)`")
+COMMAND = re.compile(r"space-robot ((?:[a-z]+)\b[^`;|#\n]*)")
+
+
+def resolve(name: str) -> object:
+    """The object of a dotted name, whole or below one of the packages.
+
+    Raises:
+        LookupError: there is none.
+    """
+    for prefix in PREFIXES:
+        parts = (prefix + name).split(".")
+        for length in range(len(parts), 0, -1):
+            try:
+                found: object = importlib.import_module(".".join(parts[:length]))
+            except ImportError:
+                continue
+            try:
+                for attribute in parts[length:]:
+                    found = getattr(found, attribute)
+            except AttributeError:
+                continue
+            return found
+    raise LookupError(name)
+
+
+def test_functions_named_in_the_theory_exist() -> None:
+    names = sorted(set(DOTTED.findall((ROOT / "docs/theory.md").read_text("utf-8"))))
+    assert len(names) > 20
+    for name in names:
+        resolve(name)
+
+
+def test_snippets_of_the_errata_run(capsys: pytest.CaptureFixture[str]) -> None:
+    """And print the numbers that stand below them."""
+    text = (ROOT / "docs/errata.md").read_text("utf-8")
+    for snippet in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
+        exec(snippet, {})
+    printed = capsys.readouterr().out
+    for number in ("3.054371", "3.054071", "0.0106599", "22857.1428", "-14545.4545"):
+        assert number in printed
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)
+def test_links_lead_to_files(document: Path) -> None:
+    for target in re.findall(r"\]\(([^)]+)\)", document.read_text("utf-8")):
+        if "://" not in target:
+            assert (document.parent / target.split("#")[0]).exists(), target
+
+
+def commands(text: str) -> Iterator[list[str]]:
+    for match in COMMAND.findall(text):
+        yield match.split()
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)
+def test_commands_and_options_exist(document: Path) -> None:
+    for name, *words in commands(document.read_text("utf-8")):
+        command = cli.commands.get(name)
+        assert command is not None, f"space-robot {name}"
+        known = {
+            option
+            for parameter in command.params
+            if isinstance(parameter, click.Option)
+            for option in (*parameter.opts, *parameter.secondary_opts)
+        }
+        for word in words:
+            if word.startswith("--"):
+                assert word in {*known, "--help"}, f"space-robot {name} {word}"
