@@ -35,7 +35,7 @@ def print_study(study: Study, console: Console) -> None:
             f"{what['controller']}."
         )
         return
-    for table in (_gain_conditions, _circle_criterion, _paper_lmi, _lmi, _reaching):
+    for table in (_gain_conditions, _circle_criterion, _paper_lmi, _lmi, _matrices, _reaching):
         console.print(table(names, twisting))
     console.print(_closing(study, twisting), highlight=False, soft_wrap=True)
 
@@ -141,6 +141,14 @@ def _lmi(names: Sequence[str], twisting: SuperTwisting) -> Table:
                 f"{assumed.residual:.1e}",
             ]  # fmt: skip
         table.add_row(name, _number(measured.gamma if measured else None), *cells)
+    return table
+
+
+def _matrices(names: Sequence[str], twisting: SuperTwisting) -> Table:
+    table = _table("M of that solution, for half the beta tolerated", "M_11", "M_12", "M_22")
+    for name, certificate in zip(names, twisting.assumed_certificates, strict=True):
+        entries = certificate.m[[0, 0, 1], [0, 1, 1]] if certificate else [None] * 3
+        table.add_row(name, *(_number(entry) for entry in entries))
     return table
 
 
