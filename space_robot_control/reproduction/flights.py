@@ -23,7 +23,7 @@ from ..flight.simulate import simulate
 from .table_v import PRINTED
 
 ROBOT = "paper"
-DEFINITIONS = {"mean_axis": "mean of the axes' RMS", "eq64": "RMS of (64)"}
+DEFINITIONS = {"mean_axis": "mean of the axes' RMS", "eq64": "RMS by (64)"}
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,8 @@ from .report import Chapter, Picture, render
 from .table import Block, as_csv, as_markdown, as_records, blocks, cells
 
 TABLE = "table_v"
+FULL_DURATION = 30.0
+"""s, of the mission that Table V is about."""
 FIGURE_OF_CASE = {"1": "6", "2": "7", "3": "8", "4-1": "9a", "4-2": "9b"}
 
 
@@ -71,21 +73,23 @@ def reproduce(
         figures.mkdir(parents=True)
         with flights(rows, duration, figures, jobs) as futures:
             results = collect(futures, progress(len(futures)))
-        record = _write(rows, results, work)
+        record = _write(rows, results, duration or FULL_DURATION, work)
         if folder.exists():
             shutil.rmtree(folder)
         work.rename(folder)
     return record
 
 
-def _write(rows: Sequence[Row], results: Sequence[Result], folder: Path) -> dict[str, Any]:
+def _write(
+    rows: Sequence[Row], results: Sequence[Result], duration: float, folder: Path
+) -> dict[str, Any]:
     comparison = cells(results)
     judged, chattering = claims(results, comparison), chatter(results)
     chatter_table = Block(
         "Chatter in case 1, printed friction", CHATTER_HEADINGS, [c.texts() for c in chattering]
     )
     tables = [*blocks(comparison), chatter_table]
-    flown = provenance()
+    flown = {**provenance(), "duration_s": duration}
     told = {
         f"{row.controller}, case {row.case}, {gains} gains": parameters(
             row.controller, row.case, gains

@@ -76,7 +76,7 @@ def blocks(comparison: Sequence[Cell]) -> list[Block]:
         for variant in VARIANTS:
             rows = _rows(comparison, variant, definition)
             headings = ["controller", "case", *HEADINGS.values()]
-            found.append(Block(f"{meaning}; {variant.title}", headings, rows))
+            found.append(Block(f"{variant.title}; {meaning}", headings, rows))
     return found
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import scipy.signal
 from numpy.typing import NDArray
-from scipy.signal import welch
 
 Array = NDArray[np.float64]
+
+_welch: Any = scipy.signal.welch  # some of its published types know no linear trend
 
 SEGMENT = 2048
 """Samples of a segment: about 1 Hz of resolution at 2 kHz."""
@@ -30,7 +34,7 @@ def power_spectral_density(values: Array, period: float) -> tuple[Array, Array]:
     if len(samples) < SHORTEST:
         return np.empty(0), np.empty(0)
     # Each segment's trend goes, else the slow motion leaks into the high frequencies.
-    frequency, density = welch(
+    frequency, density = _welch(
         samples, 1.0 / period, nperseg=min(SEGMENT, len(samples)), detrend="linear", axis=0
     )
     total = np.sum(density[1:], axis=1)
