@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from flights import Flown, space_robot
@@ -24,3 +25,11 @@ def fly(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Flown]:
         return flown[options]
 
     return run
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Graphs fly one after the other, whatever runs beside them: four processes fill two cores."""
+    here = Path(__file__).parent
+    for item in items:
+        if here in item.path.parents:
+            item.add_marker(pytest.mark.xdist_group("graph"))
