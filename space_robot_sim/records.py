@@ -44,7 +44,7 @@ class Record:
     @classmethod
     def block(cls, n: int) -> NDArray[Any]:
         """An array of one record of zeros; ``block[0]`` is the record."""
-        return np.zeros(1, cls.dtype(n)).view(np.recarray)
+        return np.zeros(1, cls.dtype(n))
 
     @classmethod
     def allocate(cls, n: int) -> Self:
