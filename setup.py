@@ -22,7 +22,10 @@ setup(
     maintainer="space_robot maintainers",
     maintainer_email="maintainers@space-robot.example.org",
     packages=find_packages(include=[f"{NAME}_*"]),
-    package_data={"space_robot_control.reproduction": ["templates/*.j2"]},
+    package_data={
+        "space_robot_control.reproduction": ["templates/*.j2"],
+        "space_robot_msgs_py.ros": ["*.xml"],
+    },
     python_requires=">=3.10,<3.14",
     install_requires=[
         "click>=8.1",

@@ -140,20 +140,23 @@ class ControllerLoop:
             self._telemetry_out.publish(self._telemetry.encode(tick, controller.telemetry()))
 
     def _take_state(self) -> int | None:
-        """The tick of the newest whole state, decoded into ``_state``; None if there is none."""
-        data = take_or_wait(self._base_in, self._base_waiter, 0.02)
+        """The tick of the newest whole state, decoded into ``_state``; None if there is none.
+
+        The joints' part is sent first: it is decoded while the base's part is on its way.
+        """
+        data = take_or_wait(self._joints_in, self._joints_waiter, 0.02)
         if data is None:
             return None
-        while (newer := self._base_in.take()) is not None:
+        while (newer := self._joints_in.take()) is not None:
             data = newer
-        tick = self._states.decode_base(data, self._state)
-        joints_tick = -1
-        while joints_tick < tick and not self._shell.stopping:
-            data = take_or_wait(self._joints_in, self._joints_waiter, 0.02)
+        tick = self._states.decode_joints(data, self._state)
+        base_tick = -1
+        while base_tick < tick and not self._shell.stopping:
+            data = take_or_wait(self._base_in, self._base_waiter, 0.02)
             if data is None:
                 return None
-            joints_tick = self._states.decode_joints(data, self._state)
-        return tick if joints_tick == tick else None
+            base_tick = self._states.decode_base(data, self._state)
+        return tick if base_tick == tick else None
 
     def _have_reference(self, tick: int) -> bool:
         """Wait until the reference of ``tick`` is there; False if told to stop."""

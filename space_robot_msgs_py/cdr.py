@@ -39,7 +39,8 @@ class CdrBuilder:
 
     def __init__(self) -> None:
         self._bytes = bytearray()
-        self._variable: list[tuple[int, int]] = []
+        self._numbers: list[tuple[int, int]] = []
+        self._padding: list[tuple[int, int]] = []
 
     def uint32(self, value: int) -> None:
         """A constant uint32 (also a sequence's length)."""
@@ -79,26 +80,28 @@ class CdrBuilder:
 
     def build(self) -> FixedMessage:
         """The laid-out message."""
-        return FixedMessage(bytes(self._bytes), self._variable)
+        return FixedMessage(bytes(self._bytes), self._numbers, self._padding)
 
     def _room(self, size: int, count: int) -> Slot:
         self._align(size)
         slot = Slot(len(self._bytes), count)
         self._bytes += bytes(size * count)
-        self._variable.append((slot.offset, slot.offset + size * count))
+        self._numbers.append((slot.offset, slot.offset + size * count))
         return slot
 
     def _align(self, size: int) -> None:
         padding = -len(self._bytes) % size
-        if padding:  # a foreign writer leaves what it likes there
-            self._variable.append((len(self._bytes), len(self._bytes) + padding))
+        if padding:
+            self._padding.append((len(self._bytes), len(self._bytes) + padding))
             self._bytes += bytes(padding)
 
 
 class FixedMessage:
     """A message's bytes, with views on its numbers."""
 
-    def __init__(self, body: bytes, variable: list[tuple[int, int]]) -> None:
+    def __init__(
+        self, body: bytes, numbers: list[tuple[int, int]], padding: list[tuple[int, int]]
+    ) -> None:
         size = _BODY + len(body)
         room = np.zeros(size + 16, dtype=np.uint8)
         start = -(room.ctypes.data + _BODY) % 8  # the float64 inside must be aligned in memory
@@ -106,8 +109,14 @@ class FixedMessage:
         self._buffer[:] = np.frombuffer(_ENCAPSULATION + body, dtype=np.uint8)
         self._memory = memoryview(self._buffer.data)
         self._size = size
-        edges = [0, *(_BODY + edge for pair in variable for edge in pair), size]
-        self._constant = [
+        self._as_we_write = self._between(numbers)
+        # a foreign writer leaves what it likes in the padding
+        self._as_others_write = self._between(sorted(numbers + padding))
+
+    def _between(self, variable: list[tuple[int, int]]) -> list[tuple[int, int, bytes]]:
+        """Where the constant bytes stand, and what they are."""
+        edges = [0, *(_BODY + edge for pair in variable for edge in pair), self._size]
+        return [
             (start, stop, self._memory[start:stop].tobytes())
             for start, stop in zip(edges[::2], edges[1::2], strict=True)
             if stop > start
@@ -155,11 +164,17 @@ class FixedMessage:
         """Take the numbers out of ``data``; False, and nothing taken, if its layout differs."""
         if len(data) < self._size:  # foreign writers may leave bytes behind the message
             return False
-        for start, stop, expected in self._constant:
-            if data[start:stop] != expected:
-                return False
+        if not (_agrees(data, self._as_we_write) or _agrees(data, self._as_others_write)):
+            return False
         self._memory[:] = data if len(data) == self._size else data[: self._size]
         return True
+
+
+def _agrees(data: bytes, constants: list[tuple[int, int, bytes]]) -> bool:
+    for start, stop, expected in constants:  # noqa: SIM110  (all() takes twice as long)
+        if data[start:stop] != expected:
+            return False
+    return True
 
 
 def header_stamp_ns(data: bytes) -> int:

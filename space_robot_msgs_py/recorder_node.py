@@ -34,7 +34,7 @@ class RecorderNodeSettings(NodeSettings):
     )
     flight: str = Field("{}", description="what is flown, as a JSON object; stored with the bag")
     drain_period: Annotated[float, Field(ge=0.0005, le=0.1)] = Field(
-        0.005, description="time between two rounds of emptying the queues, s"
+        0.02, description="time between two rounds of emptying the queues, s"
     )
 
 
@@ -75,6 +75,7 @@ class RecorderLoop:
             while (data := entry.take()) is not None:
                 self._recorder.record(entry.topic, data)
                 count += 1
+                os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
         return count
 
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 DEFAULTS = {
     # discovery stays on this machine
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
     # a killed process leaves half-made shared memory behind that hangs the next one
     "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
+    # without it every sample sent to a reliable reader wakes a thread of Fast DDS
+    "FASTRTPS_DEFAULT_PROFILES_FILE": str(Path(__file__).with_name("fastdds_profiles.xml")),
 }
 
 

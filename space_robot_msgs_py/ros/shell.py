@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import sys
 import time
@@ -102,6 +103,8 @@ def run_node(
         settings = declare_settings(node, schema, changeable)
         ready = loop(shell, settings)
         refuse_unknown(node)
+        gc.collect()
+        gc.freeze()  # what lives until the end need not be looked through in the loop
         ready.run()
     except SpaceRobotError as error:
         print(f"{schema.node}: error: {error}", file=sys.stderr, flush=True)

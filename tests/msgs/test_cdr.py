@@ -150,7 +150,7 @@ def test_rows_are_one_view_on_equally_spaced_slots(rows: int, count: int) -> Non
 
 
 def test_rows_of_unequal_spacing_are_refused() -> None:
-    message = FixedMessage(bytes(64), [])
+    message = FixedMessage(bytes(64), [], [])
     with pytest.raises(ValueError, match="equally spaced"):
         message.float64_rows([Slot(0, 1), Slot(8, 1), Slot(24, 1)])
     with pytest.raises(ValueError, match="equally spaced"):
