@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NoReturn
+from typing import Any, ClassVar, NoReturn
 
 import numpy as np
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
@@ -84,12 +84,14 @@ class Laws:
 class ControllerLoop:
     """Takes the newest state, waits for its reference, answers; never answers a tick anew."""
 
+    controller_class: ClassVar[type[Controller]] = Controller
+
     def __init__(self, shell: Shell, settings: ControllerNodeSettings) -> None:
         self._shell, self._settings = shell, settings
         robot = Robot.from_yaml(named_file("robots", settings.robot))
         self._laws = Laws(shell, settings, robot.n + 3)
         self._laws.warm_up(robot)
-        self._controller = Controller(robot, self._laws.chosen, settings.period)
+        self._controller = self.controller_class(robot, self._laws.chosen, settings.period)
         self._references = ReferenceBuffer(robot.n)
         timebase = settings.timebase
         self._states = StateCodec(robot.joint_names, timebase)

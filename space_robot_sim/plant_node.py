@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import NoReturn
+from typing import ClassVar, NoReturn
 
 import numpy as np
 
@@ -27,10 +27,12 @@ FLUSH_S = 5.0
 class PlantLoop:
     """Sends the state of a tick, waits for its command, steps; paced by the graph or the clock."""
 
+    plant_class: ClassVar[type[Plant]] = Plant
+
     def __init__(self, shell: Shell, settings: PlantNodeSettings) -> None:
         self._shell, self._settings = shell, settings
         robot = Robot.from_yaml(named_file("robots", settings.robot))
-        self._plant = Plant(robot, settings, settings.period)
+        self._plant = self.plant_class(robot, settings, settings.period)
         at_rest = Command(0, np.zeros(robot.n + 3))
         Plant(robot, settings, settings.period).step(at_rest)  # loads the compiled code
         timebase = settings.timebase
@@ -60,9 +62,9 @@ class PlantLoop:
                 break
             plant.step(self._command)
             shell.serve()
+        elapsed = time.monotonic() - begin
         for output in self._outputs:
             output.flush(FLUSH_S)
-        elapsed = time.monotonic() - begin
         flown = plant.tick * settings.period
         late = f", {self.late_ticks} ticks without an answer in time" if settings.realtime else ""
         shell.log(f"flew {flown:.4f} s in {elapsed:.2f} s{late}")

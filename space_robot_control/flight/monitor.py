@@ -33,6 +33,8 @@ class Monitor:
         self._clock = In(self._node, topics.CLOCK, group, depth=1)
         self._telemetry = In(self._node, topics.TELEMETRY, group, depth=1)
         self.simulated_s = 0.0
+        self.has_begun = False
+        """Whether the plant has sent a tick."""
         self.errors: tuple[float, float] | None = None
         """Largest current attitude error (eps) and joint error (rad)."""
 
@@ -41,7 +43,7 @@ class Monitor:
         from space_robot_msgs_py.cdr import header_stamp_ns
 
         while (data := self._clock.take()) is not None:
-            self.simulated_s = header_stamp_ns(data) / 1e9
+            self.simulated_s, self.has_begun = header_stamp_ns(data) / 1e9, True
         while (data := self._telemetry.take()) is not None:
             _, rows = TelemetryCodec.decode(data)
             error = abs(rows[TelemetryCodec.ROWS.index("e")])

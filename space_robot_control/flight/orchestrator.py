@@ -22,7 +22,7 @@ from .compilation import compile_kernels
 from .display import flight_progress
 from .domain import ros_domain
 from .plan import Flight, check_bag_path
-from .processes import MODULES, Graph
+from .processes import MODULES, Graph, node_command
 
 POLL_S = 0.1
 READY_TIMEOUT_S = 60.0
@@ -57,7 +57,11 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
         _say(f"flying on ROS_DOMAIN_ID={domain}, recording to {bag}")
         begin = time.monotonic()
         try:
-            with Graph(_parameters(flight, bag), environment) as graph:
+            commands = {
+                node: node_command(node, values)
+                for node, values in flight_parameters(flight, bag).items()
+            }
+            with Graph(commands, environment) as graph:
                 _follow(graph, flight, domain, stopped)
         except FlightError as error:
             kept = f"; what was flown is in {bag}" if (bag / "metadata.yaml").exists() else ""
@@ -68,7 +72,8 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
     return report
 
 
-def _parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
+def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
+    """The parameters of every node of a flight that is recorded to ``bag``."""
     plan = flight.plan
     parameters = {node: plan.overrides(node) for node in MODULES}
     parameters["plant"] |= {
@@ -101,7 +106,7 @@ def _follow(graph: Graph, flight: Flight, domain: int, stopped: list[int]) -> No
                 time.sleep(POLL_S)
                 monitor.poll()
                 now = time.monotonic()
-                if monitor.simulated_s > last_time or (first_tick_at is None and monitor.errors):
+                if monitor.simulated_s > last_time or (first_tick_at is None and monitor.has_begun):
                     first_tick_at = first_tick_at or now
                     last_time, last_change, patience = monitor.simulated_s, now, STALL_TIMEOUT_S
                     show(last_time, _remark(monitor.errors, last_time, now - first_tick_at))

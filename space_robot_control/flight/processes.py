@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -45,24 +45,33 @@ def node_command(node: str, parameters: Mapping[str, Any]) -> list[str]:
         if has_ros2_run()
         else [sys.executable, "-m", MODULES[node]]
     )
-    if parameters:
-        command.append("--ros-args")
+    return command + ros_arguments(parameters)
+
+
+def ros_arguments(parameters: Mapping[str, Any]) -> list[str]:
+    """Parameters as a node's command line takes them."""
+    arguments = ["--ros-args"] if parameters else []
     for name, value in parameters.items():
-        command += ["-p", f"{name}:={json.dumps(value)}"]  # JSON is YAML, which ROS reads
-    return command
+        arguments += ["-p", f"{name}:={json.dumps(value)}"]  # JSON is YAML, which ROS reads
+    return arguments
 
 
 class NodeProcess:
     """One node in a process group of its own, its output kept in a file."""
 
-    def __init__(self, node: str, parameters: Mapping[str, Any], environment: Mapping[str, str]):
+    def __init__(self, node: str, command: Sequence[str], environment: Mapping[str, str]):
         self.node = node
         self._output = tempfile.TemporaryFile()  # noqa: SIM115  (closed in `close`)
         self._process = subprocess.Popen(
-            node_command(node, parameters),
+            command,
             stdin=subprocess.DEVNULL, stdout=self._output, stderr=subprocess.STDOUT,
             env=dict(environment), start_new_session=True,
         )  # fmt: skip
+
+    @property
+    def pid(self) -> int:
+        """Of the process, and of its group."""
+        return self._process.pid
 
     @property
     def exit_code(self) -> int | None:
@@ -101,14 +110,15 @@ class NodeProcess:
 class Graph:
     """The processes of one flight; leaving the context leaves none behind."""
 
-    def __init__(self, parameters: Mapping[str, Mapping[str, Any]], environment: Mapping[str, str]):
-        self._parameters, self._environment = parameters, environment
+    def __init__(self, commands: Mapping[str, Sequence[str]], environment: Mapping[str, str]):
+        """``commands``: the command line of each node."""
+        self._commands, self._environment = commands, environment
         self.nodes: dict[str, NodeProcess] = {}
 
     def __enter__(self) -> Graph:
         try:
-            for node, parameters in self._parameters.items():
-                self.nodes[node] = NodeProcess(node, parameters, self._environment)
+            for node, command in self._commands.items():
+                self.nodes[node] = NodeProcess(node, command, self._environment)
         except BaseException:
             self.__exit__()
             raise

@@ -20,7 +20,7 @@ from ..reference_codec import ReferenceCodec
 from ..samples import RobotState, Timebase
 from ..validation import read_yaml
 from .coverage import Coverage, lost_messages, message_tick, unanswered_ticks
-from .recorder import FLIGHT_KEY
+from .recorder import COVERAGE_KEY, FLIGHT_KEY
 
 REQUIRED = (
     topics.JOINT_STATES, topics.BASE_STATE, topics.REFERENCE_JOINTS, topics.REFERENCE_BASE,
@@ -41,6 +41,15 @@ def read_flight(path: Path) -> FlightLog:
             return _read(reader, path)
     except (ReaderError, OSError, ValueError, KeyError) as error:
         raise InputError(f"{path}: cannot be read as a flight ({error})") from None
+
+
+def read_coverage(path: Path) -> dict[str, dict[str, int]]:
+    """How many messages of each topic the recorder counted: received, missing, repeated.
+
+    Empty for a bag of another recorder.
+    """
+    counts: dict[str, dict[str, int]] = json.loads(_custom_data(path).get(COVERAGE_KEY, "{}"))
+    return counts
 
 
 def _read(reader: Reader, path: Path) -> FlightLog:
@@ -66,11 +75,13 @@ def _read(reader: Reader, path: Path) -> FlightLog:
 
 def _description(path: Path) -> dict[str, Any]:
     """What our recorder noted of the flight; empty for a bag of another recorder."""
-    information = read_yaml(path / "metadata.yaml")["rosbag2_bagfile_information"]
-    description: dict[str, Any] = json.loads(
-        (information["custom_data"] or {}).get(FLIGHT_KEY, "{}")
-    )
+    description: dict[str, Any] = json.loads(_custom_data(path).get(FLIGHT_KEY, "{}"))
     return description
+
+
+def _custom_data(path: Path) -> dict[str, str]:
+    information = read_yaml(path / "metadata.yaml")["rosbag2_bagfile_information"]
+    return information["custom_data"] or {}
 
 
 def _fill(reader: Reader, connections: list[Connection], log: FlightLog) -> dict[str, Coverage]:

@@ -1,0 +1,152 @@
+"""Plant and controller nodes with a stopwatch, as they are or empty.
+
+    python -m space_robot_control.bench.nodes plant|controller full|empty FILE --ros-args ...
+
+The empty ones send and take every message and compute nothing: what the middleware and rclpy
+cost. The times are written to FILE (.npz) when the node ends.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from array import array
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.ros.shell import Shell, run_node
+from space_robot_msgs_py.samples import Command, RobotState
+from space_robot_sim.plant import Plant
+from space_robot_sim.plant_node import PlantLoop
+from space_robot_sim.plant_settings import PlantNodeSettings
+
+from ..controller import Controller
+from ..controller_node import ControllerLoop
+from ..settings import ControllerNodeSettings
+
+Array = NDArray[np.float64]
+
+
+class Stopwatch:
+    """Durations of calls by name, ns."""
+
+    def __init__(self) -> None:
+        self.durations: dict[str, array[int]] = {}
+        self.starts: dict[str, array[int]] = {}
+
+    def attach(self, owner: Any, method: str, name: str) -> None:
+        """Time every call of ``owner.method``."""
+        setattr(owner, method, self._timed(getattr(owner, method), name))
+
+    def _timed(self, function: Callable[..., Any], name: str) -> Callable[..., Any]:
+        durations = self.durations.setdefault(name, array("q"))
+        starts = self.starts.setdefault(name, array("q"))
+        is_take = name.startswith("take")
+        clock = time.perf_counter_ns
+
+        def timed(*arguments: Any) -> Any:
+            begin = clock()
+            result = function(*arguments)
+            end = clock()
+            if not is_take or result is not None:  # a look in vain is waiting
+                durations.append(end - begin)
+                starts.append(begin)
+            return result
+
+        return timed
+
+    def save(self, file: str, **further: Any) -> None:
+        """Write ``<name>`` and ``<name> start`` arrays, and further ones."""
+        arrays = {name: np.array(values) for name, values in self.durations.items()}
+        arrays |= {f"{name} start": np.array(values) for name, values in self.starts.items()}
+        np.savez(file, **arrays, **further)
+
+
+class EmptyPlant(Plant):
+    """Counts ticks."""
+
+    def step(self, command: Command) -> None:
+        """Nothing but the count."""
+        self.state.tick += 1
+
+
+class EmptyController(Controller):
+    """Answers with the same torque always."""
+
+    def update(self, state: RobotState, joints: Array, base: Array) -> Command:
+        """Nothing but the stamp."""
+        self._command.tick = state.tick
+        return self._command
+
+
+class TimedPlantLoop(PlantLoop):
+    """The plant node's loop with a stopwatch."""
+
+    file = ""
+
+    def __init__(self, shell: Shell, settings: PlantNodeSettings) -> None:
+        """See `PlantLoop`."""
+        super().__init__(shell, settings)
+        self._watch = watch = Stopwatch()
+        watch.attach(self._states, "encode", "encode state")
+        watch.attach(self._joint_states, "publish", "publish joints")
+        watch.attach(self._base_state, "publish", "publish base")
+        watch.attach(self._command_in, "take", "take command")
+        self._command_ticks = array("q")
+        decode = self._commands.decode
+
+        def noting_tick(data: bytes, command: Command) -> None:
+            decode(data, command)
+            self._command_ticks.append(command.tick)
+
+        self._commands.decode = noting_tick  # type: ignore[method-assign]
+        watch.attach(self._commands, "decode", "decode command")
+        watch.attach(self._plant, "step", "step plant")
+
+    def run(self) -> None:
+        """Fly, then write the times down."""
+        super().run()
+        self._watch.save(self.file, command_ticks=self._command_ticks, late_ticks=self.late_ticks)
+
+
+class TimedControllerLoop(ControllerLoop):
+    """The controller node's loop with a stopwatch."""
+
+    file = ""
+
+    def __init__(self, shell: Shell, settings: ControllerNodeSettings) -> None:
+        """See `ControllerLoop`."""
+        super().__init__(shell, settings)
+        self._watch = watch = Stopwatch()
+        watch.attach(self._joints_in, "take", "take joints")
+        watch.attach(self._states, "decode_joints", "decode joints")
+        watch.attach(self._base_in, "take", "take base")
+        watch.attach(self._states, "decode_base", "decode base")
+        watch.attach(self._controller, "update", "update controller")
+        watch.attach(self._commands, "encode", "encode command")
+        watch.attach(self._command_out, "publish", "publish command")
+
+    def run(self) -> None:
+        """Answer, then write the times down."""
+        super().run()
+        self._watch.save(self.file)
+
+
+def main() -> NoReturn:
+    """See the module."""
+    node, work, file, *arguments = sys.argv[1:]
+    TimedPlantLoop.file = TimedControllerLoop.file = file
+    if work == "empty":
+        TimedPlantLoop.plant_class = EmptyPlant
+        TimedControllerLoop.controller_class = EmptyController
+    sys.argv[1:] = arguments  # what rclpy reads
+    if node == "plant":
+        run_node(PlantNodeSettings, TimedPlantLoop)
+    run_node(ControllerNodeSettings, TimedControllerLoop, changeable=("law",))
+
+
+if __name__ == "__main__":
+    main()
