@@ -43,6 +43,8 @@ setup(
         "typing_extensions>=4.8",
     ],
     extras_require={
+        # tests/benchmarks; bsk (Basilisk) holds back numpy and matplotlib, so a venv of its own
+        "bench": ["bsk", "hypothesis", "mujoco", "pin"],
         # ROS 2 Jazzy from wheels; never a requirement, for apt's ROS must stay untouched
         "ros": [
             "ros-jazzy-common-interfaces",

@@ -12,6 +12,7 @@ import click
 
 from space_robot_msgs_py.errors import SpaceRobotError
 
+from .commands.bench import bench
 from .commands.options import OPTIONS, flight_options
 from .commands.reproduce import reproduce
 from .commands.stability import stability
@@ -29,6 +30,7 @@ def cli() -> None:
       space-robot simulate --json                   the same flight without ROS
       space-robot analyze flights/<bag>             the table of a recorded flight
       space-robot reproduce                         the paper's Table V and figures, flown again
+      space-robot bench                             how fast it is here
     """
 
 
@@ -117,6 +119,7 @@ def analyze(bag: Path, as_json: bool) -> None:
     _report(analyse(read_flight(bag)), as_json)
 
 
+cli.add_command(bench)
 cli.add_command(reproduce)
 cli.add_command(stability)
 

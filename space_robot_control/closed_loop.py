@@ -58,7 +58,7 @@ def close_loop(plant: Plant, controller: Controller, log: FlightLog, start: int,
         _close_loop_in_python(plant, controller, Rows.of(log), start, stop)
         return
     tick, value = fly_ticks(
-        _law_pointer(type(law).kernel), law.gain_matrix, law.memory, law.h_bar, law.uses_model,
+        law_pointer(type(law).kernel), law.gain_matrix, law.memory, law.h_bar, law.uses_model,
         plant.block, plant.late, controller.block, Rows.of(log), start, stop, plant.period,
     )  # fmt: skip
     if tick < 0:
@@ -85,7 +85,8 @@ def _close_loop_in_python(
 
 
 @cache
-def _law_pointer(law: Callable[..., None]) -> Any:
+def law_pointer(law: Callable[..., None]) -> Any:
+    """A law's kernel as `fly_ticks` takes it."""
     vector, matrix = numba.float64[::1], numba.float64[:, ::1]
     signature = numba.void(
         vector, vector, vector, vector, matrix, vector, matrix, matrix, numba.float64

@@ -1,0 +1,75 @@
+"""What a person sees of a benchmark: a table a section."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from .result import Result
+
+
+def print_section(title: str, results: Sequence[Result], console: Console) -> None:
+    """Print the rows of one section."""
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table.add_column("", overflow="fold")
+    for column in ("median", "spread"):
+        table.add_column(column, justify="right", no_wrap=True)
+    table.add_column("beside", overflow="fold")
+    table.add_column("times better", justify="right")
+    table.add_column("asked", overflow="fold")
+    for result in results:
+        table.add_row(*cells(result))
+    console.print(table)
+    for result in results:
+        if result.note:
+            console.print(f"{result.name}: {result.note}", markup=False, highlight=False)
+
+
+def print_machine(machine: dict[str, Any], console: Console) -> None:
+    """One line on the machine."""
+    build = [name.upper() for name, is_so in machine["python_build"].items() if is_so]
+    packages = ", ".join(f"{name} {number}" for name, number in machine["packages"].items())
+    console.print(
+        f"{machine['cpu']}, {machine['cpus_allowed']} of {machine['cpus']} processors, load "
+        f"{machine['load_average'][0]:g}; Python {machine['python']} "
+        f"({', '.join(build) or 'no PGO, no LTO'}), {packages}",
+        markup=False,
+        highlight=False,
+    )
+
+
+def cells(result: Result) -> list[str]:
+    """The texts of a row."""
+    low, high = result.spread
+    beside = ""
+    if result.beside and result.median_beside is not None:
+        beside = f"{result.beside.name}: {_number(result.median_beside)}"
+    return [
+        result.name,
+        f"{_number(result.median)} {result.unit}",
+        f"{_number(low)}..{_number(high)}",
+        beside,
+        f"{result.ratio:.2f}" if result.ratio is not None else "",
+        _asked(result),
+    ]
+
+
+def _asked(result: Result) -> str:
+    target = result.target
+    if target is None:
+        return ""
+    of = "times better " if target.of == "ratio" else ""
+    text = f"{of}{result.relation} {target.limit:g}"
+    if target.aim is not None:
+        text += f" (aim {target.aim:g})"
+    if result.reached_aim:
+        return f"{text}: [green]aim reached"
+    return f"{text}: [green]reached" if result.reached else f"{text}: [red]missed"
+
+
+def _number(value: float) -> str:
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"

@@ -1,0 +1,95 @@
+"""Loops in compiled code around what is measured, as it is called in a flight."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_sim.compiled import kernel
+from space_robot_sim.dynamics import forward_dynamics_into
+from space_robot_sim.integrator import state_derivative
+from space_robot_sim.plant import advance
+
+from ..closed_loop import Rows
+from ..controller import form_signals
+from ..tracking import torque_from_force
+
+Array = NDArray[np.float64]
+Block = NDArray[Any]
+
+
+@kernel
+def plant_steps(
+    block: Block, late: Array, torque: Array, tick: int, steps: int, period: float
+) -> float:
+    """Steps of a `Plant` from ``tick`` on under one torque; returns the fastest rate at the end."""
+    memory, fastest = block[0], 0.0
+    for k in range(tick, tick + steps):
+        fastest = advance(memory, late, torque, k, period)
+    return fastest
+
+
+@kernel
+def forward_dynamics_calls(block: Block, force: Array, calls: int) -> None:
+    """``qdd = H^-1 (F - c)`` in the state of a `Plant`; ``force`` (n+6,)."""
+    memory = block[0]
+    x, stages, n = memory.x, memory.stages, memory.joint_positions.size
+    out = stages.slope[0, 7 + n :]
+    for _ in range(calls):
+        forward_dynamics_into(
+            memory.model, x[3:7], x[7 : 7 + n], x[10 + n : 13 + n], x[13 + n :], force,
+            stages.data, out,
+        )  # fmt: skip
+        force[0] = 1e-12 * out[0]  # the next call waits for this one
+
+
+@kernel
+def state_derivatives(block: Block, torque: Array, disturbance: Array, calls: int) -> None:
+    """``xdot`` in the state of a `Plant`; ``torque`` and ``disturbance`` (n+3,)."""
+    memory = block[0]
+    slope = memory.stages.slope[0]
+    for _ in range(calls):
+        state_derivative(
+            memory.model, memory.environment, memory.x, torque, disturbance, memory.stages, slope
+        )
+        torque[0] = 1e-12 * slope[slope.size - 1]
+
+
+@kernel
+def controller_ticks(
+    law: Callable[..., None], gains: Array, law_memory: Array, h_bar: Array, uses_model: bool,
+    block: Block, rows: Rows, ticks: int, torque: Array, period: float,
+) -> None:  # fmt: skip
+    """All that an on-board computer does in a tick, over the rows of a recorded flight."""
+    memory, recorded = block[0], rows.quaternion.shape[0]
+    for i in range(ticks):
+        k = i % recorded
+        form_signals(
+            memory, k, rows.quaternion[k], rows.omega_base[k], rows.joint_positions[k],
+            rows.joint_velocities[k], rows.applied_torque[k], rows.reference_joints[k],
+            rows.reference_base[k], h_bar, uses_model, period,
+        )  # fmt: skip
+        law(
+            memory.error[:], memory.error_rate[:], memory.acceleration_desired[:],
+            memory.n_hat[:], memory.nominal.inertia[:], memory.nominal.bias[:], gains, law_memory,
+            period,
+        )  # fmt: skip
+        torque_from_force(memory.jacobian, law_memory[2], torque)
+
+
+@kernel
+def law_ticks(
+    law: Callable[..., None], gains: Array, law_memory: Array, signals: Array, inertia: Array,
+    bias: Array, ticks: int, period: float,
+) -> None:  # fmt: skip
+    """A law's equation alone; ``signals`` (ticks, 4, m) are e, edot, rhodd_d and N_hat."""
+    recorded = signals.shape[0]
+    for i in range(ticks):
+        k = i % recorded
+        law(
+            signals[k, 0], signals[k, 1], signals[k, 2], signals[k, 3], inertia, bias, gains,
+            law_memory, period,
+        )  # fmt: skip
