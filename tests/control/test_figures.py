@@ -19,6 +19,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
+from PIL import Image
 from scipy import signal
 
 from space_robot_control.analysis import tracking_error
@@ -30,6 +31,7 @@ from space_robot_control.analysis.figures import (
     save_figure,
 )
 from space_robot_control.analysis.figures.envelope import envelope
+from space_robot_control.analysis.figures.png import encode_png
 from space_robot_control.analysis.figures.quantity import Quantity, power_of_ten
 from space_robot_control.analysis.figures.side_by_side import common_limits
 from space_robot_control.analysis.figures.spectrum import power_spectral_density, welch
@@ -404,6 +406,14 @@ class TestPrint:
         assert float(root.attrib["width"].removesuffix("pt")) == pytest.approx(180 / 25.4 * 72)
         assert b"<image" not in svg.read_bytes()
         assert svg.stat().st_size < 400_000
+
+    def test_png_holds_the_pixels(self, tmp_path: Path) -> None:
+        pixels = np.random.default_rng(2).integers(0, 256, (7, 5, 3), np.uint8)
+        (tmp_path / "x.png").write_bytes(encode_png(pixels, 150))
+        with Image.open(tmp_path / "x.png") as image:
+            assert (image.mode, image.size) == ("RGB", (5, 7))
+            assert image.info["dpi"] == pytest.approx((150.0, 150.0), rel=1e-3)
+            np.testing.assert_array_equal(np.asarray(image), pixels)
 
     def test_pyplot_stays_out_and_matplotlib_is_lazy(self) -> None:
         program = (
