@@ -76,11 +76,15 @@ class Mission:
             rows = np.zeros((len(time), 3, self._waypoints.shape[1]))
             rows[:, 0] = self._waypoints[0]
             return rows
-        segment = np.clip(np.searchsorted(self._times, time, side="right") - 1, 0, last - 1)
-        begin, span = self._times[segment], np.diff(self._times)[segment][:, np.newaxis]
-        u = np.clip((time - begin)[:, np.newaxis] / span, 0.0, 1.0)
-        leg = np.diff(self._waypoints, axis=0)[segment]
-        position = self._waypoints[segment] + leg * (u * u * u * (10.0 + u * (-15.0 + 6.0 * u)))
-        velocity = leg * (30.0 * u * u * (1.0 - u) * (1.0 - u)) / span
-        acceleration = leg * (60.0 * u * (1.0 - u) * (1.0 - 2.0 * u)) / (span * span)
-        return np.stack([position, velocity, acceleration], axis=1)
+        rows = np.empty((len(time), 3, self._waypoints.shape[1]))
+        changes = np.searchsorted(time, self._times[1:-1])  # at a waypoint the next leg begins
+        legs = zip(np.split(time, changes), np.split(rows, changes), strict=True)
+        for index, (part, row) in enumerate(legs):
+            begin, span = self._times[index], self._times[index + 1] - self._times[index]
+            u = np.clip((part - begin)[:, np.newaxis] / span, 0.0, 1.0)
+            leg = self._waypoints[index + 1] - self._waypoints[index]
+            course = u * u * u * (10.0 + u * (-15.0 + 6.0 * u))
+            row[:, 0] = self._waypoints[index] + leg * course
+            row[:, 1] = leg * (30.0 * u * u * (1.0 - u) * (1.0 - u)) / span
+            row[:, 2] = leg * (60.0 * u * (1.0 - u) * (1.0 - 2.0 * u)) / (span * span)
+        return rows

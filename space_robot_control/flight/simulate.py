@@ -88,10 +88,10 @@ def simulate(
     log = FlightLog.allocate(ticks, flight.robot.joint_names, flight.timebase)
     log.flight = flight.description
     log.lost = {topic.name: 0 for topic in topics.ALL}
-    log.commanded_torque = np.full_like(log.applied_torque, np.nan)
-    log.telemetry = np.full((ticks, 4, log.axes), np.nan)
+    log.commanded_torque = np.empty_like(log.applied_torque)
+    log.telemetry = np.empty((ticks, 4, log.axes))
     reference = flight.mission.chunk(0, ticks)
-    log.reference_joints[:], log.reference_base[:] = reference.joints, reference.base
+    log.reference_joints, log.reference_base = reference.joints, reference.base
     with _recording(flight, bag) as messages:
         for start in range(0, ticks, STRETCH_TICKS):
             progress(start)

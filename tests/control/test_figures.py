@@ -19,6 +19,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
+from PIL import Image
+from scipy import signal
 
 from space_robot_control.analysis import tracking_error
 from space_robot_control.analysis.figures import (
@@ -29,9 +31,10 @@ from space_robot_control.analysis.figures import (
     save_figure,
 )
 from space_robot_control.analysis.figures.envelope import envelope
+from space_robot_control.analysis.figures.png import encode_png
 from space_robot_control.analysis.figures.quantity import Quantity, power_of_ten
 from space_robot_control.analysis.figures.side_by_side import common_limits
-from space_robot_control.analysis.figures.spectrum import power_spectral_density
+from space_robot_control.analysis.figures.spectrum import power_spectral_density, welch
 from space_robot_control.analysis.figures.style import Look, house_style
 from space_robot_control.analysis.figures.waypoints import junction_ticks, waypoint_ticks
 from space_robot_control.flight.plan import Flight, FlightPlan
@@ -183,6 +186,14 @@ class TestSpectrum:
         values = np.random.default_rng(3).normal(scale=[1.0, 2.0, 3.0], size=(60000, 3))
         frequency, density = power_spectral_density(values, PERIOD)
         assert np.sum(density) * frequency[0] == pytest.approx(14.0, rel=0.05)
+
+    @pytest.mark.parametrize(("samples", "length"), [(6000, 2048), (801, 801), (100, 64), (99, 65)])
+    def test_welch_is_scipys(self, samples: int, length: int) -> None:
+        values = np.cumsum(np.random.default_rng(1).normal(size=(samples, 3)), axis=0)
+        _, expected = signal.welch(
+            values, 1.0 / PERIOD, nperseg=length, detrend="linear", axis=0
+        )  # fmt: skip
+        np.testing.assert_allclose(welch(values, PERIOD, length), expected, rtol=1e-9)
 
     def test_a_tone_stands_out_of_slow_motion(self) -> None:
         time = np.arange(60000)[:, np.newaxis] * PERIOD
@@ -395,6 +406,14 @@ class TestPrint:
         assert float(root.attrib["width"].removesuffix("pt")) == pytest.approx(180 / 25.4 * 72)
         assert b"<image" not in svg.read_bytes()
         assert svg.stat().st_size < 400_000
+
+    def test_png_holds_the_pixels(self, tmp_path: Path) -> None:
+        pixels = np.random.default_rng(2).integers(0, 256, (7, 5, 3), np.uint8)
+        (tmp_path / "x.png").write_bytes(encode_png(pixels, 150))
+        with Image.open(tmp_path / "x.png") as image:
+            assert (image.mode, image.size) == ("RGB", (5, 7))
+            assert image.info["dpi"] == pytest.approx((150.0, 150.0), rel=1e-3)
+            np.testing.assert_array_equal(np.asarray(image), pixels)
 
     def test_pyplot_stays_out_and_matplotlib_is_lazy(self) -> None:
         program = (

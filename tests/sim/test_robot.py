@@ -175,7 +175,7 @@ def test_error_names_file_key_given_and_allowed(
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("robot: {name: [", ["line 1", "not YAML"]),
+        ("robot: {name: ]\n", ["line 1", "not YAML"]),
         ("robot:\n  name: a\n base: 3\n", ["line 3", "not YAML"]),
         ("- 1\n- 2\n", ["a mapping was expected", "list"]),
         ("", ["a mapping was expected", "NoneType"]),

@@ -19,7 +19,8 @@ def envelope(signal: Array, columns: int = COLUMNS) -> Indices:
     are kept, so no peak is lost and chatter stays a band of its full width.
 
     Args:
-        signal: (N,) evenly spaced samples; NaN is passed over where a stretch has other values.
+        signal: (N,) evenly spaced samples; one that is not finite is kept only where a stretch
+            has no other.
         columns: pixel columns of the drawn line.
 
     Returns:
@@ -33,8 +34,11 @@ def envelope(signal: Array, columns: int = COLUMNS) -> Indices:
     starts = np.arange(0, count, length)
     padded = np.pad(signal, (0, len(starts) * length - count), mode="edge")
     stretches = padded.reshape(len(starts), length)
-    unknown = np.isnan(stretches)
-    lowest = np.argmin(np.where(unknown, np.inf, stretches), axis=1)
-    highest = np.argmax(np.where(unknown, -np.inf, stretches), axis=1)
+    known = np.isfinite(stretches)
+    if known.all():
+        lowest, highest = np.argmin(stretches, axis=1), np.argmax(stretches, axis=1)
+    else:
+        lowest = np.argmin(np.where(known, stretches, np.inf), axis=1)
+        highest = np.argmax(np.where(known, stretches, -np.inf), axis=1)
     kept = np.concatenate([[0], starts + lowest, starts + highest, [count - 1]])
     return np.unique(np.minimum(kept, count - 1))

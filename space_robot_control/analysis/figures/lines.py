@@ -41,16 +41,17 @@ def draw_lines(
         steps: draw each value as having held since the one before it.
     """
     axes.set_ylabel(quantity.label)
-    scaled = quantity.scaled(values)
-    lines = [(column, envelope(column)) for column in scaled.T]
+    lines = [(column, envelope(column)) for column in values.T]
     # The wildest line lies at the back, for it would hide the others.
-    roughness = [np.nansum(np.abs(np.diff(column[kept]))) for column, kept in lines]
+    roughness = [
+        np.nansum(np.abs(np.diff(quantity.scaled(column[kept])))) for column, kept in lines
+    ]
     for depth, index in enumerate(np.argsort(roughness)[::-1].tolist()):
         look, (column, kept) = Look.of(index), lines[index]
         marked = scattered_marks(len(time), index, len(lines)) if marks is None else marks
         drawn = np.union1d(kept, marked)
         axes.plot(
-            time[drawn], column[drawn],
+            time[drawn], quantity.scaled(column[drawn]),
             color=look.colour, linestyle=look.dashes if dashed else "-",
             marker=look.marker, markevery=np.searchsorted(drawn, marked).tolist(),
             drawstyle="steps-pre" if steps else "default", zorder=2.0 + 0.01 * depth,

@@ -29,7 +29,7 @@ class Quantity(NamedTuple):
     @classmethod
     def of(cls, values: Array, name: str, unit: str = "") -> Quantity:
         """A quantity with the exponent, a multiple of three, that suits its values."""
-        largest = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
+        largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
         if PLAIN[0] <= largest < PLAIN[1] or largest < NOTHING:
             return cls(name, unit)
         return cls(name, unit, 3 * math.floor(math.log10(largest) / 3.0))
