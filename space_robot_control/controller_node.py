@@ -12,7 +12,7 @@ from space_robot_msgs_py.codecs import CommandCodec, StateCodec, TelemetryCodec
 from space_robot_msgs_py.configuration import named_file, nest
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 from space_robot_msgs_py.reference_codec import ReferenceCodec
-from space_robot_msgs_py.ros.endpoints import In, Out, TakenByLoop, Waiter, take_or_wait
+from space_robot_msgs_py.ros.endpoints import SPIN_S, In, Out, TakenByLoop, Waiter, take_or_wait
 from space_robot_msgs_py.ros.parameters import overrides
 from space_robot_msgs_py.ros.shell import Shell, run_node
 from space_robot_msgs_py.samples import RobotState
@@ -106,8 +106,9 @@ class ControllerLoop:
         self._base_in = In(node, topics.BASE_STATE, group)
         self._reference_joints_in = In(node, topics.REFERENCE_JOINTS, group)
         self._reference_base_in = In(node, topics.REFERENCE_BASE, group)
-        self._base_waiter = Waiter(node, self._base_in)
-        self._joints_waiter = Waiter(node, self._joints_in)
+        spin_s = 0.0 if settings.fifo_priority else SPIN_S
+        self._base_waiter = Waiter(node, self._base_in, spin_s=spin_s)
+        self._joints_waiter = Waiter(node, self._joints_in, spin_s=spin_s)
         self._reference_waiter = Waiter(node, self._reference_joints_in, self._reference_base_in)
         self._answered, self._answer = -1, b""
 

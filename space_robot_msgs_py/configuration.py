@@ -117,6 +117,9 @@ class NodeSettings(Strict):
     period: Annotated[float, Field(ge=1e-5, le=1.0)] = Field(
         0.0005, description="length of a tick, s; the same for all nodes"
     )
+    fifo_priority: Annotated[int, Field(ge=0, le=98)] = Field(
+        0, description="SCHED_FIFO priority to ask for (0: the usual scheduling)"
+    )
 
     @property
     def timebase(self) -> Timebase:

@@ -10,7 +10,7 @@ import numpy as np
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.codecs import ClockCodec, CommandCodec, StateCodec
 from space_robot_msgs_py.configuration import named_file
-from space_robot_msgs_py.ros.endpoints import In, Out, TakenByLoop, Waiter, take_or_wait
+from space_robot_msgs_py.ros.endpoints import SPIN_S, In, Out, TakenByLoop, Waiter, take_or_wait
 from space_robot_msgs_py.ros.shell import Shell, run_node
 from space_robot_msgs_py.samples import Command
 
@@ -46,7 +46,8 @@ class PlantLoop:
         self._base_state = Out(node, topics.BASE_STATE)
         self._clock_out = Out(node, topics.CLOCK)
         self._command_in = In(node, topics.COMMAND, TakenByLoop())
-        self._waiter = Waiter(node, self._command_in)
+        spin_s = 0.0 if settings.fifo_priority else SPIN_S
+        self._waiter = Waiter(node, self._command_in, spin_s=spin_s)
         self._outputs = (self._joint_states, self._base_state, self._clock_out)
         self.late_ticks = 0
 

@@ -60,7 +60,7 @@ class Stopwatch:
 
     def save(self, file: str, **further: Any) -> None:
         """Write ``<name>`` and ``<name> start`` arrays, and further ones."""
-        arrays = {name: np.array(values) for name, values in self.durations.items()}
+        arrays: dict[str, Any] = {name: np.array(values) for name, values in self.durations.items()}
         arrays |= {f"{name} start": np.array(values) for name, values in self.starts.items()}
         np.savez(file, **arrays, **further)
 

@@ -20,7 +20,8 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from ..topics import Topic
 
 SPIN_S = 300e-6
-"""How long a wait takes and yields before it sleeps in the wait set."""
+"""How long a wait takes and yields before it sleeps in the wait set. Not under SCHED_FIFO, where
+yielding gives way to nobody and sleeping threads wake at once."""
 
 
 class TakenByLoop(CallbackGroup):
@@ -105,7 +106,8 @@ class In:
 class Waiter:
     """Waits until a subscription has something to take."""
 
-    def __init__(self, node: Node, *inputs: In) -> None:
+    def __init__(self, node: Node, *inputs: In, spin_s: float = SPIN_S) -> None:
+        self.spin_s = spin_s
         self._handles = [entry.handle for entry in inputs]
         context: Any = node.context.handle
         with context:
@@ -124,7 +126,7 @@ def take_or_wait(entry: In, waiter: Waiter, timeout_s: float) -> bytes | None:
     data = entry.take()
     if data is not None:
         return data
-    until = time.perf_counter() + SPIN_S
+    until = time.perf_counter() + waiter.spin_s
     while time.perf_counter() < until:
         os.sched_yield()
         data = entry.take()

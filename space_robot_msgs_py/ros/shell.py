@@ -23,6 +23,7 @@ from ..configuration import NodeSettings  # noqa: E402
 from ..errors import InputError, SpaceRobotError  # noqa: E402
 from .endpoints import Out  # noqa: E402
 from .parameters import declare_settings, refuse_unknown  # noqa: E402
+from .scheduling import ask_for_fifo  # noqa: E402
 
 Schema = TypeVar("Schema", bound=NodeSettings)
 
@@ -105,6 +106,8 @@ def run_node(
         refuse_unknown(node)
         gc.collect()
         gc.freeze()  # what lives until the end need not be looked through in the loop
+        if settings.fifo_priority:
+            shell.log(ask_for_fifo(settings.fifo_priority))
         ready.run()
     except SpaceRobotError as error:
         print(f"{schema.node}: error: {error}", file=sys.stderr, flush=True)

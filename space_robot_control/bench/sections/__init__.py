@@ -10,10 +10,14 @@ from collections.abc import Callable
 
 from ..measure import Options
 from ..result import Result
+from .clock import clock
+from .graph import graph
 from .laws import laws
 from .plant import plant
+from .recorder import recorder
 from .reproduce import reproduce
 from .simulate import simulate
+from .start_up import start_up
 
 Section = Callable[[Options], list[Result]]
 
@@ -22,5 +26,9 @@ SECTIONS: dict[str, Section] = {
     "laws": laws,
     "simulate": simulate,
     "reproduce": reproduce,
+    "graph": graph,
+    "clock": clock,
+    "recorder": recorder,
+    "start-up": start_up,
 }
 """By name, in the order they run."""

@@ -47,7 +47,8 @@ def _lateness_us(run: GraphRun, period: float) -> NDArray[np.float64]:
     starts = run.plant["encode state start"] / 1e3
     due = np.arange(len(starts)) * period * 1e6
     late: NDArray[np.float64] = (starts - due)[WARM_UP_TICKS:]
-    return late - late.min()
+    late -= late.min()
+    return late
 
 
 def _answer_us(run: GraphRun) -> NDArray[np.float64]:

@@ -38,22 +38,16 @@ def graph(options: Options) -> list[Result]:
 
 
 def _breakdown(runs: list[GraphRun]) -> list[Result]:
-    """Median time of a tick and of the calls in it; the rest is transport and waiting."""
+    """Mean time of a tick and of the calls in it; the rest is transport and waiting."""
     rows = {"a tick": [1e6 / run.ticks_per_s for run in runs]}
     for node in ("plant", "controller"):
         for name in getattr(runs[0], node):
-            if not name.endswith("start"):
+            if f"{name} start" in getattr(runs[0], node):
                 rows[f"{node}: {name}"] = [
-                    _median_us(getattr(run, node)[name][WARM_UP_TICKS:]) for run in runs
+                    float(getattr(run, node)[name][WARM_UP_TICKS:].mean()) / 1e3 for run in runs
                 ]
     calls = [samples for name, samples in rows.items() if name != "a tick"]
     rows["transport, waking, waiting"] = [
         rows["a tick"][k] - sum(samples[k] for samples in calls) for k in range(len(runs))
     ]
     return [Result(name, "us", tuple(samples)) for name, samples in rows.items()]
-
-
-def _median_us(durations: object) -> float:
-    import numpy as np
-
-    return float(np.median(np.asarray(durations)) / 1e3)

@@ -33,7 +33,7 @@ def start_up(options: Options) -> list[Result]:
         options.batches(usual=9),
         batch_s=options.batch_s,
     )
-    first_ticks = []
+    first_ticks: list[float] = []
     for _ in range(count := options.batches(usual=5)):
         options.progress(f"the graph's start, {len(first_ticks) + 1} of {count}")
         first_ticks.append(_first_tick_s())
