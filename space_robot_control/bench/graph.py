@@ -104,6 +104,26 @@ def fly_graph(flight: Flight, empty: bool = False) -> GraphRun:
         )
 
 
+def naive_ticks_per_s(ticks: int) -> float:
+    """Rate of the two nodes of `naive`, ticks/s.
+
+    Raises:
+        FlightError: one of them ended before.
+    """
+    with tempfile.TemporaryDirectory(prefix="space_robot_bench_") as folder, ros_domain() as domain:
+        file = Path(folder) / "rate"
+        commands = {
+            node: [
+                sys.executable, "-m", "space_robot_control.bench.naive", node, str(file), str(ticks)
+            ]
+            for node in ("controller", "plant")
+        }  # fmt: skip
+        environment = {**DEFAULTS, **os.environ, "ROS_DOMAIN_ID": str(domain)}
+        with Graph(commands, environment) as graph:
+            _watch(graph)
+        return float(file.read_text("utf-8"))
+
+
 def _watch(graph: Graph) -> dict[str, NodeUse]:
     """Sample every node until the plant has flown."""
     processes = {name: psutil.Process(node.pid) for name, node in graph.nodes.items()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...flight.plan import Flight, FlightPlan
-from ..graph import WARM_UP_TICKS, GraphRun, fly_graph
+from ..graph import WARM_UP_TICKS, GraphRun, fly_graph, naive_ticks_per_s
 from ..measure import Options
 from ..result import Beside, Result, Target
 
@@ -13,14 +13,18 @@ OF_EMPTY_ASKED = Target(0.8, of="ratio")
 
 
 def graph(options: Options) -> list[Result]:
-    """Plant, controller, mission and recorder beside the same graph that computes nothing."""
+    """Plant, controller, mission and recorder beside the same graph that computes nothing.
+
+    And beside two nodes written the usual way, which also tells how fast the machine is.
+    """
     flight = Flight(FlightPlan(duration=0.5 if options.short else DURATION_S))
-    full, empty = [], []
+    full, empty, naive = [], [], []
     count = options.batches(usual=5)
     for k in range(count):
-        options.progress(f"the graph in lockstep, {k + 1} of {count}: as it is, then empty")
+        options.progress(f"the graph in lockstep, {k + 1} of {count}: as it is, empty, naive")
         full.append(fly_graph(flight))
         empty.append(fly_graph(flight, empty=True))
+        naive.append(naive_ticks_per_s(500 if options.short else 4000))
     rates = tuple(run.ticks_per_s for run in full)
     rates_empty = tuple(run.ticks_per_s for run in empty)
     lost = sum(sum(run.lost.values()) for run in full + empty)
@@ -31,6 +35,8 @@ def graph(options: Options) -> list[Result]:
                note=f"{lost} messages lost in {2 * count} flights"),
         Result("lockstep graph", "ticks/s", rates, beside,
                None if options.short else OF_EMPTY_ASKED, better="more"),
+        Result("lockstep graph", "ticks/s", rates, Beside("two naive nodes", tuple(naive)),
+               better="more", note="naive: message objects, callbacks, SingleThreadedExecutor"),
         Result("lockstep graph, times real time", "x",
                tuple(rate * flight.period for rate in rates), better="more"),
         *_breakdown(full),
