@@ -26,7 +26,8 @@ def print_checks(checks: list[dict[str, Any]], console: Console) -> None:
 
 def print_growth(growth: Growth, is_cold: bool, console: Console) -> None:
     title = "growth with the number of joints, median us"
-    table = Table("", title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table.add_column("", overflow="fold", min_width=14)
     for n in growth.joints:
         table.add_column(str(n), justify="right")
     table.add_column("exponent", justify="right")
