@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from growth import LARGE, Growth
@@ -25,24 +26,35 @@ def print_checks(checks: list[dict[str, Any]], console: Console) -> None:
 
 
 def print_growth(growth: Growth, is_cold: bool, console: Console) -> None:
+    """Times, exponents with their spread, first calls."""
     title = "growth with the number of joints, median us"
     table = Table("", title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for n in growth.joints:
         table.add_column(str(n), justify="right")
-    table.add_column("exponent", justify="right")
-    table.add_column(f"from {LARGE} on", justify="right")
     for name in growth.samples_us:
-        exponents = (growth.exponent(name), growth.exponent(name, LARGE))
-        table.add_row(
-            name,
-            *(f"{median:.3g}" for median in growth.medians_us(name)),
-            *("" if k is None else f"{k:.2f}" for k in exponents),
-        )
-    for kernel in growth.first_call_s[0]:
-        times = (f"{call[kernel]:.2g}" for call in growth.first_call_s)
-        how = "compiled" if is_cold else "from the cache if it is there"
-        table.add_row(f"first {kernel}, s ({how})", *times, "", "")
+        table.add_row(name, *(_number(value) for value in growth.medians_us(name)))
     console.print(table)
+    title = "exponent of the number of joints, median and spread"
+    table = Table("", title=title, title_justify="left", box=SIMPLE_HEAD)
+    table.add_column("all sizes", justify="right")
+    table.add_column(f"from {LARGE} joints on", justify="right")
+    for name in growth.samples_us:
+        table.add_row(name, *(_spread(growth.exponents(name, least)) for least in (0, LARGE)))
+    console.print(table)
+    how = "compiled" if is_cold else "from the cache if it is there"
+    for kernel in growth.first_call_s[0]:
+        calls = ", ".join(f"{call[kernel]:.2g}" for call in growth.first_call_s)
+        console.print(f"first {kernel} ({how}), s: {calls}", highlight=False)
+
+
+def _spread(values: list[float]) -> str:
+    if not values:
+        return ""
+    return f"{median(values):.2f} ({min(values):.2f}..{max(values):.2f})"
+
+
+def _number(value: float) -> str:
+    return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
 
 
 def draw_growth(growth: Growth, path: Path) -> None:

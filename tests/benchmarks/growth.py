@@ -8,16 +8,18 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from checks import HAS_BASILISK, same_motion
-from peers import BATCH, FRICTION, MuJoCo, Ours, Peer, Pinocchio, Start
+from checks import HAS_BASILISK, all_peers, same_motion
+from peers import BATCH, FRICTION, MuJoCo, Ours, Pinocchio, Start
 from random_robots import random_robot
 
 from space_robot_control.bench import Options, interleave
+from space_robot_control.bench.measure import Competitor
 
 JOINTS = (3, 5, 7, 10, 15, 20, 30)
 LARGE = 10
 """Joints from which on the growth is stated once more: below, what is constant hides it."""
 CHECK_STEPS = 200
+IN_CPP = "pinocchio, aba in C++"
 
 
 @dataclass
@@ -35,16 +37,23 @@ class Growth:
         """One for each number of joints."""
         return [float(np.median(samples)) for samples in self.samples_us[competitor]]
 
+    def exponents(self, competitor: str, least: int = 0) -> list[float]:
+        """k of ``time ~ n^k`` by least squares of the logarithms, for n from ``least`` on.
+
+        One for each repetition: the sizes are measured in turn, so a machine that is slow for a
+        while is so for all of them. Empty if there are fewer than two sizes.
+        """
+        large = [n >= least for n in self.joints]
+        if sum(large) < 2:
+            return []
+        logarithms = np.log(self.samples_us[competitor])[large]
+        sizes = np.log(np.array(self.joints)[large])
+        return [float(np.polyfit(sizes, times, 1)[0]) for times in logarithms.T]
+
     def exponent(self, competitor: str, least: int = 0) -> float | None:
-        """k of ``time ~ n^k`` by least squares of the logarithms, for n from ``least`` on."""
-        points = [
-            (np.log(n), np.log(median))
-            for n, median in zip(self.joints, self.medians_us(competitor), strict=True)
-            if n >= least
-        ]
-        if len(points) < 2:
-            return None
-        return float(np.polyfit(*np.transpose(points), 1)[0])
+        """Median of `exponents`."""
+        found = self.exponents(competitor, least)
+        return float(np.median(found)) if found else None
 
     def record(self) -> dict[str, Any]:
         """As JSON holds it."""
@@ -55,7 +64,9 @@ class Growth:
                 name: {
                     "median_us": self.medians_us(name),
                     "exponent": self.exponent(name),
+                    "exponents": self.exponents(name),
                     f"exponent_from_{LARGE}_joints": self.exponent(name, LARGE),
+                    f"exponents_from_{LARGE}_joints": self.exponents(name, LARGE),
                     "samples_us": samples,
                 }
                 for name, samples in self.samples_us.items()
@@ -67,37 +78,43 @@ class Growth:
 def growth(options: Options, joints: Sequence[int] = JOINTS) -> Growth:
     """Forward dynamics beside Pinocchio's, steps beside MuJoCo's and Basilisk's."""
     found = Growth(tuple(joints))
+    sizes: dict[str, list[Competitor]] = {}
     for n in joints:
-        options.progress(f"{n} joints")
+        options.progress(f"the first call and the motion of {n} joints")
         robot = random_robot(np.random.default_rng(n), n)
-        start = Start.moving(robot, rate=0.5, torque=1.0)
-        peers: list[Peer] = [MuJoCo(start)]
-        if HAS_BASILISK:
-            from basilisk import Basilisk
-
-            peers.append(Basilisk(start))
-        ours, pinocchio = Ours(start, with_environment=True), Pinocchio(start)
+        pushed, start = Start.moving(robot, rate=0.5, torque=1.0), Start.moving(robot)
+        ours = Ours(pushed, with_environment=True)
         found.first_call_s.append(
             {"step": _timed(ours.step), "forward dynamics": _timed(ours.forward_dynamics)}
         )
-        found.checks += same_motion(start, [*peers, Pinocchio(start)], CHECK_STEPS)
-        start = Start.moving(robot)
-        competitors: dict[str, Callable[[int], None]] = {
-            "space_robot, step": Ours(start, with_environment=True).step,
-            "mujoco, step": MuJoCo(start, FRICTION.viscous).step,
-            "space_robot, forward dynamics": Ours(start, True).forward_dynamics,
-            "pinocchio, aba in C++": pinocchio.batches_in_cpp,
-            "pinocchio, aba from Python": pinocchio.calls,
-        }
-        if HAS_BASILISK:
-            competitors["basilisk, step"] = Basilisk(start, FRICTION.viscous).step
-        seconds = interleave(
-            competitors, options.batches(usual=9), batch_s=min(options.batch_s, 0.02)
-        )
-        for name, times in seconds.items():
-            calls = BATCH if name == "pinocchio, aba in C++" else 1
-            found.samples_us.setdefault(name, []).append([1e6 * t / calls for t in times])
+        found.checks += same_motion(pushed, all_peers(pushed), CHECK_STEPS)
+        for name, run in _competitors(start).items():
+            sizes.setdefault(name, []).append(run)
+    options.progress("all of them in turn")
+    flat = {f"{name} {i}": run for name, runs in sizes.items() for i, run in enumerate(runs)}
+    seconds = interleave(flat, options.batches(), batch_s=min(options.batch_s, 0.02))
+    for name, runs in sizes.items():
+        scale = 1e6 / (BATCH if name == IN_CPP else 1)
+        found.samples_us[name] = [
+            [scale * t for t in seconds[f"{name} {i}"]] for i in range(len(runs))
+        ]
     return found
+
+
+def _competitors(start: Start) -> dict[str, Competitor]:
+    ours, pinocchio = Ours(start, with_environment=True), Pinocchio(start)
+    competitors: dict[str, Competitor] = {
+        "space_robot, step": ours.step,
+        "mujoco, step": MuJoCo(start, FRICTION.viscous).step,
+        "space_robot, forward dynamics": Ours(start, with_environment=True).forward_dynamics,
+        IN_CPP: pinocchio.batches_in_cpp,
+        "pinocchio, aba from Python": pinocchio.calls,
+    }
+    if HAS_BASILISK:
+        from basilisk import Basilisk
+
+        competitors["basilisk, step"] = Basilisk(start, FRICTION.viscous).step
+    return competitors
 
 
 def _timed(call: Callable[[int], None]) -> float:

@@ -33,9 +33,14 @@ class Recorded:
     """A flight of case 3 under one law, and a controller to run over its rows again."""
 
     controller: Controller
+    """As before the first tick."""
     rows: Rows
     signals: Array
     """(ticks, 4, m): e, edot, rhodd_d, N_hat of every tick."""
+    inertia: Array
+    """H_S of the last tick, if the law uses it."""
+    bias: Array
+    """c_S, likewise."""
 
     @classmethod
     def of(cls, name: str, ticks: int) -> Recorded:
@@ -43,33 +48,31 @@ class Recorded:
         flight = Flight(FlightPlan(controller=name, case=CASE))
         flight.ticks = ticks
         log = simulate(flight)
-        controller = Controller(flight.robot, flight.controller.law, flight.period)
-        controller.law.reset()
-        signals = np.zeros((ticks, 4, log.axes))
+        law, period = flight.controller.law, flight.period
+        controller = Controller(flight.robot, law, period)
+        signals, seen = np.zeros((ticks, 4, log.axes)), controller.signals
         for tick in range(ticks):
             controller.update(log.state(tick), *log.reference(tick))
-            seen = controller.signals
             signals[tick] = seen.error, seen.error_rate, seen.acceleration_desired, seen.n_hat
-        return cls(controller, Rows.of(log), signals)
+        fresh = Controller(flight.robot, law, period)
+        return cls(fresh, Rows.of(log), signals, seen.inertia.copy(), seen.bias.copy())
 
-    def whole_tick(self) -> Competitor:
-        """Signals, law and torque."""
+    def whole_tick(self) -> tuple[Competitor, Array]:
+        """Signals, law and torque; and the array (m,) the torque is written into."""
         law, pointer = self._law()
-        torque = np.zeros(law.memory.shape[1])
-        period = self.controller.period
+        torque, period = np.zeros(law.memory.shape[1]), self.controller.period
         return lambda ticks: controller_ticks(
             pointer, law.gain_matrix, law.memory, law.h_bar, law.uses_model,
             self.controller.block, self.rows, ticks, torque, period,
-        )  # fmt: skip
+        ), torque  # fmt: skip
 
     def equation(self) -> Competitor:
         """The law's equation alone."""
         law, pointer = self._law()
-        signals, period = self.controller.signals, self.controller.period
-        inertia, bias = signals.inertia.copy(), signals.bias.copy()
         return lambda ticks: law_ticks(
-            pointer, law.gain_matrix, law.memory, self.signals, inertia, bias, ticks, period
-        )
+            pointer, law.gain_matrix, law.memory, self.signals, self.inertia, self.bias, ticks,
+            self.controller.period,
+        )  # fmt: skip
 
     def _law(self) -> tuple[CompiledLaw, Any]:
         law = self.controller.law
@@ -82,10 +85,9 @@ def laws(options: Options) -> list[Result]:
     names = [REFERENCE, *(name for name in all_laws() if name != REFERENCE)]
     recorded = {name: Recorded.of(name, 100 if options.short else TICKS) for name in names}
     results = []
-    for what, unit, parts in (
-        ("tick", "us", {name: flown.whole_tick() for name, flown in recorded.items()}),
-        ("equation", "ns", {name: flown.equation() for name, flown in recorded.items()}),
-    ):
+    ticks = {name: flown.whole_tick()[0] for name, flown in recorded.items()}
+    equations = {name: flown.equation() for name, flown in recorded.items()}
+    for what, unit, parts in (("tick", "us", ticks), ("equation", "ns", equations)):
         options.progress(f"one {what} of each law")
         seconds = interleave(parts, options.batches(), batch_s=options.batch_s)
         for name in names:
