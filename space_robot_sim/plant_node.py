@@ -55,12 +55,17 @@ class PlantLoop:
         """Fly until the last tick, or until told to stop."""
         shell, settings, plant = self._shell, self._settings, self._plant
         shell.wait_for_listeners(self._outputs, settings.wait_for)
-        answer = self._answer_by_the_clock if settings.realtime else self._answer_in_lockstep
         begin = time.monotonic()
         while not shell.stopping and (not settings.ticks or plant.tick < settings.ticks):
             self._send()
-            if not answer(begin):
+            if settings.realtime and plant.tick > 0:
+                answered = self._answer_by_the_clock(begin)
+            else:
+                answered = self._answer_in_lockstep()
+            if not answered:
                 break
+            if plant.tick == 0:  # the clock starts when the loop is closed
+                begin = time.monotonic() - settings.period
             plant.step(self._command)
             shell.serve()
         elapsed = time.monotonic() - begin
@@ -78,7 +83,7 @@ class PlantLoop:
         if tick % self._settings.clock_decimation == 0:
             self._clock_out.publish(self._clock.encode(self._timebase.stamp_ns(tick)))
 
-    def _answer_in_lockstep(self, begin: float) -> bool:
+    def _answer_in_lockstep(self) -> bool:
         """Wait for the command that answers this tick; False if told to stop."""
         tick, command = self._plant.tick, self._command
         ask_again = time.monotonic() + ASK_AGAIN_S

@@ -20,7 +20,7 @@ from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.ros.process_environment import DEFAULTS
 
 from ..flight.domain import ros_domain
-from ..flight.orchestrator import flight_parameters
+from ..flight.orchestrator import flight_parameters, require_ros
 from ..flight.plan import Flight
 from ..flight.processes import MODULES, Graph, ros_arguments
 
@@ -76,6 +76,7 @@ def fly_graph(flight: Flight, empty: bool = False) -> GraphRun:
     Raises:
         FlightError: a node ended before the flight did, or the flight takes for ever.
     """
+    require_ros()
     with tempfile.TemporaryDirectory(prefix="space_robot_bench_") as folder, ros_domain() as domain:
         bag = Path(folder) / "bag"
         parameters = flight_parameters(flight, bag)

@@ -35,7 +35,8 @@ def bench(
 ) -> None:
     r"""Measure how fast it is on this machine, each figure beside its competitor in the same run.
 
-    SECTION is one of plant, laws, simulate, reproduce [default: all]. Shown are the median and the
+    SECTION is one of plant, laws, simulate, reproduce, and on the ROS 2 graph: graph, clock,
+    recorder (10 minutes), start-up [default: all]. Shown are the median and the
     spread of several repetitions, how many times better that is than what stands beside it, and
     what was asked. A machine that does other work meanwhile shows in the spread.
 

@@ -46,13 +46,7 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
             the bag is closed and no process left.
     """
     check_bag_path(bag)
-    try:
-        import rclpy  # noqa: F401
-    except ImportError as error:
-        raise FlightError(
-            f"rclpy cannot be imported ({error}): source your ROS 2 Jazzy, or install the [ros] "
-            "extra; `space-robot simulate` flies without"
-        ) from None
+    require_ros()
     compile_kernels()
     with ros_domain() as domain, _stop_signals() as stopped:
         environment = {**DEFAULTS, **os.environ, "ROS_DOMAIN_ID": str(domain)}
@@ -72,6 +66,21 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
     report = analyse(read_flight(bag))
     _check(report, flight)
     return report
+
+
+def require_ros() -> None:
+    """See that nodes can be started here.
+
+    Raises:
+        FlightError: rclpy cannot be imported.
+    """
+    try:
+        import rclpy  # noqa: F401
+    except ImportError as error:
+        raise FlightError(
+            f"rclpy cannot be imported ({error}): source your ROS 2 Jazzy, or install the [ros] "
+            "extra; `space-robot simulate` flies without"
+        ) from None
 
 
 def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:

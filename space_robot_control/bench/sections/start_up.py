@@ -13,6 +13,7 @@ from space_robot_msgs_py.errors import FlightError
 
 from ...flight.domain import ros_domain
 from ...flight.monitor import Monitor
+from ...flight.orchestrator import require_ros
 from ..measure import Options, interleave, repeated
 from ..result import Result, Target
 
@@ -23,6 +24,7 @@ COMMAND = [sys.executable, "-m", "space_robot_control.cli"]
 
 def start_up(options: Options) -> list[Result]:
     """``--help`` beside an interpreter that does nothing; ``fly`` until its plant sends."""
+    require_ros()
     options.progress("the command line's start")
     nothing, help_ = "python -c pass", "space-robot --help"
     seconds = interleave(
