@@ -10,10 +10,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.compiled import function_pointer, kernel
 from space_robot_msgs_py.errors import SingularAttitudeError
 from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_sim.attitude import SINGULAR_ETA
-from space_robot_sim.compiled import function_pointer, kernel
 from space_robot_sim.plant import RATE_LIMIT, Block, Plant, advance
 
 from .controller import Controller, form_signals

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.compiled import kernel
 from space_robot_msgs_py.errors import SingularAttitudeError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.attitude import SINGULAR_ETA, attitude_jacobian_inverse
-from space_robot_sim.compiled import kernel
 from space_robot_sim.dynamics import Model
 from space_robot_sim.dynamics.rho_space import RhoSpaceModel, rho_space_into
 from space_robot_sim.records import Record, assign, nested, shaped

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_sim.compiled import kernel
+from space_robot_msgs_py.compiled import kernel
 from space_robot_sim.records import Record, shaped
 
 Array = NDArray[np.float64]

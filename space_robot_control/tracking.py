@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.compiled import kernel
 from space_robot_sim.attitude import attitude_jacobian, rotate, rotate_back
-from space_robot_sim.compiled import kernel
 
 Array = NDArray[np.float64]
 

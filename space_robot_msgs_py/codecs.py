@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from . import topics
 from .cdr import CdrBuilder
+from .compiled_cdr import FOREIGN, read_base, read_effort, read_joints, write_effort, write_state
 from .definitions import decode
 from .errors import MessageError
 from .samples import Command, RobotState, Timebase
@@ -44,8 +45,8 @@ def name_order(given: Sequence[str], expected: Sequence[str], topic: str) -> lis
     return [list(given).index(name) for name in expected]
 
 
-class JointStateCodec:
-    """sensor_msgs/JointState with the given names; ``fields`` says which arrays are filled."""
+class JointStateMessage:
+    """A sensor_msgs/JointState with the given names; ``fields`` says which arrays are filled."""
 
     def __init__(
         self,
@@ -59,33 +60,29 @@ class JointStateCodec:
 
     def _lay_out(self, frame_id: str) -> None:
         builder = CdrBuilder()
-        self._stamp = builder.header_slot(frame_id)
+        stamp = builder.header_slot(frame_id)
         builder.strings(self._names)
         count = len(self._names)
-        slots = [
-            builder.float64_sequence_slot(count if field in self._fields else 0)
+        slots = {
+            field: builder.float64_sequence_slot(count if field in self._fields else 0)
             for field in ("position", "velocity", "effort")
-        ]
-        self._message = builder.build()
-        self.position, self.velocity, self.effort = (self._message.float64(s) for s in slots)
+        }
+        message = builder.build()
+        self.block = message.block(stamp, **slots)
+        """For the kernels."""
+        self.to_bytes = message.to_bytes
 
-    def encode(self, stamp_ns: int) -> bytes:
-        """The message with what ``position``, ``velocity`` and ``effort`` hold."""
-        self._message.set_stamp(self._stamp, stamp_ns)
-        return self._message.to_bytes()
-
-    def decode(self, data: bytes) -> int:
-        """Fill the arrays from a message; returns its stamp in ns.
+    def decode(self, data: bytes) -> tuple[int, dict[str, Array]]:
+        """Stamp in ns and arrays of a message in any layout, decoded the general way.
 
         Raises:
             MessageError: other joints than expected, or an array missing.
         """
-        if self._message.load(data):
-            return self._message.stamp_ns(self._stamp)
         message = decode(data, self._topic.type)
         order = name_order(message.name, self._names, self._topic.name)
         if order == sorted(order):
             self._lay_out(message.header.frame_id)  # same order: the next one is read fast
+        arrays = {}
         for field in self._fields:
             values = getattr(message, field)
             if len(values) != len(self._names):
@@ -93,8 +90,8 @@ class JointStateCodec:
                     f"{self._topic.name}: {len(values)} values of {field} "
                     f"for {len(self._names)} names"
                 )
-            getattr(self, field)[:] = values[order]
-        return stamp_of(message)
+            arrays[field] = values[order]
+        return stamp_of(message), arrays
 
 
 class StateCodec:
@@ -102,46 +99,47 @@ class StateCodec:
 
     def __init__(self, joint_names: Sequence[str], timebase: Timebase) -> None:
         self._timebase = timebase
-        self._joints = JointStateCodec(topics.JOINT_STATES, joint_names)
+        self._joints = JointStateMessage(topics.JOINT_STATES, joint_names)
         builder = CdrBuilder()
-        self._stamp = builder.header_slot(topics.INERTIAL_FRAME)
+        stamp = builder.header_slot(topics.INERTIAL_FRAME)
         builder.strings([topics.BASE_FRAME])
-        slots = []
-        for width in (7, 6, 6):  # Transform[1], Twist[1], Wrench[1]
+        slots = {}
+        for name, width in (("pose", 7), ("twist", 6), ("wrench", 6)):
             builder.uint32(1)
-            slots.append(builder.float64_slot(width))
+            slots[name] = builder.float64_slot(width)
         self._base = builder.build()
-        self._pose, self._twist, self._wrench = (self._base.float64(slot) for slot in slots)
+        self._base_block = self._base.block(stamp, **slots)
 
     def encode(self, state: RobotState) -> tuple[bytes, bytes]:
         """The bytes of /joint_states and /base/state."""
-        stamp_ns = self._timebase.stamp_ns(state.tick)
         joints = self._joints
-        joints.position[:] = state.joint_positions
-        joints.velocity[:] = state.joint_velocities
-        joints.effort[:] = state.applied_torque[3:]
-        self._pose[:3] = state.base_position
-        self._pose[3:6] = state.quaternion[1:]
-        self._pose[6] = state.quaternion[0]
-        self._twist[:3] = state.base_velocity
-        self._twist[3:] = state.omega_base
-        self._wrench[3:] = state.applied_torque[:3]
-        self._base.set_stamp(self._stamp, stamp_ns)
-        return joints.encode(stamp_ns), self._base.to_bytes()
+        write_state(
+            joints.block, self._base_block, self._timebase.stamp_ns(state.tick),
+            state.base_position, state.quaternion, state.base_velocity, state.omega_base,
+            state.joint_positions, state.joint_velocities, state.applied_torque,
+        )  # fmt: skip
+        return joints.to_bytes(), self._base.to_bytes()
 
     def decode_joints(self, data: bytes, state: RobotState) -> int:
         """Fill the joints' part of ``state``; returns the tick."""
-        tick = self._timebase.tick(self._joints.decode(data))
-        state.joint_positions[:] = self._joints.position
-        state.joint_velocities[:] = self._joints.velocity
-        state.applied_torque[3:] = self._joints.effort
-        return tick
+        stamp_ns = read_joints(
+            self._joints.block, data, state.joint_positions, state.joint_velocities,
+            state.applied_torque,
+        )  # fmt: skip
+        if stamp_ns == FOREIGN:
+            stamp_ns, arrays = self._joints.decode(data)
+            state.joint_positions[:] = arrays["position"]
+            state.joint_velocities[:] = arrays["velocity"]
+            state.applied_torque[3:] = arrays["effort"]
+        return self._timebase.tick(stamp_ns)
 
     def decode_base(self, data: bytes, state: RobotState) -> int:
         """Fill the base's part of ``state``; returns the tick."""
-        if self._base.load(data):
-            stamp_ns = self._base.stamp_ns(self._stamp)
-        else:
+        stamp_ns = read_base(
+            self._base_block, data, state.base_position, state.quaternion,
+            state.base_velocity, state.omega_base, state.applied_torque,
+        )  # fmt: skip
+        if stamp_ns == FOREIGN:
             message = decode(data, topics.BASE_STATE.type)
             name_order(message.joint_names, [topics.BASE_FRAME], topics.BASE_STATE.name)
             if not (len(message.transforms) == len(message.twist) == len(message.wrench) == 1):
@@ -149,16 +147,12 @@ class StateCodec:
                     f"{topics.BASE_STATE.name}: one transform, twist, wrench expected"
                 )
             pose, twist = message.transforms[0], message.twist[0]
-            self._pose[:] = (*xyz(pose.translation), *xyz(pose.rotation), pose.rotation.w)
-            self._twist[:] = (*xyz(twist.linear), *xyz(twist.angular))
-            self._wrench[3:] = xyz(message.wrench[0].torque)
+            state.base_position[:] = xyz(pose.translation)
+            state.quaternion[:] = (pose.rotation.w, *xyz(pose.rotation))
+            state.base_velocity[:] = xyz(twist.linear)
+            state.omega_base[:] = xyz(twist.angular)
+            state.applied_torque[:3] = xyz(message.wrench[0].torque)
             stamp_ns = stamp_of(message)
-        state.base_position[:] = self._pose[:3]
-        state.quaternion[1:] = self._pose[3:6]
-        state.quaternion[0] = self._pose[6]
-        state.base_velocity[:] = self._twist[:3]
-        state.omega_base[:] = self._twist[3:]
-        state.applied_torque[:3] = self._wrench[3:]
         return self._timebase.tick(stamp_ns)
 
 
@@ -167,19 +161,22 @@ class CommandCodec:
 
     def __init__(self, axis_names: Sequence[str], timebase: Timebase) -> None:
         self._timebase = timebase
-        self._axes = JointStateCodec(
+        self._axes = JointStateMessage(
             topics.COMMAND, axis_names, topics.BASE_FRAME, fields=("effort",)
         )
 
     def encode(self, command: Command) -> bytes:
         """The bytes of /command, stamped with the state it answers."""
-        self._axes.effort[:] = command.torque
-        return self._axes.encode(self._timebase.stamp_ns(command.tick))
+        write_effort(self._axes.block, self._timebase.stamp_ns(command.tick), command.torque)
+        return self._axes.to_bytes()
 
     def decode(self, data: bytes, command: Command) -> None:
         """Fill ``command``."""
-        command.tick = self._timebase.tick(self._axes.decode(data))
-        command.torque[:] = self._axes.effort
+        stamp_ns = read_effort(self._axes.block, data, command.torque)
+        if stamp_ns == FOREIGN:
+            stamp_ns, arrays = self._axes.decode(data)
+            command.torque[:] = arrays["effort"]
+        command.tick = self._timebase.tick(stamp_ns)
 
 
 class TelemetryCodec:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled import kernel
+from space_robot_msgs_py.compiled import kernel
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from space_robot_msgs_py.compiled import kernel
 from space_robot_msgs_py.validation import Strict
 
-from .compiled import kernel
 from .records import Record, assign, shaped
 from .robot import Inertia, Robot
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.compiled import kernel
+
 from .attitude import quaternion_rate, rotate, rotation_matrix
-from .compiled import kernel
 from .dynamics import Data, Model, forward_dynamics_into
 from .environment import Environment, disturbance_torque, friction_torque
 from .records import Record, nested, shaped

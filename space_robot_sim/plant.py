@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from space_robot_msgs_py.compiled import kernel
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_msgs_py.validation import Strict
 
 from .attitude import rotate_back, rotation_matrix
-from .compiled import kernel
 from .dynamics import Model
 from .environment import (
     DisturbanceSettings,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_sim.compiled import kernel
+from space_robot_msgs_py.compiled import kernel
 from space_robot_sim.dynamics import forward_dynamics_into
 from space_robot_sim.integrator import state_derivative
 from space_robot_sim.plant import advance

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from space_robot_sim.compiled import cache_directory
+from space_robot_msgs_py.compiled import cache_directory
 
 from ..laws import laws
 from .plan import Flight, FlightPlan

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import kernel
+from space_robot_msgs_py.compiled import kernel
+
 from .algebra import (
     add,
     add_symmetric,

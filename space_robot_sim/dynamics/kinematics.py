@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.compiled import kernel
+
 from ..attitude import rotation_matrix
-from ..compiled import kernel
 from .algebra import (
     Matrix,
     Symmetric,

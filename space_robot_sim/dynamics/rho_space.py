@@ -11,8 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.compiled import kernel
+
 from ..attitude import attitude_jacobian_inverse, rotate, rotate_back, rotation_matrix
-from ..compiled import kernel
 from ..records import Record, nested, shaped
 from .equations_of_motion import composite_bodies, newton_euler
 from .kinematics import forward_kinematics, spatial_velocities

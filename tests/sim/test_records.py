@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from space_robot_sim.compiled import kernel
+from space_robot_msgs_py.compiled import kernel
 from space_robot_sim.records import Record, assign, nested, shaped
 
 Array = NDArray[np.float64]

@@ -17,7 +17,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 
-_PACKAGES = ("space_robot_sim", "space_robot_control")
+_PACKAGES = ("space_robot_msgs_py", "space_robot_sim", "space_robot_control")
 _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _njit: Any = numba.njit
 config: Any = numba.config
