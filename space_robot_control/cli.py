@@ -34,12 +34,12 @@ def cli() -> None:
     """
 
 
-def _plan(realtime: bool = False, **options: Any) -> Any:
+def _plan(**options: Any) -> Any:
     from space_robot_msgs_py.validation import check
 
     from .flight.plan import Flight, FlightPlan
 
-    return Flight(check(FlightPlan, {**options, "realtime": realtime}, "options"))
+    return Flight(check(FlightPlan, options, "options"))
 
 
 def _report(report: dict[str, Any], as_json: bool) -> None:
@@ -56,6 +56,12 @@ def _report(report: dict[str, Any], as_json: bool) -> None:
 @cli.command()
 @flight_options(*OPTIONS)
 @click.option("--realtime", is_flag=True, help="Pace by the wall clock instead of lockstep.")
+@click.option(
+    "--fifo-priority",
+    type=click.IntRange(0, 98),
+    default=0,
+    help="Ask for SCHED_FIFO for plant and controller; for machines with cores to spare.",
+)
 def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     r"""Fly a mission on a ROS 2 graph, record it, and print the RMS table.
 

@@ -21,6 +21,9 @@ from .robot import Robot
 ASK_AGAIN_S = 0.5
 """Without an answer for this long the state is sent again (lockstep)."""
 SPIN_BEFORE_DEADLINE_S = 100e-6
+GIVE_WAY_S = 100e-6
+SLIP_S = 0.25
+"""Further behind the wall clock than this, the plant gives up catching up."""
 FLUSH_S = 5.0
 
 
@@ -50,6 +53,9 @@ class PlantLoop:
         self._waiter = Waiter(node, self._command_in, spin_s=spin_s)
         self._outputs = (self._joint_states, self._base_state, self._clock_out)
         self.late_ticks = 0
+        """Ticks by the wall clock that were not answered before their end."""
+        self.slipped_s = 0.0
+        """How far the wall clock has run ahead for good."""
 
     def run(self) -> None:
         """Fly until the last tick, or until told to stop."""
@@ -66,13 +72,18 @@ class PlantLoop:
                 break
             if plant.tick == 0:  # the clock starts when the loop is closed
                 begin = time.monotonic() - settings.period
+            elif settings.realtime:
+                begin += self._slip(begin)
             plant.step(self._command)
             shell.serve()
         elapsed = time.monotonic() - begin
         for output in self._outputs:
             output.flush(FLUSH_S)
         flown = plant.tick * settings.period
-        late = f", {self.late_ticks} ticks without an answer in time" if settings.realtime else ""
+        late = ""
+        if settings.realtime:
+            late = f", {self.late_ticks} ticks without an answer in time"
+            late += f", {self.slipped_s:.3f} s behind the wall clock" if self.slipped_s else ""
         shell.log(f"flew {flown:.4f} s in {elapsed:.2f} s{late}")
 
     def _send(self) -> None:
@@ -105,6 +116,8 @@ class PlantLoop:
         """Take what comes until the tick is over; an unanswered tick keeps the last command."""
         tick, command = self._plant.tick, self._command
         deadline = begin + (tick + 1) * self._settings.period
+        if time.monotonic() >= deadline:  # behind: catch up, but never take the whole processor
+            time.sleep(GIVE_WAY_S)
         while (left := deadline - time.monotonic()) > 0.0:
             if left > SPIN_BEFORE_DEADLINE_S and command.tick != tick:
                 self._waiter.wait(left - SPIN_BEFORE_DEADLINE_S)
@@ -114,6 +127,15 @@ class PlantLoop:
         self._take_newest()
         self.late_ticks += command.tick != tick
         return not self._shell.stopping
+
+    def _slip(self, begin: float) -> float:
+        """By how much to set the clock back, s: 0 unless the plant is hopelessly behind it."""
+        behind = time.monotonic() - begin - (self._plant.tick + 1) * self._settings.period
+        if behind < SLIP_S:
+            return 0.0
+        self.slipped_s += behind
+        self._shell.log(f"{behind:.3f} s behind the wall clock: time goes on from here")
+        return behind
 
     def _take_newest(self) -> None:
         while (data := self._command_in.take()) is not None:

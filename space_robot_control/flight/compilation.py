@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-import click
+import subprocess
+import sys
 
+import click
+import numpy as np
+
+from space_robot_msgs_py.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.compiled import cache_directory
+from space_robot_msgs_py.samples import Command, RobotState
 
 from ..laws import laws
 from .plan import Flight, FlightPlan
@@ -16,15 +22,40 @@ MARK = "complete"
 def compile_kernels() -> None:
     """Fly a few ticks under every law, unless that has been done since the last change.
 
-    Else the nodes would compile the same functions side by side in their first tick.
+    Else the nodes would compile the same functions side by side in their first tick. The
+    controller's kernels are compiled by a second process while this one compiles the plant's.
     """
     mark = cache_directory() / MARK
     if mark.exists():
         return
     click.echo("compiling the dynamics and the laws (once, about half a minute) ...", err=True)
+    with subprocess.Popen([sys.executable, "-m", __name__], stdout=subprocess.DEVNULL):
+        _step_plant()
     for law in laws():
-        flight = Flight(FlightPlan(controller=law, duration=0.002))
-        log = simulate(flight)
-        # and the entries of the nodes
-        flight.plant.step(flight.controller.update(log.state(0), *log.reference(0)))
+        simulate(Flight(FlightPlan(controller=law, duration=0.002)))
+    _step_plant()
+    _answer_and_exchange()
     mark.touch()
+
+
+def _step_plant() -> None:
+    flight = Flight(FlightPlan())
+    flight.plant.step(Command(0, np.zeros(flight.robot.n + 3)))
+
+
+def _answer_and_exchange() -> None:
+    """The controller's entry under every law, and the messages."""
+    for law in laws():
+        flight = Flight(FlightPlan(controller=law))
+        states = StateCodec(flight.robot.joint_names, flight.timebase)
+        commands = CommandCodec(flight.robot.axis_names, flight.timebase)
+        state = RobotState.allocate(flight.robot.n)
+        joints, base = states.encode(state)
+        states.decode_joints(joints, state)
+        states.decode_base(base, state)
+        command = flight.controller.update(state, np.zeros((3, flight.robot.n)), np.eye(10)[0])
+        commands.decode(commands.encode(command), command)
+
+
+if __name__ == "__main__":
+    _answer_and_exchange()

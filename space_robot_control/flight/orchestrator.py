@@ -27,8 +27,6 @@ from .processes import MODULES, Graph, node_command
 POLL_S = 0.1
 READY_TIMEOUT_S = 60.0
 STALL_TIMEOUT_S = 60.0
-FIFO_PRIORITY = 50
-"""Asked for the loop's nodes by the wall clock."""
 
 
 class InterruptedFlightError(FlightError):
@@ -92,9 +90,6 @@ def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
         "wait_for": ["controller", "mission", "recorder"],
     }
     parameters["controller"] |= {"wait_for": ["plant", "recorder"]}
-    if flight.plant_settings.realtime:
-        for node in ("plant", "controller"):
-            parameters[node].setdefault("fifo_priority", FIFO_PRIORITY)
     parameters["recorder"] |= {
         "bag": str(bag.absolute()),
         "flight": json.dumps(flight.description),

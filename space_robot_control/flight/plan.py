@@ -34,6 +34,7 @@ class FlightPlan(Strict):
     command_latency_ticks: int = 0
     friction: bool = True
     realtime: bool = False
+    fifo_priority: int = 0
     parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """Further parameters by node, dotted names."""
 
@@ -46,9 +47,14 @@ class FlightPlan(Strict):
                 "case": self.case,
                 "realtime": self.realtime,
                 "command_latency_ticks": self.command_latency_ticks,
+                "fifo_priority": self.fifo_priority,
                 **({} if self.friction else {"friction.coulomb": 0.0, "friction.viscous": 0.0}),
             },
-            ControllerNodeSettings.node: {"law": self.controller, "gains": self.gains},
+            ControllerNodeSettings.node: {
+                "law": self.controller,
+                "gains": self.gains,
+                "fifo_priority": self.fifo_priority,
+            },
             MissionNodeSettings.node: {"mission": self.mission},
         }
         return {**common, **specific.get(node, {}), **self.parameters.get(node, {})}
