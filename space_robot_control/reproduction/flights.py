@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py.configuration import config_directory
@@ -12,9 +11,10 @@ from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.validation import read_yaml
 
 from ..analysis import metrics
-from ..analysis.figures import BaseTorque, control_results, save_figure
+from ..analysis.figures import BaseTorque, control_results
 from ..flight.plan import Flight, FlightPlan
 from ..flight.simulate import simulate
+from .gallery import Gallery
 from .provenance import parameters
 from .table_v import PRINTED
 
@@ -120,8 +120,8 @@ class Result:
     """Of the flights that are compared."""
 
 
-def fly(planned: Planned, duration: float | None, folder: Path | None) -> Result:
-    """Fly one row in one variant; if it is shown it is also drawn into ``folder``."""
+def fly(planned: Planned, duration: float | None, gallery: Gallery | None) -> Result:
+    """Fly one row in one variant; if it is shown it is also drawn for the ``gallery``."""
     row, variant, _ = planned
     flight = Flight(
         FlightPlan(
@@ -134,9 +134,9 @@ def fly(planned: Planned, duration: float | None, folder: Path | None) -> Result
         log = simulate(flight)
     except DivergedError as error:
         return Result(row, variant, told, error.tick)
-    if planned.shown and folder is not None:
+    if planned.shown and gallery is not None:
         title = f"{row.controller}, case {row.case}: {variant.title}"
-        save_figure(control_results(log, title), folder / row.stem)
+        gallery.hang(control_results(log, title), row.stem)
     return Result(
         row, variant, told, None, metrics.rms(log),
         metrics.chatter(log) if row.case == COMPARED_CASE and variant.friction else None,

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
-from pathlib import Path
 from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
-from ..analysis.figures import BaseTorque, chatter, desired_joints, junctions, save_figure
+from ..analysis.figures import BaseTorque, chatter, desired_joints, junctions
 from ..flight.plan import Flight, FlightPlan
 from ..flight.simulate import unflown
 from .flights import ROBOT, Result, Row
-from .report import Chapter, Picture
+from .gallery import Gallery
+from .report import Chapter
 
 FIGURE_OF_CASE = {"1": "6", "2": "7", "3": "8", "4-1": "9a", "4-2": "9b"}
 
@@ -34,31 +34,31 @@ COMPARISONS = (
 
 
 def start_comparisons(
-    pool: Executor, results: Sequence[Result], duration: float | None, folder: Path
+    pool: Executor, results: Sequence[Result], duration: float | None, gallery: Gallery
 ) -> Iterator[Future[None]]:
     """Draw the mission and the comparisons of ``results`` in other processes."""
     flights = {r.row.controller: r.base_torque for r in results if r.base_torque is not None}
     if flights:
-        yield pool.submit(_draw_mission, duration, folder)
+        yield pool.submit(_draw_mission, duration, gallery)
         for comparison in COMPARISONS:
-            yield pool.submit(_draw_comparison, comparison, flights, folder)
+            yield pool.submit(_draw_comparison, comparison, flights, gallery)
 
 
-def _draw_mission(duration: float | None, folder: Path) -> None:
+def _draw_mission(duration: float | None, gallery: Gallery) -> None:
     log = unflown(Flight(FlightPlan(robot=ROBOT, duration=duration)))
-    save_figure(desired_joints(log), folder / MISSION)
+    gallery.hang(desired_joints(log), MISSION)
 
 
 def _draw_comparison(
-    comparison: Comparison, flights: Mapping[str, BaseTorque], folder: Path
+    comparison: Comparison, flights: Mapping[str, BaseTorque], gallery: Gallery
 ) -> None:
-    save_figure(comparison.draw(flights), folder / comparison.stem)
+    gallery.hang(comparison.draw(flights), comparison.stem)
 
 
-def chapters(rows: Sequence[Row], folder: Path) -> Iterator[Chapter]:
+def chapters(rows: Sequence[Row], gallery: Gallery) -> Iterator[Chapter]:
     """The pictures that were drawn."""
     laws = [(MISSION, "Figure 5: desired joint angles"), *(c[:2] for c in COMPARISONS)]
-    if pictures := _drawn(folder, laws):
+    if pictures := gallery.pictures(laws):
         yield Chapter("The mission, and the laws beside one another", pictures)
     for case, figure in FIGURE_OF_CASE.items():
         captions = [
@@ -66,13 +66,5 @@ def chapters(rows: Sequence[Row], folder: Path) -> Iterator[Chapter]:
             for row in rows
             if row.case == case
         ]
-        if pictures := _drawn(folder, captions):
+        if pictures := gallery.pictures(captions):
             yield Chapter(f"Case {case}", pictures)
-
-
-def _drawn(folder: Path, captions: Sequence[tuple[str, str]]) -> list[Picture]:
-    return [
-        Picture(caption, path)
-        for stem, caption in captions
-        if (path := folder / f"{stem}.png").is_file()
-    ]

@@ -16,6 +16,7 @@ from .chatter import HEADINGS as CHATTER_HEADINGS
 from .chatter import chatter
 from .claims import claims
 from .flights import Planned, Result, Row, fly, plan
+from .gallery import Gallery
 from .pictures import chapters, start_comparisons
 from .processes import processes
 from .provenance import provenance
@@ -47,6 +48,7 @@ def reproduce(
     *,
     duration: float | None = None,
     every_variant: bool = False,
+    png: bool = False,
     jobs: int = 1,
     progress: Callable[[int], Callable[[], None]] = lambda total: lambda: None,
 ) -> dict[str, Any]:
@@ -57,6 +59,7 @@ def reproduce(
         folder: made or renewed at the end, whole; an older reproduction there is replaced.
         duration: s to fly (None: the mission's 30 s, which is what Table V is about).
         every_variant: fly what Table V does not ask for too, see `plan`.
+        png: write the figures as PNG too.
         jobs: processes at work.
         progress: called with the number of flights, gives what is called after each.
 
@@ -70,12 +73,12 @@ def reproduce(
     folder.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=folder.parent, prefix=".reproduce-") as temporary:
         work = Path(temporary) / folder.name
-        figures = work / "figures"
-        figures.mkdir(parents=True)
+        gallery = Gallery(work / "figures", png)
+        gallery.folder.mkdir(parents=True)
         planned = list(plan(rows, every_variant))
         with processes(jobs) as pool:
-            results = _fly_and_draw(pool, planned, duration, figures, progress(len(planned)))
-        record = _write(rows, results, duration or FULL_DURATION, every_variant, work)
+            results = _fly_and_draw(pool, planned, duration, gallery, progress(len(planned)))
+        record = _write(rows, results, duration or FULL_DURATION, every_variant, gallery)
         if folder.exists():
             shutil.rmtree(folder)
         work.rename(folder)
@@ -86,17 +89,17 @@ def _fly_and_draw(
     pool: Executor,
     planned: Sequence[Planned],
     duration: float | None,
-    figures: Path,
+    gallery: Gallery,
     done: Callable[[], None],
 ) -> list[Result]:
     """The results in the order of ``planned``; ``done`` is called after each."""
     # first those the comparisons wait for, last those that take the shortest
     order = sorted(planned, key=lambda flight: (not flight.compared, not flight.shown))
-    futures = {flight: pool.submit(fly, flight, duration, figures) for flight in order}
+    futures = {flight: pool.submit(fly, flight, duration, gallery) for flight in order}
     for future in futures.values():
         future.add_done_callback(lambda _: done())
     compared = [futures[flight].result() for flight in planned if flight.compared]
-    pictures = list(start_comparisons(pool, compared, duration, figures))
+    pictures = list(start_comparisons(pool, compared, duration, gallery))
     results = [futures[flight].result() for flight in planned]
     for picture in pictures:
         picture.result()
@@ -108,9 +111,9 @@ def _write(
     results: Sequence[Result],
     duration: float,
     every_variant: bool,
-    folder: Path,
+    gallery: Gallery,
 ) -> dict[str, Any]:
-    comparison = cells(results)
+    folder, comparison = gallery.folder.parent, cells(results)
     judged, chattering = claims(results, comparison), chatter(results)
     chatter_table = Block(
         "Chatter in case 1, printed friction", CHATTER_HEADINGS, [c.texts() for c in chattering]
@@ -133,6 +136,6 @@ def _write(
     (folder / f"{TABLE}.md").write_text(as_markdown(title, tables), "utf-8")
     (folder / f"{TABLE}.csv").write_text(as_csv(comparison), "utf-8")
     (folder / f"{TABLE}.json").write_text(json.dumps(record, indent=1) + "\n", "utf-8")
-    page = render(flown, told, judged, tables, list(chapters(rows, folder / "figures")))
+    page = render(flown, told, judged, tables, list(chapters(rows, gallery)))
     (folder / "report.html").write_text(page, "utf-8")
     return record

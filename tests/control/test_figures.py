@@ -413,6 +413,11 @@ class TestPrint:
         assert b"<image" not in svg.read_bytes()
         assert svg.stat().st_size < 400_000
 
+    def test_svg_alone(self, tmp_path: Path) -> None:
+        files = save_figure(desired_joints(flown()), tmp_path / "x", png=False)
+        assert files == (tmp_path / "x.svg",)
+        assert list(tmp_path.iterdir()) == [tmp_path / "x.svg"]
+
     def test_png_holds_the_pixels(self, tmp_path: Path) -> None:
         pixels = np.random.default_rng(2).integers(0, 256, (7, 5, 3), np.uint8)
         (tmp_path / "x.png").write_bytes(encode_png(pixels, 150))

@@ -165,7 +165,8 @@ def test_two_runs_write_the_same_bytes(twice: tuple[Path, Path, dict[str, Any]])
     assert written == files(second)
     assert {"report.html", "table_v.md", "table_v.csv", "table_v.json"} <= set(written)
     for stem in ("case1_ctc", "case4-2_tde_stc", "figure5_desired_joints", "chatter", "junctions"):
-        assert {f"figures/{stem}.png", f"figures/{stem}.svg"} <= set(written)
+        assert f"figures/{stem}.svg" in written
+        assert f"figures/{stem}.png" not in written
     leftovers = [p.name for p in first.parent.iterdir() if p.name.startswith(".")]
     assert not leftovers
 
@@ -212,10 +213,10 @@ def test_parameters_of_every_flight_are_told(twice: tuple[Path, Path, dict[str, 
 
 def test_an_older_reproduction_is_replaced(twice: tuple[Path, Path, dict[str, Any]]) -> None:
     _, folder, _ = twice
-    (folder / "figures" / "old.png").write_text("of an older run")
-    reproduce([Row("tde_stc", "1")], folder, duration=SHORT)
-    assert not (folder / "figures" / "old.png").exists()
-    assert not (folder / "figures" / "case1_ctc.png").exists()
+    (folder / "figures" / "old.svg").write_text("of an older run")
+    reproduce([Row("tde_stc", "1")], folder, duration=SHORT, png=True)
+    assert not (folder / "figures" / "old.svg").exists()
+    assert not (folder / "figures" / "case1_ctc.svg").exists()
     assert (folder / "figures" / "case1_tde_stc.png").is_file()
 
 
