@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from .base_torque import BaseTorque
 from .lines import draw_lines
 from .quantity import Quantity
+from .scale import draw_scales
 from .style import GREY, LEFT, PAGE_WIDTH, RIGHT, TIME_AXIS, panel
 
 Array = NDArray[np.float64]
@@ -86,7 +87,7 @@ def draw_side_by_side(
         axes.set_ylim(*quantity.scaled(np.array([low, high])))
         lowest = number + columns >= len(curves)
         axes.set_xlabel(f"time from {stretch.moment:g} s (ms)" if lowest else "")
-        axes.tick_params(labelleft=column == 0, labelbottom=lowest)
+        draw_scales(axes, x_numbers=lowest, y_numbers=column == 0)
         panels.append(axes)
     return panels
 
