@@ -77,7 +77,7 @@ def reproduce(
         gallery.folder.mkdir(parents=True)
         planned = list(plan(rows, every_variant))
         with processes(jobs) as pool:
-            results = _fly_and_draw(pool, planned, duration, gallery, progress(len(planned)))
+            results = _fly_and_draw(pool, planned, duration, gallery, progress)
         record = _write(rows, results, duration or FULL_DURATION, every_variant, gallery)
         if folder.exists():
             shutil.rmtree(folder)
@@ -90,12 +90,13 @@ def _fly_and_draw(
     planned: Sequence[Planned],
     duration: float | None,
     gallery: Gallery,
-    done: Callable[[], None],
+    progress: Callable[[int], Callable[[], None]],
 ) -> list[Result]:
-    """The results in the order of ``planned``; ``done`` is called after each."""
+    """The results in the order of ``planned``."""
     # first those the comparisons wait for, last those that take the shortest
     order = sorted(planned, key=lambda flight: (not flight.compared, not flight.shown))
     futures = {flight: pool.submit(fly, flight, duration, gallery) for flight in order}
+    done = progress(len(planned))  # may start a thread: not before the processes are forked
     for future in futures.values():
         future.add_done_callback(lambda _: done())
     compared = [futures[flight].result() for flight in planned if flight.compared]
