@@ -28,15 +28,23 @@ import click
     type=click.FloatRange(0.0, 1e6, min_open=True),
     help="Seconds to fly for a quick look [default: the mission's 30].",
 )
+@click.option(
+    "--every-variant",
+    is_flag=True,
+    help="Fly every row with both gain sets, with friction and without: takes twice as long.",
+)
+@click.option("--png", is_flag=True, help="Write the figures as PNG too.")
 @click.option("--jobs", type=click.IntRange(1, 256), help="Processes [default: one a core].")
 @click.option("--json", "as_json", is_flag=True, help="Print table_v.json.")
 def reproduce(
-    out: Path, only: tuple[str, ...], duration: float | None, jobs: int | None, as_json: bool
+    out: Path, only: tuple[str, ...], duration: float | None, every_variant: bool,
+    png: bool, jobs: int | None, as_json: bool,
 ) -> None:  # fmt: skip
     r"""Fly Table V of the paper and compare: tables, Figures 5 to 9, one page with it all.
 
-    Every row is flown with the printed and the tuned gains, with the printed friction and without.
-    Writes table_v.md, .csv and .json, figures/ (PNG and SVG) and report.html.
+    Every row is flown with its law's default gains, with the printed friction and without; where
+    the default gains are the tuned ones, also with the printed gains and friction.
+    Writes table_v.md, .csv and .json, figures/ (SVG) and report.html.
 
     \b
     Examples:
@@ -46,7 +54,8 @@ def reproduce(
     """
     from ..flight.compilation import compile_kernels
     from ..flight.display import counting_progress
-    from ..reproduction.flights import ROWS, Row, cores
+    from ..reproduction.flights import ROWS, Row
+    from ..reproduction.processes import cores
     from ..reproduction.reproduce import check_folder
     from ..reproduction.reproduce import reproduce as run
 
@@ -54,7 +63,10 @@ def reproduce(
     check_folder(out)
     compile_kernels()
     with counting_progress("flights") as progress:
-        record = run(rows, out, duration=duration, jobs=jobs or cores(), progress=progress)
+        record = run(
+            rows, out, duration=duration, every_variant=every_variant, png=png,
+            jobs=jobs or cores(), progress=progress,
+        )  # fmt: skip
     if as_json:
         click.echo(json.dumps(record, indent=1))
     else:

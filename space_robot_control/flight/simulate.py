@@ -68,6 +68,18 @@ def _recording(flight: Flight, bag: Path | None) -> Iterator[Messages | None]:
         recorder.close()
 
 
+def unflown(flight: Flight) -> FlightLog:
+    """The log of ``flight`` before it starts: the reference alone is known."""
+    log = FlightLog.allocate(flight.ticks, flight.robot.joint_names, flight.timebase)
+    log.flight = flight.description
+    log.lost = {topic.name: 0 for topic in topics.ALL}
+    log.commanded_torque = np.empty_like(log.applied_torque)
+    log.telemetry = np.empty((log.ticks, 4, log.axes))
+    reference = flight.mission.chunk(0, log.ticks)
+    log.reference_joints, log.reference_base = reference.joints, reference.base
+    return log
+
+
 def simulate(
     flight: Flight,
     bag: Path | None = None,
@@ -85,13 +97,7 @@ def simulate(
         InputError: the bag cannot be written.
     """
     plant, controller, ticks = flight.plant, flight.controller, flight.ticks
-    log = FlightLog.allocate(ticks, flight.robot.joint_names, flight.timebase)
-    log.flight = flight.description
-    log.lost = {topic.name: 0 for topic in topics.ALL}
-    log.commanded_torque = np.empty_like(log.applied_torque)
-    log.telemetry = np.empty((ticks, 4, log.axes))
-    reference = flight.mission.chunk(0, ticks)
-    log.reference_joints, log.reference_base = reference.joints, reference.base
+    log = unflown(flight)
     with _recording(flight, bag) as messages:
         for start in range(0, ticks, STRETCH_TICKS):
             progress(start)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from .flights import Result
 
@@ -39,11 +39,13 @@ HEADINGS = [
 def chatter(results: Sequence[Result]) -> list[Chatter]:
     """Of every flight of case 1 with friction that did not diverge."""
     return [
-        Chatter(r.row.controller, r.variant.gains, **_merits(r.report["chatter"]))
+        Chatter(r.row.controller, r.variant.gains, **_merits(r.chatter))
         for r in results
-        if r.report and r.row.case == "1" and r.variant.friction
+        if r.chatter is not None
     ]
 
 
-def _merits(report: dict[str, Any]) -> dict[str, dict[str, float]]:
-    return {name: {column: values[column] for column in COLUMNS} for name, values in report.items()}
+def _merits(chatter: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
+    return {
+        name: {column: values[column] for column in COLUMNS} for name, values in chatter.items()
+    }

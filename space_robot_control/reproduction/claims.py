@@ -70,9 +70,9 @@ def _tracking(cells: Iterable[Cell]) -> Iterator[Claim]:
 
 def _chatter(results: Sequence[Result]) -> Iterator[Claim]:
     variation = {
-        r.row.controller: r.report["chatter"]["total_variation_per_s"]["base_torque"]
+        r.row.controller: r.chatter["total_variation_per_s"]["base_torque"]
         for r in results
-        if r.report and r.row.case == "1" and r.variant.gains == "printed" and r.variant.friction
+        if r.chatter is not None and r.variant.gains == "printed"
     }
     for law, factor in (("tde_tsmc", 5.0), ("tde_smc", 100.0)):
         if law in variation and variation.get("tde_stc"):

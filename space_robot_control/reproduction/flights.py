@@ -1,29 +1,27 @@
-"""All flights behind Table V, in parallel processes: each row under each variant."""
+"""The flights behind Table V: which rows fly in which variants, and what is kept of each."""
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from space_robot_msgs_py.configuration import config_directory
 from space_robot_msgs_py.errors import DivergedError, InputError
-from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_msgs_py.validation import read_yaml
 
-from ..analysis import analyse
-from ..analysis.figures import control_results, save_figure
+from ..analysis import metrics
+from ..analysis.figures import BaseTorque, control_results
 from ..flight.plan import Flight, FlightPlan
 from ..flight.simulate import simulate
+from .gallery import Gallery
+from .provenance import parameters
 from .table_v import PRINTED
 
 ROBOT = "paper"
 DEFINITIONS = {"mean_axis": "mean of the axes' RMS", "eq64": "RMS by (64)"}
+COMPARED_CASE = "1"
+"""The case in which the laws are set beside one another."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +38,7 @@ class Variant:
 
 
 VARIANTS = tuple(Variant(g, f) for g in ("printed", "tuned") for f in (True, False))
+AS_PRINTED = VARIANTS[0]
 
 
 @dataclass(frozen=True)
@@ -63,6 +62,11 @@ class Row:
         return row
 
     @property
+    def stem(self) -> str:
+        """Of the name of its picture."""
+        return f"case{self.case}_{self.controller}"
+
+    @property
     def shown(self) -> Variant:
         """The variant that is drawn: the default gains, the printed friction."""
         sets = read_yaml(config_directory() / "gains" / ROBOT / "default_sets.yaml")
@@ -72,68 +76,69 @@ class Row:
 ROWS = tuple(Row(controller, case) for controller, case in PRINTED)
 
 
+class Planned(NamedTuple):
+    """A row in one variant."""
+
+    row: Row
+    variant: Variant
+    shown: bool
+    """Whether it is drawn: the default gains, the printed friction."""
+
+    @property
+    def compared(self) -> bool:
+        """Whether it stands for its law in the pictures of all laws."""
+        return self.shown and self.row.case == COMPARED_CASE
+
+
+def plan(rows: Iterable[Row], every_variant: bool) -> Iterator[Planned]:
+    """The flights of ``rows``: all four variants of each, or those that Table V asks for.
+
+    These are the default gains with friction and without and, where the default ones are others,
+    the printed gains with the printed friction: what the paper says was flown.
+    """
+    for row in rows:
+        shown = row.shown
+        for variant in VARIANTS:
+            if every_variant or variant.gains == shown.gains or variant == AS_PRINTED:
+                yield Planned(row, variant, variant == shown)
+
+
 @dataclass(frozen=True)
 class Result:
     """A finished flight."""
 
     row: Row
     variant: Variant
-    diverged_tick: int | None
-    report: dict[str, Any] | None
-    """Of `analyse`; None if the flight diverged."""
-    log: FlightLog | None
-    """Of the flight that is drawn in case 1, for comparisons."""
+    parameters: dict[str, Any]
+    """All that plant, controller and mission were told."""
+    diverged_tick: int | None = None
+    rms: dict[str, dict[str, float]] | None = None
+    """By definition and column; None if the flight diverged."""
+    chatter: dict[str, dict[str, float]] | None = None
+    """By measure and column, of the compared case with friction."""
+    base_torque: BaseTorque | None = None
+    """Of the flights that are compared."""
 
 
-def fly(row: Row, variant: Variant, duration: float | None, folder: Path | None) -> Result:
-    """Fly one row under one variant; the one that is shown is also drawn into ``folder``."""
-    plan = FlightPlan(
-        controller=row.controller, case=row.case, gains=variant.gains, robot=ROBOT,
-        friction=variant.friction, duration=duration,
+def fly(planned: Planned, duration: float | None, gallery: Gallery | None) -> Result:
+    """Fly one row in one variant; if it is shown it is also drawn for the ``gallery``."""
+    row, variant, _ = planned
+    flight = Flight(
+        FlightPlan(
+            controller=row.controller, case=row.case, gains=variant.gains, robot=ROBOT,
+            friction=variant.friction, duration=duration,
+        )
     )  # fmt: skip
+    told = parameters(flight)
     try:
-        log = simulate(Flight(plan))
+        log = simulate(flight)
     except DivergedError as error:
-        return Result(row, variant, error.tick, None, None)
-    log.telemetry = log.commanded_torque = None  # not compared, and heavy to hand over
-    shown = variant == row.shown
-    if shown and folder is not None:
+        return Result(row, variant, told, error.tick)
+    if planned.shown and gallery is not None:
         title = f"{row.controller}, case {row.case}: {variant.title}"
-        stem = folder / f"case{row.case}_{row.controller}"
-        save_figure(control_results(log, title), stem)
-    return Result(row, variant, None, analyse(log), log if shown and row.case == "1" else None)
-
-
-@contextmanager
-def flights(
-    rows: Sequence[Row], duration: float | None, folder: Path | None, jobs: int
-) -> Iterator[list[Future[Result]]]:
-    """Start every row under every variant in ``jobs`` processes; yields the futures.
-
-    The processes are forked, and forked at once: they inherit the compiled kernels.
-    """
-    context = multiprocessing.get_context("fork")
-    with ProcessPoolExecutor(jobs, mp_context=context) as pool:
-        futures = [
-            pool.submit(fly, row, variant, duration, folder)
-            for row in rows
-            for variant in VARIANTS
-        ]  # fmt: skip
-        try:
-            yield futures
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def collect(futures: list[Future[Result]], progress: Callable[[], None]) -> list[Result]:
-    """The results in the order of the flights; ``progress`` is called as each is done."""
-    for future in as_completed(futures):
-        future.result()
-        progress()
-    return [future.result() for future in futures]
-
-
-def cores() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0))
+        gallery.hang(control_results(log, title), row.stem)
+    return Result(
+        row, variant, told, None, metrics.rms(log),
+        metrics.chatter(log) if row.case == COMPARED_CASE and variant.friction else None,
+        BaseTorque.of(log) if planned.compared else None,
+    )  # fmt: skip

@@ -10,7 +10,7 @@ from typing import Any
 
 from space_robot_msgs_py.configuration import config_directory
 
-from ..flight.plan import Flight, FlightPlan
+from ..flight.plan import Flight
 
 PACKAGES = ("space_robot", "numpy", "scipy", "numba", "llvmlite", "matplotlib")
 
@@ -26,9 +26,8 @@ def provenance() -> dict[str, Any]:
     }
 
 
-def parameters(controller: str, case: str, gains: str) -> dict[str, Any]:
-    """All that plant, controller and mission were told in a flight."""
-    flight = Flight(FlightPlan(controller=controller, case=case, gains=gains))
+def parameters(flight: Flight) -> dict[str, Any]:
+    """All that plant, controller and mission are told in a flight."""
     return {
         "period_s": flight.period,
         "plant": flight.plant_settings.model_dump(exclude={"mission", "wait_for"}),

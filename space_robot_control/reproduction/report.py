@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import jinja2
@@ -14,19 +12,8 @@ from markdown_it import MarkdownIt
 from space_robot_msgs_py.configuration import config_directory
 
 from .claims import Claim
+from .gallery import Picture
 from .table import Block
-
-
-class Picture(NamedTuple):
-    """A figure of the report."""
-
-    caption: str
-    path: Path
-
-    @property
-    def data(self) -> str:
-        """The PNG as a data URI."""
-        return "data:image/png;base64," + base64.b64encode(self.path.read_bytes()).decode()
 
 
 class Chapter(NamedTuple):

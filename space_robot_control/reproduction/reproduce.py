@@ -5,27 +5,27 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
 
-from ..analysis.figures import chatter as chatter_figure
-from ..analysis.figures import desired_joints, junctions, save_figure
 from .chatter import HEADINGS as CHATTER_HEADINGS
 from .chatter import chatter
 from .claims import claims
-from .flights import VARIANTS, Result, Row, collect, flights
-from .provenance import parameters, provenance
-from .report import Chapter, Picture, render
+from .flights import Planned, Result, Row, fly, plan
+from .gallery import Gallery
+from .pictures import chapters, start_comparisons
+from .processes import processes
+from .provenance import provenance
+from .report import render
 from .table import Block, as_csv, as_markdown, as_records, blocks, cells
 
 TABLE = "table_v"
 FULL_DURATION = 30.0
 """s, of the mission that Table V is about."""
-FIGURE_OF_CASE = {"1": "6", "2": "7", "3": "8", "4-1": "9a", "4-2": "9b"}
 
 
 def check_folder(folder: Path) -> None:
@@ -47,15 +47,19 @@ def reproduce(
     folder: Path,
     *,
     duration: float | None = None,
+    every_variant: bool = False,
+    png: bool = False,
     jobs: int = 1,
     progress: Callable[[int], Callable[[], None]] = lambda total: lambda: None,
 ) -> dict[str, Any]:
-    """Fly ``rows`` under every variant and write table, figures and report into ``folder``.
+    """Fly ``rows`` and write table, figures and report into ``folder``.
 
     Args:
         rows: of Table V.
         folder: made or renewed at the end, whole; an older reproduction there is replaced.
         duration: s to fly (None: the mission's 30 s, which is what Table V is about).
+        every_variant: fly what Table V does not ask for too, see `plan`.
+        png: write the figures as PNG too.
         jobs: processes at work.
         progress: called with the number of flights, gives what is called after each.
 
@@ -69,33 +73,58 @@ def reproduce(
     folder.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=folder.parent, prefix=".reproduce-") as temporary:
         work = Path(temporary) / folder.name
-        figures = work / "figures"
-        figures.mkdir(parents=True)
-        with flights(rows, duration, figures, jobs) as futures:
-            results = collect(futures, progress(len(futures)))
-        record = _write(rows, results, duration or FULL_DURATION, work)
+        gallery = Gallery(work / "figures", png)
+        gallery.folder.mkdir(parents=True)
+        planned = list(plan(rows, every_variant))
+        with processes(jobs) as pool:
+            results = _fly_and_draw(pool, planned, duration, gallery, progress)
+        record = _write(rows, results, duration or FULL_DURATION, every_variant, gallery)
         if folder.exists():
             shutil.rmtree(folder)
         work.rename(folder)
     return record
 
 
+def _fly_and_draw(
+    pool: Executor,
+    planned: Sequence[Planned],
+    duration: float | None,
+    gallery: Gallery,
+    progress: Callable[[int], Callable[[], None]],
+) -> list[Result]:
+    """The results in the order of ``planned``."""
+    # first those the comparisons wait for, last those that take the shortest
+    order = sorted(planned, key=lambda flight: (not flight.compared, not flight.shown))
+    futures = {flight: pool.submit(fly, flight, duration, gallery) for flight in order}
+    done = progress(len(planned))  # may start a thread: not before the processes are forked
+    for future in futures.values():
+        future.add_done_callback(lambda _: done())
+    compared = [futures[flight].result() for flight in planned if flight.compared]
+    pictures = list(start_comparisons(pool, compared, duration, gallery))
+    results = [futures[flight].result() for flight in planned]
+    for picture in pictures:
+        picture.result()
+    return results
+
+
 def _write(
-    rows: Sequence[Row], results: Sequence[Result], duration: float, folder: Path
+    rows: Sequence[Row],
+    results: Sequence[Result],
+    duration: float,
+    every_variant: bool,
+    gallery: Gallery,
 ) -> dict[str, Any]:
-    comparison = cells(results)
+    folder, comparison = gallery.folder.parent, cells(results)
     judged, chattering = claims(results, comparison), chatter(results)
     chatter_table = Block(
         "Chatter in case 1, printed friction", CHATTER_HEADINGS, [c.texts() for c in chattering]
     )
     tables = [*blocks(comparison), chatter_table]
-    flown = {**provenance(), "duration_s": duration}
+    flown = {**provenance(), "duration_s": duration, "every_variant": every_variant}
     told = {
-        f"{row.controller}, case {row.case}, {gains} gains": parameters(
-            row.controller, row.case, gains
-        )
-        for row in rows
-        for gains in dict.fromkeys(variant.gains for variant in VARIANTS)
+        f"{r.row.controller}, case {r.row.case}, {r.variant.gains} gains": r.parameters
+        for r in results
+        if r.variant.friction
     }
     record = {
         "provenance": flown,
@@ -108,36 +137,6 @@ def _write(
     (folder / f"{TABLE}.md").write_text(as_markdown(title, tables), "utf-8")
     (folder / f"{TABLE}.csv").write_text(as_csv(comparison), "utf-8")
     (folder / f"{TABLE}.json").write_text(json.dumps(record, indent=1) + "\n", "utf-8")
-    page = render(flown, told, judged, tables, _chapters(rows, results, folder / "figures"))
+    page = render(flown, told, judged, tables, list(chapters(rows, gallery)))
     (folder / "report.html").write_text(page, "utf-8")
     return record
-
-
-def _chapters(rows: Sequence[Row], results: Sequence[Result], figures: Path) -> list[Chapter]:
-    logs = {r.row.controller: r.log for r in results if r.log is not None}
-    chapters = []
-    if logs:
-        chapters.append(_comparisons(logs, figures))
-    for case, figure in FIGURE_OF_CASE.items():
-        pictures = [
-            Picture(f"Figure {figure}: {row.controller}, {row.shown.title}", path)
-            for row in rows
-            if row.case == case
-            and (path := figures / f"case{case}_{row.controller}.png").is_file()
-        ]  # fmt: skip
-        if pictures:
-            chapters.append(Chapter(f"Case {case}", pictures))
-    return chapters
-
-
-def _comparisons(logs: dict[str, FlightLog], figures: Path) -> Chapter:
-    drawn = [
-        ("figure5_desired_joints", desired_joints(next(iter(logs.values()))),
-         "Figure 5: desired joint angles"),
-        ("chatter", chatter_figure(logs), "Chatter of the base torque in case 1"),
-        ("junctions", junctions(logs), "Base torque at the junction of the two motions, case 1"),
-    ]  # fmt: skip
-    pictures = [
-        Picture(caption, save_figure(figure, figures / name)[0]) for name, figure, caption in drawn
-    ]
-    return Chapter("The mission, and the laws beside one another", pictures)

@@ -40,7 +40,7 @@ def cells(results: Sequence[Result]) -> list[Cell]:
 def _cell(result: Result, definition: str, column: str) -> Cell:
     row, variant = result.row, result.variant
     expected = printed(row.controller, row.case, column)
-    measured = result.report["rms"][definition][column] if result.report else None
+    measured = result.rms[definition][column] if result.rms else None
     return Cell(
         row.controller, row.case, variant.gains, variant.friction, definition, column, measured,
         expected, None if measured is None else measured / expected, result.diverged_tick,
@@ -70,13 +70,14 @@ class Block(NamedTuple):
 
 
 def blocks(comparison: Sequence[Cell]) -> list[Block]:
-    """One table a variant and definition, cells ``measured / printed (ratio)``."""
+    """One table a variant flown and definition, cells ``measured / printed (ratio)``."""
     found = []
     for definition, meaning in DEFINITIONS.items():
         for variant in VARIANTS:
             rows = _rows(comparison, variant, definition)
             headings = ["controller", "case", *HEADINGS.values()]
-            found.append(Block(f"{variant.title}; {meaning}", headings, rows))
+            if rows:
+                found.append(Block(f"{variant.title}; {meaning}", headings, rows))
     return found
 
 

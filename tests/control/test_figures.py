@@ -6,6 +6,7 @@ import math
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 from pathlib import Path
 
 import matplotlib
@@ -24,6 +25,7 @@ from scipy import signal
 
 from space_robot_control.analysis import tracking_error
 from space_robot_control.analysis.figures import (
+    BaseTorque,
     chatter,
     control_results,
     desired_joints,
@@ -71,6 +73,10 @@ def flown(
     log.quaternion[:, 1:] = -error * wave[:, :3]
     log.applied_torque[:] = np.cos(phase) + ripple * random.uniform(-1.0, 1.0, wave.shape)
     return log
+
+
+def base_torques(logs: Mapping[str, FlightLog]) -> dict[str, BaseTorque]:
+    return {name: BaseTorque.of(log) for name, log in logs.items()}
 
 
 def curves(axes: Axes) -> list[Line2D]:
@@ -300,13 +306,13 @@ class TestControlResults:
 class TestComparisons:
     def test_junctions_have_one_scale_and_say_what_it_cuts_off(self) -> None:
         logs = {"TDE-SMC": flown(ripple=5.0), "TDE-TSMC": flown(ripple=0.02), "TDE-STC": flown()}
-        figure = junctions({**logs, "CTC": flown(duration=0.0055)})
+        figure = junctions(base_torques({**logs, "CTC": flown(duration=0.0055)}))
         smc, tsmc, stc, ctc = figure.axes
         assert len({axes.get_ylim() for axes in figure.axes}) == 1
         assert {axes.get_xlim() for axes in figure.axes} == {(-150.0, 150.0)}
         assert smc.get_title("left").startswith("TDE-SMC, cut: -")
         assert [a.get_title("left") for a in (tsmc, stc, ctc)] == ["TDE-TSMC", "TDE-STC", "CTC"]
-        assert [text.get_text() for text in ctc.texts] == ["ended at 0.0055 s"]
+        assert ctc.texts[0].get_text() == "ended at 0.0055 s"
         assert ctc.get_xlabel() == "time from 15 s (ms)"
         assert smc.get_ylabel() == "base torque x (N m)"
         y = np.asarray(by_look(tsmc, 0).get_ydata())
@@ -314,13 +320,13 @@ class TestComparisons:
         assert (y.min(), y.max()) == pytest.approx((shown.min(), shown.max()))
 
     def test_junctions_of_flights_without_any(self) -> None:
-        figure = junctions({"TDE-STC": flown(duration=1.0)})
+        figure = junctions(base_torques({"TDE-STC": flown(duration=1.0)}))
         assert figure.axes == []
         assert "None of these flights" in figure.get_suptitle()
 
     def test_chatter_shows_ticks_and_spectra(self) -> None:
         logs = {"TDE-SMC": flown(ripple=0.5), "TDE-STC": flown(), "CTC": flown(duration=0.0055)}
-        figure = chatter(logs)
+        figure = chatter(base_torques(logs))
         smc, stc, ctc, spectrum = figure.axes
         assert smc.get_ylim() == stc.get_ylim() == ctc.get_ylim()
         assert smc.get_xlabel() == "time from 7.5 s (ms)"
@@ -358,10 +364,10 @@ class TestPrint:
         times = (0.0, 1.0, 2.0)
         log = flown(n, times, ripple=0.1, names=names)
         laws = ("CTC (printed)", "CTC-SMC (printed)", "TDE-SMC", "TDE-TSMC", "TDE-STC")
-        logs = {law: log for law in laws}
+        flights = {law: BaseTorque.of(log) for law in laws}
         title = "TDE-STC, case 4-2, gains printed, friction, payload of 20 kg, disturbances " * 2
         for figure in (
-            desired_joints(log), control_results(log, title), junctions(logs), chatter(logs),
+            desired_joints(log), control_results(log, title), junctions(flights), chatter(flights),
             control_results(flown(n, (0.0, 1.0), error=0.0126), title),
         ):  # fmt: skip
             boxes = text_boxes(figure)
@@ -406,6 +412,11 @@ class TestPrint:
         assert float(root.attrib["width"].removesuffix("pt")) == pytest.approx(180 / 25.4 * 72)
         assert b"<image" not in svg.read_bytes()
         assert svg.stat().st_size < 400_000
+
+    def test_svg_alone(self, tmp_path: Path) -> None:
+        files = save_figure(desired_joints(flown()), tmp_path / "x", png=False)
+        assert files == (tmp_path / "x.svg",)
+        assert list(tmp_path.iterdir()) == [tmp_path / "x.svg"]
 
     def test_png_holds_the_pixels(self, tmp_path: Path) -> None:
         pixels = np.random.default_rng(2).integers(0, 256, (7, 5, 3), np.uint8)

@@ -12,7 +12,16 @@ from urllib.parse import urlparse
 import pytest
 
 from space_robot_control.reproduction.claims import claims
-from space_robot_control.reproduction.flights import ROWS, VARIANTS, Result, Row, Variant, fly
+from space_robot_control.reproduction.flights import (
+    ROWS,
+    VARIANTS,
+    Planned,
+    Result,
+    Row,
+    Variant,
+    fly,
+    plan,
+)
 from space_robot_control.reproduction.reproduce import check_folder, reproduce
 from space_robot_control.reproduction.table import cells
 from space_robot_control.reproduction.table_v import COLUMNS, printed
@@ -26,7 +35,7 @@ SHORT = 0.4
 def time_delay_flights() -> list[Result]:
     """Every TDE row of Table V over the whole mission, printed gains, with friction and without."""
     return [
-        fly(row, Variant("printed", friction), None, None)
+        fly(Planned(row, Variant("printed", friction), shown=False), None, None)
         for row in ROWS
         if row.controller.startswith("tde")
         for friction in (True, False)
@@ -46,9 +55,9 @@ def test_torques_of_the_time_delay_laws_in_every_cell(time_delay_flights: list[R
     for result in time_delay_flights:
         if result.row.controller != "tde_stc" or result.variant.friction:
             continue
-        assert result.report is not None
+        assert result.rms is not None
         for column in ("base_torque", "torque_1_3", "torque_4_6"):
-            measured = result.report["rms"]["mean_axis"][column]
+            measured = result.rms["mean_axis"][column]
             expected = printed(result.row.controller, result.row.case, column)
             assert measured == pytest.approx(expected, rel=0.01), (result.row, column)
 
@@ -63,9 +72,9 @@ def test_errors_are_below_the_printed_ones_in_every_cell(time_delay_flights: lis
 def test_tde_smc_chatters_as_the_prototype_did(time_delay_flights: list[Result]) -> None:
     """103, 2.5 and 0.33 N m/s."""
     variation = {
-        r.row.controller: r.report["chatter"]["total_variation_per_s"]["base_torque"]
+        r.row.controller: r.chatter["total_variation_per_s"]["base_torque"]
         for r in time_delay_flights
-        if r.report and r.row.case == "1" and r.variant.friction
+        if r.chatter is not None
     }
     assert variation["tde_smc"] == pytest.approx(103.0, rel=0.05)
     assert variation["tde_tsmc"] == pytest.approx(2.5, rel=0.05)
@@ -73,8 +82,8 @@ def test_tde_smc_chatters_as_the_prototype_did(time_delay_flights: list[Result])
 
 
 def test_printed_computed_torque_gains_diverge_within_ticks() -> None:
-    result = fly(Row("ctc", "1"), Variant("printed", True), None, None)
-    assert result.report is None
+    result = fly(Planned(Row("ctc", "1"), Variant("printed", True), shown=False), None, None)
+    assert result.rms is None
     assert result.diverged_tick is not None
     assert result.diverged_tick < 20
     (cell, *_) = cells([result])
@@ -88,6 +97,25 @@ def test_table_v_has_seventeen_rows() -> None:
     cases = [row.case for row in ROWS if row.controller == "tde_stc"]
     assert cases == ["1", "2", "3", "4-1", "4-2"]
     assert Row.parse("tde_stc/4-2") in ROWS
+
+
+def test_what_is_flown_unless_told() -> None:
+    """All 17 rows with friction and without; the printed gains too where they are not flown."""
+    planned = list(plan(ROWS, every_variant=False))
+    assert len(planned) == len(set(planned)) == 17 * 2 + 6
+    for row in ROWS:
+        flown = [flight for flight in planned if flight.row == row]
+        default = "tuned" if row.controller.startswith("ctc") else "printed"
+        expected = {Variant(default, True), Variant(default, False), Variant("printed", True)}
+        assert {flight.variant for flight in flown} == expected
+        assert [f.variant for f in flown if f.shown] == [Variant(default, True)]
+    assert sum(flight.compared for flight in planned) == 5
+
+
+def test_every_variant_on_request() -> None:
+    planned = list(plan(ROWS, every_variant=True))
+    assert [flight.variant for flight in planned] == list(VARIANTS) * 17
+    assert sum(flight.shown for flight in planned) == 17
 
 
 @pytest.mark.parametrize("text", ["", "tde_stc", "tde_stc/5", "ctc/4-1", "pid/1", "tde_stc/1/1"])
@@ -137,7 +165,8 @@ def test_two_runs_write_the_same_bytes(twice: tuple[Path, Path, dict[str, Any]])
     assert written == files(second)
     assert {"report.html", "table_v.md", "table_v.csv", "table_v.json"} <= set(written)
     for stem in ("case1_ctc", "case4-2_tde_stc", "figure5_desired_joints", "chatter", "junctions"):
-        assert {f"figures/{stem}.png", f"figures/{stem}.svg"} <= set(written)
+        assert f"figures/{stem}.svg" in written
+        assert f"figures/{stem}.png" not in written
     leftovers = [p.name for p in first.parent.iterdir() if p.name.startswith(".")]
     assert not leftovers
 
@@ -146,7 +175,7 @@ def test_csv_json_and_markdown_say_the_same(twice: tuple[Path, Path, dict[str, A
     folder, _, record = twice
     assert json.loads((folder / "table_v.json").read_text()) == record
     rows = list(csv.DictReader((folder / "table_v.csv").read_text().splitlines()))
-    assert len(rows) == len(record["cells"]) == 2 * len(VARIANTS) * 2 * len(COLUMNS)
+    assert len(rows) == len(record["cells"]) == (3 + 2) * 2 * len(COLUMNS)
     for row, cell in zip(rows, record["cells"], strict=True):
         assert row["printed"] == str(cell["printed"])
         assert row["measured"] == ("" if cell["measured"] is None else repr(cell["measured"]))
@@ -174,10 +203,9 @@ def test_report_is_one_page_by_itself(twice: tuple[Path, Path, dict[str, Any]]) 
 def test_parameters_of_every_flight_are_told(twice: tuple[Path, Path, dict[str, Any]]) -> None:
     told = twice[2]["parameters"]
     assert set(told) == {
-        f"{name}, {gains} gains"
-        for name in ("ctc, case 1", "tde_stc, case 4-2")
-        for gains in ("printed", "tuned")
-    }
+        "ctc, case 1, printed gains", "ctc, case 1, tuned gains",
+        "tde_stc, case 4-2, printed gains",
+    }  # fmt: skip
     flown = told["tde_stc, case 4-2, printed gains"]
     assert flown["plant"]["payload"]["mass"] == 20.0
     assert flown["gains"]["h_bar"] == [50.0] * 3 + [5.0] * 3 + [0.5] * 3
@@ -185,10 +213,10 @@ def test_parameters_of_every_flight_are_told(twice: tuple[Path, Path, dict[str, 
 
 def test_an_older_reproduction_is_replaced(twice: tuple[Path, Path, dict[str, Any]]) -> None:
     _, folder, _ = twice
-    (folder / "figures" / "old.png").write_text("of an older run")
-    reproduce([Row("tde_stc", "1")], folder, duration=SHORT)
-    assert not (folder / "figures" / "old.png").exists()
-    assert not (folder / "figures" / "case1_ctc.png").exists()
+    (folder / "figures" / "old.svg").write_text("of an older run")
+    reproduce([Row("tde_stc", "1")], folder, duration=SHORT, png=True)
+    assert not (folder / "figures" / "old.svg").exists()
+    assert not (folder / "figures" / "case1_ctc.svg").exists()
     assert (folder / "figures" / "case1_tde_stc.png").is_file()
 
 

@@ -4,8 +4,9 @@ Nothing here uses pyplot or leaves a trace in matplotlib's settings, so pictures
 worker processes. The same log gives the same bytes.
 """
 
+from .base_torque import BaseTorque
 from .comparison import chatter, junctions
 from .files import save_figure
 from .single_flight import control_results, desired_joints
 
-__all__ = ["chatter", "control_results", "desired_joints", "junctions", "save_figure"]
+__all__ = ["BaseTorque", "chatter", "control_results", "desired_joints", "junctions", "save_figure"]

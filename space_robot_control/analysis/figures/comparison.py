@@ -11,9 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.flight_log import FlightLog
-
 from ..metrics import CHATTER_FREQUENCY
+from .base_torque import BaseTorque
 from .lines import mark_moments, scattered_marks
 from .quantity import power_of_ten
 from .side_by_side import Stretch, draw_side_by_side, grid_height
@@ -31,7 +30,6 @@ from .style import (
     page,
     panel,
 )
-from .waypoints import junction_ticks
 
 Array = NDArray[np.float64]
 
@@ -42,59 +40,59 @@ _WIDTH = PAGE_WIDTH - LEFT - RIGHT
 
 
 @house_style()
-def junctions(logs: Mapping[str, FlightLog]) -> Figure:
+def junctions(flights: Mapping[str, BaseTorque]) -> Figure:
     """The base torque x of all laws round the first junction of the mission's segments.
 
     All panels have one scale. A law that swings much farther than most does not set it: it is cut
     off at the panel's edges, and its heading says how far it goes.
 
     Args:
-        logs: flights of one mission by the name of the law.
+        flights: of one mission, by the name of the law.
     """
-    moments = [log.timebase.period * t for log in logs.values() for t in junction_ticks(log)[:1]]
+    moments = [flight.period * t for flight in flights.values() for t in flight.junctions[:1]]
     if not moments:
         return page(12.0, "None of these flights passes a junction of two segments.")
     stretch = Stretch(
         "base torque x", slice(0, 1), min(moments), -JUNCTION_HALF_WIDTH, JUNCTION_HALF_WIDTH
     )
-    columns, height = min(2, len(logs)), 38.0
-    figure = page(1.0 + grid_height(len(logs), columns, height))
-    for axes in draw_side_by_side(figure, 1.0, height, columns, logs, stretch):
+    columns, height = min(2, len(flights)), 38.0
+    figure = page(1.0 + grid_height(len(flights), columns, height))
+    for axes in draw_side_by_side(figure, 1.0, height, columns, flights, stretch):
         mark_moments(axes, np.zeros(1))
     return figure
 
 
 @house_style()
-def chatter(logs: Mapping[str, FlightLog]) -> Figure:
+def chatter(flights: Mapping[str, BaseTorque]) -> Figure:
     """A short stretch of base torque on one scale, and the spectrum of the whole flight.
 
     The stretch begins at a quarter of the longest flight: when the arm is fastest, if the mission
     has two segments. Scale and headings are those of :func:`junctions`.
 
     Args:
-        logs: flights of one mission by the name of the law.
+        flights: of one mission, by the name of the law.
     """
-    moment = max(log.ticks * log.timebase.period for log in logs.values()) / 4.0
+    moment = max(flight.duration for flight in flights.values()) / 4.0
     stretch = Stretch("base torque", slice(0, 3), moment, 0.0, CHATTER_STRETCH)
-    columns = math.ceil(len(logs) / math.ceil(len(logs) / 4))
+    columns = math.ceil(len(flights) / math.ceil(len(flights) / 4))
     height, spectrum_height = 32.0, 72.0
-    spectra = _spectra(logs)
+    spectra = _spectra(flights)
     top = 1.0 + legend_height(BASE_AXES, _WIDTH)
-    spectrum_top = top + grid_height(len(logs), columns, height)
+    spectrum_top = top + grid_height(len(flights), columns, height)
     spectrum_top += 2.0 + legend_height(list(spectra), _WIDTH)
     figure = page(spectrum_top + spectrum_height + TIME_AXIS)
-    draw_side_by_side(figure, top, height, columns, logs, stretch, steps=True)
+    draw_side_by_side(figure, top, height, columns, flights, stretch, steps=True)
     legend_above(figure, LEFT, top, BASE_AXES, _WIDTH, dashed=False)
     _draw_spectra(panel(figure, LEFT, spectrum_top, _WIDTH, spectrum_height), spectra)
     legend_above(figure, LEFT, spectrum_top, list(spectra), _WIDTH, dashed=True)
     return figure
 
 
-def _spectra(logs: Mapping[str, FlightLog]) -> dict[str, tuple[Array, Array]]:
+def _spectra(flights: Mapping[str, BaseTorque]) -> dict[str, tuple[Array, Array]]:
     """Frequency and density of the base torque by the name of the law for the legend."""
     spectra = {}
-    for name, log in logs.items():
-        spectrum = power_spectral_density(log.applied_torque[:, :3], log.timebase.period)
+    for name, flight in flights.items():
+        spectrum = power_spectral_density(flight.torque, flight.period)
         spectra[name if len(spectrum[0]) else f"{name}: too short"] = spectrum
     return spectra
 

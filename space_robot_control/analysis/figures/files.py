@@ -16,18 +16,23 @@ RESOLUTION = 150
 
 
 @house_style()
-def save_figure(figure: Figure, stem: Path) -> tuple[Path, Path]:
-    """Write ``stem``.png and ``stem``.svg, of equal figures the same bytes at any time.
+def save_figure(figure: Figure, stem: Path, *, png: bool = True) -> tuple[Path, ...]:
+    """Write ``stem``.svg and, if wanted, ``stem``.png; of equal figures the same bytes at any time.
 
     Returns:
-        The two files.
+        The files, the SVG last.
     """
     stem.parent.mkdir(parents=True, exist_ok=True)
-    png, svg = (stem.with_name(stem.name + suffix) for suffix in (".png", ".svg"))
+    files = [stem.with_name(stem.name + suffix) for suffix in (".png", ".svg")]
+    if png:
+        files[0].write_bytes(_png(figure))
+    figure.savefig(files[1], metadata={"Date": None, "Creator": None})
+    return tuple(files if png else files[1:])
+
+
+def _png(figure: Figure) -> bytes:
     with BytesIO() as drawn:
         figure.savefig(drawn, format="rgba", dpi=RESOLUTION)
         width = int(figure.get_size_inches()[0] * RESOLUTION)
         pixels = np.frombuffer(drawn.getvalue(), np.uint8).reshape(-1, width, 4)
-    png.write_bytes(encode_png(pixels[:, :, :3], RESOLUTION))
-    figure.savefig(svg, metadata={"Date": None, "Creator": None})
-    return png, svg
+    return encode_png(pixels[:, :, :3], RESOLUTION)

@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.flight_log import FlightLog
-
-from .lines import draw_lines, tick_times
+from .base_torque import BaseTorque
+from .lines import draw_lines
 from .quantity import Quantity
+from .scale import draw_scales
 from .style import GREY, LEFT, PAGE_WIDTH, RIGHT, TIME_AXIS, panel
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ class Stretch(NamedTuple):
 
     name: str
     axes: slice
-    """Of the applied torque."""
+    """Of the base's torque."""
     moment: float
     """s, zero of the time axis."""
     begin: float
@@ -39,11 +39,11 @@ class Stretch(NamedTuple):
     end: float
     """s from the moment."""
 
-    def of(self, log: FlightLog) -> tuple[Array, Array]:
+    def of(self, flight: BaseTorque) -> tuple[Array, Array]:
         """Time from the moment, s, and torque, N m; empty if the flight ended before."""
-        time = tick_times(log) - self.moment
+        time = flight.time - self.moment
         shown = (time > self.begin - 1e-9) & (time < self.end + 1e-9)
-        return time[shown], log.applied_torque[shown, self.axes]
+        return time[shown], flight.torque[shown, self.axes]
 
 
 def grid_height(count: int, columns: int, height: float) -> float:
@@ -57,14 +57,14 @@ def draw_side_by_side(
     top: float,
     height: float,
     columns: int,
-    logs: Mapping[str, FlightLog],
+    flights: Mapping[str, BaseTorque],
     stretch: Stretch,
     *,
     steps: bool = False,
 ) -> list[Axes]:
     """Draw the panels from ``top`` down, rows of ``columns`` of ``height`` mm."""
     width = (PAGE_WIDTH - LEFT - RIGHT - _COLUMN_GAP * (columns - 1)) / columns
-    curves = {name: stretch.of(log) for name, log in logs.items()}
+    curves = {name: stretch.of(flight) for name, flight in flights.items()}
     low, high = common_limits([torque for _, torque in curves.values()])
     quantity = Quantity.of(np.array([low, high]), stretch.name, "N m")
     panels = []
@@ -79,8 +79,7 @@ def draw_side_by_side(
             marks = None if torque.shape[1] > 1 else np.empty(0, np.intp)
             draw_lines(axes, 1e3 * time, torque, quantity, marks=marks, steps=steps)
         else:
-            end = logs[name].ticks * logs[name].timebase.period
-            axes.text(0.03, 0.5, f"ended at {end:g} s", color=GREY,
+            axes.text(0.03, 0.5, f"ended at {flights[name].duration:g} s", color=GREY,
                       transform=axes.transAxes)  # fmt: skip
         axes.set_title(name + _cut(torque, low, high), loc="left")
         axes.set_ylabel(quantity.label if column == 0 else "")
@@ -88,7 +87,7 @@ def draw_side_by_side(
         axes.set_ylim(*quantity.scaled(np.array([low, high])))
         lowest = number + columns >= len(curves)
         axes.set_xlabel(f"time from {stretch.moment:g} s (ms)" if lowest else "")
-        axes.tick_params(labelleft=column == 0, labelbottom=lowest)
+        draw_scales(axes, x_numbers=lowest, y_numbers=column == 0)
         panels.append(axes)
     return panels
 

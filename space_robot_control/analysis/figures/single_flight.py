@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -13,6 +14,7 @@ from space_robot_msgs_py.flight_log import FlightLog
 from ..metrics import tracking_error
 from .lines import draw_lines, mark_moments, tick_times
 from .quantity import Quantity
+from .scale import draw_scales
 from .style import (
     LEFT,
     PAGE_WIDTH,
@@ -54,6 +56,7 @@ def desired_joints(log: FlightLog) -> Figure:
     draw_lines(axes, time, angles, quantity, marks=waypoints, dashed=True)
     mark_moments(axes, time[waypoints])
     axes.set_xlabel("time (s)")
+    draw_scales(axes)
     legend_above(figure, LEFT, top, log.joint_names, width, dashed=True)
     return figure
 
@@ -85,13 +88,13 @@ def control_results(log: FlightLog, title: str) -> Figure:
     for left, part, names, error_name, torque_name in columns:
         errors = panel(figure, left, error_top, _COLUMN, _PANEL_HEIGHT)
         draw_lines(errors, time, error[:, part], Quantity.of(error[:, part], *error_name))
-        errors.tick_params(labelbottom=False)
         legend_above(figure, left, error_top, names, _COLUMN, dashed=False)
         torques = panel(figure, left, torque_top, _COLUMN, _PANEL_HEIGHT)
         draw_lines(torques, time, torque[:, part], Quantity.of(torque[:, part], *torque_name))
         torques.set_xlabel("time (s)")
         for axes in (errors, torques):
             mark_moments(axes, time[junctions])
+            draw_scales(axes, x_numbers=axes is torques)
         if len(junctions):
             stretches = [_round(moment, time, torque[:, part]) for moment in time[junctions]]
             _enlarge(figure, left, enlarged_top, time[junctions], stretches, torque_name)
@@ -115,15 +118,15 @@ def _enlarge(
     """Panels of torque round the junctions, beside one another on one scale."""
     width = (_COLUMN - _GAP * (len(stretches) - 1)) / len(stretches)
     quantity = Quantity.of(np.concatenate([torque for _, torque in stretches]), *name)
-    first = None
+    panels: list[Axes] = []
     for number, (moment, (time, torque)) in enumerate(zip(moments, stretches, strict=True)):
         axes = panel(figure, left + number * (width + _GAP), top, width, _PANEL_HEIGHT)
         draw_lines(axes, 1e3 * time, torque, quantity)
         mark_moments(axes, np.zeros(1))
         axes.set_xlabel(f"time from {moment:g} s (ms)")
-        if first is None:
-            first = axes
-        else:
-            axes.sharey(first)
-            axes.tick_params(labelleft=False)
+        if panels:
+            axes.sharey(panels[0])
             axes.set_ylabel("")
+        panels.append(axes)
+    for axes in panels:
+        draw_scales(axes, y_numbers=axes is panels[0])

@@ -28,7 +28,7 @@ TITLE_LINE, LEGEND_LINE, TIME_AXIS = 4.2, 4.6, 11.5
 _LABEL_LEFT, _LABEL_BELOW = 16.5, 9.2
 """mm, the outer edges of the axis labels from the axes: the same for all, so that they align."""
 
-GREY = "#707070"
+GREY, GRID = "#707070", "#E4E4E4"
 COLOURS = ("#000000", "#E69F00", "#0072B2", "#CC79A7", "#009E73", "#56B4E9", "#D55E00")
 MARKERS = ("o", "s", "^", "D", "v", "<", "P", ">", "*")
 DASHES: tuple[Any, ...] = ("-", "--", "-.", (0, (5, 1, 1, 1, 1, 1)), (0, (8, 2)), (0, (2, 1)))
@@ -54,7 +54,7 @@ _SETTINGS: Any = {
     "axes.axisbelow": True,
     "axes.formatter.useoffset": False,
     "axes.formatter.limits": (-30, 30),
-    "grid.color": "#E4E4E4",
+    "grid.color": GRID,
     "grid.linewidth": 0.5,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
