@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from ...reproduction.flights import ROWS, cores
+from ...reproduction.flights import ROWS
+from ...reproduction.processes import cores
 from ...reproduction.reproduce import reproduce as run
 from ..measure import Options, interleave
 from ..result import Result, Target
