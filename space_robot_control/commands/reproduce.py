@@ -29,22 +29,20 @@ import click
     help="Seconds to fly for a quick look [default: the mission's 30].",
 )
 @click.option(
-    "--every-variant",
+    "--brief",
     is_flag=True,
-    help="Fly every row with both gain sets, with friction and without: takes twice as long.",
+    help="Only the gains each law flies by default, and figures as SVG only: half the time.",
 )
-@click.option("--png", is_flag=True, help="Write the figures as PNG too.")
 @click.option("--jobs", type=click.IntRange(1, 256), help="Processes [default: one a core].")
 @click.option("--json", "as_json", is_flag=True, help="Print table_v.json.")
 def reproduce(
-    out: Path, only: tuple[str, ...], duration: float | None, every_variant: bool,
-    png: bool, jobs: int | None, as_json: bool,
+    out: Path, only: tuple[str, ...], duration: float | None, brief: bool, jobs: int | None,
+    as_json: bool,
 ) -> None:  # fmt: skip
     r"""Fly Table V of the paper and compare: tables, Figures 5 to 9, one page with it all.
 
-    Every row is flown with its law's default gains, with the printed friction and without; where
-    the default gains are the tuned ones, also with the printed gains and friction.
-    Writes table_v.md, .csv and .json, figures/ (SVG) and report.html.
+    Every row is flown with the printed gains and the tuned ones, with the printed friction and
+    without. Writes table_v.md, .csv and .json, figures/ (PNG and SVG) and report.html.
 
     \b
     Examples:
@@ -64,8 +62,7 @@ def reproduce(
     compile_kernels()
     with counting_progress("flights") as progress:
         record = run(
-            rows, out, duration=duration, every_variant=every_variant, png=png,
-            jobs=jobs or cores(), progress=progress,
+            rows, out, duration=duration, brief=brief, jobs=jobs or cores(), progress=progress
         )  # fmt: skip
     if as_json:
         click.echo(json.dumps(record, indent=1))

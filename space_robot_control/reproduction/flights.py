@@ -90,16 +90,16 @@ class Planned(NamedTuple):
         return self.shown and self.row.case == COMPARED_CASE
 
 
-def plan(rows: Iterable[Row], every_variant: bool) -> Iterator[Planned]:
-    """The flights of ``rows``: all four variants of each, or those that Table V asks for.
+def plan(rows: Iterable[Row], brief: bool = False) -> Iterator[Planned]:
+    """The flights of ``rows``: all four variants of each, or (``brief``) what Table V asks for.
 
-    These are the default gains with friction and without and, where the default ones are others,
+    That is the default gains with friction and without and, where the default ones are others,
     the printed gains with the printed friction: what the paper says was flown.
     """
     for row in rows:
         shown = row.shown
         for variant in VARIANTS:
-            if every_variant or variant.gains == shown.gains or variant == AS_PRINTED:
+            if not brief or variant.gains == shown.gains or variant == AS_PRINTED:
                 yield Planned(row, variant, variant == shown)
 
 

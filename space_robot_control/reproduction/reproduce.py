@@ -47,8 +47,7 @@ def reproduce(
     folder: Path,
     *,
     duration: float | None = None,
-    every_variant: bool = False,
-    png: bool = False,
+    brief: bool = False,
     jobs: int = 1,
     progress: Callable[[int], Callable[[], None]] = lambda total: lambda: None,
 ) -> dict[str, Any]:
@@ -58,8 +57,7 @@ def reproduce(
         rows: of Table V.
         folder: made or renewed at the end, whole; an older reproduction there is replaced.
         duration: s to fly (None: the mission's 30 s, which is what Table V is about).
-        every_variant: fly what Table V does not ask for too, see `plan`.
-        png: write the figures as PNG too.
+        brief: fly only what Table V asks for, see `plan`; figures as SVG only.
         jobs: processes at work.
         progress: called with the number of flights, gives what is called after each.
 
@@ -73,12 +71,12 @@ def reproduce(
     folder.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=folder.parent, prefix=".reproduce-") as temporary:
         work = Path(temporary) / folder.name
-        gallery = Gallery(work / "figures", png)
+        gallery = Gallery(work / "figures", png=not brief)
         gallery.folder.mkdir(parents=True)
-        planned = list(plan(rows, every_variant))
+        planned = list(plan(rows, brief))
         with processes(jobs) as pool:
             results = _fly_and_draw(pool, planned, duration, gallery, progress)
-        record = _write(rows, results, duration or FULL_DURATION, every_variant, gallery)
+        record = _write(rows, results, duration or FULL_DURATION, brief, gallery)
         if folder.exists():
             shutil.rmtree(folder)
         work.rename(folder)
@@ -111,7 +109,7 @@ def _write(
     rows: Sequence[Row],
     results: Sequence[Result],
     duration: float,
-    every_variant: bool,
+    brief: bool,
     gallery: Gallery,
 ) -> dict[str, Any]:
     folder, comparison = gallery.folder.parent, cells(results)
@@ -120,7 +118,7 @@ def _write(
         "Chatter in case 1, printed friction", CHATTER_HEADINGS, [c.texts() for c in chattering]
     )
     tables = [*blocks(comparison), chatter_table]
-    flown = {**provenance(), "duration_s": duration, "every_variant": every_variant}
+    flown = {**provenance(), "duration_s": duration, "brief": brief}
     told = {
         f"{r.row.controller}, case {r.row.case}, {r.variant.gains} gains": r.parameters
         for r in results
