@@ -15,7 +15,7 @@ from .result import Result
 def print_section(title: str, results: Sequence[Result], console: Console) -> None:
     """Print the rows of one section."""
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    table.add_column("", overflow="fold")
+    table.add_column("", overflow="fold", min_width=18)
     for column in ("median", "spread"):
         table.add_column(column, justify="right", no_wrap=True)
     table.add_column("beside", overflow="fold")

@@ -56,7 +56,7 @@ def _run(
 ) -> tuple[dict[str, Any], bool]:  # fmt: skip
     from checks import HAS_BASILISK
     from display import draw_growth, print_checks, print_growth
-    from growth import JOINTS, growth
+    from growth import JOINTS, SHORT_JOINTS, growth
     from plant_step import plant_step
     from rich.console import Console
 
@@ -78,7 +78,7 @@ def _run(
         report["plant"] = [result.record() for result in results]
         report["checks"] = list(checks)
     if "growth" in sections:
-        found = growth(options, JOINTS[:2] if short else JOINTS)
+        found = growth(options, SHORT_JOINTS if short else JOINTS)
         print_growth(found, bool(show_cold), console)
         report["growth"] = found.record()
         checks += found.checks

@@ -16,6 +16,7 @@ from space_robot_control.bench import Options, interleave
 from space_robot_control.bench.measure import Competitor
 
 JOINTS = (3, 5, 7, 10, 15, 20, 30)
+SHORT_JOINTS = (6, 7)
 LARGE = 10
 """Joints from which on the growth is stated once more: below, what is constant hides it."""
 CHECK_STEPS = 200
