@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import tempfile
 import time
@@ -17,12 +16,11 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag import read_coverage
 from space_robot_msgs_py.errors import FlightError
-from space_robot_msgs_py.ros.process_environment import DEFAULTS
 
 from ..flight.domain import ros_domain
 from ..flight.orchestrator import flight_parameters, require_ros
 from ..flight.plan import Flight
-from ..flight.processes import MODULES, Graph, ros_arguments
+from ..flight.processes import MODULES, Graph, node_environment, ros_arguments
 
 WATCH_S = 0.2
 WARM_UP_TICKS = 500
@@ -92,8 +90,7 @@ def fly_graph(flight: Flight, empty: bool = False) -> GraphRun:
             ]
             for node, module in MODULES.items()
         }  # fmt: skip
-        environment = {**DEFAULTS, **os.environ, "ROS_DOMAIN_ID": str(domain)}
-        with Graph(commands, environment) as graph:
+        with Graph(commands, node_environment(domain)) as graph:
             use = _watch(graph)
         coverage = read_coverage(bag)
         return GraphRun(
@@ -119,8 +116,7 @@ def naive_ticks_per_s(ticks: int) -> float:
             ]
             for node in ("controller", "plant")
         }  # fmt: skip
-        environment = {**DEFAULTS, **os.environ, "ROS_DOMAIN_ID": str(domain)}
-        with Graph(commands, environment) as graph:
+        with Graph(commands, node_environment(domain)) as graph:
             _watch(graph)
         return float(file.read_text("utf-8"))
 

@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from .result import Target
+
 Competitor = Callable[[int], object]
 """Does its work that many times over; the loop is the competitor's own, compiled if it can."""
 Clock = Callable[[], float]
@@ -29,6 +31,10 @@ class Options:
     def batch_s(self) -> float:
         """Seconds that a batch must last at least."""
         return 0.001 if self.short else 0.05
+
+    def asked(self, target: Target) -> Target | None:
+        """What is asked of a figure; nothing in a short run, whose figures mean nothing."""
+        return None if self.short else target
 
     def batches(self, usual: int = 15) -> int:
         """Repetitions of a section that usually makes ``usual``."""

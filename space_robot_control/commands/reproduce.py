@@ -47,7 +47,7 @@ def reproduce(
     \b
     Examples:
       space-robot reproduce
-      space-robot reproduce --out /tmp/table_v --only tde_stc/1 --only tde_smc/1
+      space-robot reproduce --out table_v --only tde_stc/1 --only tde_smc/1
       space-robot reproduce --json | jq '.claims[] | [.text, .value, .holds]'
     """
     from ..flight.compilation import compile_kernels

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import time
 from collections.abc import Iterator
@@ -15,14 +14,13 @@ import click
 
 from space_robot_msgs_py.bag import read_flight
 from space_robot_msgs_py.errors import FlightError
-from space_robot_msgs_py.ros.process_environment import DEFAULTS
 
 from ..analysis import analyse
 from .compilation import compile_kernels
 from .display import flight_progress
 from .domain import ros_domain
 from .plan import Flight, check_bag_path
-from .processes import MODULES, Graph, node_command
+from .processes import MODULES, Graph, node_command, node_environment
 
 POLL_S = 0.1
 READY_TIMEOUT_S = 60.0
@@ -47,7 +45,6 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
     require_ros()
     compile_kernels()
     with ros_domain() as domain, _stop_signals() as stopped:
-        environment = {**DEFAULTS, **os.environ, "ROS_DOMAIN_ID": str(domain)}
         _say(f"flying on ROS_DOMAIN_ID={domain}, recording to {bag}")
         begin = time.monotonic()
         try:
@@ -55,7 +52,7 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
                 node: node_command(node, values)
                 for node, values in flight_parameters(flight, bag).items()
             }
-            with Graph(commands, environment) as graph:
+            with Graph(commands, node_environment(domain)) as graph:
                 _follow(graph, flight, domain, stopped)
         except FlightError as error:
             kept = f"; what was flown is in {bag}" if (bag / "metadata.yaml").exists() else ""

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from space_robot_msgs_py.errors import FlightError
+from space_robot_msgs_py.ros.process_environment import DEFAULTS
 
 PACKAGE = "space_robot"
 MODULES = {
@@ -36,6 +37,11 @@ def has_ros2_run() -> bool:
         for prefix in prefixes
         if prefix
     )
+
+
+def node_environment(domain: int) -> dict[str, str]:
+    """What a node's process is started with: the project's defaults unless the user set others."""
+    return {**DEFAULTS, **os.environ, "ROS_DOMAIN_ID": str(domain)}
 
 
 def node_command(node: str, parameters: Mapping[str, Any]) -> list[str]:

@@ -31,16 +31,18 @@ def clock(options: Options) -> list[Result]:
         for name, flight in flights.items():
             options.progress(f"{duration:g} s by the wall clock, {name}, {k + 1} of {count}")
             runs[name].append(fly_graph(flight))
-    return [row for name, flight in flights.items() for row in _rows(name, flight, runs[name])]
+    target = options.asked(ANSWERED_ASKED)
+    return [
+        row for name, flight in flights.items() for row in _rows(name, flight, runs[name], target)
+    ]
 
 
-def _rows(name: str, flight: Flight, runs: list[GraphRun]) -> list[Result]:
+def _rows(name: str, flight: Flight, runs: list[GraphRun], target: Target | None) -> list[Result]:
     answered = tuple(100.0 * _answered_in_time(run, flight) for run in runs)
     lost = sum(sum(run.lost.values()) for run in runs)
     rows = [
         Result(f"{name}: ticks answered in time", "%", answered, better="more",
-               target=ANSWERED_ASKED if flight.ticks * flight.period >= DURATION_S else None,
-               note=f"{lost} messages lost"),
+               target=target, note=f"{lost} messages lost"),
     ]  # fmt: skip
     for what, times in (
         ("a tick comes late by", [_lateness_us(run, flight.period) for run in runs]),

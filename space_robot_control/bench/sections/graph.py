@@ -29,12 +29,11 @@ def graph(options: Options) -> list[Result]:
     rates_empty = tuple(run.ticks_per_s for run in empty)
     lost = sum(sum(run.lost.values()) for run in full + empty)
     beside = Beside("empty graph", rates_empty)
-    asked = None if options.short else RATE_ASKED
     return [
-        Result("lockstep graph", "ticks/s", rates, target=asked, better="more",
+        Result("lockstep graph", "ticks/s", rates, target=options.asked(RATE_ASKED), better="more",
                note=f"{lost} messages lost in {2 * count} flights"),
         Result("lockstep graph", "ticks/s", rates, beside,
-               None if options.short else OF_EMPTY_ASKED, better="more"),
+               options.asked(OF_EMPTY_ASKED), better="more"),
         Result("lockstep graph", "ticks/s", rates, Beside("two naive nodes", tuple(naive)),
                better="more", note="naive: message objects, callbacks, SingleThreadedExecutor"),
         Result("lockstep graph, times real time", "x",

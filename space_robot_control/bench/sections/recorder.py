@@ -22,16 +22,13 @@ def recorder(options: Options) -> list[Result]:
     lost = float(sum(run.lost.values()))
     own = run.use["recorder"]
 
-    def asked(target: Target) -> Target | None:
-        return None if options.short else target
-
     return [
-        Result("messages lost", "", (lost,), target=asked(LOST_ASKED),
+        Result("messages lost", "", (lost,), target=options.asked(LOST_ASKED),
                note=f"of {run.received + lost:.0f} in {duration:g} s"),
-        Result("recorder, of a core", "%", (100.0 * own.cores,), target=asked(CORE_ASKED)),
-        Result("recorder, memory growth", "MB", (_growth(own),), target=asked(GROWTH_ASKED),
+        Result("recorder, of a core", "%", (100.0 * own.cores,), target=options.asked(CORE_ASKED)),
+        Result("recorder, memory growth", "MB", (_growth(own),), target=options.asked(GROWTH_ASKED),
                note="largest of the last half less largest of the first half"),
-        *(Result(f"{name}, memory", "MB", (max(use.memory_mb),), target=asked(MEMORY_ASKED))
+        *(Result(f"{name}, memory", "MB", (max(use.memory_mb),), target=options.asked(MEMORY_ASKED))
           for name, use in run.use.items()),
         *(Result(f"{name}, of a core", "%", (100.0 * use.cores,))
           for name, use in run.use.items() if name != "recorder"),

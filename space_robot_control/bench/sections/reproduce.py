@@ -26,6 +26,5 @@ def reproduce(options: Options) -> list[Result]:
 
     options.progress(f"reproduction of {len(rows)} rows on {cores()} processors")
     seconds = interleave({"all": once}, options.batches(usual=3), warm_up=False)
-    target = None if options.short else TARGET
     name = f"{len(rows)} rows, {cores()} processes"
-    return [Result.timed(name, "s", seconds["all"], target=target)]
+    return [Result.timed(name, "s", seconds["all"], target=options.asked(TARGET))]

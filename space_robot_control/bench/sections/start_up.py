@@ -41,9 +41,9 @@ def start_up(options: Options) -> list[Result]:
         first_ticks.append(_first_tick_s())
     return [
         Result.timed(help_, "s", seconds[help_], (nothing, seconds[nothing]),
-                     None if options.short else HELP_ASKED),
+                     options.asked(HELP_ASKED)),
         Result("fly: first tick after", "s", tuple(first_ticks),
-               target=None if options.short else FIRST_TICK_ASKED),
+               target=options.asked(FIRST_TICK_ASKED)),
     ]  # fmt: skip
 
 
