@@ -68,8 +68,10 @@ class GraphRun:
         return float((len(starts) - 1) / (starts[-1] - starts[0]) * 1e9)
 
 
-def fly_graph(flight: Flight, empty: bool = False) -> GraphRun:
-    """Fly on plant and controller (`nodes`), mission and recorder, each a process.
+def fly_graph(flight: Flight, empty: bool = False, timed: bool = True) -> GraphRun:
+    """Fly on plant and controller, mission and recorder, each a process.
+
+    ``timed`` ones are those of `nodes`, which keep every duration in memory.
 
     Raises:
         FlightError: a node ended before the flight did, or the flight takes for ever.
@@ -80,13 +82,14 @@ def fly_graph(flight: Flight, empty: bool = False) -> GraphRun:
         parameters = flight_parameters(flight, bag)
         work = "empty" if empty else "full"
         files = {node: Path(folder) / f"{node}.npz" for node in ("plant", "controller")}
-        timed = {
+        stopwatches = {
             node: ["space_robot_control.bench.nodes", node, work, str(file)]
             for node, file in files.items()
+            if timed
         }
         commands = {
             node: [
-                sys.executable, "-m", *timed.get(node, [module]), *ros_arguments(parameters[node])
+                sys.executable, "-m", *stopwatches.get(node, [module]), *ros_arguments(parameters[node])
             ]
             for node, module in MODULES.items()
         }  # fmt: skip
@@ -94,8 +97,8 @@ def fly_graph(flight: Flight, empty: bool = False) -> GraphRun:
             use = _watch(graph)
         coverage = read_coverage(bag)
         return GraphRun(
-            _times(files["plant"]),
-            _times(files["controller"]),
+            _times(files["plant"]) if timed else {},
+            _times(files["controller"]) if timed else {},
             {name: counts["missing"] for name, counts in coverage.items() if counts["missing"]},
             sum(counts["received"] for counts in coverage.values()),
             use,

@@ -33,7 +33,7 @@ def bench(
     as_json: bool,
     output: Path | None,
 ) -> None:
-    r"""Measure how fast it is on this machine, each figure beside its competitor in the same run.
+    """Measure how fast it is on this machine, each figure beside its competitor in the same run.
 
     SECTION is one of plant, laws, simulate, reproduce, and on the ROS 2 graph: graph, clock,
     recorder (10 minutes), start-up [default: all]. Shown are the median and the
