@@ -21,7 +21,7 @@ from .commands.stability import stability
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="space_robot", prog_name="space-robot")
 def cli() -> None:
-    r"""Fly a satellite with a robot arm: flight software on a ROS 2 graph, or in one process.
+    """Fly a satellite with a robot arm: flight software on a ROS 2 graph, or in one process.
 
     \b
     Examples:
@@ -63,7 +63,7 @@ def _report(report: dict[str, Any], as_json: bool) -> None:
     help="Ask for SCHED_FIFO for plant and controller; for machines with cores to spare.",
 )
 def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
-    r"""Fly a mission on a ROS 2 graph, record it, and print the RMS table.
+    """Fly a mission on a ROS 2 graph, record it, and print the RMS table.
 
     Starts plant, controller, mission and recorder as processes of their own (through `ros2 run`
     where that is installed), waits until they hear one another, follows the flight, stops them,
@@ -84,7 +84,7 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
 @cli.command()
 @flight_options(*OPTIONS)
 def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
-    r"""Fly the same mission in this process, without ROS; the numbers are those of `fly`.
+    """Fly the same mission in this process, without ROS; the numbers are those of `fly`.
 
     \b
     Examples:
@@ -112,7 +112,7 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
 @click.argument("bag", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
 def analyze(bag: Path, as_json: bool) -> None:
-    r"""Print the RMS table of a recorded flight.
+    """Print the RMS table of a recorded flight.
 
     \b
     Example:

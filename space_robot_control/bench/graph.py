@@ -89,7 +89,8 @@ def fly_graph(flight: Flight, empty: bool = False, timed: bool = True) -> GraphR
         }
         commands = {
             node: [
-                sys.executable, "-m", *stopwatches.get(node, [module]), *ros_arguments(parameters[node])
+                sys.executable, "-m", *stopwatches.get(node, [module]),
+                *ros_arguments(parameters[node]),
             ]
             for node, module in MODULES.items()
         }  # fmt: skip

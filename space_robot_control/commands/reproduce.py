@@ -39,7 +39,7 @@ def reproduce(
     out: Path, only: tuple[str, ...], duration: float | None, brief: bool, jobs: int | None,
     as_json: bool,
 ) -> None:  # fmt: skip
-    r"""Fly Table V of the paper and compare: tables, Figures 5 to 9, one page with it all.
+    """Fly Table V of the paper and compare: tables, Figures 5 to 9, one page with it all.
 
     Every row is flown with the printed gains and the tuned ones, with the printed friction and
     without. Writes table_v.md, .csv and .json, figures/ (PNG and SVG) and report.html.

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     help="Folder for the Nyquist plot and V(t), as PNG and SVG.",
 )
 def stability(initial_error: float, as_json: bool, plot: Path | None, **options: Any) -> None:
-    r"""Check the paper's stability conditions on a flight: Section III-C, Appendices A and B.
+    """Check the paper's stability conditions on a flight: Section III-C, Appendices A and B.
 
     Flies the case as planned, without friction, and from an initial error; measures the
     time-delay error and its derivative, and says of every condition whether it holds.
