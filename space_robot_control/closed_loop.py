@@ -11,14 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled import function_pointer, kernel
-from space_robot_msgs_py.errors import SingularAttitudeError
 from space_robot_msgs_py.flight_log import FlightLog
-from space_robot_sim.attitude import SINGULAR_ETA
 from space_robot_sim.plant import RATE_LIMIT, Block, Plant, advance
 
-from .controller import Controller, form_signals
+from .controller import USABLE, Controller, answer, unusable
 from .laws import CompiledLaw
-from .tracking import torque_from_force
 
 Array = NDArray[np.float64]
 
@@ -51,21 +48,21 @@ def close_loop(plant: Plant, controller: Controller, log: FlightLog, start: int,
     same kernels, as the nodes do.
 
     Raises:
-        FlightError: the flight diverged or met a singular attitude.
+        FlightError: the flight diverged or met a state that no command answers.
     """
     law = controller.law
     if not isinstance(law, CompiledLaw):
         _close_loop_in_python(plant, controller, Rows.of(log), start, stop)
         return
-    tick, value = fly_ticks(
+    tick, fastest, found = fly_ticks(
         law_pointer(type(law).kernel), law.gain_matrix, law.memory, law.h_bar, law.uses_model,
         plant.block, plant.late, controller.block, Rows.of(log), start, stop, plant.period,
     )  # fmt: skip
-    if tick < 0:
-        raise SingularAttitudeError(-1 - tick, value)
     plant.state.tick = tick
-    if not value <= RATE_LIMIT:
-        raise plant.diverged(value)
+    if found != USABLE:
+        raise unusable(found, tick, plant.state.quaternion)
+    if not fastest <= RATE_LIMIT:
+        raise plant.diverged(fastest)
 
 
 def _close_loop_in_python(
@@ -99,12 +96,11 @@ def fly_ticks(
     law: Callable[..., None], gains: Array, law_memory: Array, h_bar: Array, uses_model: bool,
     plant_block: Block, late: Array, controller_block: Block, rows: Rows, start: int, stop: int,
     period: float,
-) -> tuple[int, float]:  # fmt: skip
+) -> tuple[int, float, int]:  # fmt: skip
     """The loop of `close_loop` for a law given as a function pointer.
 
     Returns:
-        The tick reached and the fastest rate there; or -1 minus the tick, and eta, where the
-        attitude was singular.
+        The tick reached, the fastest rate there, and what the controller found its state to be.
     """
     plant, memory = plant_block[0], controller_block[0]
     fastest = 0.0
@@ -116,25 +112,19 @@ def fly_ticks(
         rows.joint_positions[k] = plant.joint_positions
         rows.joint_velocities[k] = plant.joint_velocities
         rows.applied_torque[k] = plant.applied_torque
-        eta = form_signals(
-            memory, k, plant.quaternion, plant.omega_base, plant.joint_positions,
-            plant.joint_velocities, plant.applied_torque, rows.reference_joints[k],
-            rows.reference_base[k], h_bar, uses_model, period,
-        )  # fmt: skip
-        if not abs(eta) > SINGULAR_ETA:
-            return -1 - k, eta
-        law(  # slices: a pointer's arguments are arrays of any length
-            memory.error[:], memory.error_rate[:], memory.acceleration_desired[:],
-            memory.n_hat[:], memory.nominal.inertia[:], memory.nominal.bias[:], gains, law_memory,
-            period,
-        )  # fmt: skip
         torque = rows.commanded_torque[k]
-        torque_from_force(memory.jacobian, law_memory[2], torque)
+        found = answer(
+            memory, law, gains, law_memory, h_bar, uses_model, k, plant.quaternion,
+            plant.omega_base, plant.joint_positions, plant.joint_velocities, plant.applied_torque,
+            rows.reference_joints[k], rows.reference_base[k], torque, period,
+        )  # fmt: skip
+        if found != USABLE:
+            return k, fastest, found
         rows.telemetry[k, 0] = law_memory[0]
         rows.telemetry[k, 1] = law_memory[1]
         rows.telemetry[k, 2] = memory.n_hat
         rows.telemetry[k, 3] = memory.error
         fastest = advance(plant, late, torque, k, period)
         if not fastest <= RATE_LIMIT:
-            return k + 1, fastest
-    return stop, fastest
+            return k + 1, fastest, USABLE
+    return stop, fastest, USABLE

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled import kernel
-from space_robot_msgs_py.errors import SingularAttitudeError
+from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.attitude import SINGULAR_ETA, attitude_jacobian_inverse
 from space_robot_sim.dynamics import Model
@@ -17,11 +18,19 @@ from space_robot_sim.records import Record, assign, nested, shaped
 from space_robot_sim.robot import Robot
 
 from .laws import ControlLaw, Signals
-from .time_delay_estimation import TimeDelayPair, observe, time_delay_estimate
+from .time_delay_estimation import TimeDelayPair, low_pass_weight, observe, time_delay_estimate
 from .tracking import force_from_torque, measured_rate, torque_from_force, tracking_errors
 
 Array = NDArray[np.float64]
 Block = NDArray[Any]
+
+TRANSFER_S = 0.02
+"""Time in which a law that takes over passes from the force it found to its own, s."""
+NORM_TOLERANCE = 1e-3
+"""How far the square of a quaternion's norm may be from 1."""
+
+USABLE, NOT_FINITE, NOT_UNIT, SINGULAR = range(4)
+"""What `form_signals` finds a state to be."""
 
 
 class ControllerMemory(Record):
@@ -48,22 +57,36 @@ class ControllerMemory(Record):
     acceleration_desired: Array = shaped(lambda n: (n + 3,))
     n_hat: Array = shaped(lambda n: (n + 3,))
     """These four as in `Signals`."""
+    force: Array = shaped(lambda n: (n + 3,))
+    """F_S commanded."""
+    transfer: Array = shaped(lambda n: (n + 3,))
+    """What the law in force lacked of the applied force when it took over."""
+    transfer_ticks: float = shaped(lambda n: ())
+    """Length of a transfer."""
+    transfer_left: float = shaped(lambda n: ())
+    """Ticks until ``transfer`` has faded; -1: the law takes over at this tick."""
 
 
 class Controller:
     """Runs one law on a robot's nominal model; the law can be swapped between ticks.
 
-    The time-delay pair is kept whatever the law, so a swap to one that needs it is seamless.
+    The time-delay pair is kept whatever the law, and a law takes over from the force it finds
+    applied: neither a swap nor a controller that starts in the middle of a flight gives a jolt.
     """
 
-    def __init__(self, robot: Robot, law: ControlLaw, period: float) -> None:
+    def __init__(
+        self, robot: Robot, law: ControlLaw, period: float, acceleration_filter_hz: float = 0.0
+    ) -> None:
+        """``acceleration_filter_hz``: corner of the low-pass of the time-delay pair (0: none)."""
         self.period = period
         self.block = ControllerMemory.block(robot.n)
         """The controller's `ControllerMemory`, for compiled loops."""
         memory: ControllerMemory = self.block[0]
         assign(memory, model=robot.model, last_jacobian_inverse=2.0 * np.eye(3))
+        assign(memory, transfer_ticks=max(1, round(TRANSFER_S / period)))
+        assign(memory.pair, smoothing=low_pass_weight(acceleration_filter_hz, period))
+        self._memory = memory
         self._command = Command(-1, np.zeros(robot.n + 3))
-        self._jacobian = memory.jacobian
         self.signals = Signals(
             error=memory.error,
             error_rate=memory.error_rate,
@@ -76,14 +99,19 @@ class Controller:
 
     @property
     def law(self) -> ControlLaw:
-        """The law in force."""
+        """The law in force; setting it makes it `engage`."""
         return self._law
 
     @law.setter
     def law(self, law: ControlLaw) -> None:
-        law.reset()
-        self.signals.n_hat[:] = 0.0
         self._law = law
+        self.engage()
+
+    def engage(self) -> None:
+        """Let the law forget its past and take over, at the next tick, from the applied force."""
+        self._law.reset()
+        self.signals.n_hat[:] = 0.0
+        assign(self._memory, transfer_left=-1.0)
 
     def update(self, state: RobotState, joints: Array, base: Array) -> Command:
         """The torque that answers a measured state.
@@ -97,17 +125,19 @@ class Controller:
             The command for this tick, valid until the next call.
 
         Raises:
+            UnusableStateError: the state is not finite or its quaternion not unit; nothing was
+                remembered of it.
             SingularAttitudeError: the base has turned by 180 degrees.
         """
         law, command = self._law, self._command
-        eta = sense(
+        found = sense(
             self.block, state.tick, state.quaternion, state.omega_base, state.joint_positions,
             state.joint_velocities, state.applied_torque, joints, base, law.h_bar, law.uses_model,
             self.period,
         )  # fmt: skip
-        if not abs(eta) > SINGULAR_ETA:
-            raise SingularAttitudeError(state.tick, eta)
-        torque_from_force(self._jacobian, law.force(self.signals), command.torque)
+        if found != USABLE:
+            raise unusable(found, state.tick, state.quaternion)
+        actuate(self.block, state.tick, law.force(self.signals), command.torque)
         command.tick = state.tick
         return command
 
@@ -117,18 +147,82 @@ class Controller:
         return law.sliding_surface, law.pseudo_acceleration, self.signals.n_hat, self.signals.error
 
 
+def unusable(found: int, tick: int, quaternion: Array) -> UnusableStateError:
+    """What to raise when `form_signals` has ``found`` a state not usable."""
+    if found == SINGULAR:
+        return SingularAttitudeError(tick, float(quaternion[0]))
+    if found == NOT_UNIT:
+        norm = float(np.linalg.norm(quaternion))
+        why = f"the base's quaternion has norm {norm:.6g}, not 1"
+        return UnusableStateError(tick, why, "not unit")
+    return UnusableStateError(tick, "the state is not finite", "not finite")
+
+
 @kernel
 def sense(
     block: Block, tick: int, quaternion: Array, omega_base: Array, joint_positions: Array,
     joint_velocities: Array, applied_torque: Array, joints: Array, base: Array, h_bar: Array,
     uses_model: bool, period: float,
-) -> float:  # fmt: skip
+) -> int:  # fmt: skip
     """`form_signals` for callers from Python."""
-    eta: float = form_signals(
+    found: int = form_signals(
         block[0], tick, quaternion, omega_base, joint_positions, joint_velocities, applied_torque,
         joints, base, h_bar, uses_model, period,
     )  # fmt: skip
-    return eta
+    return found
+
+
+@kernel
+def actuate(block: Block, tick: int, force: Array, torque: Array) -> None:
+    """`transferred_torque` for callers from Python."""
+    transferred_torque(block[0], tick, force, torque)
+
+
+@kernel
+def answer(
+    memory: ControllerMemory, law: Callable[..., None], gains: Array, law_memory: Array,
+    h_bar: Array, uses_model: bool, tick: int, quaternion: Array, omega_base: Array,
+    joint_positions: Array, joint_velocities: Array, applied_torque: Array, joints: Array,
+    base: Array, torque: Array, period: float,
+) -> int:  # fmt: skip
+    """A whole tick of the controller under a law given as a function pointer.
+
+    Returns:
+        What `form_signals` finds; ``torque`` is written if that is `USABLE`.
+    """
+    found: int = form_signals(
+        memory, tick, quaternion, omega_base, joint_positions, joint_velocities, applied_torque,
+        joints, base, h_bar, uses_model, period,
+    )  # fmt: skip
+    if found == USABLE:
+        law(  # slices: a pointer's arguments are arrays of any length
+            memory.error[:], memory.error_rate[:], memory.acceleration_desired[:],
+            memory.n_hat[:], memory.nominal.inertia[:], memory.nominal.bias[:], gains, law_memory,
+            period,
+        )  # fmt: skip
+        transferred_torque(memory, tick, law_memory[2], torque)
+    return found
+
+
+@kernel
+def transferred_torque(memory: ControllerMemory, tick: int, force: Array, torque: Array) -> None:
+    """The torque of a law's ``force`` (m,), which takes over from the one applied before.
+
+    ``F_S + (F_applied - F_S at the takeover) fade``, the fade falling from 1 to 0. At tick 0
+    nothing has been applied, so nothing is taken over.
+    """
+    if memory.transfer_left < 0.0:
+        memory.transfer_left = memory.transfer_ticks if tick > 0 else 0.0
+        for i in range(force.size):
+            memory.transfer[i] = memory.applied_force[i] - force[i]
+    fade = memory.transfer_left / memory.transfer_ticks
+    for i in range(force.size):
+        memory.force[i] = force[i]
+        if fade > 0.0:
+            memory.force[i] += fade * memory.transfer[i]
+    if fade > 0.0:
+        memory.transfer_left -= 1.0
+    torque_from_force(memory.jacobian, memory.force, torque)
 
 
 @kernel
@@ -136,36 +230,44 @@ def form_signals(
     memory: ControllerMemory, tick: int, quaternion: Array, omega_base: Array,
     joint_positions: Array, joint_velocities: Array, applied_torque: Array, joints: Array,
     base: Array, h_bar: Array, uses_model: bool, period: float,
-) -> float:  # fmt: skip
+) -> int:  # fmt: skip
     """Turn a measured state and a reference row into the law's signals.
 
     ``h_bar`` is empty for a law without time-delay estimate.
 
     Returns:
-        eta; where it is singular (or NaN) nothing was done.
+        `USABLE`, or why the state is not: then nothing was done.
     """
-    near, rate, dot = memory.quaternion, memory.rate, 0.0
+    near, rate, dot, square = memory.quaternion, memory.rate, 0.0, 0.0
     for k in range(4):
         dot += quaternion[k] * near[k]
+        square += quaternion[k] * quaternion[k]
+    total = square + applied_torque[0] + applied_torque[1] + applied_torque[2]
+    total += omega_base[0] + omega_base[1] + omega_base[2]
+    for i in range(joint_positions.size):
+        total += joint_positions[i] + joint_velocities[i] + applied_torque[3 + i]
+    if not np.isfinite(total):  # any number that is not makes the sum so
+        return NOT_FINITE
+    if abs(square - 1.0) > NORM_TOLERANCE:
+        return NOT_UNIT
     side = -1.0 if dot < 0.0 else 1.0
-    eta: float = side * quaternion[0]
-    if not abs(eta) > SINGULAR_ETA:
-        return eta
+    if abs(quaternion[0]) <= SINGULAR_ETA:
+        return SINGULAR
     for k in range(4):
         near[k] = side * quaternion[k]
     measured_rate(near, omega_base, joint_velocities, memory.jacobian, rate)
     # the applied torque acted from the last tick on, so that tick's J0 turns it into F_S
     force_from_torque(memory.last_jacobian_inverse, applied_torque, memory.applied_force)
     attitude_jacobian_inverse(near, memory.last_jacobian_inverse)
-    observe(memory.pair, tick, memory.applied_force, rate, period)
     tracking_errors(
         near, joint_positions, rate, joints, base, memory.desired_jacobian,
         memory.error, memory.error_rate, memory.acceleration_desired,
     )  # fmt: skip
+    observe(memory.pair, tick, memory.applied_force, rate, memory.acceleration_desired, period)
     if h_bar.size > 0:
         time_delay_estimate(memory.pair, h_bar, memory.n_hat)
     if uses_model:
         rho_space_into(
             memory.model, near, joint_positions, omega_base, joint_velocities, memory.nominal
         )
-    return eta
+    return USABLE

@@ -2,83 +2,35 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, NoReturn
+import time
+from collections import Counter
+from typing import ClassVar, NoReturn
 
 import numpy as np
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from numpy.typing import NDArray
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.codecs import CommandCodec, StateCodec, TelemetryCodec
-from space_robot_msgs_py.configuration import named_file, nest
-from space_robot_msgs_py.errors import InputError, SpaceRobotError
+from space_robot_msgs_py.configuration import named_file
+from space_robot_msgs_py.errors import MessageError
+from space_robot_msgs_py.health import Health, Level
 from space_robot_msgs_py.reference_codec import ReferenceCodec
 from space_robot_msgs_py.ros.endpoints import SPIN_S, In, Out, TakenByLoop, Waiter, take_or_wait
-from space_robot_msgs_py.ros.parameters import overrides
 from space_robot_msgs_py.ros.shell import Shell, run_node
 from space_robot_msgs_py.samples import RobotState
 from space_robot_sim.robot import Robot
 
 from .controller import Controller
-from .laws import ControlLaw, find_law
+from .law_set import LawSet
 from .reference import ReferenceBuffer
-from .settings import ControllerNodeSettings, available_laws, build_law, check_gains
+from .settings import ControllerNodeSettings
+from .stamp_guard import StampGuard
+from .supervisor import Mode, Supervisor
 
+Array = NDArray[np.float64]
 
-class Laws:
-    """The laws of the gain set as parameters: ``law``, and ``<law>.<gain>`` for each."""
-
-    def __init__(self, shell: Shell, settings: ControllerNodeSettings, axes: int) -> None:
-        self._settings, self._axes = settings, axes
-        self._laws: dict[str, ControlLaw] = {}
-        names = dict.fromkeys([find_law(settings.law).name, *available_laws(settings)])
-        for name in names:
-            wanted = settings.law if name == find_law(settings.law).name else name
-            law = build_law(wanted, settings, axes)
-            given = overrides(shell.node, [f"{name}.{gain}" for gain in law.gain_descriptions])
-            tree = {**law.gains, **nest(given).get(name, {})}
-            law.gains = check_gains(tree, type(law), axes, "controller parameters")
-            for gain, description in law.gain_descriptions.items():
-                shell.node.declare_parameter(
-                    f"{name}.{gain}", law.gains[gain].tolist(),
-                    ParameterDescriptor(description=description), ignore_override=True,
-                )  # fmt: skip
-            self._laws[name] = law
-        self.chosen = self._laws[find_law(settings.law).name]
-        self._shell = shell
-        shell.node.add_on_set_parameters_callback(self._on_set)
-
-    def warm_up(self, robot: Robot) -> None:
-        """Load every law's compiled code, so that no first tick and no swap comes late."""
-        rest = RobotState.allocate(robot.n)
-        for law in self._laws.values():
-            controller = Controller(robot, law, self._settings.period)
-            controller.update(rest, np.zeros((3, robot.n)), np.eye(10)[0])
-
-    def _on_set(self, parameters: list[Any]) -> SetParametersResult:
-        """Check all changes first, then make them; the loop sees them at its next tick."""
-        gains = {name: dict(law.gains) for name, law in self._laws.items()}
-        chosen = self.chosen
-        try:
-            for parameter in parameters:
-                law_name, _, gain = parameter.name.partition(".")
-                if parameter.name == "law":
-                    if parameter.value not in self._laws:
-                        raise InputError(
-                            f"law {parameter.value!r}: choose one of {', '.join(self._laws)}"
-                        )
-                    chosen = self._laws[parameter.value]
-                elif law_name in gains and gain:
-                    law = self._laws[law_name]
-                    changed = {**gains[law_name], gain: list(parameter.value)}
-                    gains[law_name] = check_gains(changed, type(law), self._axes, "parameter")
-        except SpaceRobotError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        for name, law in self._laws.items():
-            law.gains = gains[name]
-        if chosen is not self.chosen:
-            self._shell.log(f"law {self.chosen.name} -> {chosen.name}")
-        self.chosen = chosen
-        return SetParametersResult(successful=True)
+STAND_DOWN_S = 0.5
+"""How long a controller that stands down waits for a state to answer."""
 
 
 class ControllerLoop:
@@ -89,9 +41,13 @@ class ControllerLoop:
     def __init__(self, shell: Shell, settings: ControllerNodeSettings) -> None:
         self._shell, self._settings = shell, settings
         robot = Robot.from_yaml(named_file("robots", settings.robot))
-        self._laws = Laws(shell, settings, robot.n + 3)
+        self._laws = LawSet(shell, settings, robot.n + 3)
         self._laws.warm_up(robot)
-        self._controller = self.controller_class(robot, self._laws.chosen, settings.period)
+        self._controller = self.controller_class(
+            robot, self._laws.chosen, settings.period, settings.acceleration_filter_hz
+        )
+        self._supervisor = Supervisor(self._controller, robot.n + 3, settings.hold_ticks)
+        self._stamps = StampGuard(settings.longest_jump)
         self._references = ReferenceBuffer(robot.n)
         timebase = settings.timebase
         self._states = StateCodec(robot.joint_names, timebase)
@@ -111,6 +67,10 @@ class ControllerLoop:
         self._joints_waiter = Waiter(node, self._joints_in, spin_s=spin_s)
         self._reference_waiter = Waiter(node, self._reference_joints_in, self._reference_base_in)
         self._answered, self._answer = -1, b""
+        self._rejected: Counter[str] = Counter()
+        self._state_at = time.monotonic()
+        self._held_references = 0
+        self._reference_missing = False
 
     def run(self) -> None:
         """Answer states until told to stop."""
@@ -121,24 +81,68 @@ class ControllerLoop:
             tick = self._take_state()
             if tick is None:
                 self._take_references()  # ahead of need
-            elif self._have_reference(tick):
+            else:
                 self._answer_tick(tick)
             shell.serve()
         for output in outputs:
             output.flush(1.0)
 
+    def stand_down(self) -> None:
+        """Answer one more state, with no torque: the plant holds that."""
+        if self._answered < 0 or not self._shell.node.count_publishers(topics.JOINT_STATES.name):
+            return
+        until = time.monotonic() + STAND_DOWN_S
+        while time.monotonic() < until:
+            tick = self._take_state()
+            if tick is not None and tick > self._answered:
+                self._command_out.publish(self._commands.encode(self._supervisor.stand_down(tick)))
+                return
+
+    def close(self) -> None:
+        """Leave the parameters alone."""
+        self._laws.close()
+
+    def health(self) -> Health:
+        """Mode, law, rejections."""
+        supervisor, rejected = self._supervisor, self._rejected + self._supervisor.rejected
+        silence = time.monotonic() - self._state_at
+        values: dict[str, float | int | str] = {
+            "tick": self._answered,
+            "controller": self._controller.law.name,
+            "references_held": self._held_references,
+            **{f"rejected: {reason}": count for reason, count in rejected.items()},
+        }
+        if self._answered < 0:
+            return Health("waiting for the first state", values=values)
+        if supervisor.mode is not Mode.NOMINAL:
+            level = Level.ERROR if supervisor.mode is Mode.SAFE else Level.WARN
+            return Health(f"{supervisor.mode.value}: {supervisor.reason}", level, values)
+        if silence > self._settings.state_timeout:
+            values["silence_s"] = silence
+            return Health("safe: no new state, so no command", Level.ERROR, values)
+        if self._reference_missing:
+            return Health("holding the reference: the mission is silent", Level.WARN, values)
+        return Health("nominal", values=values)
+
     def _answer_tick(self, tick: int) -> None:
         if tick == self._answered:  # the plant asked again: the same answer
             self._command_out.publish(self._answer)
             return
+        if not self._stamps.passes(tick):
+            self._rejected["stamp"] += 1
+            return
+        reference = self._reference(tick)
+        if reference is None:
+            return
         controller = self._controller
+        self._laws.swap_at(tick)
         if controller.law is not self._laws.chosen:
             controller.law = self._laws.chosen
         self._state.tick = tick
-        command = controller.update(self._state, *self._references.at(tick))
+        command = self._supervisor.answer(self._state, *reference)
         self._answer = self._commands.encode(command)
         self._command_out.publish(self._answer)
-        self._answered = tick
+        self._answered, self._state_at = tick, time.monotonic()
         if tick % self._settings.telemetry_decimation == 0:
             self._telemetry_out.publish(self._telemetry.encode(tick, controller.telemetry()))
 
@@ -152,37 +156,59 @@ class ControllerLoop:
             return None
         while (newer := self._joints_in.take()) is not None:
             data = newer
-        tick = self._states.decode_joints(data, self._state)
-        base_tick = -1
-        while base_tick < tick and not self._shell.stopping:
-            data = take_or_wait(self._base_in, self._base_waiter, 0.02)
-            if data is None:
-                return None
-            base_tick = self._states.decode_base(data, self._state)
+        try:
+            tick = self._states.decode_joints(data, self._state)
+            base_tick = -1
+            while base_tick < tick:
+                data = take_or_wait(self._base_in, self._base_waiter, 0.02)
+                if data is None:
+                    return None
+                base_tick = self._states.decode_base(data, self._state)
+        except MessageError as error:
+            self._rejected[error.reason] += 1
+            return None
         return tick if base_tick == tick else None
 
-    def _have_reference(self, tick: int) -> bool:
-        """Wait until the reference of ``tick`` is there; False if told to stop."""
+    def _reference(self, tick: int) -> tuple[Array, Array] | None:
+        """The reference of ``tick``, or its last point where the mission stays away.
+
+        None if told to stop, or while nothing has come at all.
+        """
+        if self._references.covers(tick):
+            self._reference_missing = False
+            return self._references.at(tick)
+        patience = 0.0 if self._reference_missing else self._settings.reference_timeout
+        until = time.monotonic() + patience
         while not self._references.covers(tick):
+            if self._shell.stopping:
+                return None
             if not self._take_references():
+                if time.monotonic() >= until and (held := self._references.hold(tick)):
+                    self._reference_missing = True
+                    self._held_references += 1
+                    return held
                 self._reference_waiter.wait(0.02)
                 self._shell.serve()
-            if self._shell.stopping:
-                return False
-        return True
+        self._reference_missing = False
+        return self._references.at(tick)
 
     def _take_references(self) -> bool:
+        """Take what has come of the reference; whether anything has."""
+        codec, references = self._reference_codec, self._references
         joints, base = self._reference_joints_in.take(), self._reference_base_in.take()
-        if joints is not None:
-            self._references.add_joints(*self._reference_codec.decode_joints(joints))
-        if base is not None:
-            self._references.add_base(*self._reference_codec.decode_base(base))
+        try:
+            if joints is not None:
+                references.add_joints(*codec.decode_joints(joints))
+            if base is not None:
+                references.add_base(*codec.decode_base(base))
+        except MessageError as error:
+            self._rejected[f"reference: {error.reason}"] += 1
         return joints is not None or base is not None
 
 
 def main() -> NoReturn:
     """Entry point of controller_node."""
-    run_node(ControllerNodeSettings, ControllerLoop, changeable=("law",))
+    run_node(ControllerNodeSettings, ControllerLoop, changeable=("controller",))
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ from typing import NoReturn
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.cdr import header_stamp_ns
 from space_robot_msgs_py.configuration import named_file
+from space_robot_msgs_py.health import Health
 from space_robot_msgs_py.reference_codec import ReferenceCodec
 from space_robot_msgs_py.ros.endpoints import In, Out, TakenByLoop, Waiter
 from space_robot_msgs_py.ros.shell import Shell, run_node
@@ -29,6 +30,18 @@ class MissionLoop:
         self._clock = In(shell.node, topics.CLOCK, TakenByLoop(), depth=1)
         self._waiter = Waiter(shell.node, self._clock)
 
+        self._now = 0
+
+    def stand_down(self) -> None:
+        """The controller holds the last point."""
+
+    def close(self) -> None:
+        """Nothing is kept."""
+
+    def health(self) -> Health:
+        """How far the stream has come."""
+        return Health("nominal", values={"tick": self._now})
+
     def run(self) -> None:
         """Stream until told to stop."""
         chunk_ticks, next_tick, now = self._settings.chunk_ticks, 0, 0
@@ -40,7 +53,7 @@ class MissionLoop:
                 next_tick += chunk_ticks
             self._waiter.wait(0.05)
             while (data := self._clock.take()) is not None:
-                now = self._settings.timebase.tick(header_stamp_ns(data))
+                now = self._now = self._settings.timebase.tick(header_stamp_ns(data))
                 # a mission that starts in the middle of a flight has nothing to say of its past
                 next_tick = max(next_tick, now // chunk_ticks * chunk_ticks)
             self._shell.serve()

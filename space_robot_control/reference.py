@@ -48,6 +48,20 @@ class ReferenceBuffer:
         i = tick % len(self._joint_tick)
         return self._joints[i], self._base[i]
 
+    def hold(self, tick: int) -> tuple[Array, Array] | None:
+        """Rows for a ``tick`` that is not covered: the last point before it, at rest.
+
+        None if nothing has come yet.
+        """
+        whole = np.where(self._joint_tick == self._base_tick, self._joint_tick, EMPTY)
+        whole[whole > tick] = EMPTY
+        i = int(np.argmax(whole))
+        if whole[i] == EMPTY:
+            return None
+        joints, base = np.zeros_like(self._joints[i]), np.zeros_like(self._base[i])
+        joints[0], base[:4] = self._joints[i, 0], self._base[i, :4]
+        return joints, base
+
     @staticmethod
     def _store(target: Array, ticks: NDArray[np.int64], start: int, rows: Array) -> None:
         arriving = np.arange(start, start + len(rows))

@@ -41,7 +41,7 @@ def name_order(given: Sequence[str], expected: Sequence[str], topic: str) -> lis
         MessageError: other names than expected.
     """
     if sorted(given) != sorted(expected):
-        raise MessageError(f"{topic}: names {list(given)}, expected {list(expected)}")
+        raise MessageError(f"{topic}: names {list(given)}, expected {list(expected)}", "names")
     return [list(given).index(name) for name in expected]
 
 
@@ -88,7 +88,8 @@ class JointStateMessage:
             if len(values) != len(self._names):
                 raise MessageError(
                     f"{self._topic.name}: {len(values)} values of {field} "
-                    f"for {len(self._names)} names"
+                    f"for {len(self._names)} names",
+                    reason="size",
                 )
             arrays[field] = values[order]
         return stamp_of(message), arrays
@@ -171,7 +172,11 @@ class CommandCodec:
         return self._axes.to_bytes()
 
     def decode(self, data: bytes, command: Command) -> None:
-        """Fill ``command``."""
+        """Fill ``command``.
+
+        Raises:
+            MessageError: the message does not fit.
+        """
         stamp_ns = read_effort(self._axes.block, data, command.torque)
         if stamp_ns == FOREIGN:
             stamp_ns, arrays = self._axes.decode(data)

@@ -60,7 +60,7 @@ def named_file(kind: str, name: str) -> Path:
 
 
 def node_parameters(path: Path, node: str) -> Tree:
-    """What a ROS parameter file says to a node (keys ``/**``, then ``node``), as a tree.
+    """What a ROS parameter file says to a node (keys ``/**``, then its ROS name), as a tree.
 
     Raises:
         InputError: the file cannot be read or is not a ROS parameter file.
@@ -71,7 +71,7 @@ def node_parameters(path: Path, node: str) -> Tree:
             raise InputError(
                 f"{path}: {name}: 'ros__parameters' was expected below the node's name"
             )
-        if name.strip("/") in ("**", node):
+        if name.strip("/") in ("**", f"{node}_node"):
             merged = merge(merged, nest(content["ros__parameters"] or {}))
     return merged
 
@@ -109,7 +109,7 @@ class NodeSettings(Strict):
     """What every node of the graph is told; each node's schema derives from it."""
 
     node: ClassVar[str]
-    """The node's name, key of its section in parameter files."""
+    """What the node is: plant, controller, mission, recorder."""
     selectors: ClassVar[tuple[str, ...]] = ("robot",)
     """Fields that choose configuration files."""
 
@@ -120,6 +120,11 @@ class NodeSettings(Strict):
     fifo_priority: Annotated[int, Field(ge=0, le=98)] = Field(
         0, description="SCHED_FIFO priority to ask for (0: the usual scheduling)"
     )
+
+    @classmethod
+    def ros_name(cls) -> str:
+        """The node's name in ROS, key of its section in parameter files; also its executable."""
+        return f"{cls.node}_node"
 
     @property
     def timebase(self) -> Timebase:

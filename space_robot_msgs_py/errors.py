@@ -18,6 +18,11 @@ class InputError(SpaceRobotError, ValueError):
 class MessageError(SpaceRobotError, ValueError):
     """A message came that does not fit: other names, lengths or stamps than this graph's."""
 
+    def __init__(self, text: str, reason: str = "malformed", tick: int | None = None) -> None:
+        """``reason``: the kind of misfit in a word; ``tick``: of the message, where it is known."""
+        super().__init__(text)
+        self.reason, self.tick = reason, tick
+
 
 class FlightError(SpaceRobotError):
     """A flight ended before its time."""
@@ -31,12 +36,22 @@ class DivergedError(FlightError):
         self.tick = tick
 
 
-class SingularAttitudeError(FlightError):
+class UnusableStateError(FlightError):
+    """A measured state that no command can be computed from."""
+
+    def __init__(self, tick: int, why: str, kind: str) -> None:
+        """``kind``: what is wrong in a word or two."""
+        super().__init__(f"at tick {tick} {why}")
+        self.tick, self.why, self.kind = tick, why, kind
+
+
+class SingularAttitudeError(UnusableStateError):
     """The base has turned by 180 degrees, where the quaternion coordinates end (eta = 0)."""
 
     def __init__(self, tick: int, eta: float) -> None:
         super().__init__(
-            f"at tick {tick} the base attitude has eta = {eta:.1e}: J0 of eq. (1) is singular at "
-            "180 degrees, so no command exists there in these coordinates"
+            tick,
+            f"the base attitude has eta = {eta:.1e}: J0 of eq. (1) is singular at 180 degrees, "
+            "so no command exists there in these coordinates",
+            "singular",
         )
-        self.tick = tick

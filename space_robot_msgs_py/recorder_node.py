@@ -14,6 +14,7 @@ from . import topics
 from .bag import BagRecorder
 from .configuration import NodeSettings
 from .errors import InputError
+from .health import Health
 from .ros.endpoints import In, TakenByLoop
 from .ros.shell import Shell, run_node
 
@@ -54,17 +55,26 @@ class RecorderLoop:
         shell.log(f"recording to {path}")
 
     def run(self) -> None:
-        """Record until told to stop and everything sent has come; then close the bag."""
+        """Record until told to stop and everything sent has come."""
         os.nice(NICENESS)
-        try:
-            last_arrival = time.monotonic()
-            while not self._shell.stopping or time.monotonic() - last_arrival < SILENCE_S:
-                if self._drain():
-                    last_arrival = time.monotonic()
-                self._shell.serve()
-                time.sleep(self._settings.drain_period)
-        finally:
-            self._recorder.close()
+        last_arrival = time.monotonic()
+        while not self._shell.stopping or time.monotonic() - last_arrival < SILENCE_S:
+            if self._drain():
+                last_arrival = time.monotonic()
+            self._shell.serve()
+            time.sleep(self._settings.drain_period)
+
+    def stand_down(self) -> None:
+        """Everything sent is in the bag when `run` returns."""
+
+    def health(self) -> Health:
+        """What has come."""
+        received = sum(c.received for c in self._recorder.coverages.values())
+        return Health("nominal", values={"received": received})
+
+    def close(self) -> None:
+        """Close the bag."""
+        self._recorder.close()
         received = sum(c.received for c in self._recorder.coverages.values())
         lost = {name: count for name, count in self._recorder.lost.items() if count}
         self._shell.log(f"{received} messages received, missing: {lost or 0}")

@@ -41,7 +41,8 @@ class Timebase(NamedTuple):
         if rest:
             raise MessageError(
                 f"stamp {stamp_ns} ns is not a whole number of {self.period_ns} ns ticks: "
-                "do all nodes have the same period?"
+                "do all nodes have the same period?",
+                reason="stamp",
             )
         return tick
 

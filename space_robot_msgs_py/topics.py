@@ -23,28 +23,36 @@ class Topic(NamedTuple):
     """Late joiners get the last ``depth`` messages."""
 
 
+TO_CONTROLLER = ("controller_node", "recorder_node")
+TO_PLANT = ("plant_node", "recorder_node")
+TO_MISSION = ("mission_node", "recorder_node")
+
 JOINT_STATES = Topic(
-    "/joint_states", "sensor_msgs/msg/JointState", 10_000, ("controller", "recorder"),
+    "/joint_states", "sensor_msgs/msg/JointState", 10_000, TO_CONTROLLER,
     per_tick=True,
 )  # fmt: skip
 BASE_STATE = Topic(
-    "/base/state", "sensor_msgs/msg/MultiDOFJointState", 10_000, ("controller", "recorder"),
+    "/base/state", "sensor_msgs/msg/MultiDOFJointState", 10_000, TO_CONTROLLER,
     per_tick=True,
 )  # fmt: skip
-COMMAND = Topic(
-    "/command", "sensor_msgs/msg/JointState", 10_000, ("plant", "recorder"), per_tick=True
-)
+COMMAND = Topic("/command", "sensor_msgs/msg/JointState", 10_000, TO_PLANT, per_tick=True)
 REFERENCE_JOINTS = Topic(
-    "/reference/joints", "trajectory_msgs/msg/JointTrajectory", 200, ("controller", "recorder"),
+    "/reference/joints", "trajectory_msgs/msg/JointTrajectory", 200, TO_CONTROLLER,
     transient_local=True,
 )  # fmt: skip
 REFERENCE_BASE = Topic(
     "/reference/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 200,
-    ("controller", "recorder"), transient_local=True,
+    TO_CONTROLLER, transient_local=True,
 )  # fmt: skip
-TELEMETRY = Topic("/controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, ("recorder",))
+TELEMETRY = Topic(
+    "/controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, ("recorder_node",)
+)
 CLOCK = Topic(
-    "/clock", "rosgraph_msgs/msg/Clock", 1_000, ("mission", "recorder"), transient_local=True
+    "/clock",
+    "rosgraph_msgs/msg/Clock",
+    1_000,
+    TO_MISSION,
+    transient_local=True,
 )
 
 ALL = (JOINT_STATES, BASE_STATE, COMMAND, REFERENCE_JOINTS, REFERENCE_BASE, TELEMETRY, CLOCK)

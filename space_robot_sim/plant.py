@@ -66,6 +66,8 @@ class PlantMemory(Record):
     """The state, see `Stages`."""
     limit: Array = shaped(lambda n: (n + 3,))
     """Largest torque on each axis, N m."""
+    saturated_ticks: float = shaped(lambda n: ())
+    """Ticks so far in which a torque was at its limit."""
     rotation: Array = shaped(lambda n: (3, 3))
     """Scratch."""
     base_position: Array = shaped(lambda n: (3,))
@@ -124,6 +126,12 @@ class Plant:
         """Ticks flown so far."""
         return self.state.tick
 
+    @property
+    def saturated_ticks(self) -> int:
+        """Ticks so far in which a torque was at its limit."""
+        memory: PlantMemory = self.block[0]
+        return int(memory.saturated_ticks)
+
     def step(self, command: Command) -> None:
         """Hold ``command`` (or the one due, if commands come late) over one tick.
 
@@ -156,7 +164,7 @@ def advance(memory: PlantMemory, late: Array, torque: Array, tick: int, period: 
     Returns:
         The fastest rate then, see `measure`.
     """
-    applied, limit = memory.applied_torque, memory.limit
+    applied, limit, saturated = memory.applied_torque, memory.limit, 0.0
     latency = late.shape[0]
     for i in range(applied.size):
         due = torque[i]
@@ -164,6 +172,9 @@ def advance(memory: PlantMemory, late: Array, torque: Array, tick: int, period: 
             due = late[tick % latency, i]
             late[tick % latency, i] = torque[i]
         applied[i] = min(max(due, -limit[i]), limit[i])
+        if applied[i] != due:
+            saturated = 1.0
+    memory.saturated_ticks += saturated
     rk4_step(
         memory.model, memory.environment, memory.x, applied, tick * period, period, memory.stages
     )

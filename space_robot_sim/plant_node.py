@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import ClassVar, NoReturn
 
@@ -10,25 +11,33 @@ import numpy as np
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.codecs import ClockCodec, CommandCodec, StateCodec
 from space_robot_msgs_py.configuration import named_file
+from space_robot_msgs_py.errors import MessageError
+from space_robot_msgs_py.health import Health, Level
 from space_robot_msgs_py.ros.endpoints import SPIN_S, In, Out, TakenByLoop, Waiter, take_or_wait
 from space_robot_msgs_py.ros.shell import Shell, run_node
 from space_robot_msgs_py.samples import Command
 
+from .command_guard import CommandGuard
 from .plant import Plant
 from .plant_settings import PlantNodeSettings
 from .robot import Robot
+from .wall_clock import WallClock
 
 ASK_AGAIN_S = 0.5
 """Without an answer for this long the state is sent again (lockstep)."""
 SPIN_BEFORE_DEADLINE_S = 100e-6
 GIVE_WAY_S = 100e-6
-SLIP_S = 0.25
-"""Further behind the wall clock than this, the plant gives up catching up."""
 FLUSH_S = 5.0
+HOLDING_TICKS = 20
+"""A command held for longer is worth a word in the diagnostics."""
 
 
 class PlantLoop:
-    """Sends the state of a tick, waits for its command, steps; paced by the graph or the clock."""
+    """Sends the state of a tick, waits for its command, steps; paced by the graph or the clock.
+
+    In lockstep a tick waits for its answer. A controller that has fallen silent is not waited
+    for: then, and always by the wall clock, a tick lasts its period and the last command is held.
+    """
 
     plant_class: ClassVar[type[Plant]] = Plant
 
@@ -43,7 +52,7 @@ class PlantLoop:
         self._states = StateCodec(robot.joint_names, timebase)
         self._commands = CommandCodec(robot.axis_names, timebase)
         self._clock = ClockCodec()
-        self._command = Command(-1, self._plant.state.applied_torque.copy())
+        self._guard = CommandGuard(robot.n + 3, settings.hold_ticks)
         node = shell.node
         self._joint_states = Out(node, topics.JOINT_STATES)
         self._base_state = Out(node, topics.BASE_STATE)
@@ -52,99 +61,178 @@ class PlantLoop:
         spin_s = 0.0 if settings.fifo_priority else SPIN_S
         self._waiter = Waiter(node, self._command_in, spin_s=spin_s)
         self._outputs = (self._joint_states, self._base_state, self._clock_out)
+        self._wall_clock = WallClock(settings.period)
+        self._silence_s = settings.silence_timeout or math.inf
+        self._controller_silent = False
+        self._heard = -1
+        """The newest tick that a command has come for."""
+        self._sent = (b"", b"")
+        self._sent_at = 0.0
+        self._answers, self._latency_s, self._latency_max_s = 0, 0.0, 0.0
         self.late_ticks = 0
-        """Ticks by the wall clock that were not answered before their end."""
-        self.slipped_s = 0.0
-        """How far the wall clock has run ahead for good."""
+        """Ticks that were not answered before their end."""
 
     def run(self) -> None:
         """Fly until the last tick, or until told to stop."""
-        shell, settings, plant = self._shell, self._settings, self._plant
+        shell, settings, plant, clock = self._shell, self._settings, self._plant, self._wall_clock
         shell.wait_for_listeners(self._outputs, settings.wait_for)
-        begin = time.monotonic()
+        began, first = time.monotonic(), plant.tick
+        clock.start(plant.tick)
         while not shell.stopping and (not settings.ticks or plant.tick < settings.ticks):
-            self._send()
-            if settings.realtime and plant.tick > 0:
-                answered = self._answer_by_the_clock(begin)
-            else:
-                answered = self._answer_in_lockstep()
-            if not answered:
+            if not self._exchange():
                 break
-            if plant.tick == 0:  # the clock starts when the loop is closed
-                begin = time.monotonic() - settings.period
-            elif settings.realtime:
-                begin += self._slip(begin)
-            plant.step(self._command)
+            if plant.tick == 0:
+                clock.start(0)  # time begins when the loop is closed
+            elif self._by_the_clock and (behind := clock.slip(plant.tick)):
+                shell.log(f"{behind:.3f} s behind the wall clock: time goes on from here")
+            self._step()
             shell.serve()
-        elapsed = time.monotonic() - begin
+        elapsed = time.monotonic() - began
         for output in self._outputs:
             output.flush(FLUSH_S)
-        flown = plant.tick * settings.period
-        late = ""
-        if settings.realtime:
-            late = f", {self.late_ticks} ticks without an answer in time"
-            late += f", {self.slipped_s:.3f} s behind the wall clock" if self.slipped_s else ""
-        shell.log(f"flew {flown:.4f} s in {elapsed:.2f} s{late}")
+        late = f", {self.late_ticks} ticks without an answer in time" if self.late_ticks else ""
+        late += f", {clock.slipped_s:.3f} s behind the wall clock" if clock.slipped_s else ""
+        shell.log(f"flew {(plant.tick - first) * settings.period:.4f} s in {elapsed:.2f} s{late}")
 
-    def _send(self) -> None:
-        tick = self._plant.tick
-        joints, base = self._states.encode(self._plant.state)
+    def stand_down(self) -> None:
+        """The actuators are left at zero."""
+        self._guard.release()
+
+    def close(self) -> None:
+        """Nothing is kept."""
+
+    def health(self) -> Health:
+        """Mode, answers, refusals."""
+        guard, tick = self._guard, self._plant.tick
+        values: dict[str, float | int | str] = {
+            "tick": tick,
+            "unanswered_ticks": self.late_ticks,
+            "held_ticks": guard.held_ticks(tick),
+            "saturated_ticks": self._plant.saturated_ticks,
+            **{f"refused: {reason}": count for reason, count in guard.refused.items()},
+        }
+        if self._answers:
+            values["latency_mean_ms"] = 1e3 * self._latency_s / self._answers
+            values["latency_max_ms"] = 1e3 * self._latency_max_s
+        if guard.answered < 0:
+            return Health("waiting for the first command", values=values)
+        if guard.is_safe:
+            return Health("safe: no good command, the torque is zero", Level.ERROR, values)
+        if guard.held_ticks(tick) > HOLDING_TICKS:
+            return Health("holding the last good command", Level.WARN, values)
+        return Health("nominal", values=values)
+
+    @property
+    def _by_the_clock(self) -> bool:
+        return self._controller_silent or (self._settings.realtime and self._plant.tick > 0)
+
+    def _exchange(self) -> bool:
+        """Send the state of this tick and get its answer, if it comes; False if told to stop."""
+        plant = self._plant
+        self._publish(*self._states.encode(plant.state))
+        self._publish_clock()
+        return self._wait(plant.tick)
+
+    def _publish(self, joints: bytes, base: bytes) -> None:
+        self._sent = joints, base
         self._joint_states.publish(joints)
         self._base_state.publish(base)
+        self._sent_at = time.perf_counter()
+
+    def _publish_clock(self) -> None:
+        tick = self._plant.tick
         if tick % self._settings.clock_decimation == 0:
             self._clock_out.publish(self._clock.encode(self._timebase.stamp_ns(tick)))
 
-    def _answer_in_lockstep(self) -> bool:
-        """Wait for the command that answers this tick; False if told to stop."""
-        tick, command = self._plant.tick, self._command
+    def _step(self) -> None:
+        plant, guard = self._plant, self._guard
+        self.late_ticks += guard.answered != plant.tick
+        plant.step(guard.act(plant.tick))
+
+    def _wait(self, stamp: int) -> bool:
+        """Wait for the command that answers the state stamped so; False if told to stop."""
+        if self._by_the_clock:
+            self._wait_by_the_clock(stamp)
+            return not self._shell.stopping
         ask_again = time.monotonic() + ASK_AGAIN_S
+        give_up = time.monotonic() + self._silence_s
         while True:
             data = take_or_wait(self._command_in, self._waiter, 0.02)
             if data is not None:
-                self._commands.decode(data, command)
-                if command.tick == tick:
+                if self._receive(data) == stamp:
+                    self._time_answer()
                     return True
                 continue
             if self._shell.stopping:
                 return False
-            if time.monotonic() > ask_again:
-                ask_again = time.monotonic() + ASK_AGAIN_S
-                self._send()
+            now = time.monotonic()
+            if now > give_up and self._heard >= 0:
+                self._shell.log(f"no command for {self._silence_s:g} s: the controller is silent")
+                self._controller_silent = True
+                self._wall_clock.start(self._plant.tick)
+                return True
+            if now > ask_again:
+                ask_again = now + ASK_AGAIN_S
+                self._publish(*self._sent)
             self._shell.serve()
 
-    def _answer_by_the_clock(self, begin: float) -> bool:
-        """Take what comes until the tick is over; an unanswered tick keeps the last command."""
-        tick, command = self._plant.tick, self._command
-        deadline = begin + (tick + 1) * self._settings.period
-        if time.monotonic() >= deadline:  # behind: catch up, but never take the whole processor
+    def _wait_by_the_clock(self, stamp: int) -> None:
+        """Take what comes until the tick is over."""
+        tick, clock, before = self._plant.tick, self._wall_clock, self._heard
+        if clock.left(tick) <= 0.0:  # behind: catch up, but never take the whole processor
             time.sleep(GIVE_WAY_S)
-        while (left := deadline - time.monotonic()) > 0.0:
-            if left > SPIN_BEFORE_DEADLINE_S and command.tick != tick:
+        while (left := clock.left(tick)) > 0.0:
+            if left > SPIN_BEFORE_DEADLINE_S and self._heard != stamp:
                 self._waiter.wait(left - SPIN_BEFORE_DEADLINE_S)
             elif left > SPIN_BEFORE_DEADLINE_S:
                 time.sleep(left - SPIN_BEFORE_DEADLINE_S)
-            self._take_newest()
-        self._take_newest()
-        self.late_ticks += command.tick != tick
-        return not self._shell.stopping
+            self._take_all(stamp)
+        self._take_all(stamp)
+        if self._controller_silent and self._heard > before:
+            self._shell.log("the controller answers again")
+            self._controller_silent = False
 
-    def _slip(self, begin: float) -> float:
-        """By how much to set the clock back, s: 0 unless the plant is hopelessly behind it."""
-        behind = time.monotonic() - begin - (self._plant.tick + 1) * self._settings.period
-        if behind < SLIP_S:
-            return 0.0
-        self.slipped_s += behind
-        self._shell.log(f"{behind:.3f} s behind the wall clock: time goes on from here")
-        return behind
-
-    def _take_newest(self) -> None:
+    def _take_all(self, stamp: int) -> None:
         while (data := self._command_in.take()) is not None:
-            self._commands.decode(data, self._command)
+            if self._receive(data) == stamp:
+                self._time_answer()
+
+    def _receive(self, data: bytes) -> int | None:
+        """Take a command that has come, if it is good; the tick it answers, if it tells one."""
+        guard = self._guard
+        try:
+            self._commands.decode(data, guard.offered)
+        except MessageError as error:
+            guard.refuse(error.reason)
+            return error.tick
+        tick = guard.offered.tick
+        self._heard = max(self._heard, tick)
+        self._deliver()
+        return tick
+
+    def _deliver(self) -> None:
+        """Hand the command in the guard's `offered` to the actuators."""
+        self._guard.accept(self._plant.tick)
+
+    def _time_answer(self) -> None:
+        latency = time.perf_counter() - self._sent_at
+        self._answers += 1
+        self._latency_s += latency
+        self._latency_max_s = max(self._latency_max_s, latency)
+
+
+def make_loop(shell: Shell, settings: PlantNodeSettings) -> PlantLoop:
+    """The loop that the settings ask for."""
+    if any(getattr(settings,"faults",[])):
+        from .faulty_plant_loop import FaultyPlantLoop
+
+        return FaultyPlantLoop(shell, settings)
+    return PlantLoop(shell, settings)
 
 
 def main() -> NoReturn:
     """Entry point of plant_node."""
-    run_node(PlantNodeSettings, PlantLoop)
+    run_node(PlantNodeSettings, make_loop)
 
 
 if __name__ == "__main__":

@@ -32,6 +32,13 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
     clock_decimation: Annotated[int, Field(ge=1, le=10**6)] = Field(
         20, description="ticks between two messages on /clock"
     )
+    hold_ticks: Annotated[int, Field(ge=0, le=10**6)] = Field(
+        200, description="ticks for which the last good command is held; then the torque is zero"
+    )
+    silence_timeout: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
+        3.0,
+        description="s by the wall clock a tick waits for its command in lockstep (0: for ever)",
+    )
     wait_for: list[str] = Field(
         [""], description="names of nodes that must listen before the first tick"
     )

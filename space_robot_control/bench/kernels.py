@@ -14,8 +14,7 @@ from space_robot_sim.integrator import state_derivative
 from space_robot_sim.plant import advance
 
 from ..closed_loop import Rows
-from ..controller import form_signals
-from ..tracking import torque_from_force
+from ..controller import answer
 
 Array = NDArray[np.float64]
 Block = NDArray[Any]
@@ -67,17 +66,12 @@ def controller_ticks(
     memory, recorded = block[0], rows.quaternion.shape[0]
     for i in range(ticks):
         k = i % recorded
-        form_signals(
-            memory, k, rows.quaternion[k], rows.omega_base[k], rows.joint_positions[k],
-            rows.joint_velocities[k], rows.applied_torque[k], rows.reference_joints[k],
-            rows.reference_base[k], h_bar, uses_model, period,
-        )  # fmt: skip
-        law(
-            memory.error[:], memory.error_rate[:], memory.acceleration_desired[:],
-            memory.n_hat[:], memory.nominal.inertia[:], memory.nominal.bias[:], gains, law_memory,
+        answer(
+            memory, law, gains, law_memory, h_bar, uses_model, k, rows.quaternion[k],
+            rows.omega_base[k], rows.joint_positions[k], rows.joint_velocities[k],
+            rows.applied_torque[k], rows.reference_joints[k], rows.reference_base[k], torque,
             period,
         )  # fmt: skip
-        torque_from_force(memory.jacobian, law_memory[2], torque)
 
 
 @kernel

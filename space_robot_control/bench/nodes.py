@@ -145,7 +145,7 @@ def main() -> NoReturn:
     sys.argv[1:] = arguments  # what rclpy reads
     if node == "plant":
         run_node(PlantNodeSettings, TimedPlantLoop)
-    run_node(ControllerNodeSettings, TimedControllerLoop, changeable=("law",))
+    run_node(ControllerNodeSettings, TimedControllerLoop, changeable=("controller",))
 
 
 if __name__ == "__main__":

@@ -84,9 +84,9 @@ def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
     parameters = {node: plan.overrides(node) for node in MODULES}
     parameters["plant"] |= {
         "ticks": flight.ticks,
-        "wait_for": ["controller", "mission", "recorder"],
+        "wait_for": ["controller_node", "mission_node", "recorder_node"],
     }
-    parameters["controller"] |= {"wait_for": ["plant", "recorder"]}
+    parameters["controller"] |= {"wait_for": ["plant_node", "recorder_node"]}
     parameters["recorder"] |= {
         "bag": str(bag.absolute()),
         "flight": json.dumps(flight.description),

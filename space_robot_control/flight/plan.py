@@ -51,7 +51,7 @@ class FlightPlan(Strict):
                 **({} if self.friction else {"friction.coulomb": 0.0, "friction.viscous": 0.0}),
             },
             ControllerNodeSettings.node: {
-                "law": self.controller,
+                "controller": self.controller,
                 "gains": self.gains,
                 "fifo_priority": self.fifo_priority,
             },

@@ -61,10 +61,10 @@ def test_heaviest_case_is_tracked_too(paper_robot: Robot) -> None:
 def test_seven_joints_fly_with_their_own_gains(seven_joint_robot: Robot) -> None:
     """Nothing assumes six."""
     text = (CONFIG / "gains/seven_joint/tuned/tde_stc.yaml").read_text()
-    printed = yaml.safe_load(text)["controller"]["ros__parameters"]["tde_stc"]
+    printed = yaml.safe_load(text)["controller_node"]["ros__parameters"]["tde_stc"]
     gains = {key: np.resize(np.array(value), 10) for key, value in printed.items()}
     mission = yaml.safe_load((CONFIG / "missions/seven_joint.yaml").read_text())
-    degrees = mission["mission"]["ros__parameters"]["waypoints_deg"]
+    degrees = mission["mission_node"]["ros__parameters"]["waypoints_deg"]
     errors, _ = Loop(seven_joint_robot, find_law("tde_stc")(gains, PERIOD), degrees).fly(2000)
     assert np.abs(errors).max() < 1e-4
 

@@ -89,7 +89,7 @@ def test_bad_gains_name_file_key_and_value(
     tmp_path: Path, content: dict[str, object], said: str
 ) -> None:
     path = tmp_path / "tde_stc.yaml"
-    path.write_text(yaml.safe_dump({"controller": {"ros__parameters": {"tde_stc": content}}}))
+    path.write_text(yaml.safe_dump({"controller_node": {"ros__parameters": {"tde_stc": content}}}))
     with pytest.raises(InputError) as caught:
         read_gains(path, laws()["tde_stc"], 9)
     assert said in str(caught.value)

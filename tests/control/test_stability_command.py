@@ -103,7 +103,7 @@ def test_report_of_infinite_numbers_is_json(tmp_path: Path) -> None:
     """K_1 = 0 has an infinite peak and no M: null, and the command still ends well."""
     path = tmp_path / "tde_stc.yaml"
     gains = {**GAINS["tde_stc"], "k_1": [0.0]}
-    path.write_text(yaml.safe_dump({"controller": {"ros__parameters": {"tde_stc": gains}}}))
+    path.write_text(yaml.safe_dump({"controller_node": {"ros__parameters": {"tde_stc": gains}}}))
     found = studied(gains=str(path), duration=0.05)
     data = json.loads(json.dumps(report(found), allow_nan=False))["super_twisting"]
     assert data["circle_criterion"][0]["value"] is None

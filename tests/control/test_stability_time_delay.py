@@ -136,7 +136,9 @@ def test_beta_grows_with_the_gains_it_is_to_be_compared_with(tmp_path: Path) -> 
         for name in ("k_1", "k_2"):
             gains[name] = [factor * value for value in gains[name]]
         path = tmp_path / "tde_stc.yaml"
-        path.write_text(yaml.safe_dump({"controller": {"ros__parameters": {"tde_stc": gains}}}))
+        path.write_text(
+            yaml.safe_dump({"controller_node": {"ros__parameters": {"tde_stc": gains}}})
+        )
         plan = FlightPlan(gains=str(path), friction=False, duration=1.0)
         error = time_delay_error(simulate(Flight(plan)), np.array(H_BAR))
         beta.append(error_derivative(error, 5e-4).beta)

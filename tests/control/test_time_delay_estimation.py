@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from space_robot_control.time_delay_estimation import TimeDelayPair, observe, time_delay_estimate
+from space_robot_control.time_delay_estimation import (
+    LONGEST_GAP,
+    TimeDelayPair,
+    low_pass_weight,
+    observe,
+    time_delay_estimate,
+)
+from space_robot_sim.records import assign
 
 Array = NDArray[np.float64]
 
@@ -16,13 +24,15 @@ PERIOD = 5e-4
 
 
 class Estimator:
-    """The kernels on a pair of their own."""
+    """The kernels on a pair of their own; ``desired`` is the desired acceleration of all axes."""
 
-    def __init__(self, axes: int) -> None:
+    def __init__(self, axes: int, desired: float = 0.0, corner_hz: float = 0.0) -> None:
         self.pair = TimeDelayPair.allocate(axes - 3)
+        assign(self.pair, smoothing=low_pass_weight(corner_hz, PERIOD))
+        self.desired = np.full(axes, desired)
 
     def observe(self, tick: int, force: Array, rate: Array) -> None:
-        observe(self.pair, tick, force, rate, PERIOD)
+        observe(self.pair, tick, force, rate, self.desired, PERIOD)
 
     def estimate(self, h_bar: Array) -> Array:
         n_hat = np.full_like(h_bar, np.nan)
@@ -66,34 +76,58 @@ def test_estimate_follows_the_last_pair_only(pair: tuple[Array, ...]) -> None:
     np.testing.assert_array_equal(long.estimate(h_bar), short.estimate(h_bar))
 
 
-def observed(*ticks: tuple[int, float, float]) -> Estimator:
+def observed(*ticks: tuple[int, float, float], **options: float) -> Estimator:
     """An estimator of two axes that saw (tick, force, rate)."""
-    estimator = Estimator(2)
+    estimator = Estimator(2, **options)
     for tick, force, rate in ticks:
         estimator.observe(tick, np.full(2, force), np.full(2, rate))
     return estimator
 
 
-def test_first_tick_has_no_pair_and_gives_zero() -> None:
-    """Whatever force and rate it reports."""
-    estimator = observed((1234, 50.0, 3.0))
-    np.testing.assert_array_equal(estimator.estimate(np.ones(2)), np.zeros(2))
+@pytest.mark.parametrize("before", [(), ((0, 9.0, 7.0),)])
+def test_without_a_pair_the_motion_is_taken_for_the_desired_one(
+    before: tuple[tuple[int, float, float], ...],
+) -> None:
+    """At the first tick and after a long gap: the best guess that needs no past."""
+    estimator = observed(*before, (LONGEST_GAP + 1, 50.0, 3.0), desired=4.0)
+    np.testing.assert_allclose(estimator.estimate(np.full(2, 2.0)), 50.0 - 2.0 * 4.0)
 
 
-def test_gap_in_ticks_keeps_the_last_pair() -> None:
-    """Over several intervals one force and one difference do not belong together."""
-    before = observed((0, 0.0, 0.0), (1, 5.0, 0.001)).estimate(np.full(2, 2.0))
-    np.testing.assert_allclose(before, 5.0 - 2.0 * 2.0)
-    for late in (3, 1, 0):
-        after = observed((0, 0.0, 0.0), (1, 5.0, 0.001), (late, 99.0, 0.5))
-        np.testing.assert_array_equal(after.estimate(np.full(2, 2.0)), before)
+@given(st.integers(2, LONGEST_GAP))
+def test_over_a_short_gap_the_mean_acceleration_is_the_pairs(gap: int) -> None:
+    """The plant held its command, so the force it reports acted all that time."""
+    estimator = observed((5, 0.0, 0.0), (5 + gap, 7.0, 3.0 * gap * PERIOD))
+    np.testing.assert_allclose(estimator.estimate(np.full(2, 2.0)), 7.0 - 2.0 * 3.0, rtol=1e-9)
 
 
 def test_pairs_are_formed_anew_after_a_gap() -> None:
     """From the rate at the tick that ended the gap."""
-    estimator = observed((0, 0.0, 0.0), (1, 5.0, 0.001), (7, 99.0, 0.5), (8, 6.0, 0.5005))
+    estimator = observed((0, 0.0, 0.0), (1, 5.0, 0.001), (97, 99.0, 0.5), (98, 6.0, 0.5005))
     np.testing.assert_allclose(estimator.pair.acceleration, 1.0, rtol=1e-9)
     np.testing.assert_allclose(estimator.estimate(np.full(2, 2.0)), 4.0, rtol=1e-9)
+
+
+@given(st.floats(1.0, 900.0), st.floats(-50.0, 50.0))
+def test_low_pass_keeps_force_and_acceleration_a_pair(corner_hz: float, n: float) -> None:
+    """Whatever both do, N_hat of a constant N is N: none of it is filtered away."""
+    rng = np.random.default_rng(1)
+    filtered = Estimator(2, corner_hz=corner_hz)
+    rate = 0.0
+    filtered.observe(0, np.full(2, n), np.zeros(2))  # N alone at rest
+    for tick in range(1, 50):
+        acceleration = rng.normal()
+        rate += acceleration * PERIOD
+        filtered.observe(tick, np.full(2, 2.0 * acceleration + n), np.full(2, rate))
+    np.testing.assert_allclose(filtered.estimate(np.full(2, 2.0)), n, atol=1e-8)
+
+
+def test_low_pass_reaches_63_per_cent_in_its_time_constant() -> None:
+    corner_hz = 20.0
+    time_constant = round(1.0 / (2.0 * np.pi * corner_hz) / PERIOD)
+    estimator = observed((0, 0.0, 0.0), corner_hz=corner_hz)
+    for tick in range(1, time_constant + 1):
+        estimator.observe(tick, np.ones(2), np.zeros(2))
+    np.testing.assert_allclose(estimator.pair.applied_force, 1.0 - np.exp(-1.0), atol=0.01)
 
 
 def test_estimator_keeps_copies_of_what_it_is_shown() -> None:

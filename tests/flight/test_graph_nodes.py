@@ -64,9 +64,9 @@ def _end(process: subprocess.Popen[str], number: int = signal.SIGINT) -> int:
 
 def test_start_up_in_any_order(start: Start, tmp_path: Path) -> None:
     """Plant first and recorder last: nothing moves until all are there, nothing is lost."""
-    plant = start("plant", ticks=300, wait_for="[controller, recorder]")
+    plant = start("plant", ticks=300, wait_for="[controller_node, recorder_node]")
     time.sleep(2.0)
-    controller = start("controller", wait_for="[plant, recorder]")
+    controller = start("controller", wait_for="[plant_node, recorder_node]")
     time.sleep(1.0)
     mission = start("mission")
     recorder = start("recorder", bag=tmp_path / "bag")
@@ -82,14 +82,14 @@ def test_controller_can_be_replaced_in_flight(start: Start, tmp_path: Path) -> N
     """Lockstep holds the plant while no controller is there; the next one takes over."""
     recorder = start("recorder", bag=tmp_path / "bag")
     mission = start("mission")
-    plant = start("plant", ticks=3000, wait_for="[recorder]")
-    first = start("controller", wait_for="[recorder, plant]")
+    plant = start("plant", ticks=3000, wait_for="[recorder_node]")
+    first = start("controller", wait_for="[recorder_node, plant_node]")
     file = tmp_path / "bag" / "bag_0.mcap"
     until = time.monotonic() + 60.0
     while time.monotonic() < until and not (file.exists() and file.stat().st_size > 50_000):
         time.sleep(0.02)
     first.kill()
-    start("controller", law="ctc")
+    start("controller", controller="ctc")
     output, _ = plant.communicate(timeout=90)
     assert plant.returncode == 0, output
     assert [_end(mission), _end(recorder)] == [0, 0]
@@ -108,7 +108,7 @@ def test_law_and_gains_change_in_flight(start: Start, domain: int) -> None:
     node = rclpy.create_node(f"test_{os.getpid()}", context=context)
     executor.add_node(node)
     try:
-        client = node.create_client(SetParameters, "/controller/set_parameters")
+        client = node.create_client(SetParameters, "/controller_node/set_parameters")
         assert client.wait_for_service(30.0)
 
         def change(name: str, value: object) -> tuple[bool, str]:
@@ -119,9 +119,9 @@ def test_law_and_gains_change_in_flight(start: Start, domain: int) -> None:
             result = future.result().results[0]
             return result.successful, result.reason
 
-        assert change("law", "tde_tsmc") == (True, "")
+        assert change("controller", "tde_tsmc") == (True, "")
         assert change("tde_tsmc.k_1", [0.5]) == (True, "")
-        refused, reason = change("law", "pid")
+        refused, reason = change("controller", "pid")
         assert not refused
         assert "choose one of" in reason
         refused, reason = change("tde_tsmc.h_bar", [-1.0])
@@ -141,7 +141,7 @@ def test_law_and_gains_change_in_flight(start: Start, domain: int) -> None:
         ("plant", {"command_latency_ticks": -1}, "greater than or equal to 0, got -1"),
         ("plant", {"comand_latency_ticks": 1}, "unknown parameter 'comand_latency_ticks'"),
         ("plant", {"case": 9}, "unknown case '9': choose one of 1, 2"),
-        ("controller", {"law": "pid"}, "unknown controller 'pid'"),
+        ("controller", {"controller": "pid"}, "unknown controller 'pid'"),
         ("controller", {"tde_stc__k_1": "[1.0, 2.0]"}, "9 values (base x, y, z and the joints)"),
         ("mission", {"waypoint_times": "[0.0]"}, "waypoints_deg has 18 values"),
         ("recorder", {"bag": "/proc/no/bag"}, "no bag can be written there"),

@@ -1,0 +1,96 @@
+"""The laws a controller node can fly, with their gains as parameters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+
+from space_robot_msgs_py.configuration import nest
+from space_robot_msgs_py.errors import SpaceRobotError
+from space_robot_msgs_py.ros.parameters import overrides
+from space_robot_msgs_py.ros.shell import Shell
+from space_robot_msgs_py.samples import RobotState
+from space_robot_msgs_py.validation import one_of
+from space_robot_sim.robot import Robot
+
+from .controller import Controller
+from .laws import ControlLaw, find_law
+from .settings import ControllerNodeSettings, available_laws, build_law, check_gains
+from .swaps import Swap, parse_swaps
+
+
+class LawSet:
+    """The laws of the gain set as parameters: ``controller``, and ``<law>.<gain>`` for each."""
+
+    def __init__(self, shell: Shell, settings: ControllerNodeSettings, axes: int) -> None:
+        """Build all laws and declare their gains.
+
+        Raises:
+            InputError: a law, a gain or a swap that cannot be.
+        """
+        self._shell, self._settings, self._axes = shell, settings, axes
+        self._laws: dict[str, ControlLaw] = {}
+        first = find_law(settings.controller).name
+        for name in dict.fromkeys([first, *available_laws(settings)]):
+            self._laws[name] = self._declared(settings.controller if name == first else name)
+        self.chosen = self._laws[first]
+        self._swaps: list[Swap] = parse_swaps(settings.swaps, settings.period)
+        for swap in self._swaps:
+            one_of(swap.name, self._laws, "controller", " of swaps")
+        shell.node.add_on_set_parameters_callback(self._on_set)
+
+    def warm_up(self, robot: Robot) -> None:
+        """Load every law's compiled code, so that no first tick and no swap comes late."""
+        rest = RobotState.allocate(robot.n)
+        for law in self._laws.values():
+            controller = Controller(robot, law, self._settings.period)
+            controller.update(rest, np.zeros((3, robot.n)), np.eye(10)[0])
+
+    def swap_at(self, tick: int) -> None:
+        """Choose the law of the swaps that are due."""
+        while self._swaps and self._swaps[0].tick <= tick:
+            self._choose(self._laws[self._swaps.pop(0).name])
+
+    def close(self) -> None:
+        """Take no more changes."""
+        self._shell.node.remove_on_set_parameters_callback(self._on_set)
+
+    def _declared(self, wanted: str) -> ControlLaw:
+        law = build_law(wanted, self._settings, self._axes)
+        node = self._shell.node
+        given = overrides(node, [f"{law.name}.{gain}" for gain in law.gain_descriptions])
+        tree = {**law.gains, **nest(given).get(law.name, {})}
+        law.gains = check_gains(tree, type(law), self._axes, "controller parameters")
+        for gain, description in law.gain_descriptions.items():
+            node.declare_parameter(
+                f"{law.name}.{gain}", law.gains[gain].tolist(),
+                ParameterDescriptor(description=description), ignore_override=True,
+            )  # fmt: skip
+        return law
+
+    def _choose(self, law: ControlLaw) -> None:
+        if law is not self.chosen:
+            self._shell.log(f"controller {self.chosen.name} -> {law.name}")
+        self.chosen = law
+
+    def _on_set(self, parameters: list[Any]) -> SetParametersResult:
+        """Check all changes first, then make them; the loop sees them at its next tick."""
+        gains = {name: dict(law.gains) for name, law in self._laws.items()}
+        chosen = self.chosen
+        try:
+            for parameter in parameters:
+                law_name, _, gain = parameter.name.partition(".")
+                if parameter.name == "controller":
+                    chosen = self._laws[one_of(parameter.value, self._laws, "controller")]
+                elif law_name in gains and gain:
+                    law = self._laws[law_name]
+                    changed = {**gains[law_name], gain: list(parameter.value)}
+                    gains[law_name] = check_gains(changed, type(law), self._axes, "parameter")
+        except SpaceRobotError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        for name, law in self._laws.items():
+            law.gains = gains[name]
+        self._choose(chosen)
+        return SetParametersResult(successful=True)

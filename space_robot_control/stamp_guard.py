@@ -1,0 +1,36 @@
+"""Which stamps of states to believe."""
+
+from __future__ import annotations
+
+AGREEING = 5
+"""So many strange stamps in a row that fit one another are a new time, not a fault."""
+
+
+class StampGuard:
+    """Lets stamps pass that rise by no more than a jump. Knows no ROS.
+
+    A single stamp that goes back or jumps is wrong. Several that agree mean that the plant has
+    started anew, or that this controller has slept.
+    """
+
+    def __init__(self, longest_jump: int) -> None:
+        """``longest_jump``: ticks from one state to the next that are still believed."""
+        self._longest_jump = longest_jump
+        self.last = -1
+        """The last tick believed; -1 before the first."""
+        self._strange = -1
+        self._agreeing = 0
+
+    def passes(self, tick: int) -> bool:
+        """Whether to believe a state of ``tick``, which is then the last one."""
+        if self.last >= 0 and not self._follows(tick, self.last):
+            agrees = self._agreeing and 0 <= tick - self._strange <= self._longest_jump
+            self._agreeing = self._agreeing + 1 if agrees else 1
+            self._strange = tick
+            if self._agreeing < AGREEING:
+                return False
+        self.last, self._agreeing = tick, 0
+        return True
+
+    def _follows(self, tick: int, before: int) -> bool:
+        return 0 < tick - before <= self._longest_jump

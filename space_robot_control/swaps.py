@@ -1,0 +1,41 @@
+"""Laws to be swapped to in flight, as text: ``T:LAW``, T in simulated seconds."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from space_robot_msgs_py.errors import InputError
+
+
+class Swap(NamedTuple):
+    """From ``tick`` on the law ``name`` is in force."""
+
+    tick: int
+    name: str
+
+
+def parse_swaps(texts: Iterable[str], period: float) -> list[Swap]:
+    """The swaps of several texts in the order of their ticks; empty ones are none.
+
+    Raises:
+        InputError: a text is not ``T:LAW``, or two swaps fall on one tick.
+    """
+    swaps = sorted(_parse(text, period) for text in texts if text.strip())
+    for one, other in itertools.pairwise(swaps):
+        if one.tick == other.tick:
+            raise InputError(f"swaps to {one.name} and to {other.name} fall on tick {one.tick}")
+    return swaps
+
+
+def _parse(text: str, period: float) -> Swap:
+    seconds, _, name = text.partition(":")
+    try:
+        time = float(seconds)
+    except ValueError:
+        time = math.nan
+    if not (0.0 <= time < math.inf and name.strip()):
+        raise InputError(f"swap {text!r}: T:LAW expected, T in simulated seconds, as in 5:tde_smc")
+    return Swap(math.ceil(time / period - 1e-6), name.strip())

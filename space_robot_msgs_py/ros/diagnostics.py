@@ -1,0 +1,63 @@
+"""/diagnostics: each node's `Health`, once a second and on every change of mode."""
+
+from __future__ import annotations
+
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+
+from ..health import Health, Level
+
+TOPIC = "/diagnostics"
+PERIOD_S = 1.0
+
+
+class Diagnostics:
+    """Publishes what a node reports of itself."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._publisher = node.create_publisher(DiagnosticArray, TOPIC, 10)
+        self._last: Health | None = None
+        self._last_s = -PERIOD_S
+        self._last_tick: tuple[float, float] | None = None
+
+    def report(self, health: Health) -> None:
+        """Publish if a second has passed or the mode has changed."""
+        now = time.monotonic()
+        changed = self._last is None or (health.mode, health.level) != (
+            self._last.mode,
+            self._last.level,
+        )
+        if not changed and now - self._last_s < PERIOD_S:
+            return
+        if changed:
+            if health.level is Level.OK:  # two lines: a call of the log has one severity for good
+                self._node.get_logger().info(health.mode)
+            else:
+                self._node.get_logger().warning(health.mode)
+        values = {**health.values, **self._rate(health, now)}
+        self._last, self._last_s = health, now
+        status = DiagnosticStatus(
+            level=bytes([health.level]), name=self._node.get_name(), message=health.mode,
+            hardware_id="space_robot",
+            values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()],
+        )  # fmt: skip
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)
+
+    def _rate(self, health: Health, now: float) -> dict[str, float]:
+        """Ticks by the wall clock's second since the last report."""
+        tick = health.values.get("tick")
+        if not isinstance(tick, int):
+            return {}
+        last, self._last_tick = self._last_tick, (tick, now)
+        if last is None or now <= last[1]:
+            return {}
+        return {"rate_hz": (tick - last[0]) / (now - last[1])}
+
+
+def _text(value: float | str) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,200 @@
+"""A node of this project as a ROS 2 lifecycle node.
+
+Files and parameters are checked in configure, which fails with the reason; topics are there once
+it has succeeded. Nothing is sent before activate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Generic, Protocol, TypeVar
+
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+
+from ..configuration import NodeSettings
+from ..errors import InputError, SpaceRobotError
+from ..health import Health
+from .diagnostics import Diagnostics
+from .parameters import declare_settings, refuse_unknown
+
+Schema = TypeVar("Schema", bound=NodeSettings)
+AUTOSTART = "autostart"
+
+
+class Loop(Protocol):
+    """What a node does; made with its settings in configure."""
+
+    def run(self) -> None:
+        """Work while the node is active; return when the shell is stopping, or at the end."""
+
+    def stand_down(self) -> None:
+        """Leave the graph safe: called on deactivate, and before the end of an active node."""
+
+    def close(self) -> None:
+        """Let go of everything: called on cleanup and at the end.
+
+        Raises:
+            FlightError: something that was promised has not been kept.
+        """
+
+    def health(self) -> Health:
+        """What to tell of oneself; called some times a second."""
+
+
+class ManagedNode(LifecycleNode, Generic[Schema]):
+    """Makes, starts, stops and closes a `Loop` in the transitions of the lifecycle."""
+
+    def __init__(
+        self,
+        schema: type[Schema],
+        make_loop: Callable[[ManagedNode[Schema], Schema], Loop],
+        changeable: tuple[str, ...] = (),
+    ) -> None:
+        super().__init__(schema.ros_name())
+        self._schema, self._make_loop, self._changeable = schema, make_loop, changeable
+        self.settings: Schema | None = None
+        self.loop: Loop | None = None
+        self.is_active = False
+        self.is_shut_down = False
+        self.error: SpaceRobotError | None = None
+        """Why the last transition failed."""
+        description = ParameterDescriptor(
+            description="configure and activate without being told (false: wait for transitions)",
+            read_only=True,
+        )
+        self.autostart = bool(self.declare_parameter(AUTOSTART, True, description).value)
+        self._diagnostics = Diagnostics(self)
+        self._own = self._entities()
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self)
+        self._guard_change_state()
+
+    def spin_services(self, timeout_s: float = 0.0) -> None:
+        """Let services run, and report the health."""
+        self._executor.spin_once(timeout_sec=timeout_s)
+        if self.loop is not None:
+            health = self.loop.health()
+            if not self.is_active:
+                health = Health("inactive", values=health.values)
+        else:
+            health = Health("unconfigured")
+        self._diagnostics.report(health)
+
+    def start(self) -> None:
+        """Configure and activate.
+
+        Raises:
+            SpaceRobotError: it cannot be.
+        """
+        for transition in (self.trigger_configure, self.trigger_activate):
+            if transition() is not TransitionCallbackReturn.SUCCESS:
+                raise self.error or SpaceRobotError(f"{self.get_name()} cannot be started")
+
+    def end(self) -> None:
+        """Shut down, unless that has been done.
+
+        Raises:
+            SpaceRobotError: the loop could not be closed as it should.
+        """
+        if not self.is_shut_down:
+            self.trigger_shutdown()
+            if self.error:
+                raise self.error
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Check parameters and files, make the loop and its topics."""
+
+        def configure() -> None:
+            self.settings = declare_settings(self, self._schema, self._changeable)
+            self.loop = self._make_loop(self, self.settings)
+            refuse_unknown(self)
+
+        return self._try(configure, undo=self._release)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """From here on the loop runs."""
+        self.is_active = True
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """The loop stops."""
+        return self._try(self._stand_down)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Topics and parameters are gone; a new configure reads the files again."""
+        return self._try(self._release)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """The end, from any state."""
+
+        def shut_down() -> None:
+            self.is_shut_down = True
+            self._stand_down()
+            self._release()
+
+        return self._try(shut_down)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Something unforeseen was raised in a transition: the node is of no more use."""
+        return TransitionCallbackReturn.FAILURE
+
+    def _try(
+        self, action: Callable[[], None], undo: Callable[[], None] | None = None
+    ) -> TransitionCallbackReturn:
+        self.error = None
+        try:
+            action()
+        except SpaceRobotError as error:
+            self.error = error
+            if undo:
+                undo()
+            self.get_logger().error(str(error))
+            return TransitionCallbackReturn.FAILURE
+        except Exception as error:  # rclpy would swallow it without a word
+            self.error = SpaceRobotError(f"unforeseen {type(error).__name__}: {error}")
+            self.get_logger().error(str(self.error))
+            return TransitionCallbackReturn.ERROR
+        return TransitionCallbackReturn.SUCCESS
+
+    def _stand_down(self) -> None:
+        if self.is_active and self.loop is not None:
+            self.is_active = False
+            self.loop.stand_down()
+
+    def _release(self) -> None:
+        """Close the loop, take back what configure made."""
+        loop, self.loop = self.loop, None
+        try:
+            if loop is not None:
+                loop.close()
+        finally:
+            publishers, subscriptions, parameters = self._entities()
+            for publisher in publishers - self._own[0]:
+                self.destroy_publisher(publisher)
+            for subscription in subscriptions - self._own[1]:
+                self.destroy_subscription(subscription)
+            for name in parameters - self._own[2]:
+                self._parameters.pop(name)  # undeclare_parameter refuses read-only ones
+                self._descriptors.pop(name)
+
+    def _entities(self) -> tuple[set[Any], set[Any], set[str]]:
+        return set(self.publishers), set(self.subscriptions), set(self._parameters)
+
+    def _guard_change_state(self) -> None:
+        """Answer a transition that does not exist in the present state: rclpy would die of it."""
+        service = self._service_change_state
+        change_state = service.callback
+
+        def guarded(request: Any, response: Any) -> Any:
+            try:
+                return change_state(request, response)
+            except _rclpy.RCLError:
+                response.success = False
+                self.error = InputError("this transition is not possible in the present state")
+                self.get_logger().error(str(self.error))
+                return response
+
+        service.callback = guarded

@@ -1,0 +1,70 @@
+"""Which command acts on the robot: the newest good one, held for a while, then none."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+import numpy as np
+
+from space_robot_msgs_py.samples import Command
+
+
+class CommandGuard:
+    """Keeps the command in force. Knows no ROS.
+
+    A command is good if it is finite, and answers a state that has been sent and is newer than the
+    one answered before.
+    Without a good one the last is held for ``hold_ticks``, then the torque is zero.
+    """
+
+    def __init__(self, axes: int, hold_ticks: int) -> None:
+        self._hold_ticks = hold_ticks
+        self._accepted, self.offered = (Command(-1, np.zeros(axes)) for _ in range(2))
+        """``offered``: to be filled with a command that has come, for `accept`."""
+        self._none = Command(-1, np.zeros(axes))
+        self._since = 0
+        self.acting = self._none
+        """The command that acts at the tick last given to `act`."""
+        self.refused: Counter[str] = Counter()
+        """Refused commands by reason."""
+
+    @property
+    def answered(self) -> int:
+        """The tick whose command was accepted last; -1 if none."""
+        return self._accepted.tick
+
+    @property
+    def is_safe(self) -> bool:
+        """Whether commands have failed for so long that the torque is zero."""
+        return self.acting is self._none
+
+    def held_ticks(self, now: int) -> int:
+        """Ticks at ``now`` since a good command has come."""
+        return now - self._since
+
+    def accept(self, now: int) -> bool:
+        """Take the command in `offered` at tick ``now``; False, and counted, if it is not good."""
+        if not self._accepted.tick < self.offered.tick <= now:
+            self.refused["stamp"] += 1
+            return False
+        if not math.isfinite(self.offered.torque.sum()):
+            self.refused["not finite"] += 1
+            return False
+        self._accepted, self.offered = self.offered, self._accepted
+        self._since = now
+        return True
+
+    def refuse(self, reason: str) -> None:
+        """Count a command that could not even be read."""
+        self.refused[reason] += 1
+
+    def release(self) -> None:
+        """No torque until the next good command."""
+        self._accepted.torque[:] = 0.0
+
+    def act(self, now: int) -> Command:
+        """The command for tick ``now``."""
+        held = now - self._since <= self._hold_ticks and self._accepted.tick >= 0
+        self.acting = self._accepted if held else self._none
+        return self.acting
