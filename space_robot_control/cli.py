@@ -42,6 +42,15 @@ def _plan(**options: Any) -> Any:
     return Flight(check(FlightPlan, options, "options"))
 
 
+def _faults(context: click.Context, given: Sequence[str]) -> Sequence[str]:
+    if list(given) == ["list"]:
+        from space_robot_msgs_py.fault import KINDS, help_lines
+
+        click.echo("\n".join(help_lines(KINDS)))
+        context.exit()
+    return given
+
+
 def _report(report: dict[str, Any], as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(report, indent=2))
@@ -62,23 +71,39 @@ def _report(report: dict[str, Any], as_json: bool) -> None:
     default=0,
     help="Ask for SCHED_FIFO for plant and controller; for machines with cores to spare.",
 )
+@click.option(
+    "--fault", "faults", multiple=True, metavar="KIND@T[-END][:ARG]",
+    help="Inject a fault at T simulated seconds; may be repeated; --fault list lists all kinds.",
+    callback=lambda context, option, given: _faults(context, given),
+)  # fmt: skip
+@click.option("--seed", type=int, default=0, help="Seed of the faults' random numbers.")
+@click.option("--restart-controller", is_flag=True, help="Start a dead or hung controller again.")
+@click.option("--domain", type=int, help="ROS domain [default: ROS_DOMAIN_ID, or a free one].")
 def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     """Fly a mission on a ROS 2 graph, record it, and print the RMS table.
 
     Starts plant, controller, mission and recorder as processes of their own (through `ros2 run`
-    where that is installed), waits until they hear one another, follows the flight, stops them,
-    checks the bag. Set ROS_DOMAIN_ID to watch the flight from another terminal.
+    where that is installed), configures and activates them, follows the flight, stops them,
+    checks the bag. Set ROS_DOMAIN_ID or --domain to watch the flight from another terminal.
 
     \b
     Examples:
       space-robot fly --controller tde_smc --duration 5
       space-robot fly --case 4-2 --bag flights/heavy --json
       space-robot fly --command-latency-ticks 2
+      space-robot fly --swap 5:tde_smc --swap 10:tde_stc
+      space-robot fly --fault kill_controller@3 --restart-controller
+      space-robot fly --fault drop_state@2-4:0.1 --fault noise_rate@0:1e-5 --seed 7
     """
     from .flight.orchestrator import fly as fly_graph
 
     flight = _plan(**options)
-    _report(fly_graph(flight, bag or flight.default_bag()), as_json)
+    report = fly_graph(flight, bag or flight.default_bag())
+    _report(report, as_json)
+    if failures := report["graph"]["failures"]:
+        from space_robot_msgs_py.errors import FlightError
+
+        raise FlightError("; ".join(failures))
 
 
 @cli.command()

@@ -10,6 +10,40 @@ import click
 
 Decorator = Callable[[Any], Any]
 
+
+def _parameters(
+    context: click.Context, option: click.Parameter, given: Any
+) -> dict[str, dict[str, Any]]:
+    """``plant.hold_ticks=40`` to ``{"plant": {"hold_ticks": 40}}``; a scenario gives the latter."""
+    if isinstance(given, dict):
+        return given
+    import yaml
+
+    tree: dict[str, dict[str, Any]] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        node, _, parameter = name.partition(".")
+        if not (equals and parameter):
+            raise click.BadParameter(f"{text!r}: NODE.PARAM=VALUE expected")
+        tree.setdefault(node, {})[parameter] = yaml.safe_load(value)
+    return tree
+
+
+def _scenario(context: click.Context, option: click.Parameter, path: Path | None) -> None:
+    """Take a scenario's values as the options' defaults."""
+    if path is None:
+        return
+    from space_robot_msgs_py.validation import one_of, read_yaml
+
+    names = [parameter.name for parameter in context.command.params if parameter.name]
+    content = read_yaml(path)
+    for key in content:
+        one_of(
+            key, [name for name in names if name not in ("scenario", "help")], "key", f" in {path}"
+        )
+    context.default_map = {**(context.default_map or {}), **content}
+
+
 OPTIONS: dict[str, Decorator] = {
     "controller": click.option(
         "--controller", default="tde_stc", show_default=True,
@@ -35,6 +69,16 @@ OPTIONS: dict[str, Decorator] = {
     "friction": click.option(
         "--friction/--no-friction", default=True, show_default=True,
         help="Joint friction of the case, or none."),
+    "swap": click.option(
+        "--swap", "swaps", multiple=True, metavar="T:LAW",
+        help="Swap to LAW at T simulated seconds; may be repeated."),
+    "set": click.option(
+        "--set", "parameters", multiple=True, metavar="NODE.PARAM=VALUE", callback=_parameters,
+        help="Any parameter of a node, as plant.hold_ticks=40; may be repeated."),
+    "scenario": click.option(
+        "--scenario", type=click.Path(path_type=Path), is_eager=True, callback=_scenario,
+        expose_value=False,
+        help="YAML file with any of these options; those given here come first."),
     "json": click.option(
         "--json", "as_json", is_flag=True, help="Print the report as JSON."),
 }  # fmt: skip

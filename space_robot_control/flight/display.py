@@ -44,9 +44,25 @@ def print_report(report: dict[str, Any], console: Console) -> None:
         console.print(f"ticks the controller did not answer in time: {report['unanswered_ticks']}")
 
 
-@contextmanager
-def flight_progress(total_s: float, what: str) -> Iterator[Callable[[float, str], None]]:
+class FlightProgress:
     """A progress line on standard error; call it with simulated seconds and a remark."""
+
+    def __init__(self, progress: Progress, total_s: float, what: str) -> None:
+        self._progress = progress
+        self._task = progress.add_task(what, total=total_s, remark="")
+
+    def __call__(self, simulated_s: float, remark: str = "") -> None:
+        """Show how far the flight is."""
+        self._progress.update(self._task, completed=simulated_s, remark=remark)
+
+    def say(self, text: str) -> None:
+        """A line above the progress, which stays."""
+        self._progress.console.print(text, highlight=False, markup=False)
+
+
+@contextmanager
+def flight_progress(total_s: float, what: str) -> Iterator[FlightProgress]:
+    """A progress line for a flight of ``total_s``."""
     console = Console(stderr=True)
     columns = (
         TextColumn("{task.description}"),
@@ -56,12 +72,7 @@ def flight_progress(total_s: float, what: str) -> Iterator[Callable[[float, str]
         TextColumn("{task.fields[remark]}"),
     )
     with Progress(*columns, console=console, refresh_per_second=5) as progress:
-        task = progress.add_task(what, total=total_s, remark="")
-
-        def update(simulated_s: float, remark: str = "") -> None:
-            progress.update(task, completed=simulated_s, remark=remark)
-
-        yield update
+        yield FlightProgress(progress, total_s, what)
 
 
 @contextmanager

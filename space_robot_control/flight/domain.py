@@ -17,15 +17,17 @@ DOMAINS = range(1, 102)
 
 
 @contextmanager
-def ros_domain() -> Iterator[int]:
-    """The user's ROS_DOMAIN_ID, or a free one held until the context ends.
+def ros_domain(given: int | None = None) -> Iterator[int]:
+    """``given``, or the user's ROS_DOMAIN_ID, or a free one held until the context ends.
 
     Raises:
         FlightError: none is free.
     """
-    given = os.environ.get("ROS_DOMAIN_ID")
-    if given is not None and given.isdecimal():
-        yield int(given)
+    of_user = os.environ.get("ROS_DOMAIN_ID", "")
+    if given is None and of_user.isdecimal():
+        given = int(of_user)
+    if given is not None:
+        yield given
         return
     start = os.getpid() % len(DOMAINS)
     for domain in [*DOMAINS[start:], *DOMAINS[:start]]:

@@ -3,14 +3,30 @@
 from __future__ import annotations
 
 import os
+import time
+from typing import Any, NamedTuple
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.codecs import TelemetryCodec
+from space_robot_msgs_py.definitions import decode
 from space_robot_msgs_py.ros.process_environment import set_defaults
+
+DIAGNOSTICS = topics.Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100, ())
+
+
+class Event(NamedTuple):
+    """Something that happened in a flight."""
+
+    simulated_s: float
+    node: str
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.simulated_s:8.3f} s  {self.node}: {self.what}"
 
 
 class Monitor:
-    """Simulated time from /clock and current errors from /controller/telemetry."""
+    """Simulated time from /clock, errors from telemetry, the nodes' modes from /diagnostics."""
 
     def __init__(self, domain: int) -> None:
         set_defaults()
@@ -25,31 +41,52 @@ class Monitor:
             args=[], context=self._context, domain_id=domain,
             signal_handler_options=SignalHandlerOptions.NO,
         )  # fmt: skip
-        self._node = rclpy.create_node(
+        self.node = rclpy.create_node(
             f"flight_monitor_{os.getpid()}", context=self._context,
             start_parameter_services=False, enable_rosout=False,
         )  # fmt: skip
         group = TakenByLoop()
-        self._clock = In(self._node, topics.CLOCK, group, depth=1)
-        self._telemetry = In(self._node, topics.TELEMETRY, group, depth=1)
+        self._clock = In(self.node, topics.CLOCK, group, depth=1)
+        self._telemetry = In(self.node, topics.TELEMETRY, group, depth=1)
+        self._diagnostics = In(self.node, DIAGNOSTICS, group)
         self.simulated_s = 0.0
         self.has_begun = False
         """Whether the plant has sent a tick."""
         self.errors: tuple[float, float] | None = None
         """Largest current attitude error (eps) and joint error (rad)."""
+        self.modes: dict[str, str] = {}
+        """What each node does, by ROS name."""
+        self.values: dict[str, dict[str, str]] = {}
+        """What each node last reported."""
+        self.heard_at: dict[str, float] = {}
+        """When, by the monotonic clock."""
 
-    def poll(self) -> None:
-        """Take the newest messages."""
+    def poll(self) -> list[Event]:
+        """Take the newest messages; the nodes' changes of mode."""
         from space_robot_msgs_py.cdr import header_stamp_ns
 
+        events = []
         while (data := self._clock.take()) is not None:
             self.simulated_s, self.has_begun = header_stamp_ns(data) / 1e9, True
         while (data := self._telemetry.take()) is not None:
             _, rows = TelemetryCodec.decode(data)
             error = abs(rows[TelemetryCodec.ROWS.index("e")])
             self.errors = float(error[:3].max()), float(error[3:].max())
+        while (data := self._diagnostics.take()) is not None:
+            for status in decode(data, DIAGNOSTICS.type).status:
+                events += self._take_status(status)
+        return events
+
+    def _take_status(self, status: Any) -> list[Event]:
+        name, mode = status.name, status.message
+        self.heard_at[name] = time.monotonic()
+        self.values[name] = {item.key: item.value for item in status.values}
+        if self.modes.get(name) == mode:
+            return []
+        self.modes[name] = mode
+        return [Event(self.simulated_s, name, mode)]
 
     def close(self) -> None:
         """Leave the graph."""
-        self._node.destroy_node()
+        self.node.destroy_node()
         self._context.try_shutdown()

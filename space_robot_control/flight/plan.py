@@ -12,6 +12,7 @@ from pydantic import Field
 
 from space_robot_msgs_py.configuration import named_file
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.fault import KINDS, parse_faults
 from space_robot_msgs_py.validation import Strict
 from space_robot_sim.plant import Plant
 from space_robot_sim.plant_settings import PlantNodeSettings
@@ -20,6 +21,7 @@ from space_robot_sim.robot import Robot
 from ..controller import Controller
 from ..mission import Mission
 from ..settings import ControllerNodeSettings, MissionNodeSettings, build_law
+from ..swaps import parse_swaps
 
 
 class FlightPlan(Strict):
@@ -35,8 +37,26 @@ class FlightPlan(Strict):
     friction: bool = True
     realtime: bool = False
     fifo_priority: int = 0
+    faults: list[str] = Field(default_factory=list)
+    """What fails, each as ``KIND@T[-END][:ARGUMENT]``, see `space_robot_msgs_py.fault`."""
+    seed: Annotated[int, Field(ge=0)] = 0
+    """Of the faults' random numbers."""
+    swaps: list[str] = Field(default_factory=list)
+    """Laws to swap to in flight, each as ``T:LAW``."""
+    restart_controller: bool = False
+    """Whether a controller that died or hangs is started again."""
+    domain: Annotated[int | None, Field(ge=0, le=232)] = None
+    """ROS domain to fly in (None: ROS_DOMAIN_ID, or a free one)."""
     parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """Further parameters by node, dotted names."""
+
+    def faults_of(self, where: str) -> list[str]:
+        """Those that ``where`` ("plant" or "orchestrator") brings about.
+
+        Raises:
+            InputError: a fault that cannot be.
+        """
+        return [str(f) for f in parse_faults(self.faults, KINDS) if KINDS[f.kind].where == where]
 
     def overrides(self, node: str) -> dict[str, Any]:
         """The parameters a node is given, by dotted name."""
@@ -48,12 +68,17 @@ class FlightPlan(Strict):
                 "realtime": self.realtime,
                 "command_latency_ticks": self.command_latency_ticks,
                 "fifo_priority": self.fifo_priority,
+                "faults": self.faults_of("plant") or [""],
+                "fault_seed": self.seed,
                 **({} if self.friction else {"friction.coulomb": 0.0, "friction.viscous": 0.0}),
             },
             ControllerNodeSettings.node: {
                 "controller": self.controller,
                 "gains": self.gains,
                 "fifo_priority": self.fifo_priority,
+                "swaps": self.swaps or [""],
+                # by the wall clock there is no time to wait
+                **({"reference_timeout": 0.0} if self.realtime else {}),
             },
             MissionNodeSettings.node: {"mission": self.mission},
         }
@@ -79,6 +104,7 @@ class Flight:
         )
         self.period = self.plant_settings.period
         self.timebase = self.plant_settings.timebase
+        self.orchestrator_faults = parse_faults(plan.faults_of("orchestrator"), KINDS)
         self.plant, self.controller, self.mission = self._build()
         duration = self.mission.duration if plan.duration is None else plan.duration
         if duration <= 0.0:
@@ -88,8 +114,21 @@ class Flight:
     def _build(self) -> tuple[Plant, Controller, Mission]:
         plant = Plant(self.robot, self.plant_settings, self.period)
         mission = Mission(self.robot.n, self.mission_settings, self.period)
-        law = build_law(self.plan.controller, self.controller_settings, self.robot.n + 3)
-        return plant, Controller(self.robot, law, self.period), mission
+        settings, axes = self.controller_settings, self.robot.n + 3
+        law = build_law(self.plan.controller, settings, axes)
+        self.swaps = [
+            (swap.tick, build_law(swap.name, settings, axes))
+            for swap in parse_swaps(settings.swaps, self.period)
+        ]
+        """Ticks and the laws in force from there on."""
+        controller = Controller(self.robot, law, self.period, settings.acceleration_filter_hz)
+        return plant, controller, mission
+
+    @property
+    def has_gaps(self) -> bool:
+        """Whether messages may be missing that nobody has lost."""
+        plan = self.plan
+        return plan.realtime or bool(plan.faults) or plan.restart_controller
 
     @property
     def description(self) -> dict[str, Any]:
@@ -106,6 +145,9 @@ class Flight:
             "command_latency_ticks": self.plant_settings.command_latency_ticks,
             "friction": plan.friction,
             "realtime": plan.realtime,
+            **({"faults": plan.faults, "seed": plan.seed} if plan.faults else {}),
+            **({"swaps": plan.swaps} if plan.swaps else {}),
+            **({"restart_controller": True} if plan.restart_controller else {}),
         }
 
     def default_bag(self) -> Path:

@@ -84,6 +84,17 @@ class NodeProcess:
         """None while it runs."""
         return self._process.poll()
 
+    def obituary(self) -> str:
+        """How it ended, once it has."""
+        time.sleep(0.1)  # let it finish its last line
+        code = self.exit_code or 0
+        how = f"with exit code {code}" if code >= 0 else f"by signal {-code}"
+        return f"{self.node} ended {how}"
+
+    def death(self) -> FlightError:
+        """What to raise when it has ended too early."""
+        return FlightError(f"{self.obituary()} before the flight did:\n{self.last_words()}")
+
     def last_words(self) -> str:
         """The end of what it printed."""
         self._output.seek(0)
@@ -97,6 +108,7 @@ class NodeProcess:
 
     def stop(self, patience_s: float = 10.0) -> None:
         """Ask it to end, insist, then force; returns when its group is gone."""
+        self.signal(signal.SIGCONT)  # a stopped process would not hear the rest
         for number, wait_s in ((signal.SIGINT, patience_s), (signal.SIGTERM, 2.0)):
             if self.exit_code is not None:
                 break
@@ -137,6 +149,14 @@ class Graph:
         for node in self.nodes.values():
             node.close()
 
+    def restart(self, name: str, command: Sequence[str]) -> None:
+        """Put a new process in the place of one that is dead or hangs."""
+        old = self.nodes[name]
+        old.signal(signal.SIGKILL)
+        old.stop()
+        old.close()
+        self.nodes[name] = NodeProcess(name, command, self._environment)
+
     def check(self) -> bool:
         """Whether the plant has flown to its end.
 
@@ -144,11 +164,6 @@ class Graph:
             FlightError: a node has died; with its last words.
         """
         for name, node in self.nodes.items():
-            code = node.exit_code
-            if code is not None and (code != 0 or name != "plant"):
-                time.sleep(0.1)  # let it finish its last line
-                ended = f"with exit code {code}" if code >= 0 else f"by signal {-code}"
-                raise FlightError(
-                    f"{name} ended {ended} before the flight did:\n{node.last_words()}"
-                )
+            if node.exit_code is not None and (node.exit_code != 0 or name != "plant"):
+                raise node.death()
         return self.nodes["plant"].exit_code == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag import BagRecorder
 from space_robot_msgs_py.codecs import ClockCodec, CommandCodec, StateCodec, TelemetryCodec
+from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_msgs_py.reference_codec import ReferenceCodec
 from space_robot_msgs_py.samples import Command
@@ -94,14 +96,18 @@ def simulate(
 
     Raises:
         FlightError: the flight diverged or met a singular attitude; the bag is closed.
-        InputError: the bag cannot be written.
+        InputError: the bag cannot be written, or faults are to be injected.
     """
+    if flight.plan.faults:
+        raise InputError(f"faults {flight.plan.faults}: they need the graph of nodes: use `fly`")
     plant, controller, ticks = flight.plant, flight.controller, flight.ticks
-    log = unflown(flight)
+    log, swaps = unflown(flight), dict(flight.swaps)
+    cuts = sorted({*range(0, ticks, STRETCH_TICKS), *(k for k in swaps if k < ticks), ticks})
     with _recording(flight, bag) as messages:
-        for start in range(0, ticks, STRETCH_TICKS):
+        for start, stop in itertools.pairwise(cuts):
             progress(start)
-            stop = min(start + STRETCH_TICKS, ticks)
+            if start in swaps and swaps[start].name != controller.law.name:
+                controller.law = swaps[start]
             close_loop(plant, controller, log, start, stop)
             if messages:
                 messages.stretch(log, start, stop)

@@ -1,0 +1,81 @@
+"""What the orchestrator does when a node dies or hangs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+from .monitor import Event, Monitor
+from .processes import Graph, NodeProcess
+
+HUNG_S = 2.0
+"""Without a word for this long a controller hangs; its diagnostics come every second."""
+MOST_RESTARTS = 20
+
+
+class Watch:
+    """Keeps the flight going where that makes sense.
+
+    Without its plant a flight is over. A controller is restarted if that is wanted. Without
+    recorder or mission the flight goes on: the one costs the bag's end, without the other the last
+    point of the reference is held.
+    """
+
+    def __init__(
+        self,
+        graph: Graph,
+        monitor: Monitor,
+        planned: frozenset[str],
+        restart_command: Sequence[str] | None,
+    ) -> None:
+        """``planned``: nodes that are killed on purpose; ``restart_command``: the controller's."""
+        self._graph, self._monitor = graph, monitor
+        self._planned, self._restart_command = planned, restart_command
+        self._gone: set[str] = set()
+        self.restarts = 0
+        self.failures: list[str] = []
+        """What keeps the flight from being whole."""
+
+    def poll(self, simulated_s: float) -> list[Event]:
+        """Look after all nodes.
+
+        Raises:
+            FlightError: the flight cannot go on.
+        """
+        events = []
+        for name, node in list(self._graph.nodes.items()):
+            hangs = name == "controller" and self._restart_command is not None and self._hangs(name)
+            if (node.exit_code is None and not hangs) or name in self._gone:
+                continue
+            if name == "plant":
+                if node.exit_code != 0:
+                    raise node.death()
+                continue
+            ended = "does not answer" if hangs else node.obituary()
+            events.append(Event(simulated_s, f"{name}_node", ended))
+            if name == "controller":
+                self._lose_controller(node)
+            else:
+                self._gone.add(name)
+                if name == "recorder" or name not in self._planned:
+                    self.failures.append(f"{ended} at {simulated_s:.2f} s")
+        return events
+
+    @property
+    def has_landed(self) -> bool:
+        """Whether the plant has flown to its end."""
+        return self._graph.nodes["plant"].exit_code == 0
+
+    def _hangs(self, name: str) -> bool:
+        heard_at = self._monitor.heard_at.get(f"{name}_node")
+        return heard_at is not None and time.monotonic() - heard_at > HUNG_S
+
+    def _lose_controller(self, node: NodeProcess) -> None:
+        if self._restart_command is not None and self.restarts < MOST_RESTARTS:
+            self.restarts += 1
+            self._graph.restart("controller", self._restart_command)
+            self._monitor.heard_at.pop("controller_node", None)  # until it speaks again
+        elif "controller" in self._planned:
+            self._gone.add("controller")
+        else:
+            raise node.death()
