@@ -6,11 +6,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, ClassVar
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from space_robot_msgs_py.configuration import NodeSettings, named_file
+from space_robot_msgs_py.fault import PLANT_KINDS, Fault, parse_faults
 
 from .plant import PlantSettings
+
+
+def _readable(texts: list[str]) -> list[str]:
+    parse_faults(texts, PLANT_KINDS)
+    return texts
 
 
 class PlantNodeSettings(PlantSettings, NodeSettings):
@@ -42,6 +48,17 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
     wait_for: list[str] = Field(
         [""], description="names of nodes that must listen before the first tick"
     )
+    faults: Annotated[list[str], AfterValidator(_readable)] = Field(
+        [""], description="faults to bring about, each KIND@T[-END][:ARGUMENT], see docs/faults.md"
+    )
+    fault_seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(
+        0, description="seed of the faults' random numbers"
+    )
+
+    @property
+    def parsed_faults(self) -> list[Fault]:
+        """``faults`` without the empty texts."""
+        return parse_faults(self.faults, PLANT_KINDS)
 
     @classmethod
     def layers(cls, selected: Mapping[str, str]) -> list[Path]:

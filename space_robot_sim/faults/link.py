@@ -1,0 +1,77 @@
+"""A link that loses, repeats and delays what is sent over it, in whole ticks."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from .schedule import Schedule
+
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Parcel(Generic[Item]):
+    """Something on its way; parcels sort by arrival."""
+
+    due: int
+    """Tick of arrival."""
+    serial: int
+    """Tells parcels of one tick apart, in the order sent."""
+    stamp: int = field(compare=False)
+    """Tick that is written on it, right or wrong."""
+    item: Item = field(compare=False)
+
+
+class Link(Generic[Item]):
+    """The way of states to the controller (``what`` "state") or of commands back ("command").
+
+    What is sent in one tick shares its fate. Delays add up; where they shrink or scatter, later
+    items may overtake earlier ones. Items that arrive in one tick keep the order of sending.
+    """
+
+    def __init__(self, schedule: Schedule, what: str) -> None:
+        self._drops = schedule.of(f"drop_{what}")
+        self._repeats = schedule.of(f"repeat_{what}")
+        self._delays = schedule.of(f"delay_{what}")
+        self._jitters = schedule.of(f"jitter_{what}")
+        self._under_way: list[Parcel[Item]] = []
+        self._sent = 0
+
+    def send(self, tick: int, item: Item, stamp: int | None = None) -> None:
+        """Put ``item`` on its way at ``tick``; ``stamp`` is the tick it carries if another."""
+        if any(fault.happens_at(tick) for fault in self._drops):
+            return
+        due = tick + sum(int(fault.value) for fault in self._delays if fault.acts_at(tick))
+        for fault in self._jitters:
+            if fault.acts_at(tick):
+                due += fault.choose(tick, int(fault.value) + 1)
+        carried = tick if stamp is None else stamp
+        copies = 1 + any(fault.happens_at(tick) for fault in self._repeats)
+        for copy in range(copies):
+            heapq.heappush(self._under_way, Parcel(due + copy, self._sent, carried, item))
+        self._sent += 1
+
+    def arrivals(self, tick: int) -> list[Parcel[Item]]:
+        """What has arrived up to ``tick`` and was not handed out before, in order of arrival."""
+        arrived = []
+        while self._under_way and self._under_way[0].due <= tick:
+            arrived.append(heapq.heappop(self._under_way))
+        return arrived
+
+    def push(self, tick: int, item: Item, stamp: int | None = None) -> list[Parcel[Item]]:
+        """`send`, then `arrivals`."""
+        self.send(tick, item, stamp)
+        return self.arrivals(tick)
+
+
+def awaited_stamp(states: Iterable[Parcel[Item]], tick: int, answered: int) -> int | None:
+    """The tick whose command will come when these states reach a controller at ``tick``.
+
+    That is the newest stamp among them, for a controller that leaves alone what is no newer than
+    what it answered last (``answered``) and what lies in the future. None: no answer will come.
+    """
+    fresh = [state.stamp for state in states if answered < state.stamp <= tick]
+    return max(fresh, default=None)
