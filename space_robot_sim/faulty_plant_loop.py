@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from space_robot_msgs_py.fault import PLANT_KINDS, parse_faults
 from space_robot_msgs_py.health import Health
 from space_robot_msgs_py.ros.shell import Shell
 
@@ -21,7 +20,7 @@ class FaultyPlantLoop(PlantLoop):
         """See `PlantLoop`; ``settings.faults`` says what fails."""
         super().__init__(shell, settings)
         plant = self._plant
-        faults = parse_faults(settings.faults, PLANT_KINDS)
+        faults = settings.parsed_faults()
         self._faults = PlantFaults(faults, settings.fault_seed, plant.robot, settings.period)
         self._asked = -1
         """Tick of the newest state that a controller can have answered."""

@@ -223,7 +223,7 @@ class PlantLoop:
 
 def make_loop(shell: Shell, settings: PlantNodeSettings) -> PlantLoop:
     """The loop that the settings ask for."""
-    if any(getattr(settings, "faults", [])):
+    if any(settings.faults):
         from .faulty_plant_loop import FaultyPlantLoop
 
         return FaultyPlantLoop(shell, settings)

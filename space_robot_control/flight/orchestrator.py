@@ -21,6 +21,7 @@ from .display import flight_progress
 from .domain import ros_domain
 from .injection import Injector
 from .lifecycle import LifecycleDriver
+from .monitor import Event, Monitor
 from .plan import Flight, check_bag_path
 from .processes import MODULES, Graph, node_command, node_environment
 from .watch import Watch
@@ -113,8 +114,6 @@ def _follow(
     stopped: list[int],
 ) -> dict[str, Any]:  # fmt: skip
     """Start the nodes, show the flight until the plant has ended it; what happened."""
-    from .monitor import Event, Monitor
-
     total_s = flight.ticks * flight.period
     faults = flight.orchestrator_faults
     monitor = Monitor(domain)
