@@ -20,7 +20,7 @@ class FaultyPlantLoop(PlantLoop):
         """See `PlantLoop`; ``settings.faults`` says what fails."""
         super().__init__(shell, settings)
         plant = self._plant
-        faults = settings.parsed_faults()
+        faults = settings.parsed_faults
         self._faults = PlantFaults(faults, settings.fault_seed, plant.robot, settings.period)
         self._asked = -1
         """Tick of the newest state that a controller can have answered."""

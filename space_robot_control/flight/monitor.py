@@ -54,15 +54,14 @@ class Monitor:
         """Whether the plant has sent a tick."""
         self.errors: tuple[float, float] | None = None
         """Largest current attitude error (eps) and joint error (rad)."""
-        self.modes: dict[str, str] = {}
-        """What each node does, by ROS name."""
+        self._modes: dict[str, tuple[int, str]] = {}
         self.values: dict[str, dict[str, str]] = {}
         """What each node last reported."""
         self.heard_at: dict[str, float] = {}
         """When, by the monotonic clock."""
 
     def poll(self) -> list[Event]:
-        """Take the newest messages; the nodes' changes of mode."""
+        """Take the newest messages; the nodes' changes of mode that are worth a word."""
         from space_robot_msgs_py.cdr import header_stamp_ns
 
         events = []
@@ -81,10 +80,9 @@ class Monitor:
         name, mode = status.name, status.message
         self.heard_at[name] = time.monotonic()
         self.values[name] = {item.key: item.value for item in status.values}
-        if self.modes.get(name) == mode:
-            return []
-        self.modes[name] = mode
-        return [Event(self.simulated_s, name, mode)]
+        before, self._modes[name] = self._modes.get(name), (status.level, mode)
+        is_news = before != (status.level, mode) and (status.level > 0 or (before or (0,))[0] > 0)
+        return [Event(self.simulated_s, name, mode)] if is_news else []
 
     def close(self) -> None:
         """Leave the graph."""

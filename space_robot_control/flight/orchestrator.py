@@ -115,6 +115,7 @@ def _follow(
 ) -> dict[str, Any]:  # fmt: skip
     """Start the nodes, show the flight until the plant has ended it; what happened."""
     total_s = flight.ticks * flight.period
+    last_clock_s = flight.plant_settings.clock_decimation * flight.period
     faults = flight.orchestrator_faults
     monitor = Monitor(domain)
     injector = Injector(faults, graph)
@@ -132,6 +133,7 @@ def _follow(
         with flight_progress(total_s, flight.controller.law.name) as show:
             show(0.0, "configuring the nodes")
             _bring_up(graph, monitor, stopped)
+            show.say(f"configured and active: {', '.join(ORDER)}")
             show(0.0, "waiting for the nodes")
             while not watch.has_landed:
                 if stopped:
@@ -149,11 +151,11 @@ def _follow(
                     raise FlightError(
                         f"no progress for {STALL_TIMEOUT_S:.0f} s at {last_time:.2f} s:\n{words}"
                     )
-                for event in news:
-                    show.say(str(event))
-                events += news
+                if monitor.simulated_s < total_s - last_clock_s:  # what ends then is meant to
+                    for event in news:
+                        show.say(str(event))
+                    events += news
             show(total_s, "")
-        monitor.poll()
     finally:
         monitor.close()
     return {
