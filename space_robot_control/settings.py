@@ -60,7 +60,7 @@ class ControllerNodeSettings(NodeSettings):
         2.0, description="s by the wall clock to wait for a reference; then its last point is held"
     )
     state_timeout: Annotated[float, Field(ge=0.001, le=1e6)] = Field(
-        0.5, description="s by the wall clock without a state until that is reported"
+        2.0, description="s by the wall clock without a state until that is reported"
     )
     wait_for: list[str] = Field(
         [""], description="names of nodes that must listen before the first command"

@@ -14,6 +14,7 @@ from space_robot_msgs_py.configuration import named_file
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.fault import KINDS, parse_faults
 from space_robot_msgs_py.validation import Strict
+from space_robot_sim.faults import PlantFaults
 from space_robot_sim.plant import Plant
 from space_robot_sim.plant_settings import PlantNodeSettings
 from space_robot_sim.robot import Robot
@@ -113,6 +114,9 @@ class Flight:
 
     def _build(self) -> tuple[Plant, Controller, Mission]:
         plant = Plant(self.robot, self.plant_settings, self.period)
+        PlantFaults(
+            self.plant_settings.parsed_faults, self.plan.seed, self.robot, self.period
+        )  # checks them before anything starts
         mission = Mission(self.robot.n, self.mission_settings, self.period)
         settings, axes = self.controller_settings, self.robot.n + 3
         law = build_law(self.plan.controller, settings, axes)

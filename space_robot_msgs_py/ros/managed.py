@@ -151,7 +151,8 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             self.error = error
             if undo:
                 undo()
-            self.get_logger().error(str(error))
+            if not self.autostart:  # else the process ends with these words
+                self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
         except Exception as error:  # rclpy would swallow it without a word
             self.error = SpaceRobotError(f"unforeseen {type(error).__name__}: {error}")
