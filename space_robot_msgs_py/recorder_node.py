@@ -51,32 +51,57 @@ class RecorderLoop:
         self._recorder = BagRecorder(path, {"period": settings.period, **flight}, settings.timebase)
         group = TakenByLoop()
         self._inputs = [In(shell.node, topic, group, QUEUE_DEPTH) for topic in topics.ALL]
+        self._told = self._closed = False
         shell.log(f"recording to {path}")
 
+    @property
+    def failure(self) -> str:
+        """Why the bag is no longer written (empty: all is well)."""
+        return self._recorder.failure
+
     def run(self) -> None:
-        """Record until told to stop and everything sent has come; then close the bag."""
-        os.nice(NICENESS)
+        """Record until told to stop and everything sent has come."""
+        os.nice(max(0, NICENESS - os.nice(0)))
         try:
             last_arrival = time.monotonic()
             while not self._shell.stopping or time.monotonic() - last_arrival < SILENCE_S:
                 if self._drain():
                     last_arrival = time.monotonic()
+                self._recorder.flush_if_due()
+                self._tell_failure()
                 self._shell.serve()
                 time.sleep(self._settings.drain_period)
         finally:
-            self._recorder.close()
-        received = sum(c.received for c in self._recorder.coverages.values())
+            self._recorder.flush()
+            self.close()
+
+    def close(self) -> None:
+        """Close the bag; a second call does nothing.
+
+        Raises:
+            FlightError: the bag could not be written to its end.
+        """
+        if self._closed:
+            return
+        self._closed = True
         lost = {name: count for name, count in self._recorder.lost.items() if count}
-        self._shell.log(f"{received} messages received, missing: {lost or 0}")
+        self._shell.log(f"{self._recorder.received} messages received, missing: {lost or 0}")
+        self._recorder.close()
 
     def _drain(self) -> int:
         count = 0
         for entry in self._inputs:
             while (data := entry.take()) is not None:
                 self._recorder.record(entry.topic, data)
+                self._recorder.flush_if_due()  # a long backlog takes seconds
                 count += 1
                 os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
         return count
+
+    def _tell_failure(self) -> None:
+        if self.failure and not self._told:
+            self._told = True
+            self._shell.log(f"the bag is no longer written: {self.failure}; the flight goes on")
 
 
 def main() -> NoReturn:
