@@ -32,7 +32,7 @@ setup(
         "jinja2>=3.1",
         "markdown-it-py>=3",
         "matplotlib>=3.8",
-        "mcap>=1.1",
+        "mcap>=1.5",
         "numba>=0.58.1",
         "numpy>=1.26,<3",
         "psutil>=5.9",

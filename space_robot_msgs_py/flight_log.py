@@ -43,6 +43,8 @@ class FlightLog:
     """Missing messages a topic."""
     unanswered: int = 0
     """Ticks without a command of their own (by the wall clock only)."""
+    unfinished: str = ""
+    """What is known of a bag that nobody finished; empty for a whole one."""
     commanded_torque: Array | None = None
     """(N, n+3) N m, the controller's answer to the tick; of flights in this process only."""
     telemetry: Array | None = None

@@ -14,7 +14,7 @@ from . import topics
 from .bag import BagRecorder
 from .configuration import NodeSettings
 from .errors import InputError
-from .health import Health
+from .health import Health, Level
 from .ros.endpoints import In, TakenByLoop
 from .ros.shell import Shell, run_node
 
@@ -52,41 +52,61 @@ class RecorderLoop:
         self._recorder = BagRecorder(path, {"period": settings.period, **flight}, settings.timebase)
         group = TakenByLoop()
         self._inputs = [In(shell.node, topic, group, QUEUE_DEPTH) for topic in topics.ALL]
+        self._told = False
         shell.log(f"recording to {path}")
+
+    @property
+    def failure(self) -> str:
+        """Why the bag is no longer written (empty: all is well)."""
+        return self._recorder.failure
 
     def run(self) -> None:
         """Record until told to stop and everything sent has come."""
-        os.nice(NICENESS)
+        os.nice(max(0, NICENESS - os.nice(0)))
         last_arrival = time.monotonic()
         while not self._shell.stopping or time.monotonic() - last_arrival < SILENCE_S:
             if self._drain():
                 last_arrival = time.monotonic()
+            self._recorder.flush_if_due()
+            self._tell_failure()
             self._shell.serve()
             time.sleep(self._settings.drain_period)
+        self._recorder.flush()
 
     def stand_down(self) -> None:
         """Everything sent is in the bag when `run` returns."""
 
     def health(self) -> Health:
-        """What has come."""
-        received = sum(c.received for c in self._recorder.coverages.values())
-        return Health("nominal", values={"received": received})
+        """What has come, and whether it is kept."""
+        values = {"received": self._recorder.received}
+        if self.failure:
+            return Health(f"not recording: {self.failure}", Level.ERROR, values)
+        return Health("nominal", values=values)
 
     def close(self) -> None:
-        """Close the bag."""
-        self._recorder.close()
-        received = sum(c.received for c in self._recorder.coverages.values())
+        """Close the bag.
+
+        Raises:
+            FlightError: the bag could not be written to its end.
+        """
         lost = {name: count for name, count in self._recorder.lost.items() if count}
-        self._shell.log(f"{received} messages received, missing: {lost or 0}")
+        self._shell.log(f"{self._recorder.received} messages received, missing: {lost or 0}")
+        self._recorder.close()
 
     def _drain(self) -> int:
         count = 0
         for entry in self._inputs:
             while (data := entry.take()) is not None:
                 self._recorder.record(entry.topic, data)
+                self._recorder.flush_if_due()  # a long backlog takes seconds
                 count += 1
                 os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
         return count
+
+    def _tell_failure(self) -> None:
+        if self.failure and not self._told:
+            self._told = True
+            self._shell.log(f"the bag is no longer written: {self.failure}; the flight goes on")
 
 
 def main() -> NoReturn:

@@ -42,6 +42,8 @@ def print_report(report: dict[str, Any], console: Console) -> None:
     console.print(f"messages lost: {lost or 'none'}")
     if report["unanswered_ticks"]:
         console.print(f"ticks the controller did not answer in time: {report['unanswered_ticks']}")
+    if report["unfinished"]:
+        console.print(report["unfinished"])
 
 
 class FlightProgress:

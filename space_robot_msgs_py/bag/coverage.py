@@ -56,22 +56,28 @@ class Coverage:
         return (self.last - self.first) // (self.unit or 1) + 1 - self.received
 
 
-def lost_messages(coverages: Mapping[str, Coverage], realtime: bool = False) -> dict[str, int]:
+def lost_messages(
+    coverages: Mapping[str, Coverage], realtime: bool = False, finished: bool = True
+) -> dict[str, int]:
     """Missing messages a topic; the flight's length is that of the longest per-tick topic.
 
     By the wall clock (``realtime``) a tick without a command (and its telemetry) is one the
-    controller did not answer (`unanswered_ticks`), not a lost message.
+    controller did not answer (`unanswered_ticks`), not a lost message. Of a bag that was not
+    ``finished`` each topic counts up to its own last message: nobody knows what came after.
     """
-    last_tick = _last_tick(coverages)
-    lost = {name: coverage.missing(last_tick) for name, coverage in coverages.items()}
+    lost = {
+        name: coverage.missing(_last_tick(coverages) if finished else coverage.last)
+        for name, coverage in coverages.items()
+    }
     if realtime:
         lost |= dict.fromkeys({topics.COMMAND.name, topics.TELEMETRY.name} & lost.keys(), 0)
     return lost
 
 
-def unanswered_ticks(coverages: Mapping[str, Coverage]) -> int:
+def unanswered_ticks(coverages: Mapping[str, Coverage], finished: bool = True) -> int:
     """Ticks without a command."""
-    return coverages[topics.COMMAND.name].missing(_last_tick(coverages))
+    command = coverages[topics.COMMAND.name]
+    return command.missing(_last_tick(coverages) if finished else command.last)
 
 
 def _last_tick(coverages: Mapping[str, Coverage]) -> int:

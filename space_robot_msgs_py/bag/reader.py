@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
+import struct
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.interfaces import Connection
-from rosbags.rosbag2 import Reader, ReaderError
+from rosbags.rosbag2 import ReaderError
 
 from .. import topics
 from ..codecs import StateCodec
@@ -18,28 +17,31 @@ from ..errors import InputError
 from ..flight_log import FlightLog
 from ..reference_codec import ReferenceCodec
 from ..samples import RobotState, Timebase
-from ..validation import read_yaml
 from .coverage import Coverage, lost_messages, message_tick, unanswered_ticks
+from .folder import Bag, custom_data, open_bag
 from .recorder import COVERAGE_KEY, FLIGHT_KEY
 
 REQUIRED = (
     topics.JOINT_STATES, topics.BASE_STATE, topics.REFERENCE_JOINTS, topics.REFERENCE_BASE,
 )  # fmt: skip
+UNREADABLE = (
+    ReaderError, OSError, ValueError, LookupError, StopIteration, RuntimeError, struct.error,
+)  # fmt: skip
 
 
 def read_flight(path: Path) -> FlightLog:
-    """Read a flight.
+    """Read a flight; of a bag that nobody finished (`FlightLog.unfinished`) what is there.
 
     Raises:
-        InputError: no bag is there, it is not whole, or a needed topic is missing or empty.
+        InputError: no bag is there, it cannot be read, a needed topic is missing or empty, or not
+            one tick is whole.
     """
-    if not (path / "metadata.yaml").is_file():
-        hint = "not a bag folder (no metadata.yaml)" if path.exists() else "no such bag"
-        raise InputError(f"{path}: {hint}")
     try:
-        with Reader(path) as reader:
-            return _read(reader, path)
-    except (ReaderError, OSError, ValueError, KeyError) as error:
+        bag = open_bag(path)
+        return _read(bag, path)
+    except InputError:
+        raise
+    except UNREADABLE as error:
         raise InputError(f"{path}: cannot be read as a flight ({error})") from None
 
 
@@ -47,54 +49,51 @@ def read_coverage(path: Path) -> dict[str, dict[str, int]]:
     """How many messages of each topic the recorder counted: received, missing, repeated.
 
     Empty for a bag of another recorder.
+
+    Raises:
+        InputError: there is no finished bag.
     """
-    counts: dict[str, dict[str, int]] = json.loads(_custom_data(path).get(COVERAGE_KEY, "{}"))
+    counts: dict[str, dict[str, int]] = json.loads(custom_data(path).get(COVERAGE_KEY, "{}"))
     return counts
 
 
-def _read(reader: Reader, path: Path) -> FlightLog:
-    by_topic = {c.topic: c for c in reader.connections if c.topic in topics.BY_NAME}
+def _read(bag: Bag, path: Path) -> FlightLog:
+    counts = bag.counts()
+    state = "" if bag.finished else " (the bag was not finished)"
     for topic in REQUIRED:
-        connection = by_topic.get(topic.name)
-        if connection is None or not connection.msgcount:
-            raise InputError(f"{path}: no messages on {topic.name}")
-    flight = _description(path)
+        if not counts.get(topic.name):
+            raise InputError(f"{path}: no messages on {topic.name}{state}")
+    flight = json.loads(bag.custom_data().get(FLIGHT_KEY, "{}"))
     timebase = Timebase(round(float(flight.get("period", 0.0005)) * 1e9))
-    joints_connection = by_topic[topics.JOINT_STATES.name]
-    first = next(iter(reader.messages([joints_connection])))[2]
-    names = tuple(decode(bytes(first), topics.JOINT_STATES.type).name)
-    log = FlightLog.allocate(joints_connection.msgcount, names, timebase)
+    _, first = next(bag.messages(topics.JOINT_STATES))
+    names = tuple(decode(first, topics.JOINT_STATES.type).name)
+    log = FlightLog.allocate(counts[topics.JOINT_STATES.name], names, timebase)
     log.flight = flight
-    coverages = _fill(reader, list(by_topic.values()), log)
-    log.lost = lost_messages(coverages, bool(flight.get("realtime")))
+    recorded = [topic for topic in topics.ALL if topic.name in counts]
+    coverages = _fill(bag, recorded, log)
+    log.lost = lost_messages(coverages, bool(flight.get("realtime")), bag.finished)
     if topics.COMMAND.name in coverages:
-        log.unanswered = unanswered_ticks(coverages)
+        log.unanswered = unanswered_ticks(coverages, bag.finished)
     whole = int(np.argmin(np.append(_complete_rows(log), False)))
+    if not whole:
+        raise InputError(f"{path}: not one tick with its state and reference{state}")
+    if not bag.finished:
+        last_s = timebase.stamp_ns(whole - 1) / 1e9
+        log.unfinished = f"the bag was not finished: read up to t = {last_s:.4f} s"
     return log.truncated(whole)
 
 
-def _description(path: Path) -> dict[str, Any]:
-    """What our recorder noted of the flight; empty for a bag of another recorder."""
-    description: dict[str, Any] = json.loads(_custom_data(path).get(FLIGHT_KEY, "{}"))
-    return description
-
-
-def _custom_data(path: Path) -> dict[str, str]:
-    information = read_yaml(path / "metadata.yaml")["rosbag2_bagfile_information"]
-    return information["custom_data"] or {}
-
-
-def _fill(reader: Reader, connections: list[Connection], log: FlightLog) -> dict[str, Coverage]:
+def _fill(bag: Bag, recorded: list[topics.Topic], log: FlightLog) -> dict[str, Coverage]:
     states, references = (
         StateCodec(log.joint_names, log.timebase),
         ReferenceCodec(log.joint_names, log.timebase),
     )
     state = RobotState.allocate(len(log.joint_names))
-    coverages = {c.topic: Coverage(topics.BY_NAME[c.topic]) for c in connections}
-    for connection, _, raw in reader.messages(connections):
-        topic, data = topics.BY_NAME[connection.topic], bytes(raw)
+    coverages = {topic.name: Coverage(topic) for topic in recorded}
+    for name, data in bag.messages(*recorded):
+        topic = topics.BY_NAME[name]
         tick = message_tick(topic, data, log.timebase)
-        if not coverages[topic.name].take(tick):
+        if not coverages[name].take(tick):
             continue
         if topic is topics.JOINT_STATES and tick < log.ticks:
             states.decode_joints(data, state)

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from .. import topics
+from ..errors import FlightError
 from ..samples import Timebase
 from .coverage import Coverage, lost_messages, message_tick
 from .writer import BagWriter
 
 FLIGHT_KEY = "space_robot.flight"
 COVERAGE_KEY = "space_robot.coverage"
+CHUNK_BYTES = 1 << 20
+CHUNK_AGE_S = 0.4
+"""A killed recorder loses the open chunk, so none stays open for longer."""
 
 
 class BagRecorder:
@@ -21,6 +26,9 @@ class BagRecorder:
 
     The log time of a message is its simulated stamp. A message that came before (a plant that
     asked again, a mission that started anew) is counted and left out.
+
+    A bag that can no longer be written (disk full, folder gone) stops nobody: `failure` says why,
+    later messages are counted and let go, and `close` raises.
     """
 
     def __init__(self, path: Path, flight: Mapping[str, Any], timebase: Timebase) -> None:
@@ -29,26 +37,106 @@ class BagRecorder:
         Raises:
             InputError: the bag exists already, or cannot be written.
         """
-        self._writer = BagWriter(path, topics.ALL)
-        self._flight = dict(flight)
+        self._flight = json.dumps(dict(flight))
+        self._realtime = bool(flight.get("realtime"))
+        self._writer = BagWriter(path, topics.ALL, {FLIGHT_KEY: self._flight})
         self._timebase = timebase
         self.coverages = {topic.name: Coverage(topic) for topic in topics.ALL}
+        self.failure = ""
+        """Why nothing is written any more (empty: all is well)."""
+        self.kept_tick = -1
+        """The last tick whose state is in the file for good; -1: none."""
+        self._kept = 0
+        self._flush_at = time.monotonic() + CHUNK_AGE_S
+        self._closed = False
 
     def record(self, topic: topics.Topic, data: bytes) -> None:
-        """Add one serialized message."""
+        """Add one serialized message.
+
+        Raises:
+            MessageError: its stamp is not a whole number of ticks.
+        """
         tick = message_tick(topic, data, self._timebase)
-        if self.coverages[topic.name].take(tick):
-            self._writer.write(topic, self._timebase.stamp_ns(tick), data, tick)
+        if not self.coverages[topic.name].take(tick) or self.failure:
+            return
+        if self._writer.write(topic, self._timebase.stamp_ns(tick), data, tick) > CHUNK_BYTES:
+            self.flush()
+
+    def flush(self) -> None:
+        """End the open chunk: what was recorded is with the kernel and survives this process."""
+        if not self.failure and not self._closed:
+            try:
+                self._writer.flush()
+            except OSError as error:
+                self._fail(error)
+            else:
+                self._kept = self.received
+                self.kept_tick = min(
+                    self.coverages[topic.name].last
+                    for topic in (topics.JOINT_STATES, topics.BASE_STATE)
+                )
+        self._flush_at = time.monotonic() + CHUNK_AGE_S
+
+    def flush_if_due(self) -> None:
+        """`flush` if the open chunk may be older than `CHUNK_AGE_S`; call it often."""
+        if time.monotonic() >= self._flush_at:
+            self.flush()
+
+    @property
+    def received(self) -> int:
+        """Messages recorded, repeated ones left out."""
+        return sum(coverage.received for coverage in self.coverages.values())
+
+    @property
+    def unkept(self) -> int:
+        """Messages that came but are not in the bag, because it could not be written."""
+        return self.received - self._kept if self.failure else 0
 
     @property
     def lost(self) -> dict[str, int]:
-        """Missing messages a topic, so far."""
-        return lost_messages(self.coverages, bool(self._flight.get("realtime")))
+        """Messages a topic that never came, so far."""
+        return lost_messages(self.coverages, self._realtime)
 
     def close(self) -> None:
-        """Make the bag whole, with the flight's description and the counts in its metadata."""
+        """Make the bag whole, with the flight's description and the counts in its metadata.
+
+        A second call does nothing.
+
+        Raises:
+            FlightError: the bag could not be written to its end.
+        """
+        if self._closed:
+            return
+        self.flush()
+        self._closed = True
+        if not self.failure:
+            try:
+                self._finish()
+            except OSError as error:
+                self._fail(error)
+        if self.failure:
+            kept = f"tick {self.kept_tick} (t = {self.kept_tick * self._timebase.period:.4f} s)"
+            raise FlightError(
+                f"{self._writer.path}: could not be written to the end ({self.failure}): "
+                f"last tick kept: {kept if self.kept_tick >= 0 else 'none'}, "
+                f"messages not kept: {self.unkept}"
+            )
+
+    def _finish(self) -> None:
         counts = {
             name: {"received": c.received, "missing": lost, "repeated": c.repeated}
             for (name, c), lost in zip(self.coverages.items(), self.lost.values(), strict=True)
         }
-        self._writer.close({FLIGHT_KEY: json.dumps(self._flight), COVERAGE_KEY: json.dumps(counts)})
+        ticks = [t for c in self.coverages.values() if c.received for t in (c.first, c.last)]
+        stamp_ns = self._timebase.stamp_ns
+        self._writer.close(
+            {name: c.received for name, c in self.coverages.items()},
+            (stamp_ns(min(ticks)), stamp_ns(max(ticks))) if ticks else None,
+            {FLIGHT_KEY: self._flight, COVERAGE_KEY: json.dumps(counts)},
+        )
+
+    def _fail(self, error: OSError) -> None:
+        self.failure = error.strerror or str(error)
+        if isinstance(error, FileNotFoundError):  # what was kept went with the file
+            self._kept, self.kept_tick = 0, -1
+        self._writer.abandon()

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import sys
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import yaml
-from mcap.writer import CompressionType, Writer
+from mcap.data_stream import RecordBuilder
+from mcap.records import DataEnd, Footer
+from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
 from ..definitions import definition, jazzy
 from ..errors import InputError
 from ..topics import Topic
 
-CHUNK_BYTES = 1 << 20
+DESCRIPTION = "space_robot"
+"""Name of the metadata record at the file's beginning."""
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 
 
@@ -44,30 +51,41 @@ def _yaml(value: Any) -> str:
     return yaml.dump(value, Dumper=_PlainDumper, sort_keys=False, default_flow_style=False).strip()
 
 
-class BagWriter:
-    """Writes serialized messages; `close` makes the bag whole."""
+def _bare_end() -> bytes:
+    """The end of an MCAP file without a summary."""
+    builder = RecordBuilder()
+    DataEnd(data_section_crc=0).write(builder)
+    Footer(summary_start=0, summary_offset_start=0, summary_crc=0).write(builder)
+    return bytes(builder.end()) + MCAP0_MAGIC
 
-    def __init__(self, path: Path, topics: Iterable[Topic]) -> None:
-        """Create the bag's folder.
+
+class BagWriter:
+    """Writes serialized messages; `flush` ends a chunk, `close` makes the bag whole."""
+
+    def __init__(self, path: Path, topics: Iterable[Topic], description: Mapping[str, str]) -> None:
+        """Create the bag's folder, and its file with ``description`` at the beginning.
 
         Raises:
             InputError: it exists already, or cannot be written.
         """
-        self._file_name = f"{path.name}_0.mcap"
+        self.path = path
+        self._file_path = path / f"{path.name}_0.mcap"
         try:
             path.mkdir(parents=True)
-            self._file = (path / self._file_name).open("wb")
+            self._file = self._file_path.open("wb")
+            # no chunk ends by itself: so it is known at any time what is in the file
+            self._writer = Writer(
+                self._file, chunk_size=sys.maxsize, compression=CompressionType.LZ4
+            )
+            self._writer.start(profile="ros2", library="space_robot")
+            self._writer.add_metadata(DESCRIPTION, dict(description))
+            self._topics = tuple(topics)
+            self._channels = {topic.name: self._register(topic) for topic in self._topics}
+            self.flush()
         except FileExistsError:
             raise InputError(f"{path}: exists already; a bag is never overwritten") from None
         except OSError as error:
             raise InputError(f"{path}: no bag can be written there ({error.strerror})") from None
-        self.path = path
-        self._writer = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.LZ4)
-        self._writer.start(profile="ros2", library="space_robot")
-        self._channels = {topic.name: self._register(topic) for topic in topics}
-        self._topics = {topic.name: topic for topic in topics}
-        self._counts = dict.fromkeys(self._topics, 0)
-        self._start_ns, self._end_ns = 2**63 - 1, 0
 
     def _register(self, topic: Topic) -> int:
         text = definition(topic.type).encode()
@@ -82,18 +100,46 @@ class BagWriter:
             },
         )
 
-    def write(self, topic: Topic, stamp_ns: int, data: bytes, sequence: int) -> None:
-        """Add a message at a simulated time; ``sequence`` is its tick."""
+    def write(self, topic: Topic, stamp_ns: int, data: bytes, sequence: int) -> int:
+        """Add a message at a simulated time; ``sequence`` is its tick.
+
+        Returns:
+            Bytes of messages in the open chunk.
+        """
         self._writer.add_message(
             self._channels[topic.name], stamp_ns, data, stamp_ns, sequence & 0xFFFFFFFF
         )
-        self._counts[topic.name] += 1
-        self._start_ns = min(self._start_ns, stamp_ns)
-        self._end_ns = max(self._end_ns, stamp_ns)
+        self._open_bytes += len(data)
+        return self._open_bytes
 
-    def close(self, custom_data: Mapping[str, str]) -> None:
-        """Finish the MCAP file and write metadata.yaml with ``custom_data``."""
-        information = self._information(dict(custom_data))
+    def flush(self) -> None:
+        """End the open chunk and hand everything to the kernel.
+
+        Raises:
+            OSError: that failed; the file has the whole chunks of before and perhaps more.
+            FileNotFoundError: the file is no longer at its path.
+        """
+        self._writer.flush()
+        self._whole_bytes, self._open_bytes = self._file.tell(), 0
+        with suppress(FileNotFoundError):
+            if os.path.samestat(self._file_path.stat(), os.fstat(self._file.fileno())):
+                return
+        raise FileNotFoundError(errno.ENOENT, "its file was removed or moved away")
+
+    def close(
+        self, counts: Mapping[str, int], span_ns: tuple[int, int] | None, custom: Mapping[str, str]
+    ) -> None:
+        """Finish the MCAP file and write metadata.yaml.
+
+        Args:
+            counts: messages written a topic.
+            span_ns: first and last stamp (None: no message).
+            custom: the custom data of metadata.yaml.
+
+        Raises:
+            OSError: that failed.
+        """
+        information = self._information(counts, span_ns, dict(custom))
         self._writer.add_metadata("rosbag2", {"serialized_metadata": _yaml(information)})
         self._writer.finish()
         self._file.close()
@@ -102,10 +148,25 @@ class BagWriter:
         part.write_text(text, encoding="utf-8")
         part.replace(self.path / "metadata.yaml")
 
-    def _information(self, custom_data: dict[str, str]) -> dict[str, Any]:
-        count = sum(self._counts.values())
-        start = {"nanoseconds_since_epoch": self._start_ns}
-        duration = {"nanoseconds": max(0, self._end_ns - self._start_ns) if count else 0}
+    def abandon(self) -> None:
+        """After a failure: leave the whole chunks and, if there is room, a valid MCAP end."""
+        if self._file.closed:
+            return
+        number = os.dup(self._file.fileno())
+        with suppress(OSError):
+            self._file.close()  # tries once more to write what is left in its buffer
+        with suppress(OSError):
+            os.ftruncate(number, self._whole_bytes)
+            os.pwrite(number, _bare_end(), self._whole_bytes)
+        os.close(number)
+
+    def _information(
+        self, counts: Mapping[str, int], span_ns: tuple[int, int] | None, custom: dict[str, str]
+    ) -> dict[str, Any]:
+        count = sum(counts.values())
+        first_ns, last_ns = span_ns or (2**63 - 1, 2**63 - 1)
+        start = {"nanoseconds_since_epoch": first_ns}
+        duration = {"nanoseconds": last_ns - first_ns}
         return {
             "version": 9,
             "storage_identifier": "mcap",
@@ -121,21 +182,21 @@ class BagWriter:
                         "offered_qos_profiles": _qos(topic),
                         "type_description_hash": jazzy().hash_rihs01(topic.type),
                     },
-                    "message_count": self._counts[topic.name],
+                    "message_count": counts[topic.name],
                 }
-                for topic in self._topics.values()
+                for topic in self._topics
             ],
             "compression_format": "",
             "compression_mode": "",
-            "relative_file_paths": [self._file_name],
+            "relative_file_paths": [self._file_path.name],
             "files": [
                 {
-                    "path": self._file_name,
+                    "path": self._file_path.name,
                     "starting_time": start,
                     "duration": duration,
                     "message_count": count,
                 }
             ],
-            "custom_data": custom_data or None,
+            "custom_data": custom or None,
             "ros_distro": "jazzy",
         }

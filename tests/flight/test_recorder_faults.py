@@ -1,0 +1,159 @@
+"""The recorder in a real graph: killed, without room, without its folder. The flight goes on."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from flights import ros_environment, space_robot
+
+from space_robot_control.flight.domain import ros_domain
+from space_robot_control.flight.monitor import Monitor
+from space_robot_control.flight.processes import MODULES
+from space_robot_msgs_py.bag import read_flight
+
+pytest.importorskip("rclpy")
+
+Start = Callable[..., "subprocess.Popen[str]"]
+SURVIVES_S = 1.0
+"""What is older than this survives a kill."""
+
+
+@pytest.fixture
+def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    with ros_domain() as number:
+        yield number
+
+
+@pytest.fixture
+def start(domain: int) -> Iterator[Start]:
+    """Start nodes in a domain of their own; what still runs at the end is stopped."""
+    running: list[subprocess.Popen[str]] = []
+
+    def run(node: str, **parameters: object) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", MODULES[node]]
+        if parameters:
+            command.append("--ros-args")
+        for name, value in parameters.items():
+            command += ["-p", f"{name.replace('__', '.')}:={value}"]
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            env={**ros_environment(), "ROS_DOMAIN_ID": str(domain)},
+        )  # fmt: skip
+        running.append(process)
+        return process
+
+    yield run
+    for process in running:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+def _start_graph(start: Start, bag: Path, ticks: int) -> dict[str, subprocess.Popen[str]]:
+    """A flight in lockstep."""
+    parameters: dict[str, dict[str, object]] = {
+        "recorder": {"bag": bag},
+        "mission": {},
+        "controller": {"wait_for": "[plant, recorder]"},
+        "plant": {"ticks": ticks, "wait_for": "[controller, mission, recorder]"},
+    }
+    return {node: start(node, **values) for node, values in parameters.items()}
+
+
+def _wait_for_size(file: Path, size: int) -> None:
+    until = time.monotonic() + 60.0
+    while not (file.exists() and file.stat().st_size > size):
+        assert time.monotonic() < until
+        time.sleep(0.02)
+
+
+def _end(process: subprocess.Popen[str]) -> str:
+    process.send_signal(signal.SIGINT)
+    output, _ = process.communicate(timeout=30)
+    return output
+
+
+def _only_error_line(output: str) -> str:
+    (line,) = [line for line in output.splitlines() if "error" in line]
+    assert "Traceback" not in output
+    return line
+
+
+@pytest.mark.parametrize("after_s", [1.2, 2.3])
+def test_killed_recorder_has_kept_all_but_the_last_moment(
+    start: Start, domain: int, tmp_path: Path, after_s: float
+) -> None:
+    bag = tmp_path / "bag"
+    nodes = _start_graph(start, bag, ticks=200_000)
+    monitor = Monitor(domain)
+    seen: list[tuple[float, float]] = []
+    try:
+        _wait_for_size(bag / "bag_0.mcap", 50_000)
+        begin = time.monotonic()
+        while time.monotonic() < begin + after_s:
+            monitor.poll()
+            seen.append((time.monotonic(), monitor.simulated_s))
+            time.sleep(0.01)
+        nodes["recorder"].kill()
+        killed = time.monotonic()
+    finally:
+        monitor.close()
+    assert nodes["plant"].poll() is None
+    sent_s = max(simulated for at, simulated in seen if at < killed - SURVIVES_S)
+    log = read_flight(bag)
+    assert (log.ticks - 1) * log.timebase.period >= sent_s > 0.0
+    assert not any(log.lost.values())
+    result = space_robot("analyze", str(bag), "--json")
+    assert json.loads(result.stdout)["unfinished"] == log.unfinished
+    assert f"read up to t = {(log.ticks - 1) * 0.0005:.4f} s" in log.unfinished
+
+
+def test_recorder_without_room_lets_the_flight_go_on(start: Start, tmp_path: Path) -> None:
+    bag, ticks = tmp_path / "bag", 12_000
+    nodes = _start_graph(start, bag, ticks)
+    _wait_for_size(bag / "bag_0.mcap", 50_000)
+    limit = (bag / "bag_0.mcap").stat().st_size + 500_000
+    resource.prlimit(nodes["recorder"].pid, resource.RLIMIT_FSIZE, (limit, limit))
+    output, _ = nodes["plant"].communicate(timeout=120)
+    assert nodes["plant"].returncode == 0, output
+    output = _end(nodes["recorder"])
+    assert nodes["recorder"].returncode == 1
+    assert output.count("no longer written") == 1
+    line = _only_error_line(output)
+    assert str(bag) in line
+    assert os.strerror(errno.EFBIG) in line
+    kept = re.search(r"last tick kept: tick (\d+) ", line)
+    assert kept
+    log = read_flight(bag)
+    assert 0 < log.ticks - 1 == int(kept[1]) < ticks - 1
+    assert log.unfinished
+
+
+def test_recorder_without_its_folder_says_so_at_once(start: Start, tmp_path: Path) -> None:
+    bag = tmp_path / "bag"
+    nodes = _start_graph(start, bag, ticks=12_000)
+    _wait_for_size(bag / "bag_0.mcap", 50_000)
+    shutil.rmtree(bag)
+    removed = time.time()
+    output, _ = nodes["plant"].communicate(timeout=120)
+    assert nodes["plant"].returncode == 0, output
+    output = _end(nodes["recorder"])
+    assert nodes["recorder"].returncode == 1
+    said = re.search(r"\[(\d+\.\d+)\] \[recorder\]: the bag is no longer written", output)
+    assert said
+    assert float(said[1]) - removed < 2.0
+    assert "removed or moved" in _only_error_line(output)
+    assert not bag.exists()
