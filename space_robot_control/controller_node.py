@@ -18,13 +18,13 @@ from space_robot_msgs_py.reference_codec import ReferenceCodec
 from space_robot_msgs_py.ros.endpoints import SPIN_S, In, Out, TakenByLoop, Waiter, take_or_wait
 from space_robot_msgs_py.ros.shell import Shell, run_node
 from space_robot_msgs_py.samples import RobotState
+from space_robot_msgs_py.stamp_guard import StampGuard
 from space_robot_sim.robot import Robot
 
 from .controller import Controller
 from .law_set import LawSet
 from .reference import ReferenceBuffer
 from .settings import ControllerNodeSettings
-from .stamp_guard import StampGuard
 from .supervisor import Mode, Supervisor
 
 Array = NDArray[np.float64]

@@ -42,7 +42,9 @@ class FlightLog:
     lost: dict[str, int] = field(default_factory=dict)
     """Missing messages a topic."""
     unanswered: int = 0
-    """Ticks without a command of their own (by the wall clock only)."""
+    """Ticks without a command of their own (by the wall clock, or where something failed)."""
+    filled: int = 0
+    """Ticks without a usable state, which have the one before."""
     unfinished: str = ""
     """What is known of a bag that nobody finished; empty for a whole one."""
     commanded_torque: Array | None = None

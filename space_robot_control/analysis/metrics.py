@@ -119,6 +119,7 @@ def analyse(log: FlightLog) -> dict[str, Any]:
         "chatter": chatter(log),
         "lost": log.lost,
         "unanswered_ticks": log.unanswered,
+        "filled_ticks": log.filled,
         "unfinished": log.unfinished,
     }
 

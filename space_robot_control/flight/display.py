@@ -12,6 +12,11 @@ from rich.table import Table
 
 UNITS = {"attitude": "-", "joints": "rad", "base_torque": "N m", "torque": "N m"}
 
+NOTES = {
+    "filled_ticks": "ticks without a usable state, shown as the one before",
+    "unanswered_ticks": "ticks the controller did not answer in time",
+}
+
 
 def _unit(key: str) -> str:
     return next(unit for prefix, unit in UNITS.items() if key.startswith(prefix))
@@ -40,10 +45,11 @@ def print_report(report: dict[str, Any], console: Console) -> None:
     console.print(table)
     lost = {topic: count for topic, count in report["lost"].items() if count}
     console.print(f"messages lost: {lost or 'none'}")
-    if report["unanswered_ticks"]:
-        console.print(f"ticks the controller did not answer in time: {report['unanswered_ticks']}")
     if report["unfinished"]:
         console.print(report["unfinished"])
+    for key, words in NOTES.items():
+        if report[key]:
+            console.print(f"{words}: {report[key]}")
 
 
 class FlightProgress:

@@ -193,7 +193,7 @@ def _check(report: dict[str, Any], flight: Flight) -> None:
     lost = {topic: count for topic, count in report["lost"].items() if count}
     if report["graph"]["failures"]:
         return  # the bag is not expected to be whole
-    if lost and not flight.has_gaps:
+    if lost:
         raise FlightError(f"the recorder lost messages: {lost}")
     if report["ticks"] != flight.ticks:
         raise FlightError(f"the bag holds {report['ticks']} whole ticks of {flight.ticks}")

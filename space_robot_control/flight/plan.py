@@ -129,12 +129,6 @@ class Flight:
         return plant, controller, mission
 
     @property
-    def has_gaps(self) -> bool:
-        """Whether messages may be missing that nobody has lost."""
-        plan = self.plan
-        return plan.realtime or bool(plan.faults) or plan.restart_controller
-
-    @property
     def description(self) -> dict[str, Any]:
         """What is flown, as it is stored in a bag."""
         plan = self.plan

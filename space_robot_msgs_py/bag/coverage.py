@@ -6,12 +6,14 @@ Nothing else in a bag tells a lost message: header stamps are ticks, so gaps are
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 from .. import topics
 from ..cdr import header_stamp_ns
 from ..codecs import TelemetryCodec
 from ..samples import Timebase
+from ..stamp_guard import StampGuard
 
 
 def message_tick(topic: topics.Topic, data: bytes, timebase: Timebase) -> int:
@@ -21,31 +23,53 @@ def message_tick(topic: topics.Topic, data: bytes, timebase: Timebase) -> int:
     return timebase.tick(header_stamp_ns(data))
 
 
+LONGEST_JUMP = 20_000
+"""Ticks from one message to the next that are still believed: 10 s at 2 kHz."""
+
+
 @dataclass(slots=True)
 class Coverage:
-    """Ticks of one topic's messages, in rising order."""
+    """Ticks of one topic's messages."""
 
     topic: topics.Topic
     received: int = 0
     repeated: int = 0
+    """Messages of a tick that had come already."""
+    strange: int = 0
+    """Messages whose stamp cannot be right, or cannot be read."""
     first: int = 0
     last: int = -1
     unit: int = 0
     """Ticks from one message to the next: the smallest step seen."""
+    _guard: StampGuard = field(default_factory=lambda: StampGuard(LONGEST_JUMP))
+    _holes: set[int] = field(default_factory=set)
+    """Ticks passed over, which may still come late."""
 
     def take(self, tick: int) -> bool:
-        """Count a message; False if one of this tick (or a later one) has come already."""
-        if self.received == 0:
-            self.first = tick
-        elif tick <= self.last:
-            self.repeated += 1
-            return False
+        """Count a message; False if one of this tick has come already."""
+        if self.received and tick <= self.last:
+            if tick not in self._holes:
+                self.repeated += 1
+                return False
+            self._holes.remove(tick)
+        elif not self._guard.passes(tick):
+            self.strange += 1
+            return True
+        elif self.received == 0:
+            self.first = self.last = tick
         else:
             step = tick - self.last
             self.unit = min(self.unit, step) if self.unit else step
-        self.last = tick
+            if step != 1 and self.topic.per_tick and step <= LONGEST_JUMP:
+                self._holes.update(range(self.last + 1, tick))
+            self.last = tick
         self.received += 1
         return True
+
+    @property
+    def kept(self) -> int:
+        """Messages that belong into a bag."""
+        return self.received + self.strange
 
     def missing(self, last_tick: int) -> int:
         """Messages that were sent but are not here, for a flight from tick 0 to ``last_tick``."""
@@ -57,21 +81,34 @@ class Coverage:
 
 
 def lost_messages(
-    coverages: Mapping[str, Coverage], realtime: bool = False, finished: bool = True
+    coverages: Mapping[str, Coverage],
+    excused: frozenset[str] = frozenset(),
+    finished: bool = True,
 ) -> dict[str, int]:
     """Missing messages a topic; the flight's length is that of the longest per-tick topic.
 
-    By the wall clock (``realtime``) a tick without a command (and its telemetry) is one the
-    controller did not answer (`unanswered_ticks`), not a lost message. Of a bag that was not
+    Gaps in the ``excused`` topics are not lost messages. Of a bag that was not
     ``finished`` each topic counts up to its own last message: nobody knows what came after.
     """
     lost = {
         name: coverage.missing(_last_tick(coverages) if finished else coverage.last)
         for name, coverage in coverages.items()
     }
-    if realtime:
-        lost |= dict.fromkeys({topics.COMMAND.name, topics.TELEMETRY.name} & lost.keys(), 0)
-    return lost
+    return lost | dict.fromkeys(excused & lost.keys(), 0)
+
+
+def excused_topics(flight: Mapping[str, Any]) -> frozenset[str]:
+    """Topics that may have ticks without a message in a flight of this description.
+
+    By the wall clock, or where something fails, the controller does not answer every tick
+    (`unanswered_ticks`); states may be kept back by a fault.
+    """
+    excused: tuple[topics.Topic, ...] = ()
+    if any(flight.get(key) for key in ("realtime", "faults", "restart_controller")):
+        excused += (topics.COMMAND, topics.TELEMETRY)
+    if flight.get("faults"):
+        excused += (topics.JOINT_STATES, topics.BASE_STATE)
+    return frozenset(topic.name for topic in excused)
 
 
 def unanswered_ticks(coverages: Mapping[str, Coverage], finished: bool = True) -> int:

@@ -7,18 +7,18 @@ import struct
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from rosbags.rosbag2 import ReaderError
 
 from .. import topics
 from ..codecs import StateCodec
 from ..definitions import decode
-from ..errors import InputError
+from ..errors import InputError, MessageError
 from ..flight_log import FlightLog
 from ..reference_codec import ReferenceCodec
 from ..samples import RobotState, Timebase
-from .coverage import Coverage, lost_messages, message_tick, unanswered_ticks
+from .coverage import Coverage, excused_topics, lost_messages, message_tick, unanswered_ticks
 from .folder import Bag, custom_data, open_bag
+from .gaps import complete_rows, fill_gaps
 from .recorder import COVERAGE_KEY, FLIGHT_KEY
 
 REQUIRED = (
@@ -67,14 +67,18 @@ def _read(bag: Bag, path: Path) -> FlightLog:
     timebase = Timebase(round(float(flight.get("period", 0.0005)) * 1e9))
     _, first = next(bag.messages(topics.JOINT_STATES))
     names = tuple(decode(first, topics.JOINT_STATES.type).name)
-    log = FlightLog.allocate(counts[topics.JOINT_STATES.name], names, timebase)
+    excused = excused_topics(flight)
+    planned = int(flight.get("ticks", 0)) if excused else 0
+    log = FlightLog.allocate(max(counts[topics.JOINT_STATES.name], planned), names, timebase)
     log.flight = flight
     recorded = [topic for topic in topics.ALL if topic.name in counts]
     coverages = _fill(bag, recorded, log)
-    log.lost = lost_messages(coverages, bool(flight.get("realtime")), bag.finished)
+    log.lost = lost_messages(coverages, excused, bag.finished)
     if topics.COMMAND.name in coverages:
         log.unanswered = unanswered_ticks(coverages, bag.finished)
-    whole = int(np.argmin(np.append(_complete_rows(log), False)))
+    if excused:
+        fill_gaps(log)
+    whole = int(np.argmin(np.append(complete_rows(log), False)))
     if not whole:
         raise InputError(f"{path}: not one tick with its state and reference{state}")
     if not bag.finished:
@@ -92,7 +96,11 @@ def _fill(bag: Bag, recorded: list[topics.Topic], log: FlightLog) -> dict[str, C
     coverages = {topic.name: Coverage(topic) for topic in recorded}
     for name, data in bag.messages(*recorded):
         topic = topics.BY_NAME[name]
-        tick = message_tick(topic, data, log.timebase)
+        try:
+            tick = message_tick(topic, data, log.timebase)
+        except MessageError:
+            coverages[name].strange += 1
+            continue
         if not coverages[name].take(tick):
             continue
         if topic is topics.JOINT_STATES and tick < log.ticks:
@@ -114,10 +122,3 @@ def _fill(bag: Bag, recorded: list[topics.Topic], log: FlightLog) -> dict[str, C
             start, rows = references.decode_base(data)
             log.reference_base[start : start + len(rows)] = rows[: log.ticks - start]
     return coverages
-
-
-def _complete_rows(log: FlightLog) -> NDArray[np.bool_]:
-    columns = (log.joint_positions, log.quaternion, log.reference_joints, log.reference_base)
-    rows = [np.isfinite(column.reshape(log.ticks, -1)).all(axis=1) for column in columns]
-    complete: NDArray[np.bool_] = np.logical_and.reduce(rows)
-    return complete

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from .. import topics
-from ..errors import FlightError
+from ..errors import FlightError, MessageError
 from ..samples import Timebase
-from .coverage import Coverage, lost_messages, message_tick
+from .coverage import Coverage, excused_topics, lost_messages, message_tick
 from .writer import BagWriter
 
 FLIGHT_KEY = "space_robot.flight"
@@ -38,7 +38,7 @@ class BagRecorder:
             InputError: the bag exists already, or cannot be written.
         """
         self._flight = json.dumps(dict(flight))
-        self._realtime = bool(flight.get("realtime"))
+        self._excused = excused_topics(flight)
         self._writer = BagWriter(path, topics.ALL, {FLIGHT_KEY: self._flight})
         self._timebase = timebase
         self.coverages = {topic.name: Coverage(topic) for topic in topics.ALL}
@@ -53,13 +53,19 @@ class BagRecorder:
     def record(self, topic: topics.Topic, data: bytes) -> None:
         """Add one serialized message.
 
-        Raises:
-            MessageError: its stamp is not a whole number of ticks.
+        One whose stamp cannot be right is kept at the time of the last good one.
         """
-        tick = message_tick(topic, data, self._timebase)
-        if not self.coverages[topic.name].take(tick) or self.failure:
+        coverage = self.coverages[topic.name]
+        try:
+            tick = message_tick(topic, data, self._timebase)
+            is_new = coverage.take(tick)
+        except MessageError:
+            tick, is_new = coverage.last, True
+            coverage.strange += 1
+        if not is_new or self.failure:
             return
-        if self._writer.write(topic, self._timebase.stamp_ns(tick), data, tick) > CHUNK_BYTES:
+        log_ns = self._timebase.stamp_ns(max(0, min(tick, coverage.last)))
+        if self._writer.write(topic, log_ns, data, tick) > CHUNK_BYTES:
             self.flush()
 
     def flush(self) -> None:
@@ -85,7 +91,7 @@ class BagRecorder:
     @property
     def received(self) -> int:
         """Messages recorded, repeated ones left out."""
-        return sum(coverage.received for coverage in self.coverages.values())
+        return sum(coverage.kept for coverage in self.coverages.values())
 
     @property
     def unkept(self) -> int:
@@ -95,7 +101,7 @@ class BagRecorder:
     @property
     def lost(self) -> dict[str, int]:
         """Messages a topic that never came, so far."""
-        return lost_messages(self.coverages, self._realtime)
+        return lost_messages(self.coverages, self._excused)
 
     def close(self) -> None:
         """Make the bag whole, with the flight's description and the counts in its metadata.
@@ -124,13 +130,18 @@ class BagRecorder:
 
     def _finish(self) -> None:
         counts = {
-            name: {"received": c.received, "missing": lost, "repeated": c.repeated}
+            name: {
+                "received": c.received,
+                "missing": lost,
+                "repeated": c.repeated,
+                "strange": c.strange,
+            }
             for (name, c), lost in zip(self.coverages.items(), self.lost.values(), strict=True)
         }
         ticks = [t for c in self.coverages.values() if c.received for t in (c.first, c.last)]
         stamp_ns = self._timebase.stamp_ns
         self._writer.close(
-            {name: c.received for name, c in self.coverages.items()},
+            {name: c.kept for name, c in self.coverages.items()},
             (stamp_ns(min(ticks)), stamp_ns(max(ticks))) if ticks else None,
             {FLIGHT_KEY: self._flight, COVERAGE_KEY: json.dumps(counts)},
         )
