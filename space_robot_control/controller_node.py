@@ -29,7 +29,7 @@ from .supervisor import Mode, Supervisor
 
 Array = NDArray[np.float64]
 
-STAND_DOWN_S = 0.5
+STAND_DOWN_S = 0.1
 """How long a controller that stands down waits for a state to answer."""
 
 
