@@ -16,8 +16,12 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from rclpy.node import Node
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from ..errors import InputError
+
+UNNAMED = "_NODE_NAME_UNKNOWN_"
+"""What discovery calls the node of a publisher until its participant has said, if it ever does."""
 
 
 class Claim:
@@ -84,7 +88,13 @@ def foreign_publishers(node: Node, topic_names: Sequence[str]) -> dict[str, list
     strangers = {}
     for topic in topic_names:
         infos = node.get_publishers_info_by_topic(topic)
-        names = {f"{info.node_namespace.rstrip('/')}/{info.node_name}" for info in infos} - {own}
+        names = {_full_name(info) for info in infos} - {own}
         if names:
             strangers[topic] = sorted(names)
     return strangers
+
+
+def _full_name(info: TopicEndpointInfo) -> str:
+    if info.node_name == UNNAMED:
+        return "a DDS participant without a ROS node"
+    return f"{info.node_namespace.rstrip('/')}/{info.node_name}"

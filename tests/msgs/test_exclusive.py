@@ -96,10 +96,14 @@ def test_killed_publisher_leaves_its_place_at_once(
 ) -> None:
     """Discovery still lists the dead one, under its successor's name."""
     node = make_node("controller")
-    assert _eventually(lambda: bool(node.get_publishers_info_by_topic("/command")))
+
+    def seen() -> list[str]:
+        return [info.node_name for info in node.get_publishers_info_by_topic("/command")]
+
+    assert _eventually(lambda: seen() == ["controller"])
     controller.send_signal(signal.SIGKILL)
     controller.wait()
-    assert node.get_publishers_info_by_topic("/command")
+    assert seen() == ["controller"]
     assert foreign_publishers(node, ["/command"]) == {}
     Claim(node, ["/command"]).release()
 
