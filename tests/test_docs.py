@@ -6,11 +6,13 @@ import importlib
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from xml.etree import ElementTree
 
 import click
 import pytest
 
 from space_robot_control.cli import cli
+from space_robot_msgs_py import topics
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -87,3 +89,21 @@ def test_commands_and_options_exist(document: Path) -> None:
         for word in words:
             if word.startswith("--"):
                 assert word in {*known, "--help"}, f"space-robot {name} {word}"
+
+
+def test_security_policy_has_one_publisher_a_topic_and_all_listeners() -> None:
+    text = (ROOT / "docs/security.md").read_text("utf-8")
+    block = re.search(r"```xml\n(.*?)```", text, re.DOTALL)
+    assert block is not None
+    policy = ElementTree.fromstring(block.group(1))
+
+    def nodes(access: str, topic: str) -> list[str]:
+        return [
+            profile.attrib["node"]
+            for profile in policy.iter("profile")
+            if topic in [item.text for item in profile.iterfind(f"topics[@{access}='ALLOW']/topic")]
+        ]
+
+    for topic in topics.ALL:
+        assert len(nodes("publish", topic.name)) == 1, topic.name
+        assert nodes("subscribe", topic.name) == list(topic.listeners), topic.name

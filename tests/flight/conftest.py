@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from flights import Flown, space_robot
+from flights import Flown, Start, ros_environment, space_robot
+
+from space_robot_control.flight.processes import MODULES
 
 
 @pytest.fixture(scope="session")
@@ -25,6 +29,31 @@ def fly(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Flown]:
         return flown[options]
 
     return run
+
+
+@pytest.fixture
+def start(domain: int) -> Iterator[Start]:
+    """Start nodes in a domain of their own; what still runs at the end is stopped."""
+    running: list[subprocess.Popen[str]] = []
+
+    def run(node: str, **parameters: object) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", MODULES[node]]
+        if parameters:
+            command.append("--ros-args")
+        for name, value in parameters.items():
+            command += ["-p", f"{name.replace('__', '.')}:={value}"]
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            env={**ros_environment(), "ROS_DOMAIN_ID": str(domain)},
+        )  # fmt: skip
+        running.append(process)
+        return process
+
+    yield run
+    for process in running:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -5,18 +5,21 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from space_robot_msgs_py.ros.process_environment import DEFAULTS
+from space_robot_msgs_py.ros.process_environment import completed
 
+Start = Callable[..., "subprocess.Popen[str]"]
+"""Starts a node with parameters."""
 COMMAND = [sys.executable, "-m", "space_robot_control.cli"]
 
 
 def ros_environment() -> dict[str, str]:
     """Discovery on this machine only; the orchestrator picks a free domain."""
-    environment = {**os.environ, **DEFAULTS}
+    environment = completed(os.environ)
     environment.pop("ROS_DOMAIN_ID", None)
     return environment
 

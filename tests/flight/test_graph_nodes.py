@@ -5,55 +5,17 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from flights import ros_environment
+from flights import Start
 
-from space_robot_control.flight.domain import ros_domain
-from space_robot_control.flight.processes import MODULES
 from space_robot_msgs_py.bag import read_flight
 from space_robot_msgs_py.ros.process_environment import set_defaults
 
 set_defaults()
 rclpy = pytest.importorskip("rclpy")
-
-Start = Callable[..., "subprocess.Popen[str]"]
-
-
-@pytest.fixture
-def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
-    with ros_domain() as number:
-        yield number
-
-
-@pytest.fixture
-def start(domain: int) -> Iterator[Start]:
-    """Start nodes in a domain of their own; what still runs at the end is stopped."""
-    running: list[subprocess.Popen[str]] = []
-
-    def run(node: str, **parameters: object) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", MODULES[node]]
-        if parameters:
-            command.append("--ros-args")
-        for name, value in parameters.items():
-            command += ["-p", f"{name.replace('__', '.')}:={value}"]
-        process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            env={**ros_environment(), "ROS_DOMAIN_ID": str(domain)},
-        )  # fmt: skip
-        running.append(process)
-        return process
-
-    yield run
-    for process in running:
-        if process.poll() is None:
-            process.kill()
-        process.communicate()
 
 
 def _end(process: subprocess.Popen[str], number: int = signal.SIGINT) -> int:

@@ -1,0 +1,102 @@
+"""Nodes killed at any moment: the next one of its kind comes up and talks, and leaks nothing."""
+
+from __future__ import annotations
+
+import os
+import random
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from flights import Start
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.ros.process_environment import set_defaults
+
+set_defaults()
+rclpy = pytest.importorskip("rclpy")
+
+from space_robot_msgs_py.ros.endpoints import In, TakenByLoop  # noqa: E402
+
+ROUNDS = 4
+OUTPUTS = {"plant": topics.JOINT_STATES, "controller": topics.COMMAND}
+PATIENCE_S = 30.0
+
+
+class Listener:
+    """Hears what plant and controller say."""
+
+    def __init__(self, domain: int) -> None:
+        self.context = rclpy.Context()
+        rclpy.init(args=[], context=self.context, domain_id=domain)
+        self.node = rclpy.create_node(f"listener_{os.getpid()}", context=self.context)
+        group = TakenByLoop()
+        self._inputs = {name: In(self.node, topic, group) for name, topic in OUTPUTS.items()}
+
+    def forget(self, name: str) -> None:
+        """Drop what the node has said so far."""
+        while self._inputs[name].take() is not None:
+            pass
+
+    def hears(self, name: str) -> bool:
+        """Whether the node says something in time."""
+        until = time.monotonic() + PATIENCE_S
+        while time.monotonic() < until:
+            if self._inputs[name].take() is not None:
+                return True
+            time.sleep(0.01)
+        return False
+
+
+@pytest.fixture
+def listener(domain: int) -> Iterator[Listener]:
+    it = Listener(domain)
+    yield it
+    it.node.destroy_node()
+    it.context.try_shutdown()
+
+
+def _sockets(pid: int) -> list[tuple[str, int]]:
+    """Address and port of every UDP socket of a process."""
+    inodes = set()
+    for entry in Path(f"/proc/{pid}/fd").iterdir():
+        target = os.readlink(entry)
+        if target.startswith("socket:["):
+            inodes.add(target[8:-1])
+    lines = [line.split() for line in Path(f"/proc/{pid}/net/udp").read_text().splitlines()[1:]]
+    found = [line[1].split(":") for line in lines if line[9] in inodes]
+    return [(socket.inet_ntoa(bytes.fromhex(ip)[::-1]), int(port, 16)) for ip, port in found]
+
+
+def test_a_killed_node_never_keeps_its_successor_from_the_graph(
+    start: Start, listener: Listener
+) -> None:
+    chance = random.Random(1)
+    start("mission")
+    running = {name: start(name) for name in OUTPUTS}
+    for _ in range(ROUNDS):
+        victim = chance.choice(sorted(OUTPUTS))
+        time.sleep(chance.uniform(0.0, 3.0))  # importing, joining the graph, in traffic
+        running[victim].kill()
+        running[victim].wait()
+        listener.forget(victim)
+        running[victim] = start(victim)
+        assert listener.hears(victim), victim
+    assert [process.poll() for process in running.values()] == [None, None]
+
+
+def test_nodes_use_this_machines_loopback_only_and_no_shared_memory(
+    start: Start, listener: Listener
+) -> None:
+    processes: list[subprocess.Popen[str]] = [start("mission"), start("plant"), start("controller")]
+    assert listener.hears("controller")
+    ports = []
+    for process in processes:
+        sockets = _sockets(process.pid)
+        assert {address for address, _ in sockets} == {"127.0.0.1"}
+        ports += [port for _, port in sockets]
+        assert "/dev/shm/fastrtps" not in Path(f"/proc/{process.pid}/maps").read_text()
+    assert len(set(ports)) == len(ports) > 0
