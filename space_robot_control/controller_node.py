@@ -58,6 +58,7 @@ class ControllerLoop:
         node, group = shell.node, TakenByLoop()
         self._command_out = Out(node, topics.COMMAND)
         self._telemetry_out = Out(node, topics.TELEMETRY)
+        self.outputs = (self._command_out, self._telemetry_out)
         self._joints_in = In(node, topics.JOINT_STATES, group)
         self._base_in = In(node, topics.BASE_STATE, group)
         self._reference_joints_in = In(node, topics.REFERENCE_JOINTS, group)
@@ -75,8 +76,7 @@ class ControllerLoop:
     def run(self) -> None:
         """Answer states until told to stop."""
         shell = self._shell
-        outputs = (self._command_out, self._telemetry_out)
-        shell.wait_for_listeners(outputs, self._settings.wait_for)
+        shell.wait_for_listeners(self.outputs, self._settings.wait_for)
         while not shell.stopping:
             tick = self._take_state()
             if tick is None:
@@ -84,7 +84,7 @@ class ControllerLoop:
             else:
                 self._answer_tick(tick)
             shell.serve()
-        for output in outputs:
+        for output in self.outputs:
             output.flush(1.0)
 
     def stand_down(self) -> None:

@@ -27,6 +27,7 @@ class MissionLoop:
         self._codec = ReferenceCodec(robot.joint_names, settings.timebase)
         self._joints = Out(shell.node, topics.REFERENCE_JOINTS)
         self._base = Out(shell.node, topics.REFERENCE_BASE)
+        self.outputs = (self._joints, self._base)
         self._clock = In(shell.node, topics.CLOCK, TakenByLoop(), depth=1)
         self._waiter = Waiter(shell.node, self._clock)
 

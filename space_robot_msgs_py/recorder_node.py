@@ -15,7 +15,7 @@ from .bag import BagRecorder
 from .configuration import NodeSettings
 from .errors import InputError
 from .health import Health, Level
-from .ros.endpoints import In, TakenByLoop
+from .ros.endpoints import In, Out, TakenByLoop
 from .ros.shell import Shell, run_node
 
 SILENCE_S = 0.3
@@ -50,6 +50,7 @@ class RecorderLoop:
             raise InputError(f"recorder parameters: flight: not JSON ({error})") from None
         path = Path(settings.bag or time.strftime("bag_%Y%m%d-%H%M%S"))
         self._recorder = BagRecorder(path, {"period": settings.period, **flight}, settings.timebase)
+        self.outputs: tuple[Out, ...] = ()
         group = TakenByLoop()
         self._inputs = [In(shell.node, topic, group, QUEUE_DEPTH) for topic in topics.ALL]
         self._told = False

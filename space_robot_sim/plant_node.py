@@ -60,7 +60,7 @@ class PlantLoop:
         self._command_in = In(node, topics.COMMAND, TakenByLoop())
         spin_s = 0.0 if settings.fifo_priority else SPIN_S
         self._waiter = Waiter(node, self._command_in, spin_s=spin_s)
-        self._outputs = (self._joint_states, self._base_state, self._clock_out)
+        self.outputs = (self._joint_states, self._base_state, self._clock_out)
         self._wall_clock = WallClock(settings.period)
         self._silence_s = settings.silence_timeout or math.inf
         self._controller_silent = False
@@ -75,7 +75,7 @@ class PlantLoop:
     def run(self) -> None:
         """Fly until the last tick, or until told to stop."""
         shell, settings, plant, clock = self._shell, self._settings, self._plant, self._wall_clock
-        shell.wait_for_listeners(self._outputs, settings.wait_for)
+        shell.wait_for_listeners(self.outputs, settings.wait_for)
         began, first = time.monotonic(), plant.tick
         clock.start(plant.tick)
         while not shell.stopping and (not settings.ticks or plant.tick < settings.ticks):
@@ -88,7 +88,7 @@ class PlantLoop:
             self._step()
             shell.serve()
         elapsed = time.monotonic() - began
-        for output in self._outputs:
+        for output in self.outputs:
             output.flush(FLUSH_S)
         late = f", {self.late_ticks} ticks without an answer in time" if self.late_ticks else ""
         late += f", {clock.slipped_s:.3f} s behind the wall clock" if clock.slipped_s else ""

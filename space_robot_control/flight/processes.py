@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from space_robot_msgs_py.errors import FlightError
-from space_robot_msgs_py.ros.process_environment import completed
+from space_robot_msgs_py.ros.process_environment import DEFAULTS
 
 PACKAGE = "space_robot"
 MODULES = {
@@ -41,7 +41,7 @@ def has_ros2_run() -> bool:
 
 def node_environment(domain: int) -> dict[str, str]:
     """What a node's process is started with: the project's defaults unless the user set others."""
-    return {**completed(os.environ), "ROS_DOMAIN_ID": str(domain)}
+    return {**DEFAULTS, **os.environ, "ROS_DOMAIN_ID": str(domain)}
 
 
 def node_command(node: str, parameters: Mapping[str, Any]) -> list[str]:

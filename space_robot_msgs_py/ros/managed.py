@@ -6,7 +6,8 @@ it has succeeded. Nothing is sent before activate.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
 from rcl_interfaces.msg import ParameterDescriptor
@@ -16,16 +17,23 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 
 from ..configuration import NodeSettings
 from ..errors import InputError, SpaceRobotError
-from ..health import Health
+from ..health import Health, Level
 from .diagnostics import Diagnostics
+from .endpoints import Out
+from .exclusive import Claim, foreign_publishers
 from .parameters import declare_settings, refuse_unknown
 
 Schema = TypeVar("Schema", bound=NodeSettings)
 AUTOSTART = "autostart"
+LOOK_AGAIN_S = 0.3
 
 
 class Loop(Protocol):
     """What a node does; made with its settings in configure."""
+
+    @property
+    def outputs(self) -> Sequence[Out]:
+        """Topics that nobody else may publish."""
 
     def run(self) -> None:
         """Work while the node is active; return when the shell is stopping, or at the end."""
@@ -59,6 +67,8 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         self.loop: Loop | None = None
         self.is_active = False
         self.is_shut_down = False
+        self._topics: list[str] = []
+        self._claim: Claim | None = None
         self.error: SpaceRobotError | None = None
         """Why the last transition failed."""
         description = ParameterDescriptor(
@@ -79,6 +89,8 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             health = self.loop.health()
             if not self.is_active:
                 health = Health("inactive", values=health.values)
+            elif health.level is Level.OK and (strangers := self._strangers()):
+                health = Health(strangers, Level.WARN, health.values)
         else:
             health = Health("unconfigured")
         self._diagnostics.report(health)
@@ -111,13 +123,20 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             self.settings = declare_settings(self, self._schema, self._changeable)
             self.loop = self._make_loop(self, self.settings)
             refuse_unknown(self)
+            self._topics = [output.topic.name for output in self.loop.outputs]
+            self._claim = Claim(self, self._topics)
 
         return self._try(configure, undo=self._release)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """From here on the loop runs."""
-        self.is_active = True
-        return TransitionCallbackReturn.SUCCESS
+        """From here on the loop runs, unless a stranger publishes what is this node's."""
+
+        def activate() -> None:
+            if strangers := self._lasting_strangers():
+                raise InputError(strangers)
+            self.is_active = True
+
+        return self._try(activate)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """The loop stops."""
@@ -140,6 +159,18 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Something unforeseen was raised in a transition: the node is of no more use."""
         return TransitionCallbackReturn.FAILURE
+
+    def _strangers(self) -> str:
+        """Who else publishes this node's topics, in words; empty if nobody."""
+        crowded = [topic for topic in self._topics if self.count_publishers(topic) > 1]
+        strangers = foreign_publishers(self, crowded)
+        return "; ".join(f"{t} is also published by {', '.join(n)}" for t, n in strangers.items())
+
+    def _lasting_strangers(self) -> str:
+        """`_strangers`, asked twice: one that is just being discovered has no name yet."""
+        if self._strangers():
+            time.sleep(LOOK_AGAIN_S)
+        return self._strangers()
 
     def _try(
         self, action: Callable[[], None], undo: Callable[[], None] | None = None
@@ -172,6 +203,8 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             if loop is not None:
                 loop.close()
         finally:
+            if self._claim:
+                self._claim.release()
             publishers, subscriptions, parameters = self._entities()
             for publisher in publishers - self._own[0]:
                 self.destroy_publisher(publisher)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from space_robot_msgs_py.ros.process_environment import completed
+from space_robot_msgs_py.ros.process_environment import DEFAULTS
 
 Start = Callable[..., "subprocess.Popen[str]"]
 """Starts a node with parameters."""
@@ -19,7 +19,7 @@ COMMAND = [sys.executable, "-m", "space_robot_control.cli"]
 
 def ros_environment() -> dict[str, str]:
     """Discovery on this machine only; the orchestrator picks a free domain."""
-    environment = completed(os.environ)
+    environment = {**os.environ, **DEFAULTS}
     environment.pop("ROS_DOMAIN_ID", None)
     return environment
 
