@@ -156,6 +156,8 @@ def _follow(
                         show.say(str(event))
                     events += news
             show(total_s, "")
+        graph.stop()
+        monitor.poll()  # the nodes' last reports
     finally:
         monitor.close()
     return {

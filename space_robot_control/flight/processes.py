@@ -67,6 +67,7 @@ class NodeProcess:
 
     def __init__(self, node: str, command: Sequence[str], environment: Mapping[str, str]):
         self.node = node
+        self._stopped = False
         self._output = tempfile.TemporaryFile()  # noqa: SIM115  (closed in `close`)
         self._process = subprocess.Popen(
             command,
@@ -108,6 +109,9 @@ class NodeProcess:
 
     def stop(self, patience_s: float = 10.0) -> None:
         """Ask it to end, insist, then force; returns when its group is gone."""
+        if self._stopped:
+            return
+        self._stopped = True
         self.signal(signal.SIGCONT)  # a stopped process would not hear the rest
         for number, wait_s in ((signal.SIGINT, patience_s), (signal.SIGTERM, 2.0)):
             if self.exit_code is not None:
@@ -143,11 +147,15 @@ class Graph:
         return self
 
     def __exit__(self, *exception: object) -> None:
+        self.stop()
+        for node in self.nodes.values():
+            node.close()
+
+    def stop(self) -> None:
+        """End all nodes that have not ended."""
         # the recorder last: it takes what the others still say
         for node in sorted(self.nodes.values(), key=lambda process: process.node == "recorder"):
             node.stop()
-        for node in self.nodes.values():
-            node.close()
 
     def restart(self, name: str, command: Sequence[str]) -> None:
         """Put a new process in the place of one that is dead or hangs."""

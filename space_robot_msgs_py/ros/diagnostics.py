@@ -5,12 +5,14 @@ from __future__ import annotations
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.duration import Duration
 from rclpy.node import Node
 
 from ..health import Health, Level
 
 TOPIC = "/diagnostics"
 PERIOD_S = 1.0
+FLUSH_S = 0.5
 
 
 class Diagnostics:
@@ -23,14 +25,14 @@ class Diagnostics:
         self._last_s = -PERIOD_S
         self._last_tick: tuple[float, float] | None = None
 
-    def report(self, health: Health) -> None:
-        """Publish if a second has passed or the mode has changed."""
+    def report(self, health: Health, now_or_never: bool = False) -> None:
+        """Publish if a second has passed or the mode has changed; or in any case, and wait."""
         now = time.monotonic()
         changed = self._last is None or (health.mode, health.level) != (
             self._last.mode,
             self._last.level,
         )
-        if not changed and now - self._last_s < PERIOD_S:
+        if not (changed or now_or_never) and now - self._last_s < PERIOD_S:
             return
         if changed:
             if health.level is Level.OK:  # two lines: a call of the log has one severity for good
@@ -47,6 +49,8 @@ class Diagnostics:
         message = DiagnosticArray(status=[status])
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
+        if now_or_never:
+            self._publisher.wait_for_all_acked(Duration(seconds=FLUSH_S))
 
     def _rate(self, health: Health, now: float) -> dict[str, float]:
         """Ticks by the wall clock's second since the last report."""

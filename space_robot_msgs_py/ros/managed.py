@@ -112,6 +112,8 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             SpaceRobotError: the loop could not be closed as it should.
         """
         if not self.is_shut_down:
+            if self.loop is not None and self.is_active:
+                self._diagnostics.report(self.loop.health(), now_or_never=True)
             self.trigger_shutdown()
             if self.error:
                 raise self.error
