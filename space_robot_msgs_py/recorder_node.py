@@ -21,6 +21,8 @@ from .ros.shell import Shell, run_node
 SILENCE_S = 0.3
 """Told to stop, the recorder leaves when nothing has come for this long."""
 QUEUE_DEPTH = 20_000
+TURN = 100
+"""Messages taken of one topic before the next has its turn."""
 NICENESS = 10
 """The loop goes first where cores are short; the queues hold seconds of traffic."""
 
@@ -95,14 +97,22 @@ class RecorderLoop:
         self._recorder.close()
 
     def _drain(self) -> int:
-        count = 0
-        for entry in self._inputs:
-            while (data := entry.take()) is not None:
-                self._recorder.record(entry.topic, data)
-                self._recorder.flush_if_due()  # a long backlog takes seconds
-                count += 1
-                os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
-        return count
+        """Take all there is, in turns: a backlog of one topic must not hold up the others."""
+        total = 0
+        while True:
+            counts = [self._take_some(entry) for entry in self._inputs]
+            total += sum(counts)
+            if max(counts) < TURN:
+                return total
+
+    def _take_some(self, entry: In) -> int:
+        for count in range(TURN):
+            if (data := entry.take()) is None:
+                return count
+            self._recorder.record(entry.topic, data)
+            self._recorder.flush_if_due()  # a long backlog takes seconds
+            os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
+        return TURN
 
     def _tell_failure(self) -> None:
         if self.failure and not self._told:

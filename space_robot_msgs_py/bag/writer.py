@@ -121,7 +121,7 @@ class BagWriter:
         """
         self._writer.flush()
         self._whole_bytes, self._open_bytes = self._file.tell(), 0
-        with suppress(FileNotFoundError):
+        with suppress(FileNotFoundError, NotADirectoryError):
             if os.path.samestat(self._file_path.stat(), os.fstat(self._file.fileno())):
                 return
         raise FileNotFoundError(errno.ENOENT, "its file was removed or moved away")

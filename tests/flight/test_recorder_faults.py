@@ -28,6 +28,9 @@ pytest.importorskip("rclpy")
 Start = Callable[..., "subprocess.Popen[str]"]
 SURVIVES_S = 1.0
 """What is older than this survives a kill."""
+PATIENCE_S = 60.0
+REFERENCE, IN_FLIGHT = 20_000, 1_000_000
+"""Bytes of a bag with some of the reference, and with more than what is sent in advance."""
 
 
 @pytest.fixture
@@ -63,18 +66,16 @@ def start(domain: int) -> Iterator[Start]:
 
 
 def _start_graph(start: Start, bag: Path, ticks: int) -> dict[str, subprocess.Popen[str]]:
-    """A flight in lockstep."""
-    parameters: dict[str, dict[str, object]] = {
-        "recorder": {"bag": bag},
-        "mission": {},
-        "controller": {"wait_for": "[plant, recorder]"},
-        "plant": {"ticks": ticks, "wait_for": "[controller, mission, recorder]"},
-    }
-    return {node: start(node, **values) for node, values in parameters.items()}
+    """A flight in lockstep, begun when the recorder has what mission sends in advance."""
+    nodes = {"recorder": start("recorder", bag=bag), "mission": start("mission")}
+    _wait_for_size(bag / f"{bag.name}_0.mcap", REFERENCE)
+    nodes["controller"] = start("controller", wait_for="[plant, recorder]")
+    nodes["plant"] = start("plant", ticks=ticks, wait_for="[controller, mission, recorder]")
+    return nodes
 
 
 def _wait_for_size(file: Path, size: int) -> None:
-    until = time.monotonic() + 60.0
+    until = time.monotonic() + PATIENCE_S
     while not (file.exists() and file.stat().st_size > size):
         assert time.monotonic() < until
         time.sleep(0.02)
@@ -100,12 +101,14 @@ def test_killed_recorder_has_kept_all_but_the_last_moment(
     nodes = _start_graph(start, bag, ticks=200_000)
     monitor = Monitor(domain)
     seen: list[tuple[float, float]] = []
+    start_up, begin = time.monotonic(), None
     try:
-        _wait_for_size(bag / "bag_0.mcap", 50_000)
-        begin = time.monotonic()
-        while time.monotonic() < begin + after_s:
+        while begin is None or time.monotonic() < begin + after_s:
             monitor.poll()
             seen.append((time.monotonic(), monitor.simulated_s))
+            if begin is None and monitor.simulated_s > 0.0:
+                begin = time.monotonic()
+            assert begin or time.monotonic() < start_up + PATIENCE_S
             time.sleep(0.01)
         nodes["recorder"].kill()
         killed = time.monotonic()
@@ -124,7 +127,7 @@ def test_killed_recorder_has_kept_all_but_the_last_moment(
 def test_recorder_without_room_lets_the_flight_go_on(start: Start, tmp_path: Path) -> None:
     bag, ticks = tmp_path / "bag", 12_000
     nodes = _start_graph(start, bag, ticks)
-    _wait_for_size(bag / "bag_0.mcap", 50_000)
+    _wait_for_size(bag / "bag_0.mcap", IN_FLIGHT)
     limit = (bag / "bag_0.mcap").stat().st_size + 500_000
     resource.prlimit(nodes["recorder"].pid, resource.RLIMIT_FSIZE, (limit, limit))
     output, _ = nodes["plant"].communicate(timeout=120)
@@ -145,7 +148,7 @@ def test_recorder_without_room_lets_the_flight_go_on(start: Start, tmp_path: Pat
 def test_recorder_without_its_folder_says_so_at_once(start: Start, tmp_path: Path) -> None:
     bag = tmp_path / "bag"
     nodes = _start_graph(start, bag, ticks=12_000)
-    _wait_for_size(bag / "bag_0.mcap", 50_000)
+    _wait_for_size(bag / "bag_0.mcap", IN_FLIGHT)
     shutil.rmtree(bag)
     removed = time.time()
     output, _ = nodes["plant"].communicate(timeout=120)
