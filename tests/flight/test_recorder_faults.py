@@ -10,22 +10,17 @@ import resource
 import shutil
 import signal
 import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from flights import ros_environment, space_robot
+from flights import Start, space_robot
 
-from space_robot_control.flight.domain import ros_domain
 from space_robot_control.flight.monitor import Monitor
-from space_robot_control.flight.processes import MODULES
 from space_robot_msgs_py.bag import read_flight
 
 pytest.importorskip("rclpy")
 
-Start = Callable[..., "subprocess.Popen[str]"]
 SURVIVES_S = 1.0
 """What is older than this survives a kill."""
 PATIENCE_S = 60.0
@@ -33,44 +28,14 @@ REFERENCE, IN_FLIGHT = 20_000, 1_000_000
 """Bytes of a bag with some of the reference, and with more than what is sent in advance."""
 
 
-@pytest.fixture
-def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
-    with ros_domain() as number:
-        yield number
-
-
-@pytest.fixture
-def start(domain: int) -> Iterator[Start]:
-    """Start nodes in a domain of their own; what still runs at the end is stopped."""
-    running: list[subprocess.Popen[str]] = []
-
-    def run(node: str, **parameters: object) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", MODULES[node]]
-        if parameters:
-            command.append("--ros-args")
-        for name, value in parameters.items():
-            command += ["-p", f"{name.replace('__', '.')}:={value}"]
-        process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            env={**ros_environment(), "ROS_DOMAIN_ID": str(domain)},
-        )  # fmt: skip
-        running.append(process)
-        return process
-
-    yield run
-    for process in running:
-        if process.poll() is None:
-            process.kill()
-        process.communicate()
-
-
 def _start_graph(start: Start, bag: Path, ticks: int) -> dict[str, subprocess.Popen[str]]:
     """A flight in lockstep, begun when the recorder has what mission sends in advance."""
     nodes = {"recorder": start("recorder", bag=bag), "mission": start("mission")}
     _wait_for_size(bag / f"{bag.name}_0.mcap", REFERENCE)
-    nodes["controller"] = start("controller", wait_for="[plant, recorder]")
-    nodes["plant"] = start("plant", ticks=ticks, wait_for="[controller, mission, recorder]")
+    nodes["controller"] = start("controller", wait_for="[plant_node, recorder_node]")
+    nodes["plant"] = start(
+        "plant", ticks=ticks, wait_for="[controller_node, mission_node, recorder_node]"
+    )
     return nodes
 
 
@@ -155,7 +120,7 @@ def test_recorder_without_its_folder_says_so_at_once(start: Start, tmp_path: Pat
     assert nodes["plant"].returncode == 0, output
     output = _end(nodes["recorder"])
     assert nodes["recorder"].returncode == 1
-    said = re.search(r"\[(\d+\.\d+)\] \[recorder\]: the bag is no longer written", output)
+    said = re.search(r"\[(\d+\.\d+)\] \[recorder_node\]: the bag is no longer written", output)
     assert said
     assert float(said[1]) - removed < 2.0
     assert "removed or moved" in _only_error_line(output)
