@@ -24,6 +24,7 @@ pytest.importorskip("rclpy")
 SURVIVES_S = 1.0
 """What is older than this survives a kill."""
 PATIENCE_S = 60.0
+READY = "[controller_node, mission_node, recorder_node]"
 REFERENCE, IN_FLIGHT = 20_000, 1_000_000
 """Bytes of a bag with some of the reference, and with more than what is sent in advance."""
 
