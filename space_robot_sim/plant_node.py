@@ -27,7 +27,7 @@ ASK_AGAIN_S = 0.5
 """Without an answer for this long the state is sent again (lockstep)."""
 SPIN_BEFORE_DEADLINE_S = 100e-6
 GIVE_WAY_S = 100e-6
-FLUSH_S = 5.0
+FLUSH_S = 1.0
 HOLDING_TICKS = 20
 """A command held for longer is worth a word in the diagnostics."""
 

@@ -65,7 +65,7 @@ class FlightProgress:
 
     def say(self, text: str) -> None:
         """A line above the progress, which stays."""
-        self._progress.console.print(text, highlight=False, markup=False)
+        self._progress.console.print(text, highlight=False, markup=False, soft_wrap=True)
 
 
 @contextmanager

@@ -107,12 +107,17 @@ class NodeProcess:
         with suppress(ProcessLookupError):
             os.killpg(self._process.pid, number)
 
+    def ask_to_end(self) -> None:
+        """Interrupt it, as Ctrl-C would."""
+        self.signal(signal.SIGCONT)  # a stopped process would not hear the rest
+        self.signal(signal.SIGINT)
+
     def stop(self, patience_s: float = 10.0) -> None:
         """Ask it to end, insist, then force; returns when its group is gone."""
         if self._stopped:
             return
         self._stopped = True
-        self.signal(signal.SIGCONT)  # a stopped process would not hear the rest
+        self.ask_to_end()
         for number, wait_s in ((signal.SIGINT, patience_s), (signal.SIGTERM, 2.0)):
             if self.exit_code is not None:
                 break
@@ -152,9 +157,11 @@ class Graph:
             node.close()
 
     def stop(self) -> None:
-        """End all nodes that have not ended."""
-        # the recorder last: it takes what the others still say
-        for node in sorted(self.nodes.values(), key=lambda process: process.node == "recorder"):
+        """End all nodes that have not ended, the recorder last: it takes what they still say."""
+        others = [node for node in self.nodes.values() if node.node != "recorder"]
+        for node in others:
+            node.ask_to_end()
+        for node in [*others, *self.nodes.values()]:
             node.stop()
 
     def restart(self, name: str, command: Sequence[str]) -> None:

@@ -1,0 +1,144 @@
+"""Nodes that die, hang or meet a half turn: what the rest of the graph does about it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from flights import space_robot
+
+from space_robot_msgs_py.bag import read_flight
+from space_robot_msgs_py.flight_log import FlightLog
+
+pytest.importorskip("rclpy")
+
+PERIOD = 0.0005
+
+
+class Story:
+    """A flight's events and bag."""
+
+    def __init__(self, bag: Path, *options: str) -> None:
+        self.result = space_robot("fly", "--bag", str(bag), "--json", *options)
+        assert self.result.stdout, self.result.stderr
+        assert "Traceback" not in self.result.stderr
+        self.report: dict[str, Any] = json.loads(self.result.stdout)
+        self.log: FlightLog = read_flight(bag)
+
+    def time_of(self, node: str, what: str, after: float = 0.0) -> float:
+        """Simulated time of the first event of a node that begins so."""
+        for event in self.report["graph"]["events"]:
+            if (
+                event["node"] == f"{node}_node"
+                and event["what"].startswith(what)
+                and event["simulated_s"] >= after
+            ):
+                return float(event["simulated_s"])
+        raise AssertionError(f"{node}: {what!r} not in {self.report['graph']['events']}")
+
+    def error(self, at_s: float) -> float:
+        """Largest joint error at a time, rad."""
+        k = round(at_s / PERIOD)
+        return float(np.abs(self.log.reference_joints[k, 0] - self.log.joint_positions[k]).max())
+
+
+@pytest.fixture(scope="module")
+def deaths(tmp_path_factory: pytest.TempPathFactory) -> Story:
+    """Controller, mission and recorder killed one after the other; the controller comes back."""
+    return Story(
+        tmp_path_factory.mktemp("deaths") / "bag",
+        "--duration", "12", "--restart-controller", "--set", "plant.silence_timeout=0.5",
+        "--set", "controller.reference_timeout=0.2",
+        "--fault", "kill_controller@0.3", "--fault", "kill_mission@9.5",
+        "--fault", "kill_recorder@11.5",
+    )  # fmt: skip
+
+
+def test_dead_controller_leaves_the_plant_holding_then_without_torque(deaths: Story) -> None:
+    killed = deaths.time_of("controller", "killed")
+    safe = deaths.time_of("plant", "safe: no good command, the torque is zero")
+    assert killed <= safe
+    silent = deaths.log.applied_torque[round((safe + 0.2) / PERIOD)]
+    np.testing.assert_array_equal(silent, np.zeros(9))
+
+
+def test_restarted_controller_takes_over_without_a_jolt(deaths: Story) -> None:
+    """From the echoed force, which is none; no step is larger than those of its next 10 ms."""
+    assert deaths.report["graph"]["restarts"] == 1
+    torque = deaths.log.applied_torque
+    safe = round(deaths.time_of("plant", "safe") / PERIOD)
+    back = safe + int(np.argmax(np.abs(torque[safe + 400 :]).max(axis=1) > 0.0)) + 400
+    steps = np.abs(np.diff(torque[back - 1 : back + 20], axis=0))
+    assert np.all(steps[0] <= steps[1:].max(axis=0))
+
+
+def test_restarted_controller_flies_the_mission_on(deaths: Story) -> None:
+    back = deaths.time_of("plant", "nominal", after=0.3)
+    assert back < 9.0
+    assert deaths.error(9.4) < 0.5 * max(deaths.error(back), 1e-3)
+
+
+def test_without_mission_the_last_point_is_held(deaths: Story) -> None:
+    deaths.time_of("controller", "holding the reference: the mission is silent", after=9.5)
+    assert int(deaths.report["graph"]["nodes"]["controller_node"]["references_held"]) > 100
+
+
+def test_without_recorder_the_flight_goes_on_and_the_exit_code_tells(deaths: Story) -> None:
+    assert deaths.result.returncode == 1
+    assert "recorder ended by signal 9" in deaths.result.stderr
+    assert deaths.report["unfinished"]
+    assert int(deaths.report["graph"]["nodes"]["plant_node"]["tick"]) == 24_000
+
+
+@pytest.fixture(scope="module")
+def hangs(tmp_path_factory: pytest.TempPathFactory) -> Story:
+    """Recorder, controller and mission stopped for a while one after the other."""
+    return Story(
+        tmp_path_factory.mktemp("hangs") / "bag",
+        "--duration", "8", "--set", "plant.silence_timeout=0.5",
+        "--set", "controller.reference_timeout=0.2",
+        "--fault", "stop_recorder@0.2:1", "--fault", "stop_controller@1.5:2.5",
+        "--fault", "stop_mission@6:3",
+    )  # fmt: skip
+
+
+def test_stopped_recorder_loses_nothing(hangs: Story) -> None:
+    assert hangs.result.returncode == 0, hangs.result.stderr
+    assert not any(hangs.report["lost"].values())
+    assert hangs.report["ticks"] == 16_000
+    assert hangs.report["filled_ticks"] == 0
+
+
+def test_stopped_controller_comes_back_by_itself(hangs: Story) -> None:
+    safe = hangs.time_of("plant", "safe: no good command", after=1.5)
+    assert hangs.time_of("plant", "nominal", after=safe) > safe
+    assert hangs.report["graph"]["restarts"] == 0
+
+
+def test_stopped_mission_is_waited_for_then_followed_again(hangs: Story) -> None:
+    held = hangs.time_of("controller", "holding the reference", after=6.0)
+    assert hangs.time_of("controller", "nominal", after=held) >= held
+
+
+def test_half_a_turn_is_safe_mode_with_its_reason_and_no_nan(tmp_path: Path) -> None:
+    story = Story(
+        tmp_path / "bag", "--duration", "0.5",
+        "--set", "plant.initial_quaternion=[0.01, 0.9, 0.3, 0.3]",
+    )  # fmt: skip
+    assert story.result.returncode == 0
+    story.time_of("controller", "safe: attitude near 180 degrees")
+    np.testing.assert_array_equal(story.log.applied_torque, 0.0)
+    assert np.isfinite(story.log.quaternion).all()
+
+
+def test_a_lost_controller_that_nobody_restarts_leaves_a_safe_plant(tmp_path: Path) -> None:
+    story = Story(
+        tmp_path / "bag", "--duration", "1.5", "--set", "plant.silence_timeout=0.3",
+        "--fault", "kill_controller@0.3",
+    )  # fmt: skip
+    assert story.result.returncode == 0
+    assert story.report["ticks"] == 3000
+    np.testing.assert_array_equal(story.log.applied_torque[-1000:], 0.0)
