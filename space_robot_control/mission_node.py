@@ -45,7 +45,7 @@ class MissionLoop:
 
     def run(self) -> None:
         """Stream until told to stop."""
-        chunk_ticks, next_tick, now = self._settings.chunk_ticks, 0, 0
+        chunk_ticks, next_tick, now = self._settings.chunk_ticks, 0, -1
         while not self._shell.stopping:
             while next_tick < now + self._settings.lead_ticks:
                 joints, base = self._codec.encode(self._mission.chunk(next_tick, chunk_ticks))
@@ -54,9 +54,10 @@ class MissionLoop:
                 next_tick += chunk_ticks
             self._waiter.wait(0.05)
             while (data := self._clock.take()) is not None:
+                began = now < 0
                 now = self._now = self._settings.timebase.tick(header_stamp_ns(data))
-                # a mission that starts in the middle of a flight has nothing to say of its past
-                next_tick = max(next_tick, now // chunk_ticks * chunk_ticks)
+                if began:  # in the middle of a flight there is nothing to say of its past
+                    next_tick = max(next_tick, now // chunk_ticks * chunk_ticks)
             self._shell.serve()
 
 
