@@ -54,7 +54,9 @@ class Monitor:
         """Whether the plant has sent a tick."""
         self.errors: tuple[float, float] | None = None
         """Largest current attitude error (eps) and joint error (rad)."""
-        self._modes: dict[str, tuple[int, str]] = {}
+        self.modes: dict[str, str] = {}
+        """What each node does, by ROS name."""
+        self._levels: dict[str, int] = {}
         self.values: dict[str, dict[str, str]] = {}
         """What each node last reported."""
         self.heard_at: dict[str, float] = {}
@@ -80,8 +82,9 @@ class Monitor:
         name, mode = status.name, status.message
         self.heard_at[name] = time.monotonic()
         self.values[name] = {item.key: item.value for item in status.values}
-        before, self._modes[name] = self._modes.get(name), (status.level, mode)
-        is_news = before != (status.level, mode) and (status.level > 0 or (before or (0,))[0] > 0)
+        before, self.modes[name] = self.modes.get(name), mode
+        level_before, self._levels[name] = self._levels.get(name, 0), status.level
+        is_news = before != mode and (status.level > 0 or level_before > 0)
         return [Event(self.simulated_s, name, mode)] if is_news else []
 
     def close(self) -> None:

@@ -25,6 +25,7 @@ from .parameters import declare_settings, refuse_unknown
 
 Schema = TypeVar("Schema", bound=NodeSettings)
 AUTOSTART = "autostart"
+DISCOVERY_S = 0.3
 LOOK_AGAIN_S = 0.3
 
 
@@ -101,9 +102,13 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         Raises:
             SpaceRobotError: it cannot be.
         """
-        for transition in (self.trigger_configure, self.trigger_activate):
-            if transition() is not TransitionCallbackReturn.SUCCESS:
-                raise self.error or SpaceRobotError(f"{self.get_name()} cannot be started")
+        self._insist(self.trigger_configure())
+        time.sleep(DISCOVERY_S)  # to see who else is there
+        self._insist(self.trigger_activate())
+
+    def _insist(self, outcome: TransitionCallbackReturn) -> None:
+        if outcome is not TransitionCallbackReturn.SUCCESS:
+            raise self.error or SpaceRobotError(f"{self.get_name()} cannot be started")
 
     def end(self) -> None:
         """Shut down, unless that has been done.

@@ -1,0 +1,220 @@
+"""Managed nodes: what each transition does, and what strangers are told."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from flights import Start
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.ros.process_environment import set_defaults
+from space_robot_msgs_py.samples import Command, RobotState, Timebase
+
+set_defaults()
+rclpy = pytest.importorskip("rclpy")
+
+from lifecycle_msgs.msg import Transition  # noqa: E402
+from lifecycle_msgs.srv import ChangeState, GetState  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
+
+from space_robot_control.flight.monitor import Monitor  # noqa: E402
+from space_robot_msgs_py.ros.endpoints import In, Out, TakenByLoop  # noqa: E402
+from space_robot_sim.robot import Robot  # noqa: E402
+
+PATIENCE_S = 30.0
+TIMEBASE = Timebase(500_000)
+
+
+class Ground:
+    """A node of the test that calls services, and hears and sends what it likes."""
+
+    def __init__(self, domain: int) -> None:
+        self.context = rclpy.Context()
+        rclpy.init(args=[], context=self.context, domain_id=domain)
+        self.node = rclpy.create_node(f"ground_{os.getpid()}", context=self.context)
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self.node)
+        self.monitor = Monitor(domain)
+
+    def close(self) -> None:
+        self.monitor.close()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+    def call(self, service: Any, name: str, request: Any) -> Any:
+        client = self.node.create_client(service, name)
+        try:
+            assert client.wait_for_service(PATIENCE_S), name
+            future = client.call_async(request)
+            self._executor.spin_until_future_complete(future, PATIENCE_S)
+            assert future.done(), name
+            return future.result()
+        finally:
+            self.node.destroy_client(client)
+
+    def change(self, node: str, transition: str) -> bool:
+        number = getattr(Transition, f"TRANSITION_{transition.upper()}")
+        request = ChangeState.Request(transition=Transition(id=number))
+        return bool(self.call(ChangeState, f"/{node}_node/change_state", request).success)
+
+    def state(self, node: str) -> str:
+        answer = self.call(GetState, f"/{node}_node/get_state", GetState.Request())
+        return str(answer.current_state.label)
+
+    def value(self, node: str, key: str) -> float:
+        return float(self.monitor.values.get(f"{node}_node", {}).get(key, 0))
+
+    def until(self, done: Callable[[], bool], what: str) -> None:
+        until = time.monotonic() + PATIENCE_S
+        while not done():
+            assert time.monotonic() < until, (what, self.monitor.values)
+            self.monitor.poll()
+            time.sleep(0.01)
+
+
+@pytest.fixture
+def ground(domain: int) -> Iterator[Ground]:
+    it = Ground(domain)
+    yield it
+    it.close()
+
+
+def test_a_node_goes_through_its_life(start: Start, ground: Ground) -> None:
+    plant = start("plant", autostart="false")
+    joints = In(ground.node, topics.JOINT_STATES, TakenByLoop())
+    assert ground.state("plant") == "unconfigured"
+    assert not ground.change("plant", "activate")  # not from here; and it survives the asking
+    assert ground.change("plant", "configure")
+    assert ground.state("plant") == "inactive"
+    time.sleep(0.5)
+    assert joints.take() is None  # nothing is sent before activate
+    assert ground.change("plant", "activate")
+    ground.until(lambda: joints.take() is not None, "states")
+    assert ground.change("plant", "deactivate")
+    assert ground.change("plant", "cleanup")
+    assert ground.state("plant") == "unconfigured"
+    assert ground.change("plant", "configure")
+    assert ground.change("plant", "activate")
+    ground.until(lambda: joints.take() is not None, "states again")
+    plant.send_signal(signal.SIGINT)
+    assert plant.wait(30) == 0
+
+
+def test_configure_fails_with_the_reason(start: Start, ground: Ground) -> None:
+    plant = start("plant", autostart="false", case=9)
+    assert not ground.change("plant", "configure")
+    assert ground.state("plant") == "unconfigured"
+    plant.send_signal(signal.SIGINT)
+    output, _ = plant.communicate(timeout=30)
+    assert "unknown case '9': choose one of 1, 2" in output
+    assert plant.returncode == 0
+
+
+def test_deactivated_controller_leaves_no_torque_and_comes_back(
+    start: Start, ground: Ground
+) -> None:
+    nodes = [start("mission"), start("controller"), start("plant", silence_timeout=0.3)]
+    robot = Robot.from_yaml("config/robots/paper.yaml")
+    codec, state = StateCodec(robot.joint_names, TIMEBASE), RobotState.allocate(robot.n)
+    joints = In(ground.node, topics.JOINT_STATES, TakenByLoop())
+
+    def torque() -> float:
+        while (data := joints.take()) is not None:
+            codec.decode_joints(data, state)
+        return float(np.abs(state.applied_torque[3:]).max())
+
+    ground.until(lambda: torque() > 1e-3, "a torque")
+    assert ground.change("controller", "deactivate")
+    ground.until(lambda: torque() == 0.0, "no torque")
+    time.sleep(0.5)
+    assert torque() == 0.0
+    assert ground.change("controller", "activate")
+    ground.until(lambda: torque() > 1e-3, "a torque again")
+    assert all(node.poll() is None for node in nodes)
+
+
+@pytest.mark.parametrize(
+    ("second", "said"),
+    [
+        ("plant", "/joint_states of ROS domain"),
+        ("controller", "/command of ROS domain"),
+        ("mission", "/reference/joints of ROS domain"),
+    ],
+)
+def test_a_second_node_of_a_kind_is_refused_by_name(
+    start: Start, ground: Ground, second: str, said: str
+) -> None:
+    first = start(second)
+    ground.until(lambda: f"{second}_node" in ground.monitor.values, "the first one")
+    other = start(second)
+    output, _ = other.communicate(timeout=60)
+    assert other.returncode == 2
+    assert said in output
+    assert f"already published by {second}_node (pid {first.pid})" in output
+    assert first.poll() is None
+
+
+def test_a_stranger_on_its_topic_keeps_a_node_from_flying(start: Start, ground: Ground) -> None:
+    Out(ground.node, topics.COMMAND)
+    controller = start("controller")
+    output, _ = controller.communicate(timeout=60)
+    assert controller.returncode == 2
+    assert f"/command is also published by /ground_{os.getpid()}" in output
+
+
+class Rogue:
+    """Sends bad commands, well formed or not, beside the controller."""
+
+    def __init__(self, ground: Ground, axis_names: tuple[str, ...]) -> None:
+        self._ground, self._out = ground, Out(ground.node, topics.COMMAND)
+        self._names = axis_names
+
+    def send(self, names: tuple[str, ...], torque: float, tick: int, stamp_ns: int = 0) -> None:
+        timebase = Timebase(1) if stamp_ns else TIMEBASE
+        command = Command(stamp_ns or tick, np.full(len(names), torque))
+        self._out.publish(CommandCodec(names, timebase).encode(command))
+
+
+def test_bad_commands_are_refused_counted_and_change_nothing(
+    start: Start, ground: Ground, tmp_path: Any
+) -> None:
+    nodes: list[subprocess.Popen[str]] = [
+        start("recorder", bag=tmp_path / "bag"), start("mission"), start("controller"),
+        start("plant"),
+    ]  # fmt: skip
+    ground.until(lambda: ground.monitor.simulated_s > 0.1, "a flight")
+    axes = Robot.from_yaml("config/robots/paper.yaml").axis_names
+    rogue = Rogue(ground, axes)
+    ground.until(lambda: bool(ground.node.count_subscribers("/command") >= 2), "listeners")
+
+    def now() -> int:
+        ground.monitor.poll()
+        return round(ground.monitor.simulated_s * 2000)
+
+    time.sleep(0.3)
+    wrong = {
+        "refused: names": lambda: rogue.send(tuple(f"x_{a}" for a in axes), 1e3, now()),
+        "refused: names ": lambda: rogue.send(axes[:4], 1e3, now()),  # too few of them
+        "refused: stamp": lambda: rogue.send(axes, 1e3, now() + 100_000),
+        "refused: stamp ": lambda: rogue.send(axes, 1e3, 0, stamp_ns=123_456_789),
+        "refused: malformed": lambda: rogue._out.publish(b"\x00\x01\x00\x00garbage"),
+    }
+    for key, send in wrong.items():
+        before = ground.value("plant", key.strip())
+        send()
+        ground.until(lambda k=key, b=before: ground.value("plant", k.strip()) > b, key)
+    ground.until(
+        lambda: "also published by" in ground.monitor.modes.get("controller_node", ""), "a warning"
+    )
+    assert all(node.poll() is None for node in nodes)
+    for node in reversed(nodes):
+        node.send_signal(signal.SIGINT)
+        assert node.wait(30) == 0
