@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled import kernel
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
-from space_robot_msgs_py.samples import Command, RobotState
+from space_robot_msgs_py.samples import LARGEST, Command, RobotState
 from space_robot_sim.attitude import SINGULAR_ETA, attitude_jacobian_inverse
 from space_robot_sim.dynamics import Model
 from space_robot_sim.dynamics.rho_space import RhoSpaceModel, rho_space_into
@@ -18,7 +18,13 @@ from space_robot_sim.records import Record, assign, nested, shaped
 from space_robot_sim.robot import Robot
 
 from .laws import ControlLaw, Signals
-from .time_delay_estimation import TimeDelayPair, low_pass_weight, observe, time_delay_estimate
+from .time_delay_estimation import (
+    TimeDelayPair,
+    follows,
+    low_pass_weight,
+    observe,
+    time_delay_estimate,
+)
 from .tracking import force_from_torque, measured_rate, torque_from_force, tracking_errors
 
 Array = NDArray[np.float64]
@@ -29,7 +35,7 @@ TRANSFER_S = 0.02
 NORM_TOLERANCE = 1e-3
 """How far the square of a quaternion's norm may be from 1."""
 
-USABLE, NOT_FINITE, NOT_UNIT, SINGULAR = range(4)
+USABLE, NOT_FINITE, TOO_LARGE, NOT_UNIT, SINGULAR = range(5)
 """What `form_signals` finds a state to be."""
 
 
@@ -125,8 +131,8 @@ class Controller:
             The command for this tick, valid until the next call.
 
         Raises:
-            UnusableStateError: the state is not finite or its quaternion not unit; nothing was
-                remembered of it.
+            UnusableStateError: the state is not finite, beyond `LARGEST`, or its quaternion not
+                unit; nothing was remembered of it.
             SingularAttitudeError: the base has turned by 180 degrees.
         """
         law, command = self._law, self._command
@@ -155,6 +161,8 @@ def unusable(found: int, tick: int, quaternion: Array) -> UnusableStateError:
         norm = float(np.linalg.norm(quaternion))
         why = f"the base's quaternion has norm {norm:.6g}, not 1"
         return UnusableStateError(tick, why, "not unit")
+    if found == TOO_LARGE:
+        return UnusableStateError(tick, f"the state has a number beyond {LARGEST:g}", "too large")
     return UnusableStateError(tick, "the state is not finite", "not finite")
 
 
@@ -242,12 +250,17 @@ def form_signals(
     for k in range(4):
         dot += quaternion[k] * near[k]
         square += quaternion[k] * quaternion[k]
-    total = square + applied_torque[0] + applied_torque[1] + applied_torque[2]
-    total += omega_base[0] + omega_base[1] + omega_base[2]
+    total = square
+    for k in range(3):
+        total += abs(omega_base[k])
     for i in range(joint_positions.size):
-        total += joint_positions[i] + joint_velocities[i] + applied_torque[3 + i]
+        total += abs(joint_positions[i]) + abs(joint_velocities[i])
+    for i in range(applied_torque.size):
+        total += abs(applied_torque[i])
     if not np.isfinite(total):  # any number that is not makes the sum so
         return NOT_FINITE
+    if total > LARGEST:
+        return TOO_LARGE
     if abs(square - 1.0) > NORM_TOLERANCE:
         return NOT_UNIT
     side = -1.0 if dot < 0.0 else 1.0
@@ -256,6 +269,8 @@ def form_signals(
     for k in range(4):
         near[k] = side * quaternion[k]
     measured_rate(near, omega_base, joint_velocities, memory.jacobian, rate)
+    if not follows(memory.pair, tick):  # whatever J0 was, this one's is nearer
+        attitude_jacobian_inverse(near, memory.last_jacobian_inverse)
     # the applied torque acted from the last tick on, so that tick's J0 turns it into F_S
     force_from_torque(memory.last_jacobian_inverse, applied_torque, memory.applied_force)
     attitude_jacobian_inverse(near, memory.last_jacobian_inverse)

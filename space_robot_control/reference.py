@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.samples import ReferenceChunk
+from space_robot_msgs_py.errors import MessageError
+from space_robot_msgs_py.samples import LARGEST, ReferenceChunk
 
 Array = NDArray[np.float64]
 
@@ -17,6 +18,7 @@ class ReferenceBuffer:
     """A ring of reference rows by tick; the joints' and the base's part may come apart.
 
     A row stays until the ring's length of newer ones has come, so late readers can go back.
+    Rows with a number not finite, or beyond `LARGEST`, are refused with a `MessageError`.
     """
 
     def __init__(self, n: int, capacity: int = 16_384) -> None:
@@ -64,6 +66,11 @@ class ReferenceBuffer:
 
     @staticmethod
     def _store(target: Array, ticks: NDArray[np.int64], start: int, rows: Array) -> None:
+        if not np.all(np.abs(rows) <= LARGEST):
+            raise MessageError(
+                f"reference from tick {start}: a number is not finite or beyond {LARGEST:g}",
+                "not finite",
+            )
         arriving = np.arange(start, start + len(rows))
         places = arriving % len(ticks)
         newer = arriving >= ticks[places]  # a repeated old chunk must not push out a newer one

@@ -9,6 +9,7 @@ applied force (`Controller.engage`).
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from enum import Enum
 
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Command, RobotState
 
-from .controller import Controller
+from .controller import NORM_TOLERANCE, Controller
 from .time_delay_estimation import LONGEST_GAP
 
 Array = NDArray[np.float64]
@@ -55,11 +56,13 @@ class Supervisor:
     def answer(self, state: RobotState, joints: Array, base: Array) -> Command:
         """The command for a state, of the law or a safe one; see `Controller.update`."""
         controller = self.controller
-        if self.mode is Mode.SAFE or state.tick - self._last_tick > LONGEST_GAP:
+        if self.mode is Mode.SAFE or not 0 < state.tick - self._last_tick <= LONGEST_GAP:
             controller.engage()
         try:
             eta = abs(state.quaternion[0])
-            if eta < (SINGULAR_ETA if self.mode is Mode.NOMINAL else REGULAR_ETA):
+            if eta < (REGULAR_ETA if self.mode is Mode.SAFE else SINGULAR_ETA) and _is_unit(
+                state.quaternion
+            ):
                 raise SingularAttitudeError(state.tick, float(state.quaternion[0]))
             self._command = controller.update(state, joints, base)
         except UnusableStateError as error:
@@ -82,7 +85,13 @@ class Supervisor:
             self._command = Command(error.tick, self._command.torque.copy())
         self._command.tick = error.tick
         is_singular = isinstance(error, SingularAttitudeError)
-        if is_singular or error.tick - self._held_since >= self._hold_ticks:
+        if is_singular or not 0 <= error.tick - self._held_since < self._hold_ticks:
             self.mode = Mode.SAFE
             self._command.torque[:] = 0.0
         return self._command
+
+
+def _is_unit(quaternion: Array) -> bool:
+    """Whether the controller would take it for an attitude."""
+    norm = math.hypot(*quaternion)
+    return abs(norm * norm - 1.0) <= NORM_TOLERANCE

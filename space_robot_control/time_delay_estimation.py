@@ -47,6 +47,13 @@ def low_pass_weight(corner_hz: float, period: float) -> float:
 
 
 @kernel
+def follows(pair: TimeDelayPair, tick: int) -> bool:
+    """Whether ``tick`` makes a pair with the last tick observed."""
+    elapsed = tick - pair.tick
+    return bool(pair.seen == 1.0 and 1.0 <= elapsed <= LONGEST_GAP)
+
+
+@kernel
 def observe(
     pair: TimeDelayPair, tick: int, applied_force: Array, rate: Array,
     acceleration_desired: Array, period: float,
@@ -56,8 +63,7 @@ def observe(
     The first tick, and one after a longer gap, has no acceleration: the desired one is taken.
     A low-pass takes force and acceleration alike, so that they stay a pair.
     """
-    elapsed = tick - pair.tick
-    known = pair.seen == 1.0 and 1.0 <= elapsed <= LONGEST_GAP
+    known, elapsed = follows(pair, tick), tick - pair.tick
     weight = pair.smoothing if known and pair.smoothing > 0.0 else 1.0
     for i in range(rate.size):
         force, acceleration = applied_force[i], acceleration_desired[i]

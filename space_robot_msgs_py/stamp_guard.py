@@ -23,7 +23,7 @@ class StampGuard:
 
     def passes(self, tick: int) -> bool:
         """Whether to believe a state of ``tick``, which is then the last one."""
-        if self.last >= 0 and not self._follows(tick, self.last):
+        if self.last >= 0 and not 0 < tick - self.last <= self._longest_jump:
             agrees = self._agreeing and 0 <= tick - self._strange <= self._longest_jump
             self._agreeing = self._agreeing + 1 if agrees else 1
             self._strange = tick
@@ -31,6 +31,3 @@ class StampGuard:
                 return False
         self.last, self._agreeing = tick, 0
         return True
-
-    def _follows(self, tick: int, before: int) -> bool:
-        return 0 < tick - before <= self._longest_jump

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 
 import numpy as np
@@ -15,7 +14,8 @@ class CommandGuard:
 
     A command is good if it is finite, and answers a state that has been sent and is newer than the
     one answered before.
-    Without a good one the last is held for ``hold_ticks``, then the torque is zero.
+    It acts until ``hold_ticks`` after the state it answers, however late it came; then, without a
+    newer one, the torque is zero.
     """
 
     def __init__(self, axes: int, hold_ticks: int) -> None:
@@ -23,7 +23,6 @@ class CommandGuard:
         self._accepted, self.offered = (Command(-1, np.zeros(axes)) for _ in range(2))
         """``offered``: to be filled with a command that has come, for `accept`."""
         self._none = Command(-1, np.zeros(axes))
-        self._since = 0
         self.acting = self._none
         """The command that acts at the tick last given to `act`."""
         self.refused: Counter[str] = Counter()
@@ -40,19 +39,18 @@ class CommandGuard:
         return self.acting is self._none
 
     def held_ticks(self, now: int) -> int:
-        """Ticks at ``now`` since a good command has come."""
-        return now - self._since
+        """Age at ``now`` of the state that the last good command answers, ticks."""
+        return now - self._accepted.tick
 
     def accept(self, now: int) -> bool:
         """Take the command in `offered` at tick ``now``; False, and counted, if it is not good."""
         if not self._accepted.tick < self.offered.tick <= now:
             self.refused["stamp"] += 1
             return False
-        if not math.isfinite(self.offered.torque.sum()):
+        if not np.isfinite(self.offered.torque).all():
             self.refused["not finite"] += 1
             return False
         self._accepted, self.offered = self.offered, self._accepted
-        self._since = now
         return True
 
     def refuse(self, reason: str) -> None:
@@ -65,6 +63,6 @@ class CommandGuard:
 
     def act(self, now: int) -> Command:
         """The command for tick ``now``."""
-        held = now - self._since <= self._hold_ticks and self._accepted.tick >= 0
+        held = self.answered >= 0 and self.held_ticks(now) <= self._hold_ticks
         self.acting = self._accepted if held else self._none
         return self.acting

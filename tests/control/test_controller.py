@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 import pytest
 from closed_loop import GAINS, PERIOD, Loop, law_of
@@ -9,10 +11,10 @@ from hypothesis import assume, given, settings
 from oracles import attitude_jacobian_base, attitude_jacobian_inertial, rotation_of, skew
 from random_robots import Case, cases, random_quaternion
 
-from space_robot_control.controller import Controller
+from space_robot_control.controller import TRANSFER_S, Controller
 from space_robot_control.laws import find_law
-from space_robot_msgs_py.errors import SingularAttitudeError
-from space_robot_msgs_py.samples import RobotState
+from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
+from space_robot_msgs_py.samples import LARGEST, RobotState
 from space_robot_sim import Robot, forward_dynamics
 from space_robot_sim.environment import FrictionSettings
 
@@ -105,7 +107,7 @@ def test_measurement_that_changes_sign_in_flight_gives_no_jolt(paper_robot: Robo
 # Contract
 
 
-@pytest.mark.parametrize("quaternion", [[0.0, 1.0, 0.0, 0.0], [1e-9, 0.6, 0.0, 0.8], [np.nan] * 4])
+@pytest.mark.parametrize("quaternion", [[0.0, 1.0, 0.0, 0.0], [1e-9, 0.6, 0.0, 0.8]])
 def test_half_a_turn_is_an_error_not_a_nan(paper_robot: Robot, quaternion: list[float]) -> None:
     controller = Controller(paper_robot, law_of("tde_stc"), PERIOD)
     state = RobotState.allocate(6)
@@ -113,6 +115,79 @@ def test_half_a_turn_is_an_error_not_a_nan(paper_robot: Robot, quaternion: list[
     with pytest.raises(SingularAttitudeError, match=r"tick 321.*eta.*180 degrees") as caught:
         controller.update(state, np.zeros((3, 6)), np.eye(10)[0])
     assert caught.value.tick == 321
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "kind"),
+    [
+        ("quaternion", np.nan, "not finite"),
+        ("omega_base", np.inf, "not finite"),
+        ("joint_positions", np.nan, "not finite"),
+        ("joint_velocities", -np.inf, "not finite"),
+        ("applied_torque", np.nan, "not finite"),
+        ("joint_velocities", -2.0 * LARGEST, "too large"),
+        ("applied_torque", 1e300, "too large"),
+        ("quaternion", 1.1, "not unit"),
+        ("quaternion", 0.0, "not unit"),
+    ],
+)
+@pytest.mark.parametrize("place", [0, -1])
+def test_an_unusable_state_is_refused_and_forgotten(
+    paper_robot: Robot, field: str, value: float, kind: str, place: int
+) -> None:
+    """Wherever the bad number stands; the flight goes on as if it had not come."""
+    if field == "quaternion":
+        place = 0
+    shown, spared = (Loop(paper_robot, law_of("tde_stc")) for _ in range(2))
+    for loop in (shown, spared):
+        loop.fly(20)
+    state = copy.deepcopy(shown.plant.state)
+    getattr(state, field)[place] = value
+    with pytest.raises(UnusableStateError, match="at tick 20 the") as caught:
+        shown.controller.update(state, *shown.references.at(20))
+    assert (caught.value.tick, caught.value.kind) == (20, kind)
+    np.testing.assert_array_equal(shown.fly(20)[1], spared.fly(20)[1])
+
+
+def test_numbers_of_opposite_sign_do_not_hide_one_another(paper_robot: Robot) -> None:
+    """Infinities, or huge ones, that a plain sum would cancel."""
+    controller = Controller(paper_robot, law_of("ctc"), PERIOD)
+    for value in (np.inf, 1e200):
+        state = RobotState.allocate(6)
+        state.quaternion[0], state.joint_velocities[:2] = 1.0, [value, -value]
+        with pytest.raises(UnusableStateError):
+            controller.update(state, np.zeros((3, 6)), np.eye(10)[0])
+
+
+# Taking over
+
+
+def test_a_law_takes_over_within_the_transfer_and_then_is_alone(paper_robot: Robot) -> None:
+    """The first torque is the one that was applied; 20 ms later it is the law's own."""
+    loop = Loop(paper_robot, law_of("tde_stc"))
+    before = loop.fly(1000)[1][-1]
+    loop.controller.law = law_of("ctc")
+    ticks = round(TRANSFER_S / PERIOD)
+    shares = []
+    for tick in range(ticks + 5):
+        torque = loop.fly(1)[1][0]
+        memory = loop.controller.block[0]
+        own = loop.controller.law.force(loop.controller.signals)
+        shares.append(np.abs(memory.force - own).max())
+        if tick == 0:
+            np.testing.assert_allclose(torque, before, atol=1e-9)
+    assert shares[0] > 0.0
+    fade = 1.0 - np.minimum(np.arange(ticks + 5) / ticks, 1.0)
+    np.testing.assert_allclose(shares, shares[0] * fade, atol=1e-12)
+    assert shares[ticks:] == [0.0] * 5
+
+
+def test_at_tick_0_nothing_is_taken_over(paper_robot: Robot) -> None:
+    """The law's own torque from the beginning."""
+    loop = Loop(paper_robot, law_of("ctc"), initial_quaternion=[0.99, 0.1, 0.05, 0.05])
+    loop.fly(1)
+    own = loop.controller.law.force(loop.controller.signals)
+    np.testing.assert_array_equal(loop.controller.block[0].force, own)
 
 
 @pytest.mark.parametrize("name", GAINS)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot_control.reference import ReferenceBuffer
+from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import ReferenceChunk
 
 CAPACITY = 32
@@ -132,3 +134,55 @@ def test_what_is_covered_is_always_right_and_the_newest_always_covered(
         assert buffer.covers(tick) == (newest.get(tick % CAPACITY) == tick)
         if buffer.covers(tick):
             assert_holds(buffer, tick)
+
+
+# Where the mission stays away
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 3 * CAPACITY), st.integers(1, 8)), max_size=6),
+    st.lists(st.tuples(st.integers(0, 3 * CAPACITY), st.integers(1, 8)), max_size=6),
+    st.integers(0, 4 * CAPACITY),
+)
+def test_held_is_the_last_whole_point_before_at_rest(
+    joints: list[tuple[int, int]], base: list[tuple[int, int]], tick: int
+) -> None:
+    """Of what is still in the ring; a point needs both parts; none from the future is taken."""
+    buffer = ReferenceBuffer(2, CAPACITY)
+    for start, length in joints:
+        buffer.add_joints(start, chunk(start, length).joints)
+    for start, length in base:
+        buffer.add_base(start, chunk(start, length).base)
+    there = [k for k in range(tick + 1) if buffer.covers(k)]
+    held = buffer.hold(tick)
+    if not there:
+        assert held is None
+        return
+    assert held is not None
+    expected = chunk(there[-1], 1)
+    np.testing.assert_array_equal(held[0][0], expected.joints[0, 0])
+    np.testing.assert_array_equal(held[1][:4], expected.base[0, :4])
+    assert not held[0][1:].any()
+    assert not held[1][4:].any()
+
+
+def test_what_is_held_is_a_copy() -> None:
+    buffer = ReferenceBuffer(2, CAPACITY)
+    buffer.add(chunk(0, 4))
+    held = buffer.hold(10)
+    assert held is not None
+    held[0][:], held[1][:] = -1.0, -1.0
+    assert_holds(buffer, 3)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1e300])
+@pytest.mark.parametrize("part", ["joints", "base"])
+def test_rows_that_make_no_sense_are_refused_as_a_whole(part: str, value: float) -> None:
+    """A law would carry a NaN on in its integral for ever."""
+    buffer, bad = ReferenceBuffer(2, CAPACITY), chunk(0, 4)
+    getattr(bad, part)[2, -1] = value
+    with pytest.raises(MessageError, match="reference from tick 0") as caught:
+        getattr(buffer, f"add_{part}")(0, getattr(bad, part))
+    assert caught.value.reason == "not finite"
+    buffer.add(chunk(0, 4))
+    assert_holds(buffer, 2)

@@ -44,7 +44,7 @@ def test_every_shipped_parameter_file_is_one() -> None:
         if path.parent.name == "robots" or path.name == "default_sets.yaml":
             continue
         for node in yaml.safe_load(path.read_text()):
-            assert node_parameters(path, node.strip("/"))
+            assert node_parameters(path, node.strip("/").removesuffix("_node"))
 
 
 def test_layers_and_overrides() -> None:

@@ -14,7 +14,7 @@ from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py.bag import read_flight
-from space_robot_msgs_py.errors import DivergedError
+from space_robot_msgs_py.errors import DivergedError, InputError
 
 
 def _rms(**options: object) -> dict[str, float]:
@@ -60,6 +60,34 @@ def test_two_flights_are_the_same_to_the_last_bit() -> None:
     first, second = (simulate(Flight(FlightPlan(case="4-2", duration=0.5))) for _ in range(2))
     np.testing.assert_array_equal(first.joint_positions, second.joint_positions)
     np.testing.assert_array_equal(first.applied_torque, second.applied_torque)
+
+
+def test_swaps_are_flown_at_their_ticks() -> None:
+    """Up to the tick before it is the flight without a swap; a swap to the same law is none."""
+    plain, swapped, same = (
+        simulate(Flight(FlightPlan(duration=0.3, swaps=swaps)))
+        for swaps in ([], ["0.2:ctc", "0.1:tde_smc"], ["0.1:tde_stc"])
+    )
+    assert plain.commanded_torque is not None
+    assert swapped.commanded_torque is not None
+    np.testing.assert_array_equal(same.commanded_torque, plain.commanded_torque)
+    differs = (swapped.commanded_torque != plain.commanded_torque).any(axis=1)
+    assert int(np.argmax(differs)) == 200
+    assert swapped.telemetry is not None
+    has_estimate = swapped.telemetry[:, 2].any(axis=1)
+    np.testing.assert_array_equal(has_estimate[2:], np.arange(2, 600) < 400)  # ctc has none
+
+
+def test_a_swap_after_the_end_changes_nothing() -> None:
+    plain, swapped = (
+        simulate(Flight(FlightPlan(duration=0.1, swaps=swaps))) for swaps in ([], ["0.1:ctc"])
+    )
+    np.testing.assert_array_equal(swapped.applied_torque, plain.applied_torque)
+
+
+def test_faults_need_the_graph() -> None:
+    with pytest.raises(InputError, match="use `fly`"):
+        simulate(Flight(FlightPlan(faults=["nan_state@1-2"])))
 
 
 def test_simulate_prints_what_its_bag_says(tmp_path: Path) -> None:
