@@ -160,10 +160,12 @@ def unusable(found: int, tick: int, quaternion: Array) -> UnusableStateError:
     if found == NOT_UNIT:
         norm = float(np.linalg.norm(quaternion))
         why = f"the base's quaternion has norm {norm:.6g}, not 1"
-        return UnusableStateError(tick, why, "not unit")
+        return UnusableStateError(tick, why, "quaternion not unit")
     if found == TOO_LARGE:
-        return UnusableStateError(tick, f"the state has a number beyond {LARGEST:g}", "too large")
-    return UnusableStateError(tick, "the state is not finite", "not finite")
+        return UnusableStateError(
+            tick, f"the state has a number beyond {LARGEST:g}", "state too large"
+        )
+    return UnusableStateError(tick, "the state is not finite", "state not finite")
 
 
 @kernel

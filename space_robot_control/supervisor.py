@@ -79,7 +79,7 @@ class Supervisor:
 
     def _safe_command(self, error: UnusableStateError) -> Command:
         self.rejected[error.kind] += 1
-        self.reason = error.why
+        self.reason = error.kind
         if self.mode is Mode.NOMINAL:
             self.mode, self._held_since = Mode.HOLDING, error.tick
             self._command = Command(error.tick, self._command.torque.copy())

@@ -53,5 +53,5 @@ class SingularAttitudeError(UnusableStateError):
             tick,
             f"the base attitude has eta = {eta:.1e}: J0 of eq. (1) is singular at 180 degrees, "
             "so no command exists there in these coordinates",
-            "singular",
+            "attitude near 180 degrees",
         )

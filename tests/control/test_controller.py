@@ -120,12 +120,12 @@ def test_half_a_turn_is_an_error_not_a_nan(paper_robot: Robot, quaternion: list[
 @pytest.mark.parametrize(
     ("field", "value", "kind"),
     [
-        ("quaternion", np.nan, "not finite"),
-        ("omega_base", np.inf, "not finite"),
-        ("joint_positions", np.nan, "not finite"),
-        ("joint_velocities", -np.inf, "not finite"),
-        ("applied_torque", np.nan, "not finite"),
-        ("joint_velocities", -2.0 * LARGEST, "too large"),
+        ("quaternion", np.nan, "state not finite"),
+        ("omega_base", np.inf, "state not finite"),
+        ("joint_positions", np.nan, "state not finite"),
+        ("joint_velocities", -np.inf, "state not finite"),
+        ("applied_torque", np.nan, "state not finite"),
+        ("joint_velocities", -2.0 * LARGEST, "state too large"),
         ("applied_torque", 1e300, "too large"),
         ("quaternion", 1.1, "not unit"),
         ("quaternion", 0.0, "not unit"),

@@ -131,11 +131,11 @@ def counts(node: str, key: str, *kinds: str) -> Check:
 MATRIX: list[tuple[str, str, str, Check]] = [
     # fault, flight, reaction, how it shows
     ("nan_state", "bad messages", "not used, counted",
-     counts("controller", "rejected: not finite", "nan_state", "inf_state")),
+     counts("controller", "rejected: state not finite", "nan_state", "inf_state")),
     ("nan_state", "bad messages", "last torque repeated", tracks(0.1, 0.2, 1e-5)),
     ("inf_state", "bad messages", "last torque repeated", tracks(0.2, 0.3, 1e-5)),
     ("scaled_quaternion", "bad messages", "not used, counted",
-     counts("controller", "rejected: not unit", "scaled_quaternion")),
+     counts("controller", "rejected: quaternion not unit", "scaled_quaternion")),
     ("stamp_back", "bad messages", "not used", tracks(0.4, 0.45, 1e-5)),
     ("stamp_jump", "bad messages", "not used", tracks(0.5, 0.55, 1e-5)),
     ("stamp_jump", "bad messages", "counted",
@@ -168,7 +168,7 @@ MATRIX: list[tuple[str, str, str, Check]] = [
      and seen.count("plant", "saturated_ticks") > 100),
     ("stuck_joint", "bad actuators", "the others go on", tracks(0.6, 0.9, 0.5)),
     ("scaled_quaternion", "long silences", "the controller goes safe, then back",
-     lambda seen: "safe: the base's quaternion has norm" in " ".join(seen.modes("controller"))
+     lambda seen: "safe: quaternion not unit" in " ".join(seen.modes("controller"))
      and seen.modes("controller")[-1] == "nominal"),
     ("scaled_quaternion", "long silences", "no torque after hold_ticks", no_torque(0.1, 0.25)),
     ("drop_command", "long silences", "the plant goes safe, then back",
