@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.ros.process_environment import completed, set_defaults
+from space_robot_msgs_py.ros.process_environment import DEFAULTS, set_defaults
 
 set_defaults()
 rclpy = pytest.importorskip("rclpy")
@@ -62,7 +62,7 @@ def make_node(domain: int) -> Iterator[Callable[..., rclpy.node.Node]]:
 @pytest.fixture
 def controller(domain: int) -> Iterator[subprocess.Popen[str]]:
     """A process that has claimed /command and publishes on it."""
-    environment = {**completed(os.environ), "ROS_DOMAIN_ID": str(domain)}
+    environment = {**os.environ, **DEFAULTS, "ROS_DOMAIN_ID": str(domain)}
     process = subprocess.Popen(
         [sys.executable, "-c", PUBLISHER], stdout=subprocess.PIPE, text=True, env=environment
     )
