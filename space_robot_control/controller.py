@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled import kernel
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
-from space_robot_msgs_py.samples import LARGEST, Command, RobotState
+from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.attitude import SINGULAR_ETA, attitude_jacobian_inverse
 from space_robot_sim.dynamics import Model
 from space_robot_sim.dynamics.rho_space import RhoSpaceModel, rho_space_into
@@ -34,6 +34,9 @@ TRANSFER_S = 0.02
 """Time in which a law that takes over passes from the force it found to its own, s."""
 NORM_TOLERANCE = 1e-3
 """How far the square of a quaternion's norm may be from 1."""
+LARGEST = 1e30
+"""No number of a state or reference is larger: far beyond any flight, yet no law's products of
+such numbers overflow."""
 
 USABLE, NOT_FINITE, TOO_LARGE, NOT_UNIT, SINGULAR = range(5)
 """What `form_signals` finds a state to be."""

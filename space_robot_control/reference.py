@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.samples import LARGEST, ReferenceChunk
+from space_robot_msgs_py.samples import ReferenceChunk
+
+from .controller import LARGEST
 
 Array = NDArray[np.float64]
 

@@ -16,10 +16,6 @@ from .errors import MessageError
 
 Array = NDArray[np.float64]
 
-LARGEST = 1e30
-"""No number of a state or reference is larger: far beyond any flight, yet no law's products of
-such numbers overflow."""
-
 
 class Timebase(NamedTuple):
     """Ticks to stamps and back, in integers: never a clock's difference."""
