@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,15 +10,16 @@ from typing import Any
 import click
 
 Decorator = Callable[[Any], Any]
+NODES = ("plant", "controller", "mission", "recorder")
 
 
 def _parameters(
     context: click.Context, option: click.Parameter, given: Any
 ) -> dict[str, dict[str, Any]]:
-    """``plant.hold_ticks=40`` to ``{"plant": {"hold_ticks": 40}}``; a scenario gives the latter."""
-    if isinstance(given, dict):
-        return given
+    """``plant.hold_ticks=40`` to ``{"plant": {"hold_ticks": 40}}``."""
     import yaml
+
+    from space_robot_msgs_py.validation import one_of
 
     tree: dict[str, dict[str, Any]] = {}
     for text in given:
@@ -25,6 +27,7 @@ def _parameters(
         node, _, parameter = name.partition(".")
         if not (equals and parameter):
             raise click.BadParameter(f"{text!r}: NODE.PARAM=VALUE expected")
+        one_of(node, NODES, "node", f" in --set {text}")
         tree.setdefault(node, {})[parameter] = yaml.safe_load(value)
     return tree
 
@@ -33,6 +36,7 @@ def _scenario(context: click.Context, option: click.Parameter, path: Path | None
     """Take a scenario's values as the options' defaults."""
     if path is None:
         return
+    from space_robot_msgs_py.configuration import flatten
     from space_robot_msgs_py.validation import one_of, read_yaml
 
     names = [parameter.name for parameter in context.command.params if parameter.name]
@@ -41,6 +45,8 @@ def _scenario(context: click.Context, option: click.Parameter, path: Path | None
         one_of(
             key, [name for name in names if name not in ("scenario", "help")], "key", f" in {path}"
         )
+    if isinstance(parameters := content.get("parameters"), dict):
+        content["parameters"] = [f"{k}={json.dumps(v)}" for k, v in flatten(parameters)]
     context.default_map = {**(context.default_map or {}), **content}
 
 
