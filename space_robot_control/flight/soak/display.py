@@ -11,10 +11,12 @@ from rich.table import Table
 def print_soak(report: dict[str, Any], console: Console) -> None:
     """Print the report of `run.Soak`."""
     ended = ", interrupted" if report["interrupted"] else ""
-    table = Table(title=f"soak, seed {report['seed']}{ended}", title_justify="left")
-    table.add_column("")
-    table.add_column("", justify="right")
-    table.add_column("")
+    table = Table(
+        title=f"soak, seed {report['seed']}{ended}", title_justify="left", show_header=False
+    )
+    table.add_column()
+    table.add_column(justify="right", no_wrap=True)
+    table.add_column()
     for row in rows(report):
         table.add_row(*row)
     console.print(table)
@@ -37,20 +39,27 @@ def rows(report: dict[str, Any]) -> list[tuple[str, str, str]]:
         ("faults", str(report["faults"]), f"{len(report['faults_by_kind'])} kinds"),
         ("controllers restarted", str(report["restarts"]), ""),
         ("messages lost", str(report["messages_lost"]), ""),
-        *_errors(report["largest_error"]["tracking"], "largest {} error"),
-        *_errors(report["largest_error"]["disturbed"], "... {}, torque or reference taken away"),
+        *_errors(
+            report["largest_error"]["tracking"], "largest {} error", ", torque and reference whole"
+        ),
+        *_errors(
+            report["largest_error"]["disturbed"],
+            "largest {} error",
+            ", torque or reference taken away",
+        ),
         ("memory growth, this process", _mb(growth["soak"]), "since the third flight"),
         ("memory growth, largest node", _mb(growth["largest_node"]), "first to last quarter"),
         ("shared memory files", f"{files['start']} to {files['end']}", "of Fast DDS"),
     ]
 
 
-def _errors(errors: dict[str, Any], name: str) -> list[tuple[str, str, str]]:
+def _errors(errors: dict[str, Any], name: str, remark: str) -> list[tuple[str, str, str]]:
     found = []
     for what, unit in (("attitude", ""), ("joint", " rad")):
         largest = errors[what]
         figure = f"{largest['value']:.2e}{unit}" if largest else "-"
-        found.append((name.format(what), figure, f"flight {largest['flight']}" if largest else ""))
+        where = f"flight {largest['flight']}{remark}" if largest else ""
+        found.append((name.format(what), figure, where))
     return found
 
 
