@@ -63,7 +63,7 @@ def judge(flight: Flight, report: dict[str, Any] | None, bag: Path) -> Outcome:
         return outcome
     outcome.lost = sum(log.lost.values())
     outcome.attitude_error, outcome.joint_error = largest_errors(log)
-    if outcome.lost:
+    if outcome.lost and report is not None:  # else `fly` has said so
         outcome.wrong.append(f"messages lost: { {k: v for k, v in log.lost.items() if v} }")
     if log.unfinished and "kill_recorder" not in kinds:
         outcome.wrong.append(log.unfinished)
