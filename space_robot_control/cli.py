@@ -15,6 +15,7 @@ from space_robot_msgs_py.errors import SpaceRobotError
 from .commands.bench import bench
 from .commands.options import OPTIONS, flight_options
 from .commands.reproduce import reproduce
+from .commands.soak import soak
 from .commands.stability import stability
 
 
@@ -31,6 +32,7 @@ def cli() -> None:
       space-robot analyze flights/<bag>             the table of a recorded flight
       space-robot reproduce                         the paper's Table V and figures, flown again
       space-robot bench                             how fast it is here
+      space-robot soak --minutes 5                  flights with faults drawn by chance
     """
 
 
@@ -152,6 +154,7 @@ def analyze(bag: Path, as_json: bool) -> None:
 
 cli.add_command(bench)
 cli.add_command(reproduce)
+cli.add_command(soak)
 cli.add_command(stability)
 
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .options import check_writable
+
 if TYPE_CHECKING:
     from ..bench import Result
 
@@ -58,7 +60,7 @@ def bench(
         if name not in SECTIONS:
             raise click.UsageError(f"unknown section {name!r}: choose from {', '.join(SECTIONS)}")
     if output:
-        _check_writable(output)
+        check_writable(output)
     options = Options(
         short, repetitions, lambda what: click.echo(f"measuring {what} ...", err=True)
     )
@@ -76,15 +78,6 @@ def bench(
         click.echo(text)
     else:
         _show_machine(report["machine"])
-
-
-def _check_writable(path: Path) -> None:
-    from space_robot_msgs_py.errors import InputError
-
-    try:
-        path.open("a", encoding="utf-8").close()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from None
 
 
 def _show(name: str, results: list[Result]) -> None:

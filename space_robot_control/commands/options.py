@@ -99,3 +99,17 @@ def flight_options(*names: str) -> Decorator:
         return function
 
     return decorate
+
+
+def check_writable(path: Path) -> None:
+    """See that a file can be written, before any work is done for it.
+
+    Raises:
+        InputError: it cannot.
+    """
+    from space_robot_msgs_py.errors import InputError
+
+    try:
+        path.open("a", encoding="utf-8").close()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror})") from None

@@ -157,6 +157,8 @@ def _follow(
                     events += news
             show(total_s, "")
         graph.stop()
+        if stopped:
+            raise InterruptedFlightError("stopped when the flight had landed")
         monitor.poll()  # the nodes' last reports
     finally:
         monitor.close()
