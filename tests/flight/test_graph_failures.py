@@ -44,7 +44,7 @@ def _start(bag: Path) -> tuple[subprocess.Popen[str], dict[str, int]]:
     nodes = {}
     for child in _children(process.pid):
         for name in ("plant", "controller", "mission", "recorder"):
-            if f"{name}_node" in _command_line(child):
+            if f".{name}_node " in _command_line(child):
                 nodes[name] = child
     assert len(nodes) == 4
     return process, nodes
@@ -52,7 +52,7 @@ def _start(bag: Path) -> tuple[subprocess.Popen[str], dict[str, int]]:
 
 def _assert_gone(nodes: dict[str, int]) -> None:
     for name, pid in nodes.items():
-        assert f"{name}_node" not in _command_line(pid)
+        assert f".{name}_node " not in _command_line(pid)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
