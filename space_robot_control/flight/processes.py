@@ -158,10 +158,13 @@ class Graph:
 
     def stop(self) -> None:
         """End all nodes that have not ended, the recorder last: it takes what they still say."""
-        others = [node for node in self.nodes.values() if node.node != "recorder"]
-        for node in others:
-            node.ask_to_end()
-        for node in [*others, *self.nodes.values()]:
+        plant, recorder = self.nodes.get("plant"), self.nodes.get("recorder")
+        if plant:
+            plant.stop()  # first: what it asks must still be answered
+        for node in self.nodes.values():
+            if node is not recorder:
+                node.ask_to_end()
+        for node in sorted(self.nodes.values(), key=lambda node: node is recorder):
             node.stop()
 
     def restart(self, name: str, command: Sequence[str]) -> None:

@@ -56,6 +56,7 @@ def start(domain: int) -> Iterator[Start]:
         process.communicate()
 
 
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the marks
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Graphs fly one after the other, whatever runs beside them: four processes fill two cores."""
     here = Path(__file__).parent

@@ -45,3 +45,8 @@ class Flown:
     report: dict[str, Any]
     bag: Path
     standard_error: str
+
+    @property
+    def bag_report(self) -> dict[str, Any]:
+        """What the report says of the bag: without what happened in the graph."""
+        return {key: value for key, value in self.report.items() if key != "graph"}

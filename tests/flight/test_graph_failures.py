@@ -37,7 +37,7 @@ def _start(bag: Path) -> tuple[subprocess.Popen[str], dict[str, int]]:
     file = bag / f"{bag.name}_0.mcap"
     until = time.monotonic() + 90.0
     while time.monotonic() < until and process.poll() is None:
-        if file.exists() and file.stat().st_size > 100_000:  # chunks are being written
+        if file.exists() and file.stat().st_size > 1_000_000:  # more than is sent in advance
             break
         time.sleep(0.05)
     assert process.poll() is None, process.communicate()[1]

@@ -37,7 +37,7 @@ def test_graph_and_in_process_flights_agree_to_the_last_bit(
     recorded = read_flight(flown.bag)
     for column in STATE_COLUMNS:
         np.testing.assert_array_equal(getattr(recorded, column), getattr(log, column), column)
-    assert flown.report == json.loads(json.dumps(analyse(log)))
+    assert flown.bag_report == json.loads(json.dumps(analyse(log)))
 
 
 def test_nothing_is_lost_and_every_tick_is_in_the_bag(fly: Callable[..., Flown]) -> None:
@@ -124,7 +124,7 @@ def test_analyze_prints_the_same_report(fly: Callable[..., Flown]) -> None:
     flown = fly(*LONG)
     result = space_robot("analyze", str(flown.bag), "--json")
     assert result.returncode == 0
-    assert json.loads(result.stdout) == flown.report
+    assert json.loads(result.stdout) == flown.bag_report
 
 
 def test_seven_joint_robot_flies_in_the_graph(fly: Callable[..., Flown]) -> None:
