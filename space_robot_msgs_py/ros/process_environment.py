@@ -8,9 +8,9 @@ from pathlib import Path
 DEFAULTS = {
     # discovery stays on this machine
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-    # no shared memory, where the middleware obeys: rmw_fastrtps 8.4 with LOCALHOST does not
+    # no shared memory, where the middleware obeys: rmw_fastrtps 8.4 with LOCALHOST does not, so
+    # the profile keeps to UDP, too
     "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
-    # without it every sample sent to a reliable reader wakes a thread of Fast DDS
     "FASTRTPS_DEFAULT_PROFILES_FILE": str(Path(__file__).with_name("fastdds_profiles.xml")),
 }
 
