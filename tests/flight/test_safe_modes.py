@@ -99,9 +99,9 @@ def hangs(tmp_path_factory: pytest.TempPathFactory) -> Story:
     return Story(
         tmp_path_factory.mktemp("hangs") / "bag",
         "--duration", "8", "--set", "plant.silence_timeout=0.5",
-        "--set", "controller.reference_timeout=0.2",
+        "--set", "controller.reference_timeout=1", "--set", "mission.lead_ticks=200",
         "--fault", "stop_recorder@0.2:1", "--fault", "stop_controller@1.5:2.5",
-        "--fault", "stop_mission@6:3",
+        "--fault", "stop_mission@5:2",
     )  # fmt: skip
 
 
@@ -119,7 +119,7 @@ def test_stopped_controller_comes_back_by_itself(hangs: Story) -> None:
 
 
 def test_stopped_mission_is_waited_for_then_followed_again(hangs: Story) -> None:
-    held = hangs.time_of("controller", "holding the reference", after=6.0)
+    held = hangs.time_of("controller", "holding the reference", after=5.0)
     assert hangs.time_of("controller", "nominal", after=held) >= held
 
 
