@@ -157,6 +157,7 @@ def _follow(
                     events += news
             show(total_s, "")
         graph.stop()
+        watch.bury_recorder()
         if stopped:
             raise InterruptedFlightError("stopped when the flight had landed")
         monitor.poll()  # the nodes' last reports

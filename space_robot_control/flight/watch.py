@@ -61,6 +61,12 @@ class Watch:
                     self.failures.append(f"{ended} at {simulated_s:.2f} s")
         return events
 
+    def bury_recorder(self) -> None:
+        """Once all nodes have been stopped: see whether the recorder kept everything."""
+        recorder = self._graph.nodes["recorder"]
+        if recorder.exit_code != 0 and "recorder" not in self._gone:
+            self.failures.append(recorder.last_words().splitlines()[-1].strip())
+
     @property
     def has_landed(self) -> bool:
         """Whether the plant has flown to its end."""

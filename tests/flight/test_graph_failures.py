@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+import resource
 import signal
 import subprocess
 import time
@@ -28,10 +30,10 @@ def _command_line(pid: int) -> str:
         return ""
 
 
-def _start(bag: Path) -> tuple[subprocess.Popen[str], dict[str, int]]:
+def _start(bag: Path, *options: str) -> tuple[subprocess.Popen[str], dict[str, int]]:
     """A long flight in progress, and the pids of its nodes by name."""
     process = subprocess.Popen(
-        [*COMMAND, "fly", "--bag", str(bag)],
+        [*COMMAND, "fly", "--bag", str(bag), *options],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
     )  # fmt: skip
     file = bag / f"{bag.name}_0.mcap"
@@ -80,6 +82,21 @@ def test_dead_node_ends_the_flight_with_an_error(tmp_path: Path, victim: str) ->
     assert f"{victim} ended by signal 9" in standard_error
     _assert_gone(nodes)
     assert read_flight(tmp_path / "bag").ticks > 0
+
+
+def test_recorder_without_room_costs_the_bag_and_the_exit_code(tmp_path: Path) -> None:
+    """Not the flight: it is flown to its end."""
+    bag = tmp_path / "bag"
+    process, nodes = _start(bag, "--duration", "6", "--json")
+    limit = (bag / f"{bag.name}_0.mcap").stat().st_size + 500_000
+    resource.prlimit(nodes["recorder"], resource.RLIMIT_FSIZE, (limit, limit))
+    output, standard_error = process.communicate(timeout=120)
+    assert process.returncode == 1
+    assert "could not be written to the end (File too large)" in standard_error
+    assert "recorder_node: not recording" in standard_error
+    report = json.loads(output)
+    assert report["unfinished"]
+    assert int(report["graph"]["nodes"]["plant_node"]["tick"]) == 12_000
 
 
 def test_diverging_flight_says_so(tmp_path: Path) -> None:

@@ -89,6 +89,9 @@ def test_law_and_gains_change_in_flight(start: Start, domain: int) -> None:
         refused, reason = change("tde_tsmc.h_bar", [-1.0])
         assert not refused
         assert "above 0" in reason
+        refused, reason = change("tde_tsmc.k_1", [0.5, 0.5])
+        assert not refused
+        assert "9 values" in reason
         assert change("robot", "seven_joint")[0] is False  # read-only
     finally:
         node.destroy_node()
