@@ -68,6 +68,8 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         self.loop: Loop | None = None
         self.is_active = False
         self.is_shut_down = False
+        self.is_running = False
+        """Whether the loop's `run` is on the stack."""
         self._topics: list[str] = []
         self._claim: Claim | None = None
         self.error: SpaceRobotError | None = None
@@ -110,18 +112,29 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         if outcome is not TransitionCallbackReturn.SUCCESS:
             raise self.error or SpaceRobotError(f"{self.get_name()} cannot be started")
 
+    def run_loop(self) -> None:
+        """Let the loop run until it returns."""
+        assert self.loop is not None
+        self.is_running = True
+        try:
+            self.loop.run()
+        finally:
+            self.is_running = False
+
     def end(self) -> None:
-        """Shut down, unless that has been done.
+        """Shut down, unless that has been done, and let go of everything.
 
         Raises:
             SpaceRobotError: the loop could not be closed as it should.
         """
-        if not self.is_shut_down:
+        if self.is_shut_down:
+            self._try(self._release)
+        else:
             if self.loop is not None and self.is_active:
                 self._diagnostics.report(self.loop.health(), now_or_never=True)
             self.trigger_shutdown()
-            if self.error:
-                raise self.error
+        if self.error:
+            raise self.error
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Check parameters and files, make the loop and its topics."""
@@ -159,7 +172,8 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         def shut_down() -> None:
             self.is_shut_down = True
             self._stand_down()
-            self._release()
+            if not self.is_running:  # else the loop's own topics would go under its hands
+                self._release()
 
         return self._try(shut_down)
 

@@ -123,7 +123,7 @@ def _live(node: ManagedNode[Schema], shell: Shell) -> None:
         gc.freeze()  # what lives until the end need not be looked through in the loop
         if node.settings and node.settings.fifo_priority:
             shell.log(ask_for_fifo(node.settings.fifo_priority))
-        node.loop.run()
+        node.run_loop()
         if node.is_active:
             return
 

@@ -40,6 +40,15 @@ def test_graph_and_in_process_flights_agree_to_the_last_bit(
     assert flown.bag_report == json.loads(json.dumps(analyse(log)))
 
 
+def test_laws_are_swapped_at_the_same_tick_in_both(fly: Callable[..., Flown]) -> None:
+    swaps = ["0.2:ctc", "0.35:tde_smc"]
+    flown = fly(*SHORT, "--swap", swaps[0], "--swap", swaps[1])
+    log = simulate(Flight(FlightPlan(swaps=swaps, duration=0.5)))
+    recorded = read_flight(flown.bag)
+    for column in STATE_COLUMNS:
+        np.testing.assert_array_equal(getattr(recorded, column), getattr(log, column), column)
+
+
 def test_nothing_is_lost_and_every_tick_is_in_the_bag(fly: Callable[..., Flown]) -> None:
     flown = fly(*LONG)
     assert flown.report["lost"] == {topic.name: 0 for topic in topics.ALL}

@@ -104,8 +104,10 @@ def test_a_node_goes_through_its_life(start: Start, ground: Ground) -> None:
     assert ground.change("plant", "configure")
     assert ground.change("plant", "activate")
     ground.until(lambda: joints.take() is not None, "states again")
-    plant.send_signal(signal.SIGINT)
-    assert plant.wait(30) == 0
+    assert ground.change("plant", "active_shutdown")
+    output, _ = plant.communicate(timeout=30)
+    assert plant.returncode == 0, output
+    assert "Traceback" not in output
 
 
 def test_configure_fails_with_the_reason(start: Start, ground: Ground) -> None:
