@@ -14,7 +14,8 @@ from space_robot_msgs_py.compiled import function_pointer, kernel
 from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_sim.plant import RATE_LIMIT, Block, Plant, advance
 
-from .controller import USABLE, Controller, answer, unusable
+from .controller import Controller, unusable
+from .controller_kernels import USABLE, answer
 from .laws import CompiledLaw
 
 Array = NDArray[np.float64]

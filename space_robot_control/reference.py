@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import ReferenceChunk
 
-from .controller import LARGEST
+from .controller_kernels import LARGEST
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Command, RobotState
 
-from .controller import NORM_TOLERANCE, Controller
+from .controller import Controller
+from .controller_kernels import NORM_TOLERANCE
 from .time_delay_estimation import LONGEST_GAP
 
 Array = NDArray[np.float64]

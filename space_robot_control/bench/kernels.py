@@ -14,7 +14,7 @@ from space_robot_sim.integrator import state_derivative
 from space_robot_sim.plant import advance
 
 from ..closed_loop import Rows
-from ..controller import answer
+from ..controller_kernels import answer
 
 Array = NDArray[np.float64]
 Block = NDArray[Any]

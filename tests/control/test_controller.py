@@ -11,7 +11,8 @@ from hypothesis import assume, given, settings
 from oracles import attitude_jacobian_base, attitude_jacobian_inertial, rotation_of, skew
 from random_robots import Case, cases, random_quaternion
 
-from space_robot_control.controller import LARGEST, TRANSFER_S, Controller
+from space_robot_control.controller import TRANSFER_S, Controller
+from space_robot_control.controller_kernels import LARGEST
 from space_robot_control.laws import find_law
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import RobotState
