@@ -18,7 +18,8 @@ import psutil
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
 from ..compilation import compile_kernels
-from ..orchestrator import InterruptedFlightError, fly, require_ros
+from ..following import InterruptedFlightError
+from ..orchestrator import fly, require_ros
 from ..plan import Flight, FlightPlan
 from .census import Census, shared_memory_files
 from .draw import breaks_tracking, command_line, draw_flight
