@@ -15,7 +15,15 @@ from space_robot_msgs_py.configuration import named_file
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.health import Health, Level
 from space_robot_msgs_py.reference_codec import ReferenceCodec
-from space_robot_msgs_py.ros.endpoints import SPIN_S, In, Out, TakenByLoop, Waiter, take_or_wait
+from space_robot_msgs_py.ros.endpoints import (
+    SPIN_S,
+    In,
+    Out,
+    TakenByLoop,
+    Waiter,
+    flush,
+    take_or_wait,
+)
 from space_robot_msgs_py.ros.shell import Shell, run_node
 from space_robot_msgs_py.samples import RobotState
 from space_robot_msgs_py.stamp_guard import StampGuard
@@ -29,6 +37,7 @@ from .supervisor import Mode, Supervisor
 
 Array = NDArray[np.float64]
 
+FLUSH_S = 1.0
 STAND_DOWN_S = 0.1
 """How long a controller that stands down waits for a state to answer."""
 
@@ -84,8 +93,7 @@ class ControllerLoop:
             else:
                 self._answer_tick(tick)
             shell.serve()
-        for output in self.outputs:
-            output.flush(1.0)
+        flush(self.outputs, FLUSH_S)
 
     def stand_down(self) -> None:
         """Answer one more state, with no torque: the plant holds that."""

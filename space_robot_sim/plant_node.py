@@ -13,7 +13,15 @@ from space_robot_msgs_py.codecs import ClockCodec, CommandCodec, StateCodec
 from space_robot_msgs_py.configuration import named_file
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.health import Health, Level
-from space_robot_msgs_py.ros.endpoints import SPIN_S, In, Out, TakenByLoop, Waiter, take_or_wait
+from space_robot_msgs_py.ros.endpoints import (
+    SPIN_S,
+    In,
+    Out,
+    TakenByLoop,
+    Waiter,
+    flush,
+    take_or_wait,
+)
 from space_robot_msgs_py.ros.shell import Shell, run_node
 from space_robot_msgs_py.samples import Command
 
@@ -27,7 +35,8 @@ ASK_AGAIN_S = 0.5
 """Without an answer for this long the state is sent again (lockstep)."""
 SPIN_BEFORE_DEADLINE_S = 100e-6
 GIVE_WAY_S = 100e-6
-FLUSH_S = 1.0
+FLUSH_S = 5.0
+"""How long a flight's end waits for its listeners: one may be stopped, or dead."""
 HOLDING_TICKS = 20
 """A command held for longer is worth a word in the diagnostics."""
 
@@ -88,8 +97,7 @@ class PlantLoop:
             self._step()
             shell.serve()
         elapsed = time.monotonic() - began
-        for output in self.outputs:
-            output.flush(FLUSH_S)
+        flush(self.outputs, FLUSH_S)
         late = f", {self.late_ticks} ticks without an answer in time" if self.late_ticks else ""
         late += f", {clock.slipped_s:.3f} s behind the wall clock" if clock.slipped_s else ""
         shell.log(f"flew {(plant.tick - first) * settings.period:.4f} s in {elapsed:.2f} s{late}")

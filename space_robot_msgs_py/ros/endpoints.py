@@ -82,6 +82,13 @@ class Out:
         self._publisher.wait_for_all_acked(Duration(seconds=timeout_s))
 
 
+def flush(outputs: Sequence[Out], timeout_s: float) -> None:
+    """`Out.flush` of all, in ``timeout_s`` together."""
+    until = time.monotonic() + timeout_s
+    for output in outputs:
+        output.flush(max(0.0, until - time.monotonic()))
+
+
 class In:
     """A subscription whose messages the loop takes itself, serialized."""
 
