@@ -26,7 +26,7 @@ class FaultyPlantLoop(PlantLoop):
         """Tick of the newest state that a controller can have answered."""
 
     def health(self) -> Health:
-        """With the number of states that were sent wrong or not at all."""
+        """Says that what is wrong is meant to be."""
         health = super().health()
         return Health(health.mode, health.level, {**health.values, "faults": "injected"})
 
