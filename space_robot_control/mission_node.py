@@ -7,6 +7,7 @@ from typing import NoReturn
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.cdr import header_stamp_ns
 from space_robot_msgs_py.configuration import named_file
+from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.health import Health
 from space_robot_msgs_py.reference_codec import ReferenceCodec
 from space_robot_msgs_py.ros.endpoints import In, Out, TakenByLoop, Waiter
@@ -31,7 +32,7 @@ class MissionLoop:
         self._clock = In(shell.node, topics.CLOCK, TakenByLoop(), depth=1)
         self._waiter = Waiter(shell.node, self._clock)
 
-        self._now = 0
+        self._now, self._strange = 0, 0
 
     def stand_down(self) -> None:
         """The controller holds the last point."""
@@ -41,7 +42,7 @@ class MissionLoop:
 
     def health(self) -> Health:
         """How far the stream has come."""
-        return Health("nominal", values={"tick": self._now})
+        return Health("nominal", values={"tick": self._now, "rejected: stamp": self._strange})
 
     def run(self) -> None:
         """Stream until told to stop."""
@@ -54,8 +55,13 @@ class MissionLoop:
                 next_tick += chunk_ticks
             self._waiter.wait(0.05)
             while (data := self._clock.take()) is not None:
-                began = now < 0
-                now = self._now = self._settings.timebase.tick(header_stamp_ns(data))
+                try:
+                    tick = self._settings.timebase.tick(header_stamp_ns(data))
+                except MessageError:  # not this graph's clock
+                    self._strange += 1
+                    continue
+                began, now = now < 0, tick
+                self._now = now
                 if began:  # in the middle of a flight there is nothing to say of its past
                     next_tick = max(next_tick, now // chunk_ticks * chunk_ticks)
             self._shell.serve()

@@ -19,6 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import MessageError
+
 Array = NDArray[np.float64]
 
 _ENCAPSULATION = b"\x00\x01\x00\x00"
@@ -193,6 +195,13 @@ class FixedMessage:
 
 
 def header_stamp_ns(data: bytes) -> int:
-    """Stamp of a serialized message that starts with a Header or is a Time, ns."""
-    sec, nanosec = _STAMP.unpack_from(data, _BODY)
+    """Stamp of a serialized message that starts with a Header or is a Time, ns.
+
+    Raises:
+        MessageError: the message ends before that.
+    """
+    try:
+        sec, nanosec = _STAMP.unpack_from(data, _BODY)
+    except struct.error:
+        raise MessageError(f"a message of {len(data)} bytes has no stamp") from None
     return int(sec * 1_000_000_000 + nanosec)

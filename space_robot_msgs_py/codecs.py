@@ -215,10 +215,17 @@ class TelemetryCodec:
 
     @staticmethod
     def decode(data: bytes) -> tuple[int, Array]:
-        """Tick and (4, n+3) rows."""
+        """Tick and (4, n+3) rows.
+
+        Raises:
+            MessageError: the message does not fit.
+        """
         message = decode(data, topics.TELEMETRY.type)
         offset, shape = message.layout.data_offset, [dim.size for dim in message.layout.dim]
-        return int(message.data[0]), message.data[offset:].reshape(shape)
+        try:
+            return int(message.data[0]), message.data[offset:].reshape(shape)
+        except (IndexError, ValueError, OverflowError) as error:
+            raise MessageError(f"{topics.TELEMETRY.name}: {error}") from None
 
 
 class ClockCodec:

@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
@@ -36,7 +37,7 @@ def decode(data: bytes, type_name: str) -> Any:
     parse = {b"\0\1": definition.deserialize_cdr_le, b"\0\0": definition.deserialize_cdr_be}
     try:
         message, _ = parse[data[:2]](data[4:], 0, definition.cls, jazzy())
-    except (KeyError, struct.error, IndexError, ValueError) as error:
+    except (KeyError, struct.error, IndexError, ValueError, SerdeError) as error:
         raise MessageError(f"not a {type_name}: {error}") from None
     return message
 

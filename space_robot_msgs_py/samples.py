@@ -35,10 +35,10 @@ class Timebase(NamedTuple):
         """The tick of a stamp.
 
         Raises:
-            MessageError: the stamp is not a whole number of ticks.
+            MessageError: the stamp is not a whole number of ticks, or before the first.
         """
         tick, rest = divmod(stamp_ns, self.period_ns)
-        if rest:
+        if rest or tick < 0:
             raise MessageError(
                 f"stamp {stamp_ns} ns is not a whole number of {self.period_ns} ns ticks: "
                 "do all nodes have the same period?",
