@@ -58,8 +58,8 @@ def start(domain: int) -> Iterator[Start]:
 
 @pytest.hookimpl(tryfirst=True)  # before xdist reads the marks
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Graphs fly one after the other, whatever runs beside them: four processes fill two cores."""
+    """A module's flights go one after the other, in one process: they share what has been flown."""
     here = Path(__file__).parent
     for item in items:
         if here in item.path.parents:
-            item.add_marker(pytest.mark.xdist_group("graph"))
+            item.add_marker(pytest.mark.xdist_group(item.path.stem))
