@@ -31,7 +31,7 @@ fly: $(VENV)/.flies
 	@$(VENV)/bin/space-robot fly --controller tde_stc --case 1 $(ARGS)
 
 test: lint
-	$(VENV)/bin/python -m pytest --numprocesses 2 --dist loadgroup $(ARGS)
+	$(VENV)/bin/python -m pytest --numprocesses 2 --dist loadfile $(ARGS)
 
 lint: $(VENV)/.tests
 	$(VENV)/bin/ruff check .
