@@ -147,7 +147,10 @@ class ControllerLoop:
         if controller.law is not self._laws.chosen:
             controller.law = self._laws.chosen
         self._state.tick = tick
+        mode = self._supervisor.mode
         command = self._supervisor.answer(self._state, *reference)
+        if self._supervisor.mode is not mode:
+            self._shell.report_soon()
         self._answer = self._commands.encode(command)
         self._command_out.publish(self._answer)
         self._answered, self._state_at = tick, time.monotonic()

@@ -155,7 +155,11 @@ class PlantLoop:
     def _step(self) -> None:
         plant, guard = self._plant, self._guard
         self.late_ticks += guard.answered != plant.tick
-        plant.step(guard.act(plant.tick))
+        was_safe = guard.is_safe
+        command = guard.act(plant.tick)
+        if guard.is_safe is not was_safe:
+            self._shell.report_soon()
+        plant.step(command)
 
     def _wait(self, stamp: int) -> bool:
         """Wait for the command that answers the state stamped so; False if told to stop."""

@@ -61,6 +61,10 @@ class Shell:
             self._next_service = now + SERVICE_PERIOD_S
             self.node.spin_services()
 
+    def report_soon(self) -> None:
+        """Report the health at the next `serve`: the mode has changed."""
+        self._next_service = 0.0
+
     def wait_for_listeners(self, outputs: Sequence[Out], names: Sequence[str]) -> None:
         """Return when the named nodes listen to all of ``outputs``, or when stopping."""
         remind = time.monotonic() + REMIND_S

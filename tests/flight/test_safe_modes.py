@@ -136,9 +136,9 @@ def test_half_a_turn_is_safe_mode_with_its_reason_and_no_nan(tmp_path: Path) -> 
 
 def test_a_lost_controller_that_nobody_restarts_leaves_a_safe_plant(tmp_path: Path) -> None:
     story = Story(
-        tmp_path / "bag", "--duration", "1.5", "--set", "plant.silence_timeout=0.3",
+        tmp_path / "bag", "--duration", "3", "--set", "plant.silence_timeout=0.3",
         "--fault", "kill_controller@0.3",
     )  # fmt: skip
     assert story.result.returncode == 0
-    assert story.report["ticks"] == 3000
-    np.testing.assert_array_equal(story.log.applied_torque[-1000:], 0.0)
+    assert story.report["ticks"] == 6000
+    np.testing.assert_array_equal(story.log.applied_torque[-500:], 0.0)
