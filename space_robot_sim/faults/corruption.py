@@ -48,11 +48,6 @@ class Corruption:
                         array[place] = value
                     place -= array.size
 
-    def spoils_state(self, tick: int) -> bool:
-        """Whether `spoil_state` does anything at ``tick``."""
-        faults = [*self._quaternions, *(fault for fault, _ in self._states)]
-        return any(fault.happens_at(tick) for fault in faults)
-
     def spoil_command(self, command: Command, tick: int) -> None:
         """Spoil a command that has come to the plant at ``tick``."""
         for fault, value in self._commands:
