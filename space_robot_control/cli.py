@@ -145,7 +145,7 @@ def analyze(bag: Path, as_json: bool) -> None:
     Example:
       space-robot analyze flights/tde_stc_case1_20261121-120000 --json
     """
-    from space_robot_msgs_py.bag import read_flight
+    from space_robot_msgs_py.bag.reader import read_flight
 
     from .analysis import analyse
 

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.codecs import CommandCodec, StateCodec, TelemetryCodec
+from space_robot_msgs_py.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.configuration import named_file
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.health import Health, Level
+from space_robot_msgs_py.plain_codecs import TelemetryCodec
 from space_robot_msgs_py.reference_codec import ReferenceCodec
 from space_robot_msgs_py.ros.endpoints import (
     SPIN_S,

@@ -8,7 +8,6 @@ joints in another order) by way of the general decoder.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,33 +15,12 @@ from numpy.typing import NDArray
 from . import topics
 from .cdr import CdrBuilder
 from .compiled_cdr import FOREIGN, read_base, read_effort, read_joints, write_effort, write_state
+from .decoded import name_order, stamp_of, xyz
 from .definitions import decode
 from .errors import MessageError
 from .samples import Command, RobotState, Timebase
 
 Array = NDArray[np.float64]
-
-
-def stamp_of(message: Any) -> int:
-    """Header stamp of a decoded message, ns."""
-    stamp = message.header.stamp
-    return int(stamp.sec * 1_000_000_000 + stamp.nanosec)
-
-
-def xyz(value: Any) -> tuple[float, float, float]:
-    """A Vector3 message's numbers (or a Quaternion's first three)."""
-    return value.x, value.y, value.z
-
-
-def name_order(given: Sequence[str], expected: Sequence[str], topic: str) -> list[int]:
-    """Where each expected name stands among the given ones.
-
-    Raises:
-        MessageError: other names than expected.
-    """
-    if sorted(given) != sorted(expected):
-        raise MessageError(f"{topic}: names {list(given)}, expected {list(expected)}", "names")
-    return [list(given).index(name) for name in expected]
 
 
 class JointStateMessage:
@@ -182,61 +160,3 @@ class CommandCodec:
             stamp_ns, arrays = self._axes.decode(data)
             command.torque[:] = arrays["effort"]
         command.tick = self._timebase.tick(stamp_ns)
-
-
-class TelemetryCodec:
-    """s, u, N_hat and e as a labelled Float64MultiArray; the padding before holds the tick."""
-
-    ROWS = ("s", "u", "n_hat", "e")
-
-    def __init__(self, axis_names: Sequence[str]) -> None:
-        rows, columns = len(self.ROWS), len(axis_names)
-        builder = CdrBuilder()
-        builder.uint32(2)
-        for label, size, stride in (
-            ("signal: " + ", ".join(self.ROWS), rows, rows * columns),
-            ("axis: " + ", ".join(axis_names), columns, columns),
-        ):
-            builder.string(label)
-            builder.uint32(size)
-            builder.uint32(stride)
-        builder.uint32(1)  # data_offset: data[0] is the tick
-        slot = builder.float64_sequence_slot(1 + rows * columns)
-        self._message = builder.build()
-        data = self._message.float64(slot)
-        self._tick, self._values = data[:1], data[1:].reshape(rows, columns)
-
-    def encode(self, tick: int, rows: Sequence[Array]) -> bytes:
-        """The bytes of /controller/telemetry for the rows named by ``ROWS``."""
-        self._tick[0] = tick
-        for target, row in zip(self._values, rows, strict=True):
-            target[:] = row
-        return self._message.to_bytes()
-
-    @staticmethod
-    def decode(data: bytes) -> tuple[int, Array]:
-        """Tick and (4, n+3) rows.
-
-        Raises:
-            MessageError: the message does not fit.
-        """
-        message = decode(data, topics.TELEMETRY.type)
-        offset, shape = message.layout.data_offset, [dim.size for dim in message.layout.dim]
-        try:
-            return int(message.data[0]), message.data[offset:].reshape(shape)
-        except (IndexError, ValueError, OverflowError) as error:
-            raise MessageError(f"{topics.TELEMETRY.name}: {error}") from None
-
-
-class ClockCodec:
-    """/clock."""
-
-    def __init__(self) -> None:
-        builder = CdrBuilder()
-        self._stamp = builder.stamp_slot()
-        self._message = builder.build()
-
-    def encode(self, stamp_ns: int) -> bytes:
-        """The bytes of /clock."""
-        self._message.set_stamp(self._stamp, stamp_ns)
-        return self._message.to_bytes()

@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar, NoReturn
 from pydantic import Field
 
 from . import topics
-from .bag import BagRecorder
+from .bag.recorder import BagRecorder
 from .configuration import NodeSettings
 from .errors import InputError
 from .health import Health, Level
@@ -23,7 +23,7 @@ SILENCE_S = 0.3
 QUEUE_DEPTH = 20_000
 TURN = 100
 """Messages taken of one topic before the next has its turn."""
-NICENESS = 10
+NICENESS = 5
 """The loop goes first where cores are short; the queues hold seconds of traffic."""
 
 
@@ -68,12 +68,15 @@ class RecorderLoop:
         os.nice(max(0, NICENESS - os.nice(0)))
         last_arrival = time.monotonic()
         while not self._shell.stopping or time.monotonic() - last_arrival < SILENCE_S:
-            if self._drain():
+            # in turns: a backlog of one topic must not hold up the others
+            counts = [self._take_some(entry) for entry in self._inputs]
+            if any(counts):
                 last_arrival = time.monotonic()
             self._recorder.flush_if_due()
             self._tell_failure()
             self._shell.serve()
-            time.sleep(self._settings.drain_period)
+            if max(counts) < TURN:
+                time.sleep(self._settings.drain_period)
         self._recorder.flush()
 
     def stand_down(self) -> None:
@@ -96,21 +99,11 @@ class RecorderLoop:
         self._shell.log(f"{self._recorder.received} messages received, missing: {lost or 0}")
         self._recorder.close()
 
-    def _drain(self) -> int:
-        """Take all there is, in turns: a backlog of one topic must not hold up the others."""
-        total = 0
-        while True:
-            counts = [self._take_some(entry) for entry in self._inputs]
-            total += sum(counts)
-            if max(counts) < TURN:
-                return total
-
     def _take_some(self, entry: In) -> int:
         for count in range(TURN):
             if (data := entry.take()) is None:
                 return count
             self._recorder.record(entry.topic, data)
-            self._recorder.flush_if_due()  # a long backlog takes seconds
             os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
         return TURN
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from . import topics
 from .cdr import CdrBuilder, FixedMessage, Slot
-from .codecs import name_order, stamp_of, xyz
+from .decoded import name_order, stamp_of, xyz
 from .definitions import decode
 from .errors import MessageError
 from .samples import ReferenceChunk, Timebase

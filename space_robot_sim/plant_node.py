@@ -9,10 +9,11 @@ from typing import ClassVar, NoReturn
 import numpy as np
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.codecs import ClockCodec, CommandCodec, StateCodec
+from space_robot_msgs_py.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.configuration import named_file
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.health import Health, Level
+from space_robot_msgs_py.plain_codecs import ClockCodec
 from space_robot_msgs_py.ros.endpoints import (
     SPIN_S,
     In,

@@ -14,7 +14,7 @@ import numpy as np
 import psutil
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.bag import read_coverage
+from space_robot_msgs_py.bag.reader import read_coverage
 from space_robot_msgs_py.errors import FlightError
 
 from ..flight.domain import ros_domain

@@ -42,11 +42,17 @@ class LifecycleDriver:
 
         number = getattr(Transition, f"TRANSITION_{transition.upper()}")
         clients = {n: self._node.create_client(self._type, f"/{n}/change_state") for n in names}
+        request = self._type.Request(transition=Transition(id=number))
+        answers: dict[str, Any] = {}
+
+        def all_have_answered() -> bool:
+            for name, client in clients.items():
+                if name not in answers and client.service_is_ready():
+                    answers[name] = client.call_async(request)
+            return len(answers) == len(names) and all(a.done() for a in answers.values())
+
         try:
-            self._wait(lambda: all(c.service_is_ready() for c in clients.values()), check)
-            request = self._type.Request(transition=Transition(id=number))
-            answers = {name: client.call_async(request) for name, client in clients.items()}
-            self._wait(lambda: all(answer.done() for answer in answers.values()), check)
+            self._wait(all_have_answered, check)
             return [name for name, answer in answers.items() if not answer.result().success]
         finally:
             for client in clients.values():

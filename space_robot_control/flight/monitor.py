@@ -7,8 +7,8 @@ import time
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.codecs import TelemetryCodec
 from space_robot_msgs_py.definitions import decode
+from space_robot_msgs_py.plain_codecs import TelemetryCodec
 from space_robot_msgs_py.ros.process_environment import set_defaults
 
 DIAGNOSTICS = topics.Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100, ())

@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from space_robot_msgs_py.bag import read_flight
+from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import FlightError
 
 from ..analysis import analyse

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag import BagRecorder
-from space_robot_msgs_py.codecs import ClockCodec, CommandCodec, StateCodec, TelemetryCodec
+from space_robot_msgs_py.bag.recorder import BagRecorder
+from space_robot_msgs_py.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.plain_codecs import ClockCodec, TelemetryCodec
 from space_robot_msgs_py.reference_codec import ReferenceCodec
 from space_robot_msgs_py.samples import Command
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from .. import topics
 from ..cdr import header_stamp_ns
-from ..codecs import TelemetryCodec
+from ..plain_codecs import TelemetryCodec
 from ..samples import Timebase
 from ..stamp_guard import StampGuard
 

@@ -17,7 +17,7 @@ from .writer import BagWriter
 FLIGHT_KEY = "space_robot.flight"
 COVERAGE_KEY = "space_robot.coverage"
 CHUNK_BYTES = 1 << 20
-CHUNK_AGE_S = 0.4
+CHUNK_AGE_S = 0.25
 """A killed recorder loses the open chunk, so none stays open for longer."""
 
 

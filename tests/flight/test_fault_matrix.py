@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from flights import Flown
 
-from space_robot_msgs_py.bag import read_flight
+from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.fault import KINDS, PLANT_KINDS, parse_faults
 from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_sim.faults.schedule import Schedule, ScheduledFault

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from flights import COMMAND, ros_environment, space_robot
 
-from space_robot_msgs_py.bag import read_flight
+from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")
 

@@ -14,7 +14,7 @@ from space_robot_control.analysis import analyse
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag import read_flight
+from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.definitions import jazzy
 from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_sim.attitude import rotation_matrix

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from flights import Start
 
-from space_robot_msgs_py.bag import read_flight
+from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.ros.process_environment import set_defaults
 
 set_defaults()

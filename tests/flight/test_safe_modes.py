@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from flights import space_robot
 
-from space_robot_msgs_py.bag import read_flight
+from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.flight_log import FlightLog
 
 pytest.importorskip("rclpy")

@@ -13,7 +13,7 @@ from space_robot_control.analysis import analyse
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_control.laws import laws
-from space_robot_msgs_py.bag import read_flight
+from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import DivergedError, InputError
 
 

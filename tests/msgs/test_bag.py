@@ -16,12 +16,14 @@ from rosbags.typesys import get_types_from_msg
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag import BagRecorder, read_flight
 from space_robot_msgs_py.bag.coverage import Coverage, lost_messages
-from space_robot_msgs_py.codecs import ClockCodec, CommandCodec, StateCodec
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.bag.recorder import BagRecorder
+from space_robot_msgs_py.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.definitions import definition, jazzy
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.plain_codecs import ClockCodec
 from space_robot_msgs_py.samples import Command, RobotState, Timebase
 
 SAMPLE = Path(__file__).parent.parent / "data" / "rosbag2_sample"

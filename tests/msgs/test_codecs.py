@@ -22,8 +22,9 @@ from rosbags.typesys import Stores, get_typestore
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.cdr import header_stamp_ns
-from space_robot_msgs_py.codecs import ClockCodec, CommandCodec, StateCodec, TelemetryCodec
+from space_robot_msgs_py.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.errors import MessageError
+from space_robot_msgs_py.plain_codecs import ClockCodec, TelemetryCodec
 from space_robot_msgs_py.samples import Command, RobotState, Timebase
 
 Array = NDArray[np.float64]

@@ -24,9 +24,9 @@ from space_robot_control.flight.display import print_report
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag import BagRecorder, read_flight
 from space_robot_msgs_py.bag.folder import open_bag
-from space_robot_msgs_py.bag.recorder import CHUNK_AGE_S, FLIGHT_KEY
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.bag.recorder import CHUNK_AGE_S, FLIGHT_KEY, BagRecorder
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase

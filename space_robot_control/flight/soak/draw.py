@@ -33,7 +33,7 @@ SILENCING = ("drop_state", "drop_command")
 SILENCE_S = 0.3
 SILENCE_SHARE = 0.25
 EARLIEST_S = {"kill_recorder": 1.5}
-"""Before that the bag may hold nothing yet: its first chunk ends after 0.4 s of the wall clock."""
+"""Before that the bag may hold nothing yet: its first chunk ends after 0.25 s of the wall clock."""
 BREAKING = (
     "kill_controller", "stop_controller", "kill_mission", "stop_mission",
     "saturate_base", "saturate_joints", "stuck_joint",

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag import read_flight
 from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.cdr import header_stamp_ns
 from space_robot_msgs_py.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.errors import SpaceRobotError
