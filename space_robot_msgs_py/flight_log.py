@@ -47,8 +47,12 @@ class FlightLog:
     """Ticks without a usable state, which have the one before."""
     unfinished: str = ""
     """What is known of a bag that nobody finished; empty for a whole one."""
+    damage: tuple[str, ...] = ()
+    """What was found wrong with the bag, a sentence each."""
     commanded_torque: Array | None = None
-    """(N, n+3) N m, the controller's answer to the tick; of flights in this process only."""
+    """(N, n+3) N m, the controller's answer to the tick (NaN: none); None: not recorded."""
+    latency_s: Array | None = None
+    """(N,) s from the state's sending to its answer's, by the clock of the wall (NaN: none)."""
     telemetry: Array | None = None
     """(N, 4, n+3) s, u, N_hat, e of the controller; of flights in this process only."""
 
