@@ -12,7 +12,7 @@ from mcap.writer import MCAP0_MAGIC
 from ..errors import InputError
 from ..topics import Topic
 from .batch import Batch
-from .mcap_file import McapFile
+from .mcap_storage import McapStorage
 from .metadata import METADATA, BagInformation, parse_information, read_information
 from .rosbags_storage import RosbagsStorage
 from .writer import DESCRIPTION
@@ -133,7 +133,7 @@ def _open_files(
     opened = []
     for file in files:
         try:
-            opened.append(McapFile(file))
+            opened.append(McapStorage(file))
         except OSError as error:
             if len(files) == 1:
                 raise
@@ -155,7 +155,7 @@ class McapBag(Bag):
     """MCAP files, of any recorder."""
 
     def __init__(
-        self, files: list[McapFile], information: BagInformation | None, damage: list[str],
+        self, files: list[McapStorage], information: BagInformation | None, damage: list[str],
         closed: bool,
     ) -> None:  # fmt: skip
         """``closed``: nothing but the files can say that the bag is unfinished."""

@@ -88,16 +88,17 @@ def gather(
         fits[i] = lengths[i] >= len(layout)
         if not fits[i]:
             continue
-        start = starts[i]
+        message = data[starts[i] : starts[i] + len(layout)]
         differing = np.uint8(0)
         for k in range(len(layout)):
-            differing |= (data[start + k] ^ layout[k]) & constant[k]
+            differing |= (message[k] ^ layout[k]) & constant[k]
         fits[i] = differing == 0
         if not fits[i]:
             continue
         to = 0
         for r in range(len(runs)):
-            offset = start + runs[r, 0]
-            for k in range(runs[r, 1]):
-                numbers[i, to + k] = data[offset + k]
+            source = message[runs[r, 0] : runs[r, 0] + runs[r, 1]]
+            target = numbers[i, to : to + runs[r, 1]]
+            for k in range(len(source)):
+                target[k] = source[k]
             to += runs[r, 1]

@@ -20,7 +20,7 @@ from .batch import Batch
 from .coverage import LONGEST_JUMP, Coverage, excused_topics, lost_messages, unanswered_ticks
 from .findings import missing_ticks, printable, unread_messages
 from .folder import Bag, custom_data, open_bag
-from .gaps import complete_rows, fill_gaps
+from .gaps import fill_gaps
 from .recorder import COVERAGE_KEY, FLIGHT_KEY
 from .rows import Rows, stamps_of
 from .selection import Selection
@@ -92,7 +92,7 @@ def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
     _count_lost(bag, selection, rows, gone)
     if excused and not (gone or bag.incomplete):
         fill_gaps(log)
-    whole = complete_rows(log)
+    whole = log.whole
     ticks = len(whole) - int(np.argmax(whole[::-1])) if whole.any() else 0
     damage += [*bag.damage, *unread_messages(selection.recorded() or {}, gone)]
     damage += [f"{name} is left out: {wrong}" for name, wrong in selection.wrong.items()]

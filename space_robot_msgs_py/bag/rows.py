@@ -9,25 +9,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import topics
-from ..errors import MessageError
-from ..flight_log import FlightLog
-from ..reference_codec import ReferenceCodec
+from ..flight_log import REFERENCE, STATE, FlightLog
 from ..samples import Timebase
 from .batch import Batch
 from .coverage import LONGEST_JUMP, Coverage
 from .kernels import NO_STAMP, read_stamps
-from .layouts import BASE_WIDTH, Numbers, base_state, first_number, joint_states
+from .layouts import (
+    Describe,
+    Numbers,
+    base_state,
+    base_trajectory,
+    first_number,
+    joint_states,
+    joint_trajectory,
+)
 
-BASE_AXES = ("base_x", "base_y", "base_z")
+Array = NDArray[np.float64]
+
 _GROWTH = 1.25
 _TICKS_A_MESSAGE = 20
 """A tick further away than so many ticks a message is not believed: it would cost memory."""
+LAST_TICK = 2**53
+"""A tick in a float64 is exact below."""
 _NEVER = np.iinfo(np.int64).min
-_STATE_COLUMNS = (
-    "base_position", "quaternion", "base_velocity", "omega_base", "joint_positions",
-    "joint_velocities", "applied_torque", "reference_joints", "reference_base",
-    "commanded_torque",
-)  # fmt: skip
 
 
 def stamps_of(batch: Batch) -> NDArray[np.int64]:
@@ -54,31 +58,29 @@ class Rows:
         self.coverages: dict[str, Coverage] = {}
         self.counts: Counter[str] = Counter()
         """Messages a topic, of every kind."""
-        self.misfits: Counter[str] = Counter()
-        """Messages a topic whose content could not be read."""
         self._origin_ns = origin_ns
         self._sent_ns = {name: np.empty(0, np.int64) for name in ("state", "command")}
         self._wall_clock = False
         self._rows = self._believed = 0
-        self._references = ReferenceCodec(joint_names, timebase)
         arrays = ("position", "velocity", "effort")
-        self._numbers = {
-            topic: Numbers(topic.type, width, describe)
-            for topic, width, describe in (
-                (topics.JOINT_STATES, 3 * n, joint_states(topics.JOINT_STATES, joint_names, arrays)),
-                (topics.BASE_STATE, BASE_WIDTH, base_state),
-                (topics.COMMAND, n + 3,
-                 joint_states(topics.COMMAND, (*BASE_AXES, *joint_names), ("effort",))),
-                (topics.TELEMETRY, 1, first_number),
-            )
-        }  # fmt: skip
+        describe: dict[topics.Topic, Describe] = {
+            topics.JOINT_STATES: joint_states(topics.JOINT_STATES, joint_names, arrays),
+            topics.BASE_STATE: base_state,
+            topics.COMMAND: joint_states(
+                topics.COMMAND, (*topics.BASE_AXES, *joint_names), ("effort",)
+            ),
+            topics.REFERENCE_JOINTS: joint_trajectory(joint_names, timebase),
+            topics.REFERENCE_BASE: base_trajectory(timebase),
+            topics.TELEMETRY: first_number,
+        }
+        self._numbers = {topic: Numbers(topic.type, d) for topic, d in describe.items()}
 
     def oddities(self, excused: bool) -> list[str]:
         """Messages that could not be used; strange stamps are no news if ``excused``."""
-        faults = {topic.name: numbers.fault for topic, numbers in self._numbers.items()}
         found = [
-            f"{count} messages on {name} do not fit ({faults.get(name) or 'a broken trajectory'})"
-            for name, count in self.misfits.items()
+            f"{numbers.misfits} messages on {topic.name} do not fit ({numbers.fault})"
+            for topic, numbers in self._numbers.items()
+            if numbers.misfits
         ]
         for name, coverage in self.coverages.items():
             if coverage.strange and not excused:
@@ -98,19 +100,17 @@ class Rows:
         if len(fresh) < len(batch):
             batch, ticks = batch.select(fresh), ticks[fresh]
         self._believed += _TICKS_A_MESSAGE * len(batch)
+        self._grow(coverage.last + 1)
         if topic in (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE):
-            self._take_references(topic, batch, ticks)
+            for which, values in self._numbers[topic].read(batch):
+                self._put_references(topic, ticks[which], values)
         elif topic in (topics.JOINT_STATES, topics.BASE_STATE, topics.COMMAND):
-            self._grow(coverage.last + 1)
             near = ticks < self._rows
             if not near.all():
                 batch, ticks = batch.select(near), ticks[near]
-            values, good = self._numbers[topic].read(batch)
-            if not good.all():
-                self.misfits[topic.name] += int(np.count_nonzero(~good))
-                batch, ticks, values = batch.select(good), ticks[good], values[good]
-            self._put(topic, ticks, values)
-            self._note_sending(topic, batch, ticks)
+            for which, values in self._numbers[topic].read(batch):
+                self._put(topic, ticks[which], values)
+                self._note_sending(topic, batch, which, ticks[which])
 
     def finish(self, ticks: int) -> FlightLog:
         """The log, cut to ``ticks`` rows."""
@@ -121,8 +121,8 @@ class Rows:
             log.commanded_torque = None
         sent, answered = self._sent_ns["state"], self._sent_ns["command"]
         if self._wall_clock and topics.COMMAND.name in self.coverages:
-            log.latency_s = (answered - sent) * 1e-9
-            log.latency_s[(answered == _NEVER) | (sent == _NEVER)] = np.nan
+            both = (answered != _NEVER) & (sent != _NEVER)
+            log.latency_s = np.where(both, answered - sent, np.nan) * 1e-9
         return log
 
     def _ticks(
@@ -130,9 +130,10 @@ class Rows:
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """(M,) ticks, and of which messages they are to be had."""
         if topic is topics.TELEMETRY:
-            values, known = self._numbers[topic].read(batch)
-            known &= np.abs(values[:, 0]) < 2**53
-            return np.where(known, values[:, 0], 0).astype(np.int64), known
+            numbers, known = np.zeros(len(batch)), np.zeros(len(batch), np.bool_)
+            for which, values in self._numbers[topic].read(batch):
+                numbers[which], known[which] = values[:, 0], np.abs(values[:, 0]) < LAST_TICK
+            return np.where(known, numbers, 0.0).astype(np.int64), known
         stamps = stamps_of(batch)
         known = stamps != NO_STAMP
         ticks, rest = np.divmod(stamps - self._origin_ns, self.log.timebase.period_ns)
@@ -141,26 +142,19 @@ class Rows:
             known &= ticks >= 0
         return ticks, known
 
-    def _take_references(self, topic: topics.Topic, batch: Batch, ticks: NDArray[np.int64]) -> None:
-        decode, column = (
-            (self._references.decode_joints, self.log.reference_joints)
-            if topic is topics.REFERENCE_JOINTS
-            else (self._references.decode_base, self.log.reference_base)
-        )
-        for i, first in enumerate(ticks.tolist()):
-            data = batch.message(i)
-            try:  # its tick is known: a stamp of 0 is right whatever the origin
-                _, rows = decode(data[:4] + bytes(8) + data[12:])
-            except MessageError:
-                self.misfits[topic.name] += 1
-                continue
-            self._believed += len(rows)
-            self._grow(first + len(rows))
-            start, stop = max(first, 0), min(first + len(rows), self._rows)
+    def _put_references(self, topic: topics.Topic, ticks: NDArray[np.int64], values: Array) -> None:
+        log, joints = self.log, topic is topics.REFERENCE_JOINTS
+        column = log.reference_joints if joints else log.reference_base
+        points = values.reshape(len(values), -1, *column.shape[1:])
+        length = points.shape[1]
+        self._believed += length * len(points)
+        self._grow(int(ticks.max()) + length)
+        for first, rows in zip(ticks.tolist(), points, strict=True):
+            start, stop = max(first, 0), min(first + length, self._rows)
             if start < stop:
                 column[start:stop] = rows[start - first : stop - first]
 
-    def _put(self, topic: topics.Topic, ticks: NDArray[np.int64], values: Any) -> None:
+    def _put(self, topic: topics.Topic, ticks: NDArray[np.int64], values: Array) -> None:
         log, n = self.log, len(self.log.joint_names)
         if topic is topics.JOINT_STATES:
             log.joint_positions[ticks] = values[:, :n]
@@ -168,23 +162,27 @@ class Rows:
             log.applied_torque[ticks, 3:] = values[:, 2 * n :]
         elif topic is topics.BASE_STATE:
             log.base_position[ticks] = values[:, :3]
-            log.quaternion[ticks, 1:] = values[:, 3:6]
-            log.quaternion[ticks, 0] = values[:, 6]
+            log.quaternion[ticks] = values[:, 3:7]
             log.base_velocity[ticks] = values[:, 7:10]
             log.omega_base[ticks] = values[:, 10:13]
-            log.applied_torque[ticks, :3] = values[:, 16:]
+            log.applied_torque[ticks, :3] = values[:, 13:]
         elif log.commanded_torque is not None:
             log.commanded_torque[ticks] = values
 
-    def _note_sending(self, topic: topics.Topic, batch: Batch, ticks: NDArray[np.int64]) -> None:
-        if topic is not topics.JOINT_STATES:
-            name = "state" if topic is topics.BASE_STATE else "command"
-            self._sent_ns[name][ticks] = batch.publish_ns
-            if not self._wall_clock:
-                self._wall_clock = bool(np.any(batch.publish_ns != batch.log_ns))
+    def _note_sending(
+        self, topic: topics.Topic, batch: Batch, which: NDArray[np.intp], ticks: NDArray[np.int64]
+    ) -> None:
+        if topic is topics.JOINT_STATES:
+            return
+        sent_ns = batch.publish_ns[which]
+        self._sent_ns["state" if topic is topics.BASE_STATE else "command"][ticks] = sent_ns
+        self._wall_clock = self._wall_clock or bool(np.any(sent_ns != batch.log_ns[which]))
 
     def _columns(self) -> list[NDArray[Any]]:
-        return [*(getattr(self.log, name) for name in _STATE_COLUMNS), *self._sent_ns.values()]
+        return [
+            *(getattr(self.log, name) for name in (*STATE, *REFERENCE, "commanded_torque")),
+            *self._sent_ns.values(),
+        ]
 
     def _grow(self, ticks: int) -> None:
         """Make room, within what can be believed; memory that is not touched costs nothing."""

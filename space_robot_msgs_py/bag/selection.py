@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from .. import topics
+from .. import topics as graph
 from ..errors import InputError
 from ..validation import one_of
 from .batch import Batch
@@ -24,24 +24,24 @@ class Selection:
         self.wrong: dict[str, str] = {}
         """What was found instead of the right type, by our topic."""
         for theirs, ours in self._remap.items():
-            one_of(ours, topics.BY_NAME, "topic", f" to take {theirs} for")
+            one_of(ours, graph.BY_NAME, "topic", f" to take {theirs} for")
             if list(self._remap.values()).count(ours) > 1:
                 raise InputError(f"more than one topic is to be taken for {ours}")
 
-    def batches(self) -> Iterator[tuple[topics.Topic, Batch]]:
+    def batches(self) -> Iterator[tuple[graph.Topic, Batch]]:
         """All messages of our topics, as they were written."""
         for batch in self._bag.batches():
             topic = self.ours(batch.topic)
             if topic and self._fits(topic, batch.type, batch.encoding):
                 yield topic, batch
 
-    def ours(self, name: str) -> topics.Topic | None:
+    def ours(self, name: str) -> graph.Topic | None:
         """Our topic that a topic of the bag is taken for."""
         if name not in self._remap and name in self._remap.values():
             return None
-        return topics.BY_NAME.get(self._remap.get(name, name))
+        return graph.BY_NAME.get(self._remap.get(name, name))
 
-    def topics(self) -> list[topics.Topic]:
+    def topics(self) -> list[graph.Topic]:
         """Our topics that the bag has with the right type, messages or none.
 
         Raises:
@@ -56,7 +56,7 @@ class Selection:
             for name, kind in there.items()
             if (topic := self.ours(name)) and self._fits(topic, kind, "cdr")
         ]
-        return sorted(set(found), key=topics.ALL.index)
+        return sorted(set(found), key=graph.ALL.index)
 
     def recorded(self) -> dict[str, int] | None:
         """Messages that the bag should hold, by our topic; None: nobody counted."""
@@ -72,7 +72,7 @@ class Selection:
         """The bag's topics in words."""
         return ", ".join(sorted(self._bag.topics())) or "no topics"
 
-    def _fits(self, topic: topics.Topic, kind: str, encoding: str) -> bool:
+    def _fits(self, topic: graph.Topic, kind: str, encoding: str) -> bool:
         if encoding != "cdr":
             self.wrong[topic.name] = f"encoded as {encoding!r}, 'cdr' is needed"
         elif kind and kind.replace("/msg/", "/") != topic.type.replace("/msg/", "/"):

@@ -26,8 +26,15 @@ from mcap.writer import MCAP0_MAGIC
 
 from .batch import Batch
 from .kernels import (
-    CHANNEL, LENGTH, LOG_NS, PUBLISH_NS, START, Bytes, Integers, walk_messages,
-)  # fmt: skip
+    CHANNEL,
+    LENGTH,
+    LOG_NS,
+    PUBLISH_NS,
+    START,
+    Bytes,
+    Integers,
+    walk_messages,
+)
 
 BROKEN = (
     McapError, zstandard.ZstdError, struct.error, ValueError, RuntimeError, OverflowError,
@@ -53,7 +60,7 @@ _MOST_EXPANDED = 1000
 _FOOTER_BYTES = 29
 
 
-class McapFile:
+class McapStorage:
     """The messages and descriptions in a file, as far as they can be read."""
 
     def __init__(self, path: Path) -> None:
