@@ -83,7 +83,8 @@ class FlightLog:
     @property
     def time(self) -> Array:
         """(N,) s, simulated time of the rows."""
-        return (self.first_tick + np.arange(self.ticks)) * self.timebase.period
+        ticks = np.arange(self.first_tick, self.first_tick + self.ticks, dtype=np.float64)
+        return np.asarray(ticks * self.timebase.period)
 
     @property
     def angular_velocity(self) -> Array:

@@ -6,8 +6,6 @@ which there are millions, are found in compiled code.
 
 from __future__ import annotations
 
-import re
-import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterator
@@ -16,12 +14,9 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-import zstandard
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Footer, Metadata, Schema, Statistics
-from mcap.stream_reader import get_chunk_data_stream
+from mcap.records import Channel, Footer, Metadata, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
 
 from .batch import Batch
@@ -35,28 +30,22 @@ from .kernels import (
     Integers,
     walk_messages,
 )
+from .mcap_records import (
+    BROKEN,
+    DESCRIPTIONS,
+    HEAD,
+    INDEX_HEAD,
+    LEAST_MESSAGE,
+    PASSED,
+    PIECE,
+    cause,
+    check_index,
+    decompressed,
+    next_chunk,
+    parse,
+    whole_messages,
+)
 
-BROKEN = (
-    McapError, zstandard.ZstdError, struct.error, ValueError, RuntimeError, OverflowError,
-    MemoryError,
-)  # fmt: skip
-"""What mcap, lz4 and zstd raise on bytes that end early or make no sense."""
-_HEAD = struct.Struct("<BQ")
-_INDEX_HEAD = struct.Struct("<HI")
-_PARSED: dict[int, Any] = {
-    Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.METADATA: Metadata,
-    Opcode.CHUNK: Chunk, Opcode.STATISTICS: Statistics,
-}  # fmt: skip
-_DESCRIPTIONS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA)
-_PASSED = (Opcode.HEADER, Opcode.ATTACHMENT)
-_CHUNK = re.compile(
-    rb"\x06.{5}\0\0\0.{28}(?:\0{4}|\x03\0\0\0lz4|\x04\0\0\0zstd)", re.DOTALL
-)  # opcode, length, two times, size, CRC, compression
-_LONGEST_CHUNK_HEAD = 64
-_PIECE = 1 << 20
-_LEAST_MESSAGE = 31
-_MOST_EXPANDED = 1000
-"""A chunk that claims to be larger, compared with its compressed bytes, is broken."""
 _FOOTER_BYTES = 29
 
 
@@ -130,10 +119,10 @@ class McapStorage:
             at = self.size - len(MCAP0_MAGIC) - _FOOTER_BYTES
             file.seek(at)
             end = file.read(_FOOTER_BYTES)
-            opcode, length = _HEAD.unpack_from(end)
-            if opcode != Opcode.FOOTER or length != _FOOTER_BYTES - _HEAD.size:
+            opcode, length = HEAD.unpack_from(end)
+            if opcode != Opcode.FOOTER or length != _FOOTER_BYTES - HEAD.size:
                 raise ValueError("no footer")
-            footer = Footer.read(ReadDataStream(BytesIO(end[_HEAD.size :])))
+            footer = Footer.read(ReadDataStream(BytesIO(end[HEAD.size :])))
             if not footer.summary_start:
                 return
             if not 0 < footer.summary_start < at:
@@ -144,15 +133,15 @@ class McapStorage:
                 raise ValueError("CRC")
             self._note_summary(summary)
         except BROKEN as error:
-            self._index_fault = f"its index cannot be read ({_short(error)})"
+            self._index_fault = f"its index cannot be read ({cause(error)})"
 
     def _note_summary(self, summary: bytes) -> None:
         at = 0
         while at < len(summary):
-            opcode, length = _HEAD.unpack_from(summary, at)
-            at += _HEAD.size
+            opcode, length = HEAD.unpack_from(summary, at)
+            at += HEAD.size
             if opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS):
-                self._note(_parse(opcode, summary[at : at + length]))
+                self._note(parse(opcode, summary[at : at + length]))
             at += length
 
     def _note(self, record: Any) -> None:
@@ -177,8 +166,8 @@ class McapStorage:
         while at < self.size:
             file.seek(at)
             try:
-                opcode, length = _HEAD.unpack(file.read(_HEAD.size))
-                if length > self.size - at - _HEAD.size:
+                opcode, length = HEAD.unpack(file.read(HEAD.size))
+                if length > self.size - at - HEAD.size:
                     raise ValueError("a record that ends behind the file")
                 if opcode == Opcode.DATA_END and length == 4:
                     return
@@ -186,48 +175,32 @@ class McapStorage:
                     return
                 if opcode == Opcode.MESSAGE:
                     file.seek(at)
-                    piece = file.read(max(_PIECE, _HEAD.size + length))
-                    whole = _whole_messages(piece)
+                    piece = file.read(max(PIECE, HEAD.size + length))
+                    whole = whole_messages(piece)
                     yield piece[:whole]
                     at += whole
                     continue
                 if opcode == Opcode.CHUNK:
-                    yield _decompressed(_parse(opcode, file.read(length)))
-                elif opcode in _DESCRIPTIONS:
-                    yield _parse(opcode, file.read(length))
+                    yield decompressed(parse(opcode, file.read(length)))
+                elif opcode in DESCRIPTIONS:
+                    yield parse(opcode, file.read(length))
                 elif opcode == Opcode.MESSAGE_INDEX:
-                    _check_index(file.read(_INDEX_HEAD.size), length)
-                elif opcode not in _PASSED:
+                    check_index(file.read(INDEX_HEAD.size), length)
+                elif opcode not in PASSED:
                     raise ValueError("no record of MCAP")
-                at += _HEAD.size + length
+                at += HEAD.size + length
             except BROKEN as error:
                 if before_messages:
                     return
-                next_chunk = self._next_chunk(file, at + 1)
-                if next_chunk < self.size or self.has_end:  # else it is where writing ended
-                    self._faults.append((at, _short(error)))
-                at = next_chunk
-
-    def _next_chunk(self, file: BinaryIO, at: int) -> int:
-        """Where a chunk begins at or behind ``at``; the file's size: nowhere."""
-        while at < self.size:
-            file.seek(at)
-            piece = file.read(_PIECE + _LONGEST_CHUNK_HEAD)
-            for found in _CHUNK.finditer(piece):
-                start = at + found.start()
-                _, length = _HEAD.unpack_from(piece, found.start())
-                inner = found.end() - found.start() - _HEAD.size + 8
-                file.seek(start + _HEAD.size + inner - 8)
-                size = file.read(8)
-                if len(size) == 8 and int.from_bytes(size, "little") == length - inner:
-                    return start
-            at += _PIECE
-        return self.size
+                behind = next_chunk(file, at + 1, self.size)
+                if behind < self.size or self.has_end:  # else it is where writing ended
+                    self._faults.append((at, cause(error)))
+                at = behind
 
     def _walk(self, data: bytes) -> Iterator[Batch]:
         """The messages among the records in ``data``; its channels are noted."""
         array = np.frombuffer(data, np.uint8)
-        found = np.empty((5, len(data) // _LEAST_MESSAGE + 1), np.int64)
+        found = np.empty((5, len(data) // LEAST_MESSAGE + 1), np.int64)
         at = 0
         while at < len(data):
             count, at = walk_messages(array, at, found)
@@ -236,15 +209,15 @@ class McapStorage:
             if at == len(data):
                 return
             try:
-                opcode, length = _HEAD.unpack_from(data, at)
-                if opcode == Opcode.MESSAGE or length > len(data) - at - _HEAD.size:
+                opcode, length = HEAD.unpack_from(data, at)
+                if opcode == Opcode.MESSAGE or length > len(data) - at - HEAD.size:
                     raise ValueError("a message that is not whole in a chunk")
-                if opcode in _DESCRIPTIONS:
-                    body = at + _HEAD.size
-                    self._note(_parse(opcode, data[body : body + length]))
-                at += _HEAD.size + length
+                if opcode in DESCRIPTIONS:
+                    body = at + HEAD.size
+                    self._note(parse(opcode, data[body : body + length]))
+                at += HEAD.size + length
             except BROKEN as error:
-                self._faults.append((at, _short(error)))
+                self._faults.append((at, cause(error)))
                 return
 
     def _by_topic(self, data: Bytes, found: Integers) -> Iterator[Batch]:
@@ -262,49 +235,3 @@ class McapStorage:
     def _type(self, channel: Channel) -> str:
         schema = self._schemas.get(channel.schema_id)
         return schema.name if schema else ""
-
-
-def _parse(opcode: int, body: bytes) -> Any:
-    stream = ReadDataStream(BytesIO(body))
-    record = _PARSED[opcode].read(stream)
-    if stream.count != len(body):
-        raise ValueError("a record of another length than it says")
-    return record
-
-
-def _decompressed(chunk: Chunk) -> bytes:
-    """The records in a chunk, checked.
-
-    Raises:
-        ValueError: or another of `BROKEN`: they cannot be read.
-    """
-    size = chunk.uncompressed_size
-    if size > _MOST_EXPANDED * len(chunk.data) + _PIECE:
-        raise ValueError(f"{len(chunk.data)} bytes that claim to be {size}")
-    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
-    if length != size:
-        raise ValueError(f"{length} bytes instead of {size}")
-    data: bytes = stream.read(length)
-    return data
-
-
-def _whole_messages(piece: bytes) -> int:
-    """Bytes of the whole messages at the beginning of ``piece``."""
-    found = np.empty((5, len(piece) // _LEAST_MESSAGE + 1), np.int64)
-    _, end = walk_messages(np.frombuffer(piece, np.uint8), 0, found)
-    if not end:
-        raise ValueError("a message that is not whole")
-    return int(end)
-
-
-def _check_index(head: bytes, length: int) -> None:
-    if _INDEX_HEAD.unpack(head)[1] != length - _INDEX_HEAD.size:
-        raise ValueError("no message index")
-
-
-def _short(error: BaseException) -> str:
-    """The cause in one short line."""
-    text = " ".join(str(error).split()) or type(error).__name__
-    if "crc" in text.lower():
-        return "CRC"
-    return text if len(text) <= 60 else text[:57] + "..."

@@ -17,9 +17,10 @@ from ..errors import InputError, MessageError
 from ..flight_log import FlightLog
 from ..samples import Timebase
 from .batch import Batch
+from .contents import Bag
 from .coverage import LONGEST_JUMP, Coverage, excused_topics, lost_messages, unanswered_ticks
 from .findings import missing_ticks, printable, unread_messages
-from .folder import Bag, custom_data, open_bag
+from .folder import custom_data, open_bag
 from .gaps import fill_gaps
 from .recorder import COVERAGE_KEY, FLIGHT_KEY
 from .rows import Rows, stamps_of

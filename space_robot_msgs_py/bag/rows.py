@@ -63,12 +63,11 @@ class Rows:
         self._wall_clock = False
         self._rows = self._believed = 0
         arrays = ("position", "velocity", "effort")
+        axes = (*topics.BASE_AXES, *joint_names)
         describe: dict[topics.Topic, Describe] = {
             topics.JOINT_STATES: joint_states(topics.JOINT_STATES, joint_names, arrays),
             topics.BASE_STATE: base_state,
-            topics.COMMAND: joint_states(
-                topics.COMMAND, (*topics.BASE_AXES, *joint_names), ("effort",)
-            ),
+            topics.COMMAND: joint_states(topics.COMMAND, axes, ("effort",)),
             topics.REFERENCE_JOINTS: joint_trajectory(joint_names, timebase),
             topics.REFERENCE_BASE: base_trajectory(timebase),
             topics.TELEMETRY: first_number,

@@ -8,7 +8,7 @@ from .. import topics as graph
 from ..errors import InputError
 from ..validation import one_of
 from .batch import Batch
-from .folder import Bag
+from .contents import Bag
 
 
 class Selection:
