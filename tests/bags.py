@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from mcap.reader import make_reader
+from mcap.writer import Writer as McapWriter
+from rosbags.rosbag2 import StoragePlugin, Writer
 
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
+from space_robot_msgs_py.definitions import definition, jazzy
 from space_robot_msgs_py.flight_log import REFERENCE, STATE, FlightLog
 from space_robot_msgs_py.samples import Timebase
 
 TIMEBASE = Timebase(500_000)
 FLIGHT = {"controller": "tde_stc", "case": "1", "period": 0.0005}
 COLUMNS = (*STATE, *REFERENCE, "commanded_torque")
+
+Entry = tuple[str, str, int, bytes]
+"""Topic, type, log time, message."""
 
 
 @dataclass
@@ -92,3 +99,37 @@ def assert_nothing_is_hidden(log: FlightLog, original: FlightLog) -> None:
     """Whatever is missing is told."""
     if log.ticks < original.ticks or not log.whole.all():
         assert log.damage or log.unfinished
+
+
+def entries_of(bag: Path) -> list[Entry]:
+    """Messages as a recorder on another machine would have them: by its own clock."""
+    clock = 1_795_220_105_128_297_452
+    sent = messages_of(bag)
+    return [(t.name, t.type, clock + 31_000 * i, data) for i, (t, data) in enumerate(sent)]
+
+
+def rosbags_bag(folder: Path, entries: Iterable[Entry], setup: Callable[[Writer], Any]) -> Path:
+    storage = StoragePlugin.SQLITE3 if "sqlite" in folder.name else StoragePlugin.MCAP
+    writer = Writer(folder, version=9, storage_plugin=storage)
+    setup(writer)
+    with writer:
+        connections: dict[str, Any] = {}
+        for name, kind, log_ns, data in entries:
+            if name not in connections:
+                connections[name] = writer.add_connection(name, kind, typestore=jazzy())
+            writer.write(connections[name], log_ns, data)
+    return folder
+
+
+def mcap_of(path: Path, entries: Iterable[Entry], **options: Any) -> Path:
+    with path.open("wb") as file:
+        writer = McapWriter(file, **options)
+        writer.start("ros2")
+        channels: dict[str, int] = {}
+        for name, kind, log_ns, data in entries:
+            if name not in channels:
+                schema = writer.register_schema(kind, "ros2msg", definition(kind).encode())
+                channels[name] = writer.register_channel(name, "cdr", schema)
+            writer.add_message(channels[name], log_ns, data, log_ns)
+        writer.finish()
+    return path

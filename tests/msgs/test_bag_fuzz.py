@@ -10,12 +10,22 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from bags import Recorded, assert_nothing_is_hidden, assert_rows_are_the_originals, record
+from bags import (
+    Recorded,
+    assert_nothing_is_hidden,
+    assert_rows_are_the_originals,
+    entries_of,
+    mcap_of,
+    record,
+    rosbags_bag,
+)
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mcap.writer import CompressionType
 
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.flight_log import FlightLog
 
 EXAMPLES = os.environ.get("BAG_FUZZ_EXAMPLES")
 Change = tuple[str, str, float, float, int, bytes]
@@ -106,40 +116,79 @@ def offset(place: float, starts: list[int], size: int) -> int:
     return min(starts[int(place) % len(starts)] + int(place % 1.0 * 64), size - 1)
 
 
-def check(recorded: Recorded, folder: Path, given_changes: list[Change]) -> None:
-    contents = {
-        "mcap": bytearray(recorded.file.read_bytes()),
-        "yaml": bytearray((recorded.folder / "metadata.yaml").read_bytes()),
-    }
+def broken(contents: dict[str, bytes], given_changes: list[Change]) -> dict[str, bytes]:
+    """The files after all changes."""
+    changed = {name: bytearray(content) for name, content in contents.items()}
     for name, kind, one, other, number, some in given_changes:
-        content = contents[name]
-        if content:
+        if content := changed.get(name):
             starts = record_starts(content) if name == "mcap" else line_starts(content)
             at, to = (offset(place, starts, len(content)) for place in (one, other))
             KINDS[kind](content, at, to, number, some)
-    (folder / recorded.file.name).write_bytes(contents["mcap"])
-    (folder / "metadata.yaml").write_bytes(contents["yaml"])
+    return {name: bytes(content) for name, content in changed.items()}
+
+
+def read_or_refused(path: Path) -> FlightLog | None:
+    """The flight; None if it was refused in one line."""
     try:
-        log = read_flight(folder)
+        log = read_flight(path)
     except InputError as error:
-        line = str(error)
-        assert line
-        assert line.isprintable()
-        return
-    assert_rows_are_the_originals(log, recorded.log)
-    assert_nothing_is_hidden(log, recorded.log)
+        assert str(error).isprintable()  # noqa: PT017
+        return None
     assert all(count >= 0 for count in log.lost.values())
     assert all(text.isprintable() for text in (*log.damage, log.unfinished))
+    return log
 
 
-@settings(
+def check(recorded: Recorded, folder: Path, given_changes: list[Change]) -> None:
+    metadata = folder / "metadata.yaml"
+    contents = {
+        "mcap": recorded.file.read_bytes(),
+        "yaml": (recorded.folder / metadata.name).read_bytes(),
+    }
+    contents = broken(contents, given_changes)
+    (folder / recorded.file.name).write_bytes(contents["mcap"])
+    metadata.write_bytes(contents["yaml"])
+    if log := read_or_refused(folder):
+        assert_rows_are_the_originals(log, recorded.log)
+        assert_nothing_is_hidden(log, recorded.log)
+
+
+fuzzed = settings(
     max_examples=int(EXAMPLES or 150),
     derandomize=not EXAMPLES,
     deadline=None,
     suppress_health_check=list(HealthCheck),
 )
+
+
+@fuzzed
 @given(st.lists(changes, min_size=1, max_size=4))
 def test_a_bag_broken_by_chance_is_read_truly_or_refused(
     recorded: Recorded, folder: Path, given_changes: list[Change]
 ) -> None:
     check(recorded, folder, given_changes)
+
+
+@pytest.fixture(scope="module", params=["no CRC", "no chunks", "db3"])
+def unguarded(
+    request: pytest.FixtureRequest, recorded: Recorded, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[str, bytes]:
+    """A bag in which no checksum tells that a number has changed."""
+    folder, entries = tmp_path_factory.mktemp("unguarded"), entries_of(recorded.folder)
+    if request.param == "db3":
+        (file,) = rosbags_bag(folder / "sqlite", entries, lambda writer: None).glob("*.db3")
+        return "x.db3", file.read_bytes()
+    options = {"enable_crcs": False, "use_chunking": request.param == "no CRC"}
+    file = mcap_of(folder / "x.mcap", entries, compression=CompressionType.NONE, **options)
+    return "x.mcap", file.read_bytes()
+
+
+@fuzzed
+@given(st.lists(changes, min_size=1, max_size=4))
+def test_a_bag_without_checksums_broken_by_chance_is_read_or_refused(
+    unguarded: tuple[str, bytes], folder: Path, given_changes: list[Change]
+) -> None:
+    name, content = unguarded
+    (folder / name).write_bytes(broken({"mcap": content}, given_changes)["mcap"])
+    if log := read_or_refused(folder / name):
+        assert 0 < log.ticks < 100_000

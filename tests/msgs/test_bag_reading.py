@@ -2,30 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from bags import COLUMNS, FLIGHT, TIMEBASE, Recorded, messages_of, record
+from bags import (
+    COLUMNS,
+    FLIGHT,
+    TIMEBASE,
+    Entry,
+    Recorded,
+    entries_of,
+    mcap_of,
+    messages_of,
+    record,
+    rosbags_bag,
+)
 from mcap.reader import make_reader
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, Writer
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import FLIGHT_KEY
-from space_robot_msgs_py.definitions import decode, definition, jazzy
+from space_robot_msgs_py.definitions import decode
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 
 SAMPLE = Path(__file__).parent.parent / "data" / "rosbag2_sample"
-Entry = tuple[str, str, int, bytes]
-"""Topic, type, log time, message."""
 
 
 @pytest.fixture(scope="module")
@@ -35,37 +44,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
 
 @pytest.fixture(scope="module")
 def entries(recorded: Recorded) -> list[Entry]:
-    """As a recorder on another machine would have them: by its own clock."""
-    clock = 1_795_220_105_128_297_452
-    sent = messages_of(recorded.folder)
-    return [(t.name, t.type, clock + 31_000 * i, data) for i, (t, data) in enumerate(sent)]
-
-
-def rosbags_bag(folder: Path, entries: Iterable[Entry], setup: Callable[[Writer], Any]) -> Path:
-    storage = StoragePlugin.SQLITE3 if "sqlite" in folder.name else StoragePlugin.MCAP
-    writer = Writer(folder, version=9, storage_plugin=storage)
-    setup(writer)
-    with writer:
-        connections: dict[str, Any] = {}
-        for name, kind, log_ns, data in entries:
-            if name not in connections:
-                connections[name] = writer.add_connection(name, kind, typestore=jazzy())
-            writer.write(connections[name], log_ns, data)
-    return folder
-
-
-def mcap_of(path: Path, entries: Iterable[Entry], **options: Any) -> Path:
-    with path.open("wb") as file:
-        writer = McapWriter(file, **options)
-        writer.start("ros2")
-        channels: dict[str, int] = {}
-        for name, kind, log_ns, data in entries:
-            if name not in channels:
-                schema = writer.register_schema(kind, "ros2msg", definition(kind).encode())
-                channels[name] = writer.register_channel(name, "cdr", schema)
-            writer.add_message(channels[name], log_ns, data, log_ns)
-        writer.finish()
-    return path
+    return entries_of(recorded.folder)
 
 
 def assert_same_flight(log: FlightLog, original: FlightLog) -> None:
