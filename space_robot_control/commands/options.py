@@ -113,3 +113,18 @@ def check_writable(path: Path) -> None:
         path.open("a", encoding="utf-8").close()
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+OUTPUT = click.option(
+    "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+    help="File to write the JSON to as well.",
+)  # fmt: skip
+
+
+def put_json(report: Any, as_json: bool, output: Path | None) -> None:
+    """Write a report to ``output``, if given, and print it if JSON was asked for."""
+    text = json.dumps(report, indent=1, allow_nan=False)
+    if output:
+        output.write_text(text + "\n", "utf-8")
+    if as_json:
+        click.echo(text)
