@@ -144,6 +144,7 @@ class BagRecorder:
     def _finish(self) -> None:
         counts = {
             name: {
+                "expected": c.received + lost,
                 "received": c.received,
                 "missing": lost,
                 "repeated": c.repeated,
