@@ -53,7 +53,7 @@ MEANT = {
     r".*/reference/joints/.*/durability": "the sample's stand-in mission offered it as volatile",
     r"header/library": "who wrote it",
     r"own metadata records": "they stand before rosbag2's: what is flown, what was lost",
-    r"chunk/compression|chunk index/compression": "LZ4 unless told otherwise: 0.4 of the size",
+    r"chunk/compression|chunk index/compression": "LZ4 unless told otherwise: less than half the size",
     r"chunk/checksum": "we give one: a spoilt chunk is found",
     r"chunk/all definitions first": "rosbag2 has each before its first message",
     r"message/sequence": "the tick; rosbag2 writes 0",
