@@ -30,6 +30,7 @@ setup(
     install_requires=[
         "click>=8.1",
         "jinja2>=3.1",
+        "lz4>=4",
         "markdown-it-py>=3",
         "matplotlib>=3.8",
         "mcap>=1.5",
@@ -42,6 +43,7 @@ setup(
         "rosbags>=0.11",
         "scipy>=1.11.4",
         "typing_extensions>=4.8",
+        "zstandard>=0.22",
     ],
     extras_require={
         # tests/benchmarks; bsk (Basilisk) holds back numpy and matplotlib, so a venv of its own

@@ -69,6 +69,13 @@ OPTIONS: dict[str, Decorator] = {
         "--duration", type=float, help="Seconds to fly [default: the mission's]."),
     "bag": click.option(
         "--bag", type=click.Path(path_type=Path), help="Folder of the bag to write."),
+    "compression": click.option(
+        "--compression", type=click.Choice(["none", "lz4", "zstd"]),
+        help="Of the bag [default: lz4]."),
+    "split_size": click.option(
+        "--split-size", metavar="SIZE",
+        help="Go on in another file of the bag after so many bytes, as 500K, 100M, 2G "
+        "[default: one file]."),
     "latency": click.option(
         "--command-latency-ticks", type=int, default=0, show_default=True,
         help="Ticks by which the plant applies commands late."),
