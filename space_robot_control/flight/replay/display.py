@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 COUNTS = {
@@ -32,6 +33,8 @@ def print_replay(report: dict[str, Any], console: Console) -> None:
         _print_first(first, console)
     if not report["identical"]:
         _print_axes(report, console)
+        for reason in report["reasons"] if report["judged"] else ():
+            console.print(f"may differ: {reason}", highlight=False, markup=False, soft_wrap=True)
     if report["passed"]:
         console.print(verdict(report), highlight=False, markup=False, soft_wrap=True)
 
@@ -61,13 +64,13 @@ def verdict(report: dict[str, Any]) -> str:
     flown, first = report["recorded"], report["first_difference"]
     if not report["has_commands"]:
         return "the bag has no commands to compare with"
+    if report["identical"]:
+        return "the commands are the recorded ones, to the last bit"
     if not report["judged"]:
         return (
             f"{flown['controller']}, gains {flown['gains']}, was flown: the differences are what "
             "the other would have commanded on the same history (open loop)"
         )
-    if report["identical"]:
-        return "the commands are the recorded ones, to the last bit"
     if first:
         when = f"tick {first['tick']} (t = {first['time_s']:.4f} s)"
         return f"the commands are not the recorded ones: they differ from {when} on"
@@ -84,7 +87,7 @@ def _print_first(first: dict[str, Any], console: Console) -> None:
     for field in first["fields"]:
         amount = field["difference"]
         table.add_row(
-            field["field"], str(field["recorded"]), str(field["replayed"]),
+            escape(field["field"]), str(field["recorded"]), str(field["replayed"]),
             "" if amount is None else f"{amount:.3g}",
         )  # fmt: skip
     console.print(table)

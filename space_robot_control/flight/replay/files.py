@@ -64,7 +64,8 @@ def torques(comparison: Comparison, period: float, title: str) -> Figure:
         row, column = divmod(index, COLUMNS)
         left = LEFT + column * (LEFT + RIGHT + _WIDTH)
         axes = panel(figure, left, top + row * row_height + _NAME, _WIDTH, _HEIGHT)
-        both = np.stack([recorded[:, index], replayed[:, index]], axis=1)
+        both = np.empty((len(ticks), 2))
+        both[:, 0], both[:, 1] = recorded[:, index], replayed[:, index]
         draw_lines(axes, time, both, Quantity.of(both, "torque", "N m"), dashed=True)
         axes.set_title(name)
         axes.set_xlabel("time (s)")

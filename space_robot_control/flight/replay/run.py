@@ -27,6 +27,7 @@ from .choice import ControllerChoice
 from .commands import CommandList, Commands
 from .comparison import Comparison
 from .player import CONTROLLER, Player
+from .reasons import reasons
 from .recording import Recording, State
 
 SHOW_S = 0.2
@@ -99,6 +100,14 @@ class Replay:
             "has_commands": self.recording.has_commands,
             "judged": self.is_judged,
             "passed": self.has_passed,
+            "reasons": [
+                *reasons(
+                    flight,
+                    begins_late=options.start_s > 0.0,
+                    by_the_clock=options.rate is not None,
+                    is_finished=self.recording.is_finished,
+                )
+            ],
             "skipped": self.skipped,
             "elapsed_s": self.elapsed_s,
             "ticks_per_s": numbers["played"] / self.elapsed_s if self.elapsed_s else None,
