@@ -55,7 +55,7 @@ def write_plot(comparison: Comparison, period: float, title: str, path: Path) ->
 def torques(comparison: Comparison, period: float, title: str) -> Figure:
     """Recorded and replayed torque of every axis over time."""
     ticks, recorded, replayed = comparison.table()
-    time, names = ticks * period, comparison.axis_names
+    time, names = ticks.astype(np.float64) * period, comparison.axis_names
     top = title_height(title) + LEGEND_LINE
     row_height = _NAME + _HEIGHT + TIME_AXIS
     figure = page(top + row_height * math.ceil(len(names) / COLUMNS), title)
@@ -64,8 +64,7 @@ def torques(comparison: Comparison, period: float, title: str) -> Figure:
         row, column = divmod(index, COLUMNS)
         left = LEFT + column * (LEFT + RIGHT + _WIDTH)
         axes = panel(figure, left, top + row * row_height + _NAME, _WIDTH, _HEIGHT)
-        both = np.empty((len(ticks), 2))
-        both[:, 0], both[:, 1] = recorded[:, index], replayed[:, index]
+        both = np.column_stack([recorded[:, index], replayed[:, index]])
         draw_lines(axes, time, both, Quantity.of(both, "torque", "N m"), dashed=True)
         axes.set_title(name)
         axes.set_xlabel("time (s)")

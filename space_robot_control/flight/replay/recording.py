@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 import math
+import struct
 from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from rosbags.rosbag2 import ReaderError
+
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.coverage import excused_topics, message_tick
 from space_robot_msgs_py.bag.folder import open_bag
-from space_robot_msgs_py.bag.reader import UNREADABLE
 from space_robot_msgs_py.bag.recorder import FLIGHT_KEY
 from space_robot_msgs_py.errors import InputError, MessageError
 from space_robot_msgs_py.samples import Timebase
@@ -24,6 +26,8 @@ from .commands import CommandList, Commands
 PLAYED = (
     topics.JOINT_STATES, topics.BASE_STATE, topics.REFERENCE_JOINTS, topics.REFERENCE_BASE,
 )  # fmt: skip
+
+UNREADABLE = (ReaderError, OSError, ValueError, LookupError, RuntimeError, struct.error)
 
 
 class State(NamedTuple):
