@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import csv
 import json
+import signal
+import subprocess
+import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
-from flights import Flown, space_robot
+from flights import COMMAND, Flown, ros_environment, space_robot
 
+from space_robot_control.cli import main
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.replay.run import Options, Replay, replay
 from space_robot_control.flight.simulate import simulate
@@ -142,8 +147,9 @@ def test_one_altered_command_is_found_exactly(
         command.torque[4] = np.nextafter(command.torque[4], np.inf)
         return codec.encode(command)
 
-    done = play(altered(recorded(), tmp_path / "bag", alter))
+    done = play(altered(recorded(), tmp_path / "bag", alter), end_s=0.1)
     assert not done.has_passed
+    assert done.comparison.ticks.tolist() == list(range(200))
     assert np.flatnonzero(~done.comparison.equal).tolist() == [123]
     found = done.comparison.first_difference()
     assert found is not None
@@ -170,12 +176,8 @@ def test_lost_commands_are_missing_and_none_at_all_are_only_shown(
 def test_a_part_is_compared_by_itself(
     recorded: Callable[..., Path], play: Callable[..., Replay]
 ) -> None:
-    """From the beginning it is equal; a law without memory is equal once it has taken over."""
-    bag = recorded(controller="ctc")
-    until = play(bag, end_s=0.05)
-    assert until.comparison.is_identical
-    assert until.comparison.ticks.tolist() == list(range(100))
-    part = play(bag, start_s=0.05, end_s=0.15)
+    """A law without memory is equal again once it has taken over from the applied torque."""
+    part = play(recorded(controller="ctc"), start_s=0.05, end_s=0.15)
     assert part.comparison.ticks.tolist() == list(range(100, 300))
     assert part.comparison.equal[41:].all()  # the transfer lasts 20 ms
     assert not part.comparison.equal[1]
@@ -202,9 +204,44 @@ def test_by_the_clock_missed_ticks_are_counted(
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(
-    recorded: Callable[..., Path], options: tuple[str, ...], said: str
+    recorded: Callable[..., Path],
+    capsys: pytest.CaptureFixture[str],
+    options: tuple[str, ...],
+    said: str,
 ) -> None:
-    result = space_robot("replay", str(recorded()), *options)
-    assert result.returncode == 2
-    assert said in result.stderr.splitlines()[-1]
-    assert "Traceback" not in result.stderr
+    with pytest.raises(SystemExit) as ended:
+        main(["replay", str(recorded()), *options])
+    assert ended.value.code == 2
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("victim", "number", "code", "said"),
+    [
+        ("controller", signal.SIGKILL, 1, "controller ended by signal 9 before the replay was"),
+        ("replay", signal.SIGINT, 130, "the replay was stopped"),
+    ],
+)
+def test_a_replay_that_is_cut_short_tells_what_it_has_and_leaves_no_process(
+    recorded: Callable[..., Path], victim: str, number: int, code: int, said: str
+) -> None:
+    """By the clock so slowly that there is time: it would take 15 s."""
+    process = subprocess.Popen(
+        [*COMMAND, "replay", str(recorded()), "--rate", "0.01", "--json"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
+    )  # fmt: skip
+    replaying = psutil.Process(process.pid)
+    until = time.monotonic() + 60.0
+    while time.monotonic() < until and not (children := replaying.children()):
+        time.sleep(0.05)
+    controller = children[0]
+    while time.monotonic() < until and controller.cpu_times().user < 1.0:
+        time.sleep(0.05)
+    time.sleep(2.0)
+    (controller if victim == "controller" else replaying).send_signal(number)
+    output, errors = process.communicate(timeout=60)
+    assert process.returncode == code, errors
+    assert said in errors
+    if output:  # the playing had begun
+        assert json.loads(output)["error"]
+    assert not controller.is_running()

@@ -140,6 +140,8 @@ class _Run:
         if math.isfinite(options.end_s):
             self._stop = math.ceil(options.end_s / period - 1e-6)
         self._recorded = self._read_commands()
+        if next(recording.states(self._start, self._stop), None) is None:
+            raise InputError(f"{options.bag}: no states in the part to be replayed")
         self._skipped = 0
         self._progress: FlightProgress | None = None
         self._shown_at = 0.0
@@ -180,8 +182,8 @@ class _Run:
                     error = ended
             elapsed = time.perf_counter() - begin
         played = player.played
-        if not len(played):
-            raise error or InputError(f"{options.bag}: no states in the part to be replayed")
+        if error and not len(played):
+            raise error
         comparison = Comparison(
             axes, played, self._recorded_until(played, error), answers.commands()
         )
