@@ -103,7 +103,7 @@ class Comparison:
 
     def report(self, period: float) -> dict[str, Any]:
         """The numbers, for JSON and the table; ``period``: of a tick, s."""
-        first = self.first_difference()
+        first, difference = self.first_difference(), self.difference
         return {
             "played": len(self._played),
             "compared": len(self.ticks),
@@ -124,8 +124,8 @@ class Comparison:
                 name: {
                     "recorded_rms": _rms(self.recorded[:, i]),
                     "replayed_rms": _rms(self._replayed_torque[:, i]),
-                    "difference_rms": _rms(self.difference[:, i]),
-                    "difference_max": _largest(self.difference[:, i]),
+                    "difference_rms": _rms(difference[:, i]),
+                    "difference_max": _largest(difference[:, i]),
                 }
                 for i, name in enumerate(self.axis_names)
             },

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -80,9 +81,9 @@ def verdict(report: dict[str, Any]) -> str:
 def _print_first(first: dict[str, Any], console: Console) -> None:
     table = Table(
         title=f"first difference: tick {first['tick']}, t = {first['time_s']:.4f} s",
-        title_justify="left",
-    )
-    for name in ("field", "recorded", "replayed", "difference"):
+        title_justify="left", box=SIMPLE_HEAD, show_edge=False,  # so all digits fit in 80 columns
+    )  # fmt: skip
+    for name in ("field", "recorded", "replayed", "by"):
         table.add_column(name, justify="left" if name == "field" else "right", overflow="fold")
     for field in first["fields"]:
         amount = field["difference"]
