@@ -96,7 +96,7 @@ def replay(
 
     from space_robot_msgs_py.errors import FlightError, InputError
 
-    from ..flight.replay.run import Options
+    from ..flight.replay.outcome import Options
     from ..flight.replay.run import replay as run
 
     if other := sorted(set(parameters) - {"controller"}):

@@ -17,7 +17,8 @@ from flights import COMMAND, Flown, ros_environment, space_robot
 
 from space_robot_control.cli import main
 from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_control.flight.replay.run import Options, Replay, replay
+from space_robot_control.flight.replay.outcome import Options, Replay
+from space_robot_control.flight.replay.run import replay
 from space_robot_control.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
