@@ -54,11 +54,15 @@ def test_a_state_without_its_other_half_is_passed_over(bag: Path, tmp_path: Path
     assert ticks == [tick for tick in range(400) if tick not in (10, 20)]
 
 
-def test_references_begin_with_those_that_cover_the_start(bag: Path) -> None:
+@pytest.mark.parametrize("topic", [topics.REFERENCE_JOINTS, topics.REFERENCE_BASE])
+def test_references_begin_with_the_one_that_covers_the_start(
+    bag: Path, topic: topics.Topic
+) -> None:
     recording = Recording(bag)
-    assert [r.tick for r in recording.references()] == [0, 0, 100, 100, 200, 200, 300, 300]
-    assert [r.tick for r in recording.references(250)] == [200, 200, 300, 300]
-    assert [r.tick for r in recording.references(10_000)] == [300, 300]
+    assert [r.tick for r in recording.references(topic)] == [0, 100, 200, 300]
+    assert [r.tick for r in recording.references(topic, 250)] == [200, 300]
+    assert [r.tick for r in recording.references(topic, 300)] == [300]
+    assert [r.tick for r in recording.references(topic, 10_000)] == [300]
 
 
 def test_topics_of_other_names_are_remapped(bag: Path, tmp_path: Path) -> None:

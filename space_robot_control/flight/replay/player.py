@@ -8,6 +8,7 @@ from array import array
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,8 +22,8 @@ from .recording import Reference, State
 CONTROLLER = "controller_node"
 STATES = (topics.JOINT_STATES, topics.BASE_STATE)
 REFERENCES = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
-AHEAD = 20
-"""Messages of the reference that are sent ahead of need: as a rule ten chunks, half a second."""
+AHEAD = 10
+"""Messages of each half of the reference that are sent ahead of need: as a rule half a second."""
 POLL_S = 0.02
 ASK_AGAIN_S = 0.5
 """Without an answer for this long the state is sent again, as the plant does."""
@@ -32,6 +33,14 @@ MOST_UNANSWERED = 3
 """So many unanswered ticks in a row, and the controller counts as silent."""
 LISTENER_TIMEOUT_S = 30.0
 LAST_ANSWER_S = 1.0
+
+
+class _Stream(NamedTuple):
+    """One topic's messages of the reference."""
+
+    messages: Iterator[Reference]
+    ahead: deque[int]
+    """Ticks of those sent that are not needed yet."""
 
 
 class Player:
@@ -71,8 +80,7 @@ class Player:
         self._commands = In(self.node, topics.COMMAND, TakenByLoop())
         self._waiter = Waiter(self.node, self._commands)
         self._answers = answers
-        self._references: Iterator[Reference] = iter(())
-        self._ahead: deque[int] = deque()
+        self._references: list[_Stream] = []
         self._played = array("q")
         self.check: Callable[[], None] = lambda: None
         """Called while waiting; raises to give up."""
@@ -118,20 +126,20 @@ class Player:
             )
 
     def lockstep(
-        self, states: Iterable[State], references: Iterator[Reference],
+        self, states: Iterable[State], references: Iterable[Iterator[Reference]],
         show: Callable[[int], None],
     ) -> None:  # fmt: skip
         """Send state after state, each when the one before has its answer.
 
         Args:
             states: in their order; those that were not answered in flight left out.
-            references: in their order.
+            references: those of each topic in their order.
             show: called now and then with the tick.
 
         Raises:
             FlightError: the controller has fallen silent, or `check` says so.
         """
-        self._references = references
+        self._references = [_Stream(messages, deque()) for messages in references]
         unanswered = 0
         coming = iter(states)
         state = next(coming, None)
@@ -149,14 +157,14 @@ class Player:
             state = following
 
     def by_the_clock(
-        self, states: Iterable[State], references: Iterator[Reference],
+        self, states: Iterable[State], references: Iterable[Iterator[Reference]],
         show: Callable[[int], None], period_s: float,
     ) -> None:  # fmt: skip
         """Send a tick's state every ``period_s`` of the wall clock, answered or not.
 
         Time begins when the first one is answered. Arguments and errors: see `lockstep`.
         """
-        self._references = references
+        self._references = [_Stream(messages, deque()) for messages in references]
         began, first = 0.0, -1
         for state in states:
             self._send_references(state.tick)
@@ -176,17 +184,14 @@ class Player:
         self._played.append(state.tick)
 
     def _send_references(self, tick: int) -> None:
-        """Keep the stream ahead of ``tick``."""
-        ahead = self._ahead
-        while ahead and ahead[0] <= tick:
-            ahead.popleft()
-        while len(ahead) < AHEAD:
-            reference = next(self._references, None)
-            if reference is None:
-                return
-            self._outs[reference.topic.name].publish(reference.data)
-            if reference.tick > tick:
-                ahead.append(reference.tick)
+        """Keep both streams ahead of ``tick``."""
+        for messages, ahead in self._references:
+            while ahead and ahead[0] <= tick:
+                ahead.popleft()
+            while len(ahead) < AHEAD and (reference := next(messages, None)):
+                self._outs[reference.topic.name].publish(reference.data)
+                if reference.tick > tick:
+                    ahead.append(reference.tick)
 
     def _is_answered(self, state: State) -> bool:
         """Wait for the answer to the state just sent; whether it has come."""

@@ -106,21 +106,23 @@ class Recording:
                 if start <= tick < stop:
                     yield State(tick, one, other)
 
-    def references(self, start: int = 0) -> Iterator[Reference]:
-        """Messages of the reference, from the last ones that begin by tick ``start``."""
-        begun: dict[str, Reference] = {}
-        for topic, data in self._messages(topics.REFERENCE_JOINTS, topics.REFERENCE_BASE):
+    def references(self, topic: Topic, start: int = 0) -> Iterator[Reference]:
+        """Messages of half the reference, from the last one that begins by tick ``start``."""
+        begun: Reference | None = None
+        for _, data in self._messages(topic):
             try:
                 reference = Reference(message_tick(topic, data, self.timebase), topic, data)
             except MessageError:
                 continue
             if reference.tick <= start:
-                begun[topic.name] = reference
+                begun = reference
                 continue
-            yield from begun.values()
-            begun.clear()
+            if begun:
+                yield begun
+                begun = None
             yield reference
-        yield from begun.values()
+        if begun:
+            yield begun
 
     def _name(self, topic: Topic) -> str:
         """Of a topic in this bag."""

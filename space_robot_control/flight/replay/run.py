@@ -23,7 +23,7 @@ from .choice import ControllerChoice
 from .commands import CommandList, Commands, Ticks
 from .comparison import Comparison
 from .outcome import Options, Replay
-from .player import CONTROLLER, Player
+from .player import CONTROLLER, REFERENCES, Player
 from .recording import Recording, State
 
 SHOW_S = 0.2
@@ -110,7 +110,8 @@ class _Run:
         return self._recorded.within(self._start, int(played.max()) + 1)
 
     def _play(self, player: Player, show: Callable[[int], None]) -> None:
-        states, references = self._states(), self._recording.references(self._start)
+        states = self._states()
+        references = [self._recording.references(topic, self._start) for topic in REFERENCES]
         if self._options.rate is None:
             player.lockstep(states, references, show)
         else:
