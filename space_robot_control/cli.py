@@ -14,6 +14,7 @@ from space_robot_msgs_py.errors import SpaceRobotError
 
 from .commands.bench import bench
 from .commands.options import OPTIONS, flight_options
+from .commands.replay import replay
 from .commands.reproduce import reproduce
 from .commands.soak import soak
 from .commands.stability import stability
@@ -30,6 +31,7 @@ def cli() -> None:
       space-robot fly --controller ctc --case 3     another law, another case
       space-robot simulate --json                   the same flight without ROS
       space-robot analyze flights/<bag>             the table of a recorded flight
+      space-robot replay flights/<bag>              its states to a live controller, compared
       space-robot reproduce                         the paper's Table V and figures, flown again
       space-robot bench                             how fast it is here
       space-robot soak --minutes 5                  flights with faults drawn by chance
@@ -153,6 +155,7 @@ def analyze(bag: Path, as_json: bool) -> None:
 
 
 cli.add_command(bench)
+cli.add_command(replay)
 cli.add_command(reproduce)
 cli.add_command(soak)
 cli.add_command(stability)
