@@ -7,7 +7,7 @@ import math
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 from space_robot_msgs_py.errors import FlightError, InputError
@@ -149,10 +149,12 @@ class _Run:
 
 
 def _bring_up(controller: NodeProcess, player: Player) -> None:
-    driver = LifecycleDriver(player.node)
-    for transition in ("configure", "activate"):
-        if driver.change([CONTROLLER], transition, player.check):
-            raise FlightError(f"{CONTROLLER} refused to {transition}:\n{controller.last_words()}")
+    with closing(LifecycleDriver(player.node)) as driver:
+        for transition in ("configure", "activate"):
+            if driver.change([CONTROLLER], transition, player.check):
+                raise FlightError(
+                    f"{CONTROLLER} refused to {transition}:\n{controller.last_words()}"
+                )
     player.wait_for_controller()
 
 
