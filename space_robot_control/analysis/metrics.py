@@ -7,7 +7,6 @@ RMS values instead. Both are given, named ``eq64`` and ``mean_axis``.
 from __future__ import annotations
 
 from functools import reduce
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,11 +77,10 @@ def power_above(values: Array, period: float, frequency: float = CHATTER_FREQUEN
 
 def rms(log: FlightLog) -> dict[str, dict[str, float]]:
     """The RMS of errors and torques, by definition and column of Table V."""
-    groups = axis_groups(log.axes - 3)
     found: dict[str, dict[str, float]] = {"mean_axis": {}, "eq64": {}}
     for values, names in (
-        (tracking_error(log), _columns(groups, "attitude", "joints")),
-        (log.applied_torque, _columns(groups, "base_torque", "torque")),
+        (tracking_error(log), error_columns(log.axes)),
+        (log.applied_torque, torque_columns(log.axes)),
     ):
         each = axis_rms(values)
         for name, axes in names.items():
@@ -93,8 +91,9 @@ def rms(log: FlightLog) -> dict[str, dict[str, float]]:
 
 def chatter(log: FlightLog) -> dict[str, dict[str, float]]:
     """How rough the torques are, by measure and column of Table V."""
-    names = _columns(axis_groups(log.axes - 3), "base_torque", "torque")
-    torques = {name: log.applied_torque[:, axes] for name, axes in names.items()}
+    torques = {
+        name: log.applied_torque[:, axes] for name, axes in torque_columns(log.axes).items()
+    }
     period = log.timebase.period
     return {
         "total_variation_per_s": {
@@ -106,22 +105,26 @@ def chatter(log: FlightLog) -> dict[str, dict[str, float]]:
     }
 
 
-def analyse(log: FlightLog) -> dict[str, Any]:
-    """The flight's report, the same from a graph flight, an in-process one, or a bag."""
-    return {
-        "controller": log.flight.get("controller"),
-        "case": log.flight.get("case"),
-        "gains": log.flight.get("gains"),
-        "robot": log.flight.get("robot"),
-        "ticks": log.ticks,
-        "duration_s": log.ticks * log.timebase.period_ns / 1e9,
-        "rms": rms(log),
-        "chatter": chatter(log),
-        "lost": log.lost,
-        "unanswered_ticks": log.unanswered,
-        "filled_ticks": log.filled,
-        "unfinished": log.unfinished,
-    }
+def maxima(log: FlightLog) -> dict[str, float]:
+    """Largest |error| and |torque| on any axis, by column of Table V, in its unit."""
+    found = {}
+    for values, names in (
+        (tracking_error(log), error_columns(log.axes)),
+        (log.applied_torque, torque_columns(log.axes)),
+    ):
+        each = np.max(np.abs(values), axis=0)
+        found |= {name: float(np.max(each[axes])) for name, axes in names.items()}
+    return found
+
+
+def error_columns(axes: int) -> dict[str, slice]:
+    """Which of the m = n+3 axes each error column of Table V is of."""
+    return _columns(axis_groups(axes - 3), "attitude", "joints")
+
+
+def torque_columns(axes: int) -> dict[str, slice]:
+    """Which of the m = n+3 axes each torque column of Table V is of."""
+    return _columns(axis_groups(axes - 3), "base_torque", "torque")
 
 
 def _columns(groups: dict[str, slice], base: str, prefix: str) -> dict[str, slice]:
