@@ -84,7 +84,7 @@ def estimator(log: FlightLog) -> tuple[Array, float]:
     if isinstance(gains := flight.get("gains_used"), dict):
         h_bar = np.array(gains.get("h_bar", ()), dtype=np.float64)
     else:
-        chosen = {key: flight[key] for key in ("robot", "gains") if key in flight}
+        chosen: dict[str, Any] = {key: flight[key] for key in ("robot", "gains") if key in flight}
         settings = ControllerNodeSettings.resolve({**chosen, **parameters, "controller": name})
         h_bar = build_law(str(name), settings, log.axes).h_bar
     if not h_bar.size:

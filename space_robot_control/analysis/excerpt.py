@@ -35,7 +35,9 @@ def excerpt(log: FlightLog, from_s: float | None, to_s: float | None) -> FlightL
     begin, end = log.first_tick * period, (log.first_tick + log.ticks) * period
     low, high = begin if from_s is None else from_s, end if to_s is None else to_s
     given = " ".join(
-        f"--{name} {value:g}" for name, value in (("from", from_s), ("to", to_s)) if value is not None
+        f"--{name} {value:g}"
+        for name, value in (("from", from_s), ("to", to_s))
+        if value is not None
     )
     if not (begin - ROUNDING <= low and high <= end + ROUNDING * period):
         raise InputError(f"{given}: outside the flight, which lasts from {begin:g} to {end:g} s")

@@ -38,9 +38,7 @@ class PointingError(NamedTuple):
 def pointing_error(log: FlightLog, robot: Robot) -> PointingError:
     """The error of the tool's pose at every tick of a flight of ``robot``."""
     actual, place = tool_pose(robot, _unit(log.quaternion), log.joint_positions)
-    desired, wanted = tool_pose(
-        robot, _unit(log.reference_base[:, :4]), log.reference_joints[:, 0]
-    )
+    desired, wanted = tool_pose(robot, _unit(log.reference_base[:, :4]), log.reference_joints[:, 0])
     return PointingError(
         boresight=angle_between(actual[:, :, 2], desired[:, :, 2]),
         rotation=rotation_angle(actual, desired),
