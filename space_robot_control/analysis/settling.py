@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.flight_log import FlightLog
 
-from .figures.waypoints import waypoint_ticks
+from .waypoints import waypoint_ticks
 
 Array = NDArray[np.float64]
 

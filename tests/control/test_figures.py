@@ -38,7 +38,7 @@ from space_robot_control.analysis.figures.quantity import Quantity, power_of_ten
 from space_robot_control.analysis.figures.side_by_side import common_limits
 from space_robot_control.analysis.figures.spectrum import power_spectral_density, welch
 from space_robot_control.analysis.figures.style import Look, house_style
-from space_robot_control.analysis.figures.waypoints import junction_ticks, waypoint_ticks
+from space_robot_control.analysis.waypoints import junction_ticks, waypoint_ticks
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_control.mission import Mission, MissionSettings

@@ -49,7 +49,11 @@ def junctions(flights: Mapping[str, BaseTorque]) -> Figure:
     Args:
         flights: of one mission, by the name of the law.
     """
-    moments = [flight.period * t for flight in flights.values() for t in flight.junctions[:1]]
+    moments = [
+        flight.start + flight.period * row
+        for flight in flights.values()
+        for row in flight.junctions[:1]
+    ]
     if not moments:
         return page(12.0, "None of these flights passes a junction of two segments.")
     stretch = Stretch(
@@ -72,7 +76,8 @@ def chatter(flights: Mapping[str, BaseTorque]) -> Figure:
     Args:
         flights: of one mission, by the name of the law.
     """
-    moment = max(flight.duration for flight in flights.values()) / 4.0
+    start = min(flight.start for flight in flights.values())
+    moment = start + (max(flight.end for flight in flights.values()) - start) / 4.0
     stretch = Stretch("base torque", slice(0, 3), moment, 0.0, CHATTER_STRETCH)
     columns = math.ceil(len(flights) / math.ceil(len(flights) / 4))
     height, spectrum_height = 32.0, 72.0
