@@ -35,8 +35,8 @@ Array = NDArray[np.float64]
 Curves = dict[str, tuple[Array, Array]]
 """Time, s, and values of each flight that has them."""
 
-NOTHING = 1e-16
-"""Smallest size a logarithmic panel shows: that of rounding."""
+USUAL = 0.5
+"""% of the ticks that may lie below a logarithmic panel: an error begins at zero."""
 BINS = 80
 """Of the latency's histogram."""
 
@@ -150,12 +150,16 @@ def _draw(axes: Axes, shown: _Panel, names: list[str], *, last: bool) -> None:
         drawn = np.union1d(kept, marked)
         scaled = quantity.scaled(value[drawn])
         axes.plot(
-            time[drawn], np.maximum(scaled, NOTHING) if shown.logarithmic else scaled,
+            time[drawn], np.where(scaled > 0.0, scaled, np.nan) if shown.logarithmic else scaled,
             color=look.colour, linestyle=look.dashes, marker=look.marker,
             markevery=np.searchsorted(drawn, marked).tolist(),
         )  # fmt: skip
     axes.set_xlabel("time (s)" if last else "")
     if shown.logarithmic:
+        known = [value[value > 0.0] for value in values]
+        axes.set_ylim(
+            bottom=min((np.percentile(v, USUAL) / 2.0 for v in known if len(v)), default=None)
+        )
         axes.yaxis.set_major_formatter(
             FuncFormatter(lambda y, _: power_of_ten(round(math.log10(y))) if y > 0.0 else "")
         )
