@@ -79,15 +79,10 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
             "estimate error", reports, ("estimate_error", kind), lambda _: "N m", _number,
             label=partial(_axes, kind=kind),
         )  # fmt: skip
-    for group, key, text, unit in (
-        ("pointing", "boresight_rad", _angle, ""),
-        ("rotation", "rotation_rad", _angle, ""),
-        ("tool position", "tool_position_m", _number, "m"),
-        ("base's drift", "base_drift_m", _number, "m"),
-    ):
-        found += _columns(
-            group, reports, ("pointing", key), lambda _, u=unit: u, text, label=_upper
-        )
+    for group, key in (("pointing", "boresight_rad"), ("rotation", "rotation_rad")):
+        found += _columns(group, reports, ("pointing", key), lambda _: "", _angle, label=_upper)
+    for group, key in (("tool position", "tool_position_m"), ("base's drift", "base_drift_m")):
+        found += _columns(group, reports, ("pointing", key), lambda _: "m", _number, label=_upper)
     found += [
         _line("recording", "messages lost", "", reports, lambda r: str(sum(r["lost"].values()))),
         _line("recording", "states filled in", "ticks", reports, lambda r: str(r["filled_ticks"])),
@@ -111,9 +106,12 @@ def remarks(report: Report) -> list[str]:
     return found
 
 
-def reasons(report: Report) -> list[str]:
-    """Why figures are missing, a sentence each."""
-    return [f"no {name.replace('_', ' ')}: {why}" for name, why in report["unavailable"].items()]
+def notes(report: Report) -> list[str]:
+    """What is to be known of single figures: whence they count, or why there is none."""
+    missing = [f"no {key.replace('_', ' ')}: {why}" for key, why in report["unavailable"].items()]
+    if settling := report["settling"]:
+        return [f"settling is counted from the waypoint at {settling['after_s']:g} s", *missing]
+    return missing
 
 
 def _rms_and_chatter(reports: Sequence[Report]) -> Iterator[Line]:

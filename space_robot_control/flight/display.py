@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from ..analysis.table import Line, lines, reasons, remarks, unit_of
+from ..analysis.table import Line, lines, notes, remarks, unit_of
 
 LABELS = 34
 """Columns of the terminal that names and units take beside the figures of several bags."""
@@ -52,10 +52,8 @@ def print_figures(report: dict[str, Any], console: Console) -> None:
     table.add_column("", justify="right")
     _fill(table, lines([report], brief=True))
     console.print(table)
-    if settling := report["settling"]:
-        console.print(f"settled after: counted from the waypoint at {settling['after_s']:g} s")
-    for reason in reasons(report):
-        console.print(reason)
+    for note in notes(report):
+        console.print(note)
 
 
 def print_comparison(reports: dict[str, dict[str, Any]], console: Console) -> None:
@@ -69,21 +67,15 @@ def print_comparison(reports: dict[str, dict[str, Any]], console: Console) -> No
             table.add_column(heading, overflow="fold")
         for name in shown:
             table.add_column(name, justify="right", overflow="fold")
-        described = [
-            ("law", "controller"),
-            ("case", "case"),
-            ("gains", "gains"),
-            ("robot", "robot"),
-        ]
-        for label, key in described:
-            table.add_row("flight", label, "", *(str(reports[name][key]) for name in shown))
+        for key in ("controller", "case", "gains", "robot"):
+            table.add_row(key, "", "", *(str(reports[name][key] or "-") for name in shown))
         span = [f"{reports[name]['from_s']:g} to {reports[name]['to_s']:g}" for name in shown]
-        table.add_row("flight", "time", "s", *span, end_section=True)
+        table.add_row("time", "", "s", *span, end_section=True)
         _fill(table, lines([reports[name] for name in shown]))
         console.print(table)
     for name, report in reports.items():
         console.print(f"{name}:")
-        for sentence in (*remarks(report), *reasons(report)):
+        for sentence in (*remarks(report), *notes(report)):
             console.print(f"  {sentence}")
 
 
