@@ -143,17 +143,21 @@ def _draw(axes: Axes, shown: _Panel, names: list[str], *, last: bool) -> None:
     else:
         quantity = Quantity.of(np.concatenate(values or [np.zeros(1)]), shown.name, shown.unit)
     axes.set_ylabel(quantity.label)
-    for name, (time, value) in shown.curves.items():
-        index = names.index(name)
+    for name, depth in _depths(shown.curves).items():
+        (time, value), index = shown.curves[name], names.index(name)
         look, kept = Look.of(index), envelope(value)
         marked = scattered_marks(len(time), index, len(names))
         drawn = np.union1d(kept, marked)
         scaled = quantity.scaled(value[drawn])
         axes.plot(
             time[drawn], np.where(scaled > 0.0, scaled, np.nan) if shown.logarithmic else scaled,
-            color=look.colour, linestyle=look.dashes, marker=look.marker,
+            color=look.colour, linestyle=look.dashes, marker=look.marker, zorder=depth,
             markevery=np.searchsorted(drawn, marked).tolist(),
         )  # fmt: skip
+    times = [time for time, _ in shown.curves.values()]
+    low, high = min(float(t[0]) for t in times), max(float(t[-1]) for t in times)
+    margin = 0.01 * (high - low) or 0.01
+    axes.set_xlim(low - margin, high + margin)
     axes.set_xlabel("time (s)" if last else "")
     if shown.logarithmic:
         known = [value[value > 0.0] for value in values]
@@ -165,6 +169,16 @@ def _draw(axes: Axes, shown: _Panel, names: list[str], *, last: bool) -> None:
         )
         axes.yaxis.set_minor_locator(NullLocator())
     draw_scales(axes, x_numbers=last)
+
+
+def _depths(curves: Curves) -> dict[str, float]:
+    """How far in front each line lies: the wildest at the back, for it would hide the others."""
+    roughness = {
+        name: np.nansum(np.abs(np.diff(value[envelope(value)])))
+        for name, (_, value) in curves.items()
+    }
+    order = sorted(curves, key=lambda name: -roughness[name])
+    return {name: 2.0 + 0.01 * place for place, name in enumerate(order)}
 
 
 def _keys(courses: Mapping[str, Course], field: str) -> list[str]:
