@@ -39,10 +39,10 @@ def excerpt(log: FlightLog, from_s: float | None, to_s: float | None) -> FlightL
         for name, value in (("from", from_s), ("to", to_s))
         if value is not None
     )
-    if not (begin - ROUNDING <= low and high <= end + ROUNDING * period):
+    if low >= high and None not in (from_s, to_s):
+        raise InputError(f"{given}: the start must come before the end")
+    if not (begin - ROUNDING * period <= low < end and begin < high <= end + ROUNDING * period):
         raise InputError(f"{given}: outside the flight, which lasts from {begin:g} to {end:g} s")
-    if low >= high:
-        raise InputError(f"{given}: the start must come before the end ({low:g} and {high:g} s)")
     first, stop = (math.ceil(t / period - ROUNDING) - log.first_tick for t in (low, high))
     if first >= stop:
         raise InputError(f"{given}: no tick lies between (one every {period:g} s)")

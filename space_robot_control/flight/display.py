@@ -13,9 +13,9 @@ from rich.table import Table
 
 from ..analysis.table import Line, lines, notes, remarks, unit_of
 
-LABELS = 34
+LABELS = 48
 """Columns of the terminal that names and units take beside the figures of several bags."""
-NARROWEST = 15
+NARROWEST = 17
 """Columns of one bag."""
 
 
@@ -64,7 +64,7 @@ def print_comparison(reports: dict[str, dict[str, Any]], console: Console) -> No
         shown = names[first : first + every]
         table = Table()
         for heading in ("", "", "unit"):
-            table.add_column(heading, overflow="fold")
+            table.add_column(heading, no_wrap=True)
         for name in shown:
             table.add_column(name, justify="right", overflow="fold")
         for key in ("controller", "case", "gains", "robot"):
