@@ -71,8 +71,8 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
             _line("latency", name, "ms", reports, partial(_latency, name=name))
             for name in ("p50", "p99", "max")
         ),
-        _line("commands", "unanswered", "ticks", reports, lambda r: str(r["unanswered_ticks"])),
-        _line("commands", "not as commanded", "ticks", reports, _differing),
+        _line("commands", "unanswered", "", reports, lambda r: str(r["unanswered_ticks"])),
+        _line("commands", "not as commanded", "", reports, _differing),
     ]
     for kind in ("rms", "max"):
         found += _columns(
@@ -85,7 +85,7 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
         found += _columns(group, reports, ("pointing", key), lambda _: "m", _number, label=_upper)
     found += [
         _line("recording", "messages lost", "", reports, lambda r: str(sum(r["lost"].values()))),
-        _line("recording", "states filled in", "ticks", reports, lambda r: str(r["filled_ticks"])),
+        _line("recording", "states filled in", "", reports, lambda r: str(r["filled_ticks"])),
         _line("recording", "finished", "", reports, lambda r: "no" if r["unfinished"] else "yes"),
         _line("recording", "damage found", "", reports, lambda r: str(len(r["damage"]))),
     ]
@@ -186,7 +186,7 @@ def _saturated(report: Report) -> str:
 
 def _latency(report: Report, name: str) -> str:
     found = report["latency"]
-    return f"{found[f'{name}_ms']:.3g} ({found[f'{name}_ticks']:.2g})" if found else NONE
+    return f"{found[f'{name}_ms']:.3g} ({found[f'{name}_ticks']:.3g})" if found else NONE
 
 
 def _differing(report: Report) -> str:

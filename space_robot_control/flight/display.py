@@ -13,7 +13,7 @@ from rich.table import Table
 
 from ..analysis.table import Line, lines, notes, remarks, unit_of
 
-LABELS = 48
+LABELS = 44
 """Columns of the terminal that names and units take beside the figures of several bags."""
 NARROWEST = 17
 """Columns of one bag."""
@@ -47,9 +47,8 @@ def print_report(report: dict[str, Any], console: Console) -> None:
 def print_figures(report: dict[str, Any], console: Console) -> None:
     """What `print_report` leaves out: every other figure, and why one is missing."""
     table = Table(title="further figures", title_justify="left")
-    for heading in ("", "", "unit"):
-        table.add_column(heading)
-    table.add_column("", justify="right")
+    for justify in ("left", "left", "right"):
+        table.add_column("", justify=justify)
     _fill(table, lines([report], brief=True))
     console.print(table)
     for note in notes(report):
@@ -63,14 +62,14 @@ def print_comparison(reports: dict[str, dict[str, Any]], console: Console) -> No
     for first in range(0, len(names), every):
         shown = names[first : first + every]
         table = Table()
-        for heading in ("", "", "unit"):
-            table.add_column(heading, no_wrap=True)
+        for _ in range(2):
+            table.add_column("", no_wrap=True)
         for name in shown:
             table.add_column(name, justify="right", overflow="fold")
         for key in ("controller", "case", "gains", "robot"):
-            table.add_row(key, "", "", *(str(reports[name][key] or "-") for name in shown))
+            table.add_row(key, "", *(str(reports[name][key] or "-") for name in shown))
         span = [f"{reports[name]['from_s']:g} to {reports[name]['to_s']:g}" for name in shown]
-        table.add_row("time", "", "s", *span, end_section=True)
+        table.add_row("time (s)", "", *span, end_section=True)
         _fill(table, lines([reports[name] for name in shown]))
         console.print(table)
     for name, report in reports.items():
@@ -84,9 +83,11 @@ def _fill(table: Table, shown: list[Line]) -> None:
         lines_of_group = list(group)
         for line in lines_of_group:
             table.add_row(
-                line.group if line is lines_of_group[0] else "", line.name, line.unit, *line.texts,
+                line.group if line is lines_of_group[0] else "",
+                f"{line.name} ({line.unit})" if line.unit else line.name,
+                *line.texts,
                 end_section=line is lines_of_group[-1],
-            )  # fmt: skip
+            )
 
 
 class FlightProgress:
