@@ -113,15 +113,16 @@ def analyze(
         album = Album()
     reports: dict[str, dict[str, Any]] = {}
     descriptions: dict[str, dict[str, Any]] = {}
+    options: dict[str, Any] = {"remap": remap} if remap else {}
     for name, bag in zip(names, bags, strict=True):
-        whole = read_flight(bag, remap=remap) if remap else read_flight(bag)  # type: ignore[call-arg]
-        log = excerpt(whole, from_s, to_s)
+        log = excerpt(read_flight(bag, **options), from_s, to_s)
         reports[name], descriptions[name] = analyse(log), log.flight
         for write, paths in exports:
             write(log, paths[name])
             click.echo(f"wrote {paths[name]}", err=True)
         if album:
             album.add(name, log)
+        del log  # before the next is read: a long flight fills a gigabyte
     with ExitStack() as stack:
         if album:
             folder = plot or Path(stack.enter_context(TemporaryDirectory()))

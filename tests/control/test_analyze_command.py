@@ -126,6 +126,18 @@ def test_pictures_are_pngs(
     assert again.code == 0
 
 
+@pytest.mark.parametrize(("from_s", "to_s"), [(0.1, 0.1005), (0.1, 0.101), (0.0, 0.0015)])
+def test_the_shortest_excerpts_have_what_they_can_have(
+    analyze: Analyze, bags: tuple[Path, Path], tmp_path: Path, from_s: float, to_s: float
+) -> None:
+    result = analyze(
+        *bags, "--from", from_s, "--to", to_s, "--html", tmp_path / "page.html",
+        "--parquet", tmp_path,
+    )  # fmt: skip
+    assert result.code == 0
+    assert "no settling" in result.out
+
+
 def test_the_page_stands_by_itself(
     analyze: Analyze, bags: tuple[Path, Path], tmp_path: Path
 ) -> None:
