@@ -115,6 +115,8 @@ def _draw_spectra(axes: Axes, spectra: Mapping[str, tuple[Array, Array]]) -> Non
             frequency, density,
             color=look.colour, linestyle=look.dashes, marker=look.marker, markevery=marks.tolist(),
         )  # fmt: skip
+    if not axes.get_lines():  # all too short: one mark alone gives no scale
+        axes.set_xlim(0.1 * CHATTER_FREQUENCY, 10.0 * CHATTER_FREQUENCY)
     mark_moments(axes, np.array([CHATTER_FREQUENCY]))
     axes.set_xlabel("frequency (Hz)")
     axes.set_ylabel("PSD of base torque, x + y + z ((N m)²/Hz)")
