@@ -13,7 +13,6 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.flight_log import FlightLog
-from space_robot_sim.robot import BASE_AXES
 
 from .metrics import tracking_error
 
@@ -54,7 +53,7 @@ def batches(log: FlightLog) -> Iterator[pa.RecordBatch]:
 
 
 def _names(log: FlightLog) -> list[str]:
-    joints, axes = log.joint_names, [*BASE_AXES, *log.joint_names]
+    joints, axes = log.joint_names, [*_each("base", XYZ), *log.joint_names]
     names = [
         "time_s",
         *_each("base_position", XYZ, "m"),
