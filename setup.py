@@ -23,6 +23,7 @@ setup(
     maintainer_email="maintainers@space-robot.example.org",
     packages=find_packages(include=[f"{NAME}_*"]),
     package_data={
+        "space_robot_control.analysis": ["templates/*.j2"],
         "space_robot_control.reproduction": ["templates/*.j2"],
         "space_robot_msgs_py.ros": ["*.xml"],
     },
@@ -37,6 +38,7 @@ setup(
         "numba>=0.58.1",
         "numpy>=1.26,<3",
         "psutil>=5.9",
+        "pyarrow>=14",
         "pydantic>=2.5",
         "pyyaml>=6",
         "rich>=13",

@@ -55,6 +55,8 @@ class FlightLog:
     """(N,) s from the state's sending to its answer's, by the clock of the wall (NaN: none)."""
     telemetry: Array | None = None
     """(N, 4, n+3) s, u, N_hat, e of the controller; of flights in this process only."""
+    first_tick: int = 0
+    """Tick of row 0; not 0 only in an excerpt of a flight."""
 
     @classmethod
     def allocate(cls, ticks: int, joint_names: tuple[str, ...], timebase: Timebase) -> FlightLog:
