@@ -11,21 +11,7 @@ from typing import Any
 
 import click
 
-
-def _remap(context: click.Context, option: click.Parameter, given: Sequence[str]) -> dict[str, str]:
-    """``/arm/states:=/joint_states`` to ``{"/arm/states": "/joint_states"}``."""
-    from space_robot_msgs_py.topics import BY_NAME
-    from space_robot_msgs_py.validation import one_of
-
-    remap = {}
-    for text in given:
-        theirs, sign, ours = text.partition(":=")
-        if not (theirs and sign and ours):
-            raise click.BadParameter(
-                f"{text!r}: THEIRS:=OURS expected, as /arm/states:=/joint_states"
-            )
-        remap[theirs] = one_of(ours, BY_NAME, "topic", f" in --remap {text}")
-    return remap
+from .options import REMAP
 
 
 @click.command()
@@ -56,13 +42,7 @@ def _remap(context: click.Context, option: click.Parameter, given: Sequence[str]
 )
 @click.option("--from", "from_s", type=float, metavar="T", help="Begin at T simulated seconds.")
 @click.option("--to", "to_s", type=float, metavar="T", help="End before T simulated seconds.")
-@click.option(
-    "--remap",
-    multiple=True,
-    callback=_remap,
-    metavar="THEIRS:=OURS",
-    help="Take their topic for ours, as /arm/states:=/joint_states; may be repeated.",
-)
+@REMAP
 @click.option(
     "--json", "as_json", is_flag=True, help="Print the report as JSON: a list of several."
 )
@@ -113,9 +93,8 @@ def analyze(
         album = Album()
     reports: dict[str, dict[str, Any]] = {}
     descriptions: dict[str, dict[str, Any]] = {}
-    options: dict[str, Any] = {"remap": remap} if remap else {}
     for name, bag in zip(names, bags, strict=True):
-        log = excerpt(read_flight(bag, **options), from_s, to_s)
+        log = excerpt(read_flight(bag, remap), from_s, to_s)
         reports[name], descriptions[name] = analyse(log), log.flight
         for write, paths in exports:
             write(log, paths[name])

@@ -50,6 +50,27 @@ def _scenario(context: click.Context, option: click.Parameter, path: Path | None
     context.default_map = {**(context.default_map or {}), **content}
 
 
+def _remap(context: click.Context, option: click.Parameter, given: Any) -> dict[str, str]:
+    """``/arm/states:=/joint_states`` to ``{"/arm/states": "/joint_states"}``."""
+    from space_robot_msgs_py.topics import BY_NAME
+    from space_robot_msgs_py.validation import one_of
+
+    remap = {}
+    for text in given:
+        theirs, sign, ours = text.partition(":=")
+        if not (theirs and sign and ours):
+            raise click.BadParameter(
+                f"{text!r}: THEIRS:=OURS expected, as /arm/states:=/joint_states"
+            )
+        remap[theirs] = one_of(ours, BY_NAME, "topic", f" in --remap {text}")
+    return remap
+
+
+REMAP = click.option(
+    "--remap", multiple=True, callback=_remap, metavar="THEIRS:=OURS",
+    help="Take their topic for ours, as /arm/states:=/joint_states; may be repeated.",
+)  # fmt: skip
+
 OPTIONS: dict[str, Decorator] = {
     "controller": click.option(
         "--controller", default="tde_stc", show_default=True,

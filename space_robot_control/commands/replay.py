@@ -2,27 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
-from .options import OPTIONS, check_writable
-
-
-def _remap(context: click.Context, option: click.Parameter, given: Sequence[str]) -> dict[str, str]:
-    """``/arm/states:=/joint_states`` to ``{"/joint_states": "/arm/states"}``."""
-    from space_robot_msgs_py import topics
-    from space_robot_msgs_py.validation import one_of
-
-    names = {}
-    for text in given:
-        in_bag, arrow, ours = text.partition(":=")
-        if not (in_bag and arrow):
-            raise click.BadParameter(f"{text!r}: NAME_IN_BAG:=TOPIC expected")
-        names[one_of(ours, topics.BY_NAME, "topic", f" in --remap {text}")] = in_bag
-    return names
+from .options import OPTIONS, REMAP, check_writable
 
 
 @click.command()
@@ -54,10 +39,7 @@ def _remap(context: click.Context, option: click.Parameter, given: Sequence[str]
     "--plot", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
     help="Picture of both torques by axis, as PNG and SVG.",
 )  # fmt: skip
-@click.option(
-    "--remap", multiple=True, metavar="NAME_IN_BAG:=TOPIC", callback=_remap,
-    help="A topic that has another name in the bag; may be repeated.",
-)  # fmt: skip
+@REMAP
 @click.option(
     "--domain",
     type=click.IntRange(0, 232),

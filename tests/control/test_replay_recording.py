@@ -75,7 +75,7 @@ def test_topics_of_other_names_are_remapped(bag: Path, tmp_path: Path) -> None:
             writer.write(connections[name], number, data)
     with pytest.raises(InputError, match="no messages on /joint_states; there is /arm/base/state"):
         Recording(tmp_path / "bag")
-    remapped = Recording(tmp_path / "bag", {name: f"/arm{name}" for name in topics.BY_NAME})
+    remapped = Recording(tmp_path / "bag", {f"/arm{name}": name for name in topics.BY_NAME})
     here = Recording(bag)
     assert list(remapped.states()) == list(here.states())
     axes = Flight(FlightPlan()).robot.axis_names

@@ -51,13 +51,13 @@ class Recording:
     """The messages of a bag that a controller has seen, and its answers. Knows no ROS."""
 
     def __init__(self, path: Path, remap: Mapping[str, str] | None = None) -> None:
-        """Open the bag in ``path``; ``remap``: our name of a topic to its name in the bag.
+        """Open the bag in ``path``; ``remap``: our topic by the bag's.
 
         Raises:
             InputError: no bag is there, it cannot be read, or has no states or references.
         """
         self.path = path
-        self._remap = remap or {}
+        self._names = {ours: theirs for theirs, ours in (remap or {}).items()}
         with self._readable():
             self._bag = open_bag(path)
             counts = self._bag.counts()
@@ -126,7 +126,7 @@ class Recording:
 
     def _name(self, topic: Topic) -> str:
         """Of a topic in this bag."""
-        return self._remap.get(topic.name, topic.name)
+        return self._names.get(topic.name, topic.name)
 
     def _messages(self, *wanted: Topic) -> Iterator[tuple[Topic, bytes]]:
         by_name = {self._name(topic): topic for topic in wanted}
