@@ -34,7 +34,7 @@ class Options:
     end_s: float = math.inf
     """Simulated time before which the last state lies."""
     remap: Mapping[str, str] = field(default_factory=dict)
-    """Our name of a topic to its name in the bag."""
+    """Our topic by the bag's."""
     domain: int | None = None
 
 
