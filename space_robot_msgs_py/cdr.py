@@ -145,6 +145,16 @@ class FixedMessage:
         )
         return np.ndarray((1,), np.dtype((np.record, layout)), buffer=self._room.data)
 
+    @property
+    def pattern(self) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """The message's bytes, and which of their bits are the same in all messages."""
+        return self._layout, self._constant
+
+    @staticmethod
+    def run(slot: Slot) -> tuple[int, int]:
+        """Offset in the message and length of a slot of float64, in bytes."""
+        return _BODY + slot.offset, 8 * slot.count
+
     def float64(self, slot: Slot) -> Array:
         """(count,) view."""
         start = _BODY + slot.offset

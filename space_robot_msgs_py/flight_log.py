@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -11,6 +12,14 @@ from numpy.typing import NDArray
 from .samples import RobotState, Timebase
 
 Array = NDArray[np.float64]
+
+STATE = (
+    "base_position", "quaternion", "base_velocity", "omega_base", "joint_positions",
+    "joint_velocities", "applied_torque",
+)  # fmt: skip
+"""The columns a state fills."""
+REFERENCE = ("reference_joints", "reference_base")
+"""The columns the desired motion fills."""
 
 
 @dataclass(slots=True)
@@ -72,6 +81,43 @@ class FlightLog:
         return len(self.quaternion)
 
     @property
+    def time(self) -> Array:
+        """(N,) s, simulated time of the rows."""
+        ticks = np.arange(self.first_tick, self.first_tick + self.ticks, dtype=np.float64)
+        return np.asarray(ticks * self.timebase.period)
+
+    @property
+    def angular_velocity(self) -> Array:
+        """(N, 3) rad/s, base frame; the same as ``omega_base``."""
+        return self.omega_base
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """What was flown, as recorded; the same as ``flight``. Empty for a bag of others."""
+        return self.flight
+
+    @property
+    def whole(self) -> NDArray[np.bool_]:
+        """(N,) whether state and reference of a row are there and finite."""
+        return self.finite(STATE) & self.finite(REFERENCE)
+
+    def finite(self, columns: Iterable[str]) -> NDArray[np.bool_]:
+        """(N,) whether a row has no NaN in some of the columns."""
+        found = np.ones(self.ticks, np.bool_)
+        for name in columns:
+            found &= np.isfinite(getattr(self, name).reshape(self.ticks, -1)).all(axis=1)
+        return found
+
+    def longest_stretch(self) -> FlightLog:
+        """The longest stretch of `whole` rows, for what cannot bear a gap; views, not copies."""
+        edges = np.diff(np.concatenate(([False], self.whole, [False])).astype(np.int8))
+        starts, stops = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+        if not len(starts):
+            return self.truncated(0)
+        longest = int(np.argmax(stops - starts))
+        return self._rows(int(starts[longest]), int(stops[longest]))
+
+    @property
     def axes(self) -> int:
         """Controlled coordinates, n+3."""
         return int(self.applied_torque.shape[1])
@@ -101,8 +147,11 @@ class FlightLog:
 
     def truncated(self, ticks: int) -> FlightLog:
         """The first ``ticks`` rows."""
+        return self._rows(0, ticks)
+
+    def _rows(self, start: int, stop: int) -> FlightLog:
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         rows: dict[str, Any] = {
-            k: v[:ticks] for k, v in values.items() if isinstance(v, np.ndarray)
+            k: v[start:stop] for k, v in values.items() if isinstance(v, np.ndarray)
         }
-        return replace(self, **rows)
+        return replace(self, **rows, first_tick=self.first_tick + start)

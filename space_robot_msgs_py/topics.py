@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 INERTIAL_FRAME = "inertial"
 BASE_FRAME = "base"
+BASE_AXES = ("base_x", "base_y", "base_z")
+"""Names of the base's torques in /command."""
 
 
 class Topic(NamedTuple):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
+from space_robot_msgs_py.topics import BASE_AXES
 from space_robot_msgs_py.validation import Strict, check, read_yaml
 
 from .dynamics.model import Model
@@ -101,10 +102,6 @@ class RobotFile(Strict):
 
 class _Document(Strict):
     robot: RobotFile
-
-
-BASE_AXES = ("base_x", "base_y", "base_z")
-"""Names of the base's attitude axes, first in every controlled vector."""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .. import topics
 from ..cdr import header_stamp_ns
 from ..plain_codecs import TelemetryCodec
@@ -65,6 +68,25 @@ class Coverage:
             self.last = tick
         self.received += 1
         return True
+
+    def take_all(self, ticks: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """`take` of many, in their order; those that only go forward are counted at once."""
+        steps = np.diff(ticks, prepend=[self.last] if self.received else [])
+        if not len(ticks) or np.any((steps < 1) | (steps > LONGEST_JUMP)):
+            return np.fromiter((self.take(int(tick)) for tick in ticks), np.bool_, len(ticks))
+        self._guard.passes(int(ticks[0]))
+        if not self.received:
+            self.first = int(ticks[0])
+        if len(steps):
+            shortest = int(steps.min())
+            self.unit = min(self.unit, shortest) if self.unit else shortest
+        if self.topic.per_tick:
+            after = ticks[len(ticks) - len(steps) :]
+            for i in np.flatnonzero(steps != 1):
+                self._holes.update(range(int(after[i] - steps[i]) + 1, int(after[i])))
+        self.last = self._guard.last = int(ticks[-1])
+        self.received += len(ticks)
+        return np.ones(len(ticks), np.bool_)
 
     @property
     def kept(self) -> int:

@@ -7,18 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..flight_log import FlightLog
-
-STATE = (
-    "base_position", "quaternion", "base_velocity", "omega_base", "joint_positions",
-    "joint_velocities", "applied_torque",
-)  # fmt: skip
-REFERENCE = ("reference_joints", "reference_base")
-
-
-def complete_rows(log: FlightLog) -> NDArray[np.bool_]:
-    """(N,) whether state and reference of a tick are there and finite."""
-    return _finite(log, STATE) & _finite(log, REFERENCE)
+from ..flight_log import REFERENCE, STATE, FlightLog
 
 
 def fill_gaps(log: FlightLog) -> None:
@@ -26,11 +15,11 @@ def fill_gaps(log: FlightLog) -> None:
 
     From the first whole tick to the last state; `FlightLog.filled` counts the states.
     """
-    states = _finite(log, STATE)
+    states = log.finite(STATE)
     end = len(states) - int(np.argmax(states[::-1])) if states.any() else 0
     log.filled = int(np.count_nonzero(~states[:end]))
     _repeat_before(log, STATE, states, end)
-    references = _finite(log, REFERENCE)
+    references = log.finite(REFERENCE)
     _repeat_before(log, REFERENCE, references, end)
     log.reference_joints[:end][~references[:end], 1:] = 0.0  # at rest
     log.reference_base[:end][~references[:end], 4:] = 0.0
@@ -44,9 +33,3 @@ def _repeat_before(
     for name in columns:
         column: Any = getattr(log, name)
         column[bad] = column[source[bad]]
-
-
-def _finite(log: FlightLog, columns: tuple[str, ...]) -> NDArray[np.bool_]:
-    rows = [np.isfinite(getattr(log, name).reshape(log.ticks, -1)).all(axis=1) for name in columns]
-    finite: NDArray[np.bool_] = np.logical_and.reduce(rows)
-    return finite

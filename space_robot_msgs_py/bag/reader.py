@@ -1,48 +1,61 @@
-"""A bag as a `FlightLog`: ours, or one that ``ros2 bag record`` wrote of the same topics."""
+"""A bag as a `FlightLog`: ours, or anybody's with the same topics."""
 
 from __future__ import annotations
 
 import json
-import struct
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from rosbags.rosbag2 import ReaderError
+from numpy.typing import NDArray
 
 from .. import topics
-from ..codecs import StateCodec
 from ..definitions import decode
 from ..errors import InputError, MessageError
 from ..flight_log import FlightLog
-from ..reference_codec import ReferenceCodec
-from ..samples import RobotState, Timebase
-from .coverage import Coverage, excused_topics, lost_messages, message_tick, unanswered_ticks
-from .folder import Bag, custom_data, open_bag
-from .gaps import complete_rows, fill_gaps
+from ..samples import Timebase
+from .batch import Batch
+from .contents import Bag
+from .coverage import LONGEST_JUMP, Coverage, excused_topics, lost_messages, unanswered_ticks
+from .findings import missing_ticks, printable, unread_messages
+from .folder import custom_data, open_bag
+from .gaps import fill_gaps
 from .recorder import COVERAGE_KEY, FLIGHT_KEY
+from .rows import Rows, stamps_of
+from .selection import Selection
 
 REQUIRED = (
     topics.JOINT_STATES, topics.BASE_STATE, topics.REFERENCE_JOINTS, topics.REFERENCE_BASE,
 )  # fmt: skip
-UNREADABLE = (
-    ReaderError, OSError, ValueError, LookupError, StopIteration, RuntimeError, struct.error,
-)  # fmt: skip
+DEFAULT_PERIOD = 0.0005
+"""Of a bag that does not tell its period, s."""
+LONGEST_PERIOD = 10.0
+_STAMPS_LOOKED_AT = 200
 
 
-def read_flight(path: Path) -> FlightLog:
-    """Read a flight; of a bag that nobody finished (`FlightLog.unfinished`) what is there.
+def read_flight(path: Path, remap: Mapping[str, str] | None = None) -> FlightLog:
+    """Read a flight; what is broken is left out and told (`FlightLog.damage`).
+
+    Ticks between the first and the last that have no whole state and reference are NaN. Of a bag
+    that nobody finished (`FlightLog.unfinished`) what is there is read.
+
+    Args:
+        path: the folder of a rosbag2 bag, or a single .mcap or .db3 file.
+        remap: our topic by the bag's, as in ``{"/arm/joint_states": "/joint_states"}``.
 
     Raises:
-        InputError: no bag is there, it cannot be read, a needed topic is missing or empty, or not
-            one tick is whole.
+        InputError: no bag is there, it cannot be read, a needed topic is missing, empty, or of
+            another type, or not one tick is whole. One line.
     """
     try:
-        bag = open_bag(path)
-        return _read(bag, path)
-    except InputError:
-        raise
-    except UNREADABLE as error:
-        raise InputError(f"{path}: cannot be read as a flight ({error})") from None
+        return _read(open_bag(Path(path)), remap or {})
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except InputError as error:
+        text = printable(str(error))
+        raise InputError(text if str(path) in text else f"{path}: {text}") from None
 
 
 def read_coverage(path: Path) -> dict[str, dict[str, int]]:
@@ -53,72 +66,138 @@ def read_coverage(path: Path) -> dict[str, dict[str, int]]:
     Raises:
         InputError: there is no finished bag.
     """
-    counts: dict[str, dict[str, int]] = json.loads(custom_data(path).get(COVERAGE_KEY, "{}"))
-    return counts
+    return _coverage(custom_data(path))
 
 
-def _read(bag: Bag, path: Path) -> FlightLog:
-    counts = bag.counts()
-    state = "" if bag.finished else " (the bag was not finished)"
+def _coverage(noted: Mapping[str, str]) -> dict[str, dict[str, int]]:
+    """What the recorder counted, by topic."""
+    try:
+        counts = json.loads(noted.get(COVERAGE_KEY, "{}"))
+    except (ValueError, RecursionError):
+        return {}
+    return counts if isinstance(counts, dict) else {}
+
+
+def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
+    selection = Selection(bag, remap)
+    flight, damage = _description(bag)
+    rows = _empty_rows(bag, selection, flight, damage)
+    for topic, batch in selection.batches():
+        rows.take(topic, batch)
     for topic in REQUIRED:
-        if not counts.get(topic.name):
-            raise InputError(f"{path}: no messages on {topic.name}{state}")
-    flight = json.loads(bag.custom_data().get(FLIGHT_KEY, "{}"))
-    timebase = Timebase(round(float(flight.get("period", 0.0005)) * 1e9))
-    _, first = next(bag.messages(topics.JOINT_STATES))
-    names = tuple(decode(first, topics.JOINT_STATES.type).name)
-    excused = excused_topics(flight)
-    planned = int(flight.get("ticks", 0)) if excused else 0
-    log = FlightLog.allocate(max(counts[topics.JOINT_STATES.name], planned), names, timebase)
+        if not rows.counts[topic.name]:
+            raise _missing(topic, bag, selection)
+    log, excused = rows.log, excused_topics(flight)
     log.flight = flight
-    recorded = [topic for topic in topics.ALL if topic.name in counts]
-    coverages = _fill(bag, recorded, log)
-    log.lost = lost_messages(coverages, excused, bag.finished)
+    gone = _gone(selection, rows)
+    _count_lost(bag, selection, rows, gone)
+    if excused and not (gone or bag.incomplete):
+        fill_gaps(log)
+    whole = log.whole
+    ticks = len(whole) - int(np.argmax(whole[::-1])) if whole.any() else 0
+    damage += [*bag.damage, *unread_messages(selection.recorded() or {}, gone)]
+    damage += [f"{name} is left out: {wrong}" for name, wrong in selection.wrong.items()]
+    damage += rows.oddities(bool(excused))
+    if not ticks:
+        context = "; ".join(_not_finished(bag) + damage)
+        raise InputError(f"not one tick with its state and reference ({context})")
+    damage += missing_ticks(whole[:ticks], log.timebase)
+    log.damage = tuple(printable(text) for text in damage)
+    if not bag.finished:
+        last_s = log.timebase.stamp_ns(ticks - 1) / 1e9
+        log.unfinished = f"the bag was not finished: read up to t = {last_s:.4f} s"
+    return rows.finish(ticks)
+
+
+def _description(bag: Bag) -> tuple[dict[str, Any], list[str]]:
+    """What was flown, as recorded, and what is wrong with that."""
+    try:
+        flight = json.loads(bag.custom_data().get(FLIGHT_KEY, "{}"))
+    except (ValueError, RecursionError):
+        flight = None
+    if isinstance(flight, dict):
+        return flight, []
+    return {}, ["the description of the flight cannot be read"]
+
+
+def _empty_rows(bag: Bag, selection: Selection, flight: dict[str, Any], damage: list[str]) -> Rows:
+    """Rows for the joints and the period of the bag's first states."""
+    names: tuple[str, ...] = ()
+    stamps: list[int] = []
+    for topic, batch in selection.batches():
+        if topic is topics.JOINT_STATES:
+            names = names or _joint_names(batch)
+            stamps += stamps_of(batch).tolist()
+        if names and len(stamps) >= _STAMPS_LOOKED_AT:
+            break
+    if not names:
+        raise _missing(topics.JOINT_STATES, bag, selection)
+    timebase = _timebase(np.array(stamps), flight, damage)
+    first_tick, rest = divmod(stamps[0], timebase.period_ns)
+    counted = "period" in flight or (not rest and 0 <= first_tick <= LONGEST_JUMP)
+    return Rows(names, timebase, 0 if counted else stamps[0])
+
+
+def _joint_names(batch: Batch) -> tuple[str, ...]:
+    """The joints in the first message of a batch that can be read."""
+    for i in range(len(batch)):
+        with suppress(MessageError):
+            return tuple(decode(batch.message(i), topics.JOINT_STATES.type).name)
+    return ()
+
+
+def _timebase(stamps: NDArray[np.int64], flight: dict[str, Any], damage: list[str]) -> Timebase:
+    """The period that was flown with: as described, if the stamps are not against it."""
+    described = flight.get("period")
+    steps = np.diff(stamps)
+    found, counts = np.unique(steps[steps > 0], return_counts=True)
+    likely_ns = int(found[np.argmax(counts)]) if len(found) else None
+    if isinstance(described, (int, float)) and 1e-9 <= described <= LONGEST_PERIOD:
+        described_ns = round(described * 1e9)
+        if likely_ns is None or likely_ns == described_ns:
+            return Timebase(described_ns)
+        if likely_ns % described_ns == 0 and excused_topics(flight):
+            return Timebase(described_ns)  # states were kept back
+    if likely_ns is None:
+        return Timebase(round(DEFAULT_PERIOD * 1e9))
+    if described is not None:
+        damage.append(f"described with a period of {described} s, flown with {likely_ns / 1e9} s")
+    return Timebase(likely_ns)
+
+
+def _missing(topic: topics.Topic, bag: Bag, selection: Selection) -> InputError:
+    selection.topics()  # a topic to remap that is not there comes first
+    if topic.name in selection.wrong:
+        return InputError(f"{topic.name} is {selection.wrong[topic.name]}")
+    context = [*_not_finished(bag), *bag.damage, f"it has {selection.listing()}"]
+    return InputError(f"no messages on {topic.name} ({'; '.join(context)})")
+
+
+def _not_finished(bag: Bag) -> list[str]:
+    return [] if bag.finished else ["the bag was not finished"]
+
+
+def _gone(selection: Selection, rows: Rows) -> dict[str, int]:
+    """Recorded messages that could not be read, by topic."""
+    recorded = selection.recorded() or {}
+    counts = ((name, count - rows.counts[name]) for name, count in recorded.items())
+    return {name: count for name, count in counts if count > 0}
+
+
+def _count_lost(bag: Bag, selection: Selection, rows: Rows, gone: Mapping[str, int]) -> None:
+    """`FlightLog.lost` and `FlightLog.unanswered`: what never came and what is gone since."""
+    log = rows.log
+    there = selection.topics()
+    coverages = {
+        topic.name: rows.coverages.get(topic.name, Coverage(topic))
+        for topic in topics.ALL
+        if topic.name in rows.coverages or (bag.finished and topic in there)
+    }
+    log.lost = lost_messages(coverages, excused_topics(log.flight), bag.finished)
+    if bag.finished and gone:
+        noted = _coverage(bag.custom_data())
+        for name, count in gone.items():
+            missed = noted.get(name, {}).get("missing", 0)
+            log.lost[name] = max(log.lost.get(name, 0), count + missed)
     if topics.COMMAND.name in coverages:
         log.unanswered = unanswered_ticks(coverages, bag.finished)
-    if excused:
-        fill_gaps(log)
-    whole = int(np.argmin(np.append(complete_rows(log), False)))
-    if not whole:
-        raise InputError(f"{path}: not one tick with its state and reference{state}")
-    if not bag.finished:
-        last_s = timebase.stamp_ns(whole - 1) / 1e9
-        log.unfinished = f"the bag was not finished: read up to t = {last_s:.4f} s"
-    return log.truncated(whole)
-
-
-def _fill(bag: Bag, recorded: list[topics.Topic], log: FlightLog) -> dict[str, Coverage]:
-    states, references = (
-        StateCodec(log.joint_names, log.timebase),
-        ReferenceCodec(log.joint_names, log.timebase),
-    )
-    state = RobotState.allocate(len(log.joint_names))
-    coverages = {topic.name: Coverage(topic) for topic in recorded}
-    for name, data in bag.messages(*recorded):
-        topic = topics.BY_NAME[name]
-        try:
-            tick = message_tick(topic, data, log.timebase)
-        except MessageError:
-            coverages[name].strange += 1
-            continue
-        if not coverages[name].take(tick):
-            continue
-        if topic is topics.JOINT_STATES and tick < log.ticks:
-            states.decode_joints(data, state)
-            log.joint_positions[tick] = state.joint_positions
-            log.joint_velocities[tick] = state.joint_velocities
-            log.applied_torque[tick, 3:] = state.applied_torque[3:]
-        elif topic is topics.BASE_STATE and tick < log.ticks:
-            states.decode_base(data, state)
-            log.base_position[tick] = state.base_position
-            log.quaternion[tick] = state.quaternion
-            log.base_velocity[tick] = state.base_velocity
-            log.omega_base[tick] = state.omega_base
-            log.applied_torque[tick, :3] = state.applied_torque[:3]
-        elif topic is topics.REFERENCE_JOINTS and tick < log.ticks:
-            start, rows = references.decode_joints(data)
-            log.reference_joints[start : start + len(rows)] = rows[: log.ticks - start]
-        elif topic is topics.REFERENCE_BASE and tick < log.ticks:
-            start, rows = references.decode_base(data)
-            log.reference_base[start : start + len(rows)] = rows[: log.ticks - start]
-    return coverages

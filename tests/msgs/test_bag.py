@@ -125,12 +125,10 @@ def test_bag_is_never_overwritten(tmp_path: Path) -> None:
         BagRecorder(tmp_path, {}, TIMEBASE)
 
 
-@pytest.mark.parametrize("spoil", ["metadata.yaml", "mcap"])
-def test_unreadable_bag_is_an_input_error(tmp_path: Path, spoil: str) -> None:
+def test_unreadable_bag_is_an_input_error(tmp_path: Path) -> None:
     bag = tmp_path / "bag"
     simulate(Flight(FlightPlan(duration=0.01)), bag)
-    victim = bag / "metadata.yaml" if spoil == "metadata.yaml" else _mcap(bag)
-    victim.write_bytes(victim.read_bytes()[:200])
+    _mcap(bag).write_bytes(_mcap(bag).read_bytes()[:200])
     with pytest.raises(InputError, match=str(bag)):
         read_flight(bag)
 

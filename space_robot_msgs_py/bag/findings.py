@@ -1,0 +1,44 @@
+"""What is wrong with a bag that was read, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..samples import Timebase
+
+_STRETCHES = 3
+
+
+def printable(text: str) -> str:
+    """One line, whatever a broken bag had for names."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
+
+
+def missing_ticks(whole: NDArray[np.bool_], timebase: Timebase) -> list[str]:
+    """Which ticks lack state or reference; (N,) ``whole`` says which do not."""
+    edges = np.diff(np.concatenate(([True], whole, [True])).astype(np.int8))
+    starts, stops = np.flatnonzero(edges < 0), np.flatnonzero(edges > 0)
+    if not len(starts):
+        return []
+    spans = [
+        f"{timebase.stamp_ns(int(start)) / 1e9:.4f} to {timebase.stamp_ns(int(stop) - 1) / 1e9:.4f}"
+        for start, stop in zip(starts[:_STRETCHES], stops, strict=False)
+    ]
+    more = (
+        f" s, and {len(starts) - _STRETCHES} stretches more" if len(starts) > _STRETCHES else " s"
+    )
+    count = int(np.count_nonzero(~whole))
+    return [f"{count} of {len(whole)} ticks lack state or reference: t = {', '.join(spans)}{more}"]
+
+
+def unread_messages(recorded: Mapping[str, int], gone: Mapping[str, int]) -> list[str]:
+    """How many of the recorded messages could not be read."""
+    if not gone:
+        return []
+    each = ", ".join(f"{name} {count}" for name, count in gone.items())
+    return [
+        f"{sum(gone.values())} of {sum(recorded.values())} recorded messages cannot be read: {each}"
+    ]

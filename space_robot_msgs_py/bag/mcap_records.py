@@ -1,0 +1,116 @@
+"""Records of an MCAP file, parsed and decompressed by the mcap library, and found where they begin.
+
+Lengths are checked before they are believed: those of a broken file would fill the memory.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from io import BytesIO
+from typing import Any, BinaryIO
+
+import numpy as np
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Metadata, Schema, Statistics
+from mcap.stream_reader import get_chunk_data_stream
+
+from .kernels import walk_messages
+
+BROKEN = (
+    McapError, zstandard.ZstdError, struct.error, ValueError, RuntimeError, OverflowError,
+    MemoryError,
+)  # fmt: skip
+"""What mcap, lz4 and zstd raise on bytes that end early or make no sense."""
+HEAD = struct.Struct("<BQ")
+INDEX_HEAD = struct.Struct("<HI")
+_PARSED: dict[int, Any] = {
+    Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.METADATA: Metadata,
+    Opcode.CHUNK: Chunk, Opcode.STATISTICS: Statistics,
+}  # fmt: skip
+DESCRIPTIONS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA)
+PASSED = (Opcode.HEADER, Opcode.ATTACHMENT)
+_CHUNK = re.compile(
+    rb"(?=(\x06.{5}\0\0\0.{28}(?:\0{4}|\x03\0\0\0lz4|\x04\0\0\0zstd)))", re.DOTALL
+)  # opcode, length, two times, size, CRC, compression; looked ahead for: they may overlap
+_LONGEST_CHUNK_HEAD = 64
+PIECE = 1 << 20
+LEAST_MESSAGE = 31
+_MOST_EXPANDED = 1000
+"""A chunk that claims to be larger, compared with its compressed bytes, is broken."""
+
+
+def parse(opcode: int, body: bytes) -> Any:
+    """A record from its content.
+
+    Raises:
+        ValueError: or another of `BROKEN`: it makes no sense.
+    """
+    stream = ReadDataStream(BytesIO(body))
+    record = _PARSED[opcode].read(stream)
+    if stream.count != len(body):
+        raise ValueError("a record of another length than it says")
+    return record
+
+
+def decompressed(chunk: Chunk) -> bytes:
+    """The records in a chunk, checked.
+
+    Raises:
+        ValueError: or another of `BROKEN`: they cannot be read.
+    """
+    size = chunk.uncompressed_size
+    if size > _MOST_EXPANDED * len(chunk.data) + PIECE:
+        raise ValueError(f"{len(chunk.data)} bytes that claim to be {size}")
+    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
+    if length != size:
+        raise ValueError(f"{length} bytes instead of {size}")
+    data: bytes = stream.read(length)
+    return data
+
+
+def whole_messages(piece: bytes) -> int:
+    """Bytes of the whole messages at the beginning of ``piece``."""
+    found = np.empty((5, len(piece) // LEAST_MESSAGE + 1), np.int64)
+    _, end = walk_messages(np.frombuffer(piece, np.uint8), 0, found)
+    if not end:
+        raise ValueError("a message that is not whole")
+    return int(end)
+
+
+def check_index(head: bytes, length: int) -> None:
+    """Whether a record of this length may be a message index.
+
+    Raises:
+        ValueError: it is not.
+    """
+    if INDEX_HEAD.unpack(head)[1] != length - INDEX_HEAD.size:
+        raise ValueError("no message index")
+
+
+def cause(error: BaseException) -> str:
+    """The cause in one short line."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    if "crc" in text.lower():
+        return "CRC"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def next_chunk(file: BinaryIO, at: int, size: int) -> int:
+    """Where a chunk begins at or behind ``at``; ``size``, the file's: nowhere."""
+    while at < size:
+        file.seek(at)
+        piece = file.read(PIECE + _LONGEST_CHUNK_HEAD)
+        for found in _CHUNK.finditer(piece):
+            start = at + found.start()
+            _, length = HEAD.unpack_from(piece, found.start())
+            inner = len(found[1]) - HEAD.size + 8
+            file.seek(start + HEAD.size + inner - 8)
+            held = file.read(8)
+            if len(held) == 8 and int.from_bytes(held, "little") == length - inner:
+                return start
+        at += PIECE
+    return size

@@ -1,0 +1,237 @@
+"""One MCAP file, chunk by chunk: what is broken is passed over and told.
+
+Records are parsed, chunks decompressed and checked by the mcap library. Only the messages, of
+which there are millions, are found in compiled code.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections import Counter
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Channel, Footer, Metadata, Schema, Statistics
+from mcap.writer import MCAP0_MAGIC
+
+from .batch import Batch
+from .kernels import (
+    CHANNEL,
+    LENGTH,
+    LOG_NS,
+    PUBLISH_NS,
+    START,
+    Bytes,
+    Integers,
+    walk_messages,
+)
+from .mcap_records import (
+    BROKEN,
+    DESCRIPTIONS,
+    HEAD,
+    INDEX_HEAD,
+    LEAST_MESSAGE,
+    PASSED,
+    PIECE,
+    cause,
+    check_index,
+    decompressed,
+    next_chunk,
+    parse,
+    whole_messages,
+)
+
+_FOOTER_BYTES = 29
+
+
+class McapStorage:
+    """The messages and descriptions in a file, as far as they can be read."""
+
+    def __init__(self, path: Path) -> None:
+        """Read the beginning and the end.
+
+        Raises:
+            OSError: the file cannot be read.
+        """
+        self.path = path
+        self.size = path.stat().st_size
+        self.metadata: dict[str, dict[str, str]] = {}
+        """The metadata records, by name."""
+        self.counts: Counter[str] | None = None
+        """Messages a topic, as the file's statistics have them; None: it has none."""
+        self._schemas: dict[int, Schema] = {}
+        self._channels: dict[int, Channel] = {}
+        self._index_fault = ""
+        self._faults: list[tuple[int, str]] = []
+        self._of_no_topic = 0
+        with path.open("rb") as file:
+            self.is_mcap = file.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC
+            file.seek(max(0, self.size - len(MCAP0_MAGIC)))
+            self.has_end = self.size > len(MCAP0_MAGIC) and file.read() == MCAP0_MAGIC
+            for record in self._records(file, before_messages=True):
+                self._note(record)
+            if self.has_end:
+                self._read_summary(file)
+
+    def batches(self) -> Iterator[Batch]:
+        """All messages, as they were written.
+
+        Raises:
+            OSError: the file can no longer be read.
+        """
+        self._faults, self._of_no_topic = [], 0
+        with self.path.open("rb") as file:
+            for record in self._records(file):
+                if isinstance(record, bytes):
+                    yield from self._walk(record)
+                else:
+                    self._note(record)
+
+    def topics(self) -> dict[str, str]:
+        """Type by topic (empty: not known), of all channels met so far."""
+        return {channel.topic: self._type(channel) for channel in self._channels.values()}
+
+    @property
+    def incomplete(self) -> bool:
+        """Whether something was passed over."""
+        return bool(self._faults or self._of_no_topic)
+
+    @property
+    def damage(self) -> list[str]:
+        """What was found broken; all of it is known when `batches` is through."""
+        found = [self._index_fault] if self._index_fault else []
+        if self._faults:
+            at, why = self._faults[0]
+            more = f", and {len(self._faults) - 1} places more" if len(self._faults) > 1 else ""
+            found.append(f"unreadable at byte {at} ({why}){more}")
+        if self._of_no_topic:
+            found.append(f"{self._of_no_topic} messages of an unknown topic")
+        return [f"{self.path.name}: {text}" for text in found]
+
+    def _read_summary(self, file: BinaryIO) -> None:
+        """Channels and counts from the file's end; they are there again if its beginning is not."""
+        try:
+            at = self.size - len(MCAP0_MAGIC) - _FOOTER_BYTES
+            file.seek(at)
+            end = file.read(_FOOTER_BYTES)
+            opcode, length = HEAD.unpack_from(end)
+            if opcode != Opcode.FOOTER or length != _FOOTER_BYTES - HEAD.size:
+                raise ValueError("no footer")
+            footer = Footer.read(ReadDataStream(BytesIO(end[HEAD.size :])))
+            if not footer.summary_start:
+                return
+            if not 0 < footer.summary_start < at:
+                raise ValueError("its place is outside the file")
+            file.seek(footer.summary_start)
+            summary = file.read(at - footer.summary_start)
+            if footer.summary_crc not in (0, zlib.crc32(summary + end[:-4])):
+                raise ValueError("CRC")
+            self._note_summary(summary)
+        except BROKEN as error:
+            self._index_fault = f"its index cannot be read ({cause(error)})"
+
+    def _note_summary(self, summary: bytes) -> None:
+        at = 0
+        while at < len(summary):
+            opcode, length = HEAD.unpack_from(summary, at)
+            at += HEAD.size
+            if opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS):
+                self._note(parse(opcode, summary[at : at + length]))
+            at += length
+
+    def _note(self, record: Any) -> None:
+        if isinstance(record, Schema):
+            self._schemas[record.id] = record
+        elif isinstance(record, Channel):
+            self._channels[record.id] = record
+        elif isinstance(record, Metadata):
+            self.metadata[record.name] = record.metadata
+        elif isinstance(record, Statistics):
+            self.counts = Counter()
+            for number, count in record.channel_message_counts.items():
+                if number in self._channels:
+                    self.counts[self._channels[number].topic] += count
+
+    def _records(self, file: BinaryIO, before_messages: bool = False) -> Iterator[Any]:
+        """The data section's records; messages as the bytes of many records.
+
+        Behind one that is not whole it goes on with the next chunk that can be found.
+        """
+        at = len(MCAP0_MAGIC) if self.is_mcap else 0
+        while at < self.size:
+            file.seek(at)
+            try:
+                opcode, length = HEAD.unpack(file.read(HEAD.size))
+                if length > self.size - at - HEAD.size:
+                    raise ValueError("a record that ends behind the file")
+                if opcode == Opcode.DATA_END and length == 4:
+                    return
+                if before_messages and opcode in (Opcode.MESSAGE, Opcode.CHUNK):
+                    return
+                if opcode == Opcode.MESSAGE:
+                    file.seek(at)
+                    piece = file.read(max(PIECE, HEAD.size + length))
+                    whole = whole_messages(piece)
+                    yield piece[:whole]
+                    at += whole
+                    continue
+                if opcode == Opcode.CHUNK:
+                    yield decompressed(parse(opcode, file.read(length)))
+                elif opcode in DESCRIPTIONS:
+                    yield parse(opcode, file.read(length))
+                elif opcode == Opcode.MESSAGE_INDEX:
+                    check_index(file.read(INDEX_HEAD.size), length)
+                elif opcode not in PASSED:
+                    raise ValueError("no record of MCAP")
+                at += HEAD.size + length
+            except BROKEN as error:
+                if before_messages:
+                    return
+                behind = next_chunk(file, at + 1, self.size)
+                if behind < self.size or self.has_end:  # else it is where writing ended
+                    self._faults.append((at, cause(error)))
+                at = behind
+
+    def _walk(self, data: bytes) -> Iterator[Batch]:
+        """The messages among the records in ``data``; its channels are noted."""
+        array = np.frombuffer(data, np.uint8)
+        found = np.empty((5, len(data) // LEAST_MESSAGE + 1), np.int64)
+        at = 0
+        while at < len(data):
+            count, at = walk_messages(array, at, found)
+            if count:
+                yield from self._by_topic(array, found[:, :count])
+            if at == len(data):
+                return
+            try:
+                opcode, length = HEAD.unpack_from(data, at)
+                if opcode == Opcode.MESSAGE or length > len(data) - at - HEAD.size:
+                    raise ValueError("a message that is not whole in a chunk")
+                if opcode in DESCRIPTIONS:
+                    body = at + HEAD.size
+                    self._note(parse(opcode, data[body : body + length]))
+                at += HEAD.size + length
+            except BROKEN as error:
+                self._faults.append((at, cause(error)))
+                return
+
+    def _by_topic(self, data: Bytes, found: Integers) -> Iterator[Batch]:
+        for number in np.flatnonzero(np.bincount(found[CHANNEL])).tolist():
+            own = found[:, found[CHANNEL] == number]
+            channel = self._channels.get(number)
+            if channel is None:
+                self._of_no_topic += own.shape[1]
+                continue
+            yield Batch(
+                channel.topic, self._type(channel), channel.message_encoding, data,
+                own[START], own[LENGTH], own[LOG_NS], own[PUBLISH_NS],
+            )  # fmt: skip
+
+    def _type(self, channel: Channel) -> str:
+        schema = self._schemas.get(channel.schema_id)
+        return schema.name if schema else ""

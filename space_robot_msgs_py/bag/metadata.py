@@ -1,0 +1,99 @@
+"""The metadata.yaml of a rosbag2 bag, of any version."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import BaseModel, Field, ValidationError
+
+from ..errors import InputError
+from ..validation import check, read_yaml
+
+METADATA = "metadata.yaml"
+
+
+class _Nanoseconds(BaseModel):
+    nanoseconds: int
+
+
+class _Time(BaseModel):
+    nanoseconds_since_epoch: int
+
+
+class _Topic(BaseModel):
+    name: str
+    type: str
+
+
+class _Count(BaseModel):
+    topic_metadata: _Topic
+    message_count: int
+
+
+class BagInformation(BaseModel):
+    """What rosbag2 notes of a bag, as far as a reader needs it."""
+
+    version: int
+    storage_identifier: str = ""
+    relative_file_paths: list[str] = Field(default_factory=list)
+    duration: _Nanoseconds
+    starting_time: _Time
+    message_count: int
+    topics_with_message_count: list[_Count]
+    compression_mode: str = ""
+    custom_data: dict[str, Any] | None = None
+
+    @property
+    def noted(self) -> dict[str, str]:
+        """The custom data, all of it text."""
+        return {key: str(value) for key, value in (self.custom_data or {}).items()}
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Messages a topic."""
+        return {t.topic_metadata.name: t.message_count for t in self.topics_with_message_count}
+
+    @property
+    def compressed(self) -> bool:
+        """Whether rosbag2 itself compressed files or messages, rather than MCAP its chunks."""
+        return self.compression_mode.lower() in ("file", "message")
+
+    @property
+    def span_ns(self) -> tuple[int, int]:
+        """Log times of the first and the last message."""
+        start = self.starting_time.nanoseconds_since_epoch
+        return start, start + self.duration.nanoseconds
+
+
+def read_information(path: Path) -> BagInformation:
+    """The metadata in a bag's folder.
+
+    Raises:
+        InputError: there is none, or it is no rosbag2 metadata.
+    """
+    file = path / METADATA
+    try:
+        content = read_yaml(file)
+    except (TypeError, RecursionError):  # keys that are no words, brackets without end
+        raise InputError(f"{file}: not the metadata of a rosbag2 bag") from None
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(f"{file}: not YAML ({error})") from None
+    return _check(content.get("rosbag2_bagfile_information"), str(file))
+
+
+def parse_information(text: str) -> BagInformation | None:
+    """The same from the metadata record in an MCAP file; None if it is none."""
+    try:
+        return BagInformation.model_validate(yaml.safe_load(text))
+    except (yaml.YAMLError, ValidationError, TypeError, ValueError, RecursionError):
+        return None
+
+
+def _check(content: Any, where: str) -> BagInformation:
+    if not isinstance(content, dict):
+        raise InputError(f"{where}: not the metadata of a rosbag2 bag")
+    return check(BagInformation, content, where)

@@ -1,0 +1,66 @@
+"""What is not plain MCAP, read with rosbags, in the batches of plain MCAP."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from rosbags.rosbag2 import Reader
+
+from ..errors import InputError
+from .batch import Batch
+
+_BATCH = 1000
+
+
+class RosbagsStorage:
+    """A db3 file, or the folder of a bag that rosbag2 compressed."""
+
+    def __init__(self, path: Path) -> None:
+        """Look at it.
+
+        Raises:
+            InputError: it cannot be read.
+        """
+        self._path = path
+        self.fault = ""
+        """What ended the last reading of the messages too soon."""
+        try:
+            with Reader(path) as reader:
+                self._types = {c.topic: c.msgtype for c in reader.connections}
+        except Exception as error:  # sqlite and zstd have errors of their own
+            raise InputError(f"{path}: cannot be read ({_line(error)})") from None
+
+    def topics(self) -> dict[str, str]:
+        """Type by topic."""
+        return self._types
+
+    def batches(self) -> Iterator[Batch]:
+        """All messages by log time; they end where they can no longer be read."""
+        self.fault = ""
+        waiting: dict[str, list[tuple[int, bytes]]] = {name: [] for name in self._types}
+        try:
+            with Reader(self._path) as reader:
+                for connection, log_ns, data in reader.messages():
+                    entries = waiting[connection.topic]
+                    entries.append((log_ns, bytes(data)))
+                    if len(entries) == _BATCH:
+                        yield self._batch(connection.topic, entries)
+                        entries.clear()
+        except Exception as error:  # likewise
+            self.fault = f"{self._path.name}: cannot be read to its end ({_line(error)})"
+        for name, entries in waiting.items():
+            if entries:
+                yield self._batch(name, entries)
+
+    def _batch(self, topic: str, entries: list[tuple[int, bytes]]) -> Batch:
+        data = np.frombuffer(b"".join(message for _, message in entries), np.uint8)
+        lengths = np.array([len(message) for _, message in entries], np.int64)
+        log_ns = np.array([stamp for stamp, _ in entries], np.int64)
+        starts = np.cumsum(lengths) - lengths
+        return Batch(topic, self._types[topic], "cdr", data, starts, lengths, log_ns, log_ns)
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__

@@ -1,0 +1,82 @@
+"""Which of a bag's messages are ours: by topic, remapped or not, of the right type."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from .. import topics as graph
+from ..errors import InputError
+from ..validation import one_of
+from .batch import Batch
+from .contents import Bag
+
+
+class Selection:
+    """The messages of our topics in a bag."""
+
+    def __init__(self, bag: Bag, remap: Mapping[str, str]) -> None:
+        """``remap``: our topic by theirs; it then stands for ours, even if the bag has ours too.
+
+        Raises:
+            InputError: a topic is to become one that is not ours, or two are to become the same.
+        """
+        self._bag, self._remap = bag, dict(remap)
+        self.wrong: dict[str, str] = {}
+        """What was found instead of the right type, by our topic."""
+        for theirs, ours in self._remap.items():
+            one_of(ours, graph.BY_NAME, "topic", f" to take {theirs} for")
+            if list(self._remap.values()).count(ours) > 1:
+                raise InputError(f"more than one topic is to be taken for {ours}")
+
+    def batches(self) -> Iterator[tuple[graph.Topic, Batch]]:
+        """All messages of our topics, as they were written."""
+        for batch in self._bag.batches():
+            topic = self.ours(batch.topic)
+            if topic and self._fits(topic, batch.type, batch.encoding):
+                yield topic, batch
+
+    def ours(self, name: str) -> graph.Topic | None:
+        """Our topic that a topic of the bag is taken for."""
+        if name not in self._remap and name in self._remap.values():
+            return None
+        return graph.BY_NAME.get(self._remap.get(name, name))
+
+    def topics(self) -> list[graph.Topic]:
+        """Our topics that the bag has with the right type, messages or none.
+
+        Raises:
+            InputError: a topic to remap is not in the bag.
+        """
+        there = self._bag.topics()
+        for theirs in self._remap:
+            if theirs not in there:
+                raise InputError(f"no topic {theirs} to remap; it has {self.listing()}")
+        found = [
+            topic
+            for name, kind in there.items()
+            if (topic := self.ours(name)) and self._fits(topic, kind, "cdr")
+        ]
+        return sorted(set(found), key=graph.ALL.index)
+
+    def recorded(self) -> dict[str, int] | None:
+        """Messages that the bag should hold, by our topic; None: nobody counted."""
+        counts = self._bag.recorded()
+        if counts is None:
+            return None
+        named = ((self.ours(name), count) for name, count in counts.items())
+        return {
+            topic.name: count for topic, count in named if topic and topic.name not in self.wrong
+        }
+
+    def listing(self) -> str:
+        """The bag's topics in words."""
+        return ", ".join(sorted(self._bag.topics())) or "no topics"
+
+    def _fits(self, topic: graph.Topic, kind: str, encoding: str) -> bool:
+        if encoding != "cdr":
+            self.wrong[topic.name] = f"encoded as {encoding!r}, 'cdr' is needed"
+        elif kind and kind.replace("/msg/", "/") != topic.type.replace("/msg/", "/"):
+            self.wrong[topic.name] = f"of type {kind}, {topic.type} is needed"
+        else:
+            return True
+        return False
