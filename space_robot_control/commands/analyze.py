@@ -60,7 +60,7 @@ def analyze(
     """Figures of merit of recorded flights: one bag, or several side by side.
 
     RMS, maxima, settling, chatter, saturation, latency, the error of the time-delay estimate, and
-    where the end effector pointed. docs/bags.md says what each means.
+    where the end effector pointed. docs/analysis.md says what each means.
 
     \b
     Examples:
