@@ -61,6 +61,7 @@ setup(
             "hypothesis",
             "mujoco",
             "mypy",
+            "pandas",
             "pin",
             "pytest",
             "pytest-xdist",
