@@ -30,7 +30,7 @@ STATE_COLUMNS = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("law", ["ctc", "ctc_smc", "tde_smc", "tde_tsmc", "tde_stc"])
+@pytest.mark.parametrize("law", ["ctc", "tde_stc"])
 def test_graph_and_in_process_flights_agree_to_the_last_bit(
     fly: Callable[..., Flown], law: str
 ) -> None:
@@ -39,12 +39,15 @@ def test_graph_and_in_process_flights_agree_to_the_last_bit(
     recorded = read_flight(flown.bag)
     for column in STATE_COLUMNS:
         np.testing.assert_array_equal(getattr(recorded, column), getattr(log, column), column)
-    assert flown.bag_report == json.loads(json.dumps(analyse(log)))
+    report = json.loads(json.dumps(analyse(log)))
+    for key in ("latency", "unavailable"):  # of the wall clock; the simulated flight has none
+        assert flown.bag_report.pop(key) != report.pop(key)
+    assert flown.bag_report == report
 
 
-def test_laws_are_swapped_at_the_same_tick_in_both(fly: Callable[..., Flown]) -> None:
-    swaps = ["0.2:ctc", "0.35:tde_smc"]
-    flown = fly(*SHORT, "--swap", swaps[0], "--swap", swaps[1])
+def test_all_laws_are_swapped_at_the_same_ticks_in_both(fly: Callable[..., Flown]) -> None:
+    swaps = ["0.1:ctc", "0.2:ctc_smc", "0.3:tde_smc", "0.4:tde_tsmc"]
+    flown = fly(*SHORT, *(word for swap in swaps for word in ("--swap", swap)))
     log = simulate(Flight(FlightPlan(swaps=swaps, duration=0.5)))
     recorded = read_flight(flown.bag)
     for column in STATE_COLUMNS:
