@@ -34,14 +34,14 @@ def _little_endian(data: Bytes, at: int, size: int) -> int:
 
 
 @kernel
-def walk_messages(data: Bytes, start: int, found: Integers) -> tuple[int, int]:
+def walk_messages(data: Bytes, start: int, found: Integers, before: int) -> tuple[int, int]:
     """MCAP's Message records that stand one behind the other from ``start`` on.
 
     Returns:
-        How many there are, one column of ``found`` each, and where they end: at a record of another
-        kind, one that is not whole, the end of the data, or when ``found`` is full.
+        How many there are in ``found``, a column each behind the ``before`` first, and where they
+        end: at a record of another kind, one that is not whole, or the end of the data.
     """
-    at, count = start, 0
+    at, count = start, before
     while count < found.shape[1] and len(data) - at >= _HEAD + _FIELDS and data[at] == _MESSAGE:
         length = _little_endian(data, at + 1, 8)
         if length < _FIELDS or length > len(data) - at - _HEAD:

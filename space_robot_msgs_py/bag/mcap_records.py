@@ -75,7 +75,7 @@ def decompressed(chunk: Chunk) -> bytes:
 def whole_messages(piece: bytes) -> int:
     """Bytes of the whole messages at the beginning of ``piece``."""
     found = np.empty((5, len(piece) // LEAST_MESSAGE + 1), np.int64)
-    _, end = walk_messages(np.frombuffer(piece, np.uint8), 0, found)
+    _, end = walk_messages(np.frombuffer(piece, np.uint8), 0, found, 0)
     if not end:
         raise ValueError("a message that is not whole")
     return int(end)

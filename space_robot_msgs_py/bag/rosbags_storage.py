@@ -25,12 +25,15 @@ class RosbagsStorage:
         """
         self._path = path
         self.fault = ""
-        """What ended the last reading of the messages too soon."""
+        """What went wrong when the messages were read."""
+        self._strange = 0
         try:
             with Reader(path) as reader:
-                self._types = {c.topic: c.msgtype for c in reader.connections}
+                names = {c.topic: c.msgtype for c in reader.connections}
         except Exception as error:  # sqlite and zstd have errors of their own
             raise InputError(f"{path}: cannot be read ({_line(error)})") from None
+        # a broken database may have anything in any place
+        self._types = {name: kind for name, kind in names.items() if _is_text(name, kind)}
 
     def topics(self) -> dict[str, str]:
         """Type by topic."""
@@ -38,18 +41,23 @@ class RosbagsStorage:
 
     def batches(self) -> Iterator[Batch]:
         """All messages by log time; they end where they can no longer be read."""
-        self.fault = ""
+        self.fault, self._strange = "", 0
         waiting: dict[str, list[tuple[int, bytes]]] = {name: [] for name in self._types}
         try:
             with Reader(self._path) as reader:
                 for connection, log_ns, data in reader.messages():
+                    if connection.topic not in waiting or not isinstance(data, bytes):
+                        self._strange += 1
+                        continue
                     entries = waiting[connection.topic]
-                    entries.append((log_ns, bytes(data)))
+                    entries.append((int(log_ns), data))
                     if len(entries) == _BATCH:
                         yield self._batch(connection.topic, entries)
                         entries.clear()
         except Exception as error:  # likewise
             self.fault = f"{self._path.name}: cannot be read to its end ({_line(error)})"
+        if self._strange and not self.fault:
+            self.fault = f"{self._path.name}: {self._strange} messages that are none"
         for name, entries in waiting.items():
             if entries:
                 yield self._batch(name, entries)
@@ -57,9 +65,13 @@ class RosbagsStorage:
     def _batch(self, topic: str, entries: list[tuple[int, bytes]]) -> Batch:
         data = np.frombuffer(b"".join(message for _, message in entries), np.uint8)
         lengths = np.array([len(message) for _, message in entries], np.int64)
-        log_ns = np.array([stamp for stamp, _ in entries], np.int64)
+        log_ns = np.array([stamp % 2**63 for stamp, _ in entries], np.int64)
         starts = np.cumsum(lengths) - lengths
         return Batch(topic, self._types[topic], "cdr", data, starts, lengths, log_ns, log_ns)
+
+
+def _is_text(*values: object) -> bool:
+    return all(isinstance(value, str) for value in values)
 
 
 def _line(error: Exception) -> str:

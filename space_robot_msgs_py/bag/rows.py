@@ -94,8 +94,9 @@ class Rows:
         coverage = self.coverages.setdefault(topic.name, Coverage(topic))
         self.counts[topic.name] += len(batch)
         ticks, known = self._ticks(topic, batch)
-        coverage.strange += int(np.count_nonzero(~known))
-        fresh = np.flatnonzero(known)[coverage.take_all(ticks[known])]
+        places = np.flatnonzero(known)
+        coverage.strange += len(batch) - len(places)
+        fresh = places[coverage.take_all(ticks[places])]
         if len(fresh) < len(batch):
             batch, ticks = batch.select(fresh), ticks[fresh]
         self._believed += _TICKS_A_MESSAGE * len(batch)

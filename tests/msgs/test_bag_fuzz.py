@@ -172,23 +172,21 @@ def test_a_bag_broken_by_chance_is_read_truly_or_refused(
 @pytest.fixture(scope="module", params=["no CRC", "no chunks", "db3"])
 def unguarded(
     request: pytest.FixtureRequest, recorded: Recorded, tmp_path_factory: pytest.TempPathFactory
-) -> tuple[str, bytes]:
+) -> Path:
     """A bag in which no checksum tells that a number has changed."""
     folder, entries = tmp_path_factory.mktemp("unguarded"), entries_of(recorded.folder)
     if request.param == "db3":
-        (file,) = rosbags_bag(folder / "sqlite", entries, lambda writer: None).glob("*.db3")
-        return "x.db3", file.read_bytes()
+        return next(rosbags_bag(folder / "sqlite", entries, lambda writer: None).glob("*.db3"))
     options = {"enable_crcs": False, "use_chunking": request.param == "no CRC"}
-    file = mcap_of(folder / "x.mcap", entries, compression=CompressionType.NONE, **options)
-    return "x.mcap", file.read_bytes()
+    return mcap_of(folder / "x.mcap", entries, compression=CompressionType.NONE, **options)
 
 
 @fuzzed
 @given(st.lists(changes, min_size=1, max_size=4))
 def test_a_bag_without_checksums_broken_by_chance_is_read_or_refused(
-    unguarded: tuple[str, bytes], folder: Path, given_changes: list[Change]
+    unguarded: Path, folder: Path, given_changes: list[Change]
 ) -> None:
-    name, content = unguarded
-    (folder / name).write_bytes(broken({"mcap": content}, given_changes)["mcap"])
-    if log := read_or_refused(folder / name):
+    file = folder / unguarded.name
+    file.write_bytes(broken({"mcap": unguarded.read_bytes()}, given_changes)["mcap"])
+    if log := read_or_refused(file):
         assert 0 < log.ticks < 100_000

@@ -17,9 +17,11 @@ from bags import (
     Recorded,
     assert_rows_are_the_originals,
     chunks_of,
+    entries_of,
     mcap_file,
     messages_of,
     record,
+    rosbags_bag,
 )
 from mcap.writer import Writer as McapWriter
 
@@ -243,6 +245,36 @@ def test_a_broken_db3_is_told_in_a_line(tmp_path: Path) -> None:
     with sqlite3.connect(tmp_path / "y.db3") as database:
         database.execute("CREATE TABLE notes(id INTEGER)")
     assert "cannot be read" in _error(tmp_path / "y.db3")
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ("UPDATE topics SET name = x'00ff' WHERE name = '/clock'", "messages that are none"),
+        ("UPDATE messages SET data = 999999999999 WHERE id = 5", "1 messages that are none"),
+        ("UPDATE messages SET data = NULL WHERE id = 9", ""),
+        ("UPDATE messages SET timestamp = 'noon' WHERE id = 7", "cannot be read to its end"),
+        (
+            "UPDATE topics SET type = 'a\nb' WHERE name = '/clock'",
+            "left out: of type a?b",
+        ),
+    ],
+)
+def test_anything_in_any_place_of_a_db3_is_left_out(
+    recorded: Recorded, tmp_path: Path, change: str, told: str
+) -> None:
+    """Found by breaking databases by chance."""
+    bag = rosbags_bag(tmp_path / "sqlite", entries_of(recorded.folder), lambda writer: None)
+    (file,) = bag.glob("*.db3")
+    with sqlite3.connect(file) as database:
+        database.execute("PRAGMA ignore_check_constraints = 1")
+        try:
+            database.execute(change)
+        except sqlite3.IntegrityError:
+            pytest.skip("sqlite itself prevents it")
+    log = read_flight(file)
+    assert told in " ".join(log.damage)
+    assert_rows_are_the_originals(log, recorded.log)
 
 
 def _write(path: Path, entries: list[tuple[str, str, str, bytes]]) -> None:
