@@ -23,6 +23,7 @@ setup(
     maintainer_email="maintainers@space-robot.example.org",
     packages=find_packages(include=[f"{NAME}_*"]),
     package_data={
+        "space_robot_control.analysis": ["templates/*.j2"],
         "space_robot_control.reproduction": ["templates/*.j2"],
         "space_robot_msgs_py.ros": ["*.xml"],
     },
@@ -30,18 +31,21 @@ setup(
     install_requires=[
         "click>=8.1",
         "jinja2>=3.1",
+        "lz4>=4",
         "markdown-it-py>=3",
         "matplotlib>=3.8",
         "mcap>=1.5",
         "numba>=0.58.1",
         "numpy>=1.26,<3",
         "psutil>=5.9",
+        "pyarrow>=14",
         "pydantic>=2.5",
         "pyyaml>=6",
         "rich>=13",
         "rosbags>=0.11",
         "scipy>=1.11.4",
         "typing_extensions>=4.8",
+        "zstandard>=0.22",
     ],
     extras_require={
         # tests/benchmarks; bsk (Basilisk) holds back numpy and matplotlib, so a venv of its own
@@ -57,6 +61,7 @@ setup(
             "hypothesis",
             "mujoco",
             "mypy",
+            "pandas",
             "pin",
             "pytest",
             "pytest-xdist",

@@ -12,8 +12,10 @@ import click
 
 from space_robot_msgs_py.errors import SpaceRobotError
 
+from .commands.analyze import analyze
 from .commands.bench import bench
 from .commands.options import OPTIONS, flight_options
+from .commands.replay import replay
 from .commands.reproduce import reproduce
 from .commands.soak import soak
 from .commands.stability import stability
@@ -29,7 +31,8 @@ def cli() -> None:
       space-robot fly                               case 1 under TDE-STC, as a graph of nodes
       space-robot fly --controller ctc --case 3     another law, another case
       space-robot simulate --json                   the same flight without ROS
-      space-robot analyze flights/<bag>             the table of a recorded flight
+      space-robot analyze flights/<bag>...          figures of merit of recorded flights
+      space-robot replay flights/<bag>              its states to a live controller, compared
       space-robot reproduce                         the paper's Table V and figures, flown again
       space-robot bench                             how fast it is here
       space-robot soak --minutes 5                  flights with faults drawn by chance
@@ -135,24 +138,9 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
     _report(analyse(log), as_json)
 
 
-@cli.command()
-@click.argument("bag", type=click.Path(path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
-def analyze(bag: Path, as_json: bool) -> None:
-    """Print the RMS table of a recorded flight.
-
-    \b
-    Example:
-      space-robot analyze flights/tde_stc_case1_20261121-120000 --json
-    """
-    from space_robot_msgs_py.bag.reader import read_flight
-
-    from .analysis import analyse
-
-    _report(analyse(read_flight(bag)), as_json)
-
-
+cli.add_command(analyze)
 cli.add_command(bench)
+cli.add_command(replay)
 cli.add_command(reproduce)
 cli.add_command(soak)
 cli.add_command(stability)

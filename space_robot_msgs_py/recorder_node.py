@@ -6,15 +6,13 @@ import json
 import os
 import time
 from pathlib import Path
-from typing import Annotated, ClassVar, NoReturn
-
-from pydantic import Field
+from typing import NoReturn
 
 from . import topics
 from .bag.recorder import BagRecorder
-from .configuration import NodeSettings
 from .errors import InputError
 from .health import Health, Level
+from .recorder_settings import RecorderNodeSettings
 from .ros.endpoints import In, Out, TakenByLoop
 from .ros.shell import Shell, run_node
 
@@ -27,20 +25,6 @@ NICENESS = 5
 """The loop goes first where cores are short; the queues hold seconds of traffic."""
 
 
-class RecorderNodeSettings(NodeSettings):
-    """Parameters of recorder_node."""
-
-    node: ClassVar[str] = "recorder"
-
-    bag: str = Field(
-        "", description="folder of the bag to write; it must not exist (empty: bag_<time>)"
-    )
-    flight: str = Field("{}", description="what is flown, as a JSON object; stored with the bag")
-    drain_period: Annotated[float, Field(ge=0.0005, le=0.1)] = Field(
-        0.02, description="time between two rounds of emptying the queues, s"
-    )
-
-
 class RecorderLoop:
     """Empties the queues of all topics in turn; deep queues bridge the time between rounds."""
 
@@ -51,7 +35,10 @@ class RecorderLoop:
         except json.JSONDecodeError as error:
             raise InputError(f"recorder parameters: flight: not JSON ({error})") from None
         path = Path(settings.bag or time.strftime("bag_%Y%m%d-%H%M%S"))
-        self._recorder = BagRecorder(path, {"period": settings.period, **flight}, settings.timebase)
+        self._recorder = BagRecorder(
+            path, {"period": settings.period, **flight}, settings.timebase,
+            settings.compression, settings.split_size,
+        )  # fmt: skip
         self.outputs: tuple[Out, ...] = ()
         group = TakenByLoop()
         self._inputs = [In(shell.node, topic, group, QUEUE_DEPTH) for topic in topics.ALL]
@@ -101,9 +88,9 @@ class RecorderLoop:
 
     def _take_some(self, entry: In) -> int:
         for count in range(TURN):
-            if (data := entry.take()) is None:
+            if (taken := entry.take_with_time()) is None:
                 return count
-            self._recorder.record(entry.topic, data)
+            self._recorder.record(entry.topic, *taken)
             os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
         return TURN
 

@@ -1,5 +1,17 @@
-"""How well a flight was flown: the figures of merit of Table V, and chatter."""
+"""How well a flight was flown: the figures of merit of Table V, and of those who fly.
 
-from .metrics import analyse, tracking_error
+| module | figures |
+|---|---|
+| `metrics` | RMS in both definitions, maxima, chatter |
+| `settling` | time until the error stays small after a motion |
+| `actuation` | saturation, latency, commands that were not applied |
+| `estimate_error` | error of the time-delay estimate |
+| `pointing` | end effector's pointing in the inertial frame |
+| `report` | all of them, as a dictionary |
+"""
 
-__all__ = ["analyse", "tracking_error"]
+from .excerpt import excerpt
+from .metrics import tracking_error
+from .report import analyse
+
+__all__ = ["analyse", "excerpt", "tracking_error"]

@@ -7,7 +7,6 @@ RMS values instead. Both are given, named ``eq64`` and ``mean_axis``.
 from __future__ import annotations
 
 from functools import reduce
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,8 @@ Array = NDArray[np.float64]
 
 CHATTER_FREQUENCY = 100.0
 """Hz; power above it is chatter."""
+LONG = 200_000
+"""Samples from which on the spectrum is of the next length that is fast, padded with zeros."""
 
 
 def axis_groups(n: int) -> dict[str, slice]:
@@ -68,21 +69,30 @@ def power_above(values: Array, period: float, frequency: float = CHATTER_FREQUEN
     if len(values) < 2 or 0.5 / period <= frequency:
         return 0.0
     window = np.hanning(len(values))[:, np.newaxis]  # keeps slow motion from leaking upwards
-    power = np.abs(np.fft.rfft(window * values, axis=0)) ** 2
-    f = np.fft.rfftfreq(len(values), period)
+    length = _transform_length(len(values))
+    power = np.abs(np.fft.rfft(window * values, length, axis=0)) ** 2
+    f = np.fft.rfftfreq(length, period)
     power[(f > 0.0) & (f < 0.5 / period * (1.0 - 1e-12))] *= 2.0  # the negative frequencies' half
     total = np.sum(power, axis=0)
     high = np.sum(power[f > frequency], axis=0)
     return float(np.mean(np.divide(high, total, out=np.zeros_like(high), where=total > 0.0)))
 
 
+def _transform_length(samples: int) -> int:
+    """``samples``, or a little more where that is long: a prime takes five times as long."""
+    if samples < LONG:
+        return samples
+    from scipy.fft import next_fast_len  # half a second to import
+
+    return int(next_fast_len(samples, real=True))
+
+
 def rms(log: FlightLog) -> dict[str, dict[str, float]]:
     """The RMS of errors and torques, by definition and column of Table V."""
-    groups = axis_groups(log.axes - 3)
     found: dict[str, dict[str, float]] = {"mean_axis": {}, "eq64": {}}
     for values, names in (
-        (tracking_error(log), _columns(groups, "attitude", "joints")),
-        (log.applied_torque, _columns(groups, "base_torque", "torque")),
+        (tracking_error(log), error_columns(log.axes)),
+        (log.applied_torque, torque_columns(log.axes)),
     ):
         each = axis_rms(values)
         for name, axes in names.items():
@@ -93,8 +103,7 @@ def rms(log: FlightLog) -> dict[str, dict[str, float]]:
 
 def chatter(log: FlightLog) -> dict[str, dict[str, float]]:
     """How rough the torques are, by measure and column of Table V."""
-    names = _columns(axis_groups(log.axes - 3), "base_torque", "torque")
-    torques = {name: log.applied_torque[:, axes] for name, axes in names.items()}
+    torques = {name: log.applied_torque[:, axes] for name, axes in torque_columns(log.axes).items()}
     period = log.timebase.period
     return {
         "total_variation_per_s": {
@@ -106,22 +115,26 @@ def chatter(log: FlightLog) -> dict[str, dict[str, float]]:
     }
 
 
-def analyse(log: FlightLog) -> dict[str, Any]:
-    """The flight's report, the same from a graph flight, an in-process one, or a bag."""
-    return {
-        "controller": log.flight.get("controller"),
-        "case": log.flight.get("case"),
-        "gains": log.flight.get("gains"),
-        "robot": log.flight.get("robot"),
-        "ticks": log.ticks,
-        "duration_s": log.ticks * log.timebase.period_ns / 1e9,
-        "rms": rms(log),
-        "chatter": chatter(log),
-        "lost": log.lost,
-        "unanswered_ticks": log.unanswered,
-        "filled_ticks": log.filled,
-        "unfinished": log.unfinished,
-    }
+def maxima(log: FlightLog) -> dict[str, float]:
+    """Largest |error| and |torque| on any axis, by column of Table V, in its unit."""
+    found: dict[str, float] = {}
+    for values, names in (
+        (tracking_error(log), error_columns(log.axes)),
+        (log.applied_torque, torque_columns(log.axes)),
+    ):
+        each = np.max(np.abs(values), axis=0)
+        found |= {name: float(np.max(each[axes])) for name, axes in names.items()}
+    return found
+
+
+def error_columns(axes: int) -> dict[str, slice]:
+    """Which of the m = n+3 axes each error column of Table V is of."""
+    return _columns(axis_groups(axes - 3), "attitude", "joints")
+
+
+def torque_columns(axes: int) -> dict[str, slice]:
+    """Which of the m = n+3 axes each torque column of Table V is of."""
+    return _columns(axis_groups(axes - 3), "base_torque", "torque")
 
 
 def _columns(groups: dict[str, slice], base: str, prefix: str) -> dict[str, slice]:

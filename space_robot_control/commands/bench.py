@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import check_writable
+from .options import OUTPUT, check_writable, put_json
 
 if TYPE_CHECKING:
     from ..bench import Result
@@ -22,12 +22,7 @@ if TYPE_CHECKING:
     help="Batches of each competitor [default: as many as the section thinks fit].",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print everything, all samples, as JSON.")
-@click.option(
-    "--output",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE",
-    help="File to write the JSON to as well.",
-)
+@OUTPUT
 def bench(
     sections: tuple[str, ...],
     short: bool,
@@ -49,8 +44,6 @@ def bench(
       space-robot bench simulate --repetitions 20 --output simulate.json
       space-robot bench --short --json | jq '.sections.plant[] | [.name, .median, .unit]'
     """
-    import json
-
     from ..bench import Options
     from ..bench.machine import machine
     from ..bench.sections import SECTIONS
@@ -71,12 +64,8 @@ def bench(
         report["sections"][name] = [result.record() for result in results]
         if not as_json:
             _show(name, results)
-    text = json.dumps(report, indent=1, allow_nan=False)
-    if output:
-        output.write_text(text + "\n", "utf-8")
-    if as_json:
-        click.echo(text)
-    else:
+    put_json(report, as_json, output)
+    if not as_json:
         _show_machine(report["machine"])
 
 

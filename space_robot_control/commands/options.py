@@ -50,6 +50,27 @@ def _scenario(context: click.Context, option: click.Parameter, path: Path | None
     context.default_map = {**(context.default_map or {}), **content}
 
 
+def _remap(context: click.Context, option: click.Parameter, given: Any) -> dict[str, str]:
+    """``/arm/states:=/joint_states`` to ``{"/arm/states": "/joint_states"}``."""
+    from space_robot_msgs_py.topics import BY_NAME
+    from space_robot_msgs_py.validation import one_of
+
+    remap = {}
+    for text in given:
+        theirs, sign, ours = text.partition(":=")
+        if not (theirs and sign and ours):
+            raise click.BadParameter(
+                f"{text!r}: THEIRS:=OURS expected, as /arm/states:=/joint_states"
+            )
+        remap[theirs] = one_of(ours, BY_NAME, "topic", f" in --remap {text}")
+    return remap
+
+
+REMAP = click.option(
+    "--remap", multiple=True, callback=_remap, metavar="THEIRS:=OURS",
+    help="Take their topic for ours, as /arm/states:=/joint_states; may be repeated.",
+)  # fmt: skip
+
 OPTIONS: dict[str, Decorator] = {
     "controller": click.option(
         "--controller", default="tde_stc", show_default=True,
@@ -69,6 +90,13 @@ OPTIONS: dict[str, Decorator] = {
         "--duration", type=float, help="Seconds to fly [default: the mission's]."),
     "bag": click.option(
         "--bag", type=click.Path(path_type=Path), help="Folder of the bag to write."),
+    "compression": click.option(
+        "--compression", type=click.Choice(["none", "lz4", "zstd"]),
+        help="Of the bag [default: lz4]."),
+    "split_size": click.option(
+        "--split-size", metavar="SIZE",
+        help="Go on in another file of the bag after so many bytes, as 500K, 100M, 2G "
+        "[default: one file]."),
     "latency": click.option(
         "--command-latency-ticks", type=int, default=0, show_default=True,
         help="Ticks by which the plant applies commands late."),
@@ -113,3 +141,18 @@ def check_writable(path: Path) -> None:
         path.open("a", encoding="utf-8").close()
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+OUTPUT = click.option(
+    "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+    help="File to write the JSON to as well.",
+)  # fmt: skip
+
+
+def put_json(report: Any, as_json: bool, output: Path | None) -> None:
+    """Write a report to ``output``, if given, and print it if JSON was asked for."""
+    text = json.dumps(report, indent=1, allow_nan=False)
+    if output:
+        output.write_text(text + "\n", "utf-8")
+    if as_json:
+        click.echo(text)

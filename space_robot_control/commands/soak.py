@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from .options import check_writable
+from .options import OUTPUT, check_writable, put_json
 
 
 @click.command()
@@ -38,10 +38,7 @@ from .options import check_writable
     help="New or empty folder to keep all bags [default: those of failed flights are kept].",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print everything, each flight, as JSON.")
-@click.option(
-    "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
-    help="File to write the JSON to as well.",
-)  # fmt: skip
+@OUTPUT
 def soak(
     minutes: float,
     seed: int,
@@ -63,8 +60,6 @@ def soak(
       space-robot soak --minutes 480 --seed 7 --output soak.json
       space-robot soak --minutes 2 --duration 1 --json | jq '.each[] | select(.survived | not)'
     """
-    import json
-
     from rich.console import Console
 
     from ..flight.soak import soak as run
@@ -74,12 +69,8 @@ def soak(
         check_writable(output)
     done = run(60.0 * minutes, seed, duration, bags, lambda line: click.echo(line, err=True))
     report = done.report()
-    text = json.dumps(report, indent=1, allow_nan=False)
-    if output:
-        output.write_text(text + "\n", "utf-8")
-    if as_json:
-        click.echo(text)
-    else:
+    put_json(report, as_json, output)
+    if not as_json:
         print_soak(report, Console())
     if failed := report["flights"] - report["survived"]:
         from space_robot_msgs_py.errors import FlightError

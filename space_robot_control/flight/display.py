@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from itertools import groupby
 from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-UNITS = {"attitude": "-", "joints": "rad", "base_torque": "N m", "torque": "N m"}
+from ..analysis.table import Line, lines, notes, remarks, unit_of
 
-NOTES = {
-    "filled_ticks": "ticks without a usable state, shown as the one before",
-    "unanswered_ticks": "ticks the controller did not answer in time",
-}
-
-
-def _unit(key: str) -> str:
-    return next(unit for prefix, unit in UNITS.items() if key.startswith(prefix))
+LABELS = 44
+"""Columns of the terminal that names and units take beside the figures of several bags."""
+NARROWEST = 17
+"""Columns of one bag."""
 
 
 def print_report(report: dict[str, Any], console: Console) -> None:
@@ -40,16 +37,57 @@ def print_report(report: dict[str, Any], console: Console) -> None:
         chatter = (f"{variation[key]:.3g}", f"{power[key]:.2e}") if key in variation else ("", "")
         form = ".4f" if "torque" in key else ".3e"
         table.add_row(
-            key, _unit(key), f"{value:{form}}", f"{report['rms']['eq64'][key]:{form}}", *chatter
+            key, unit_of(key), f"{value:{form}}", f"{report['rms']['eq64'][key]:{form}}", *chatter
         )
     console.print(table)
-    lost = {topic: count for topic, count in report["lost"].items() if count}
-    console.print(f"messages lost: {lost or 'none'}")
-    if report["unfinished"]:
-        console.print(report["unfinished"])
-    for key, words in NOTES.items():
-        if report[key]:
-            console.print(f"{words}: {report[key]}")
+    for remark in remarks(report):
+        console.print(remark)
+
+
+def print_figures(report: dict[str, Any], console: Console) -> None:
+    """What `print_report` leaves out: every other figure, and why one is missing."""
+    table = Table(title="further figures", title_justify="left")
+    for justify in ("left", "left", "right"):
+        table.add_column("", justify=justify)
+    _fill(table, lines([report], brief=True))
+    console.print(table)
+    for note in notes(report):
+        console.print(note)
+
+
+def print_comparison(reports: dict[str, dict[str, Any]], console: Console) -> None:
+    """All figures of several bags, a column each; in as many tables as the width asks for."""
+    every = max(1, (console.width - LABELS) // NARROWEST)
+    names = list(reports)
+    for first in range(0, len(names), every):
+        shown = names[first : first + every]
+        table = Table()
+        for _ in range(2):
+            table.add_column("", no_wrap=True)
+        for name in shown:
+            table.add_column(name, justify="right", overflow="fold")
+        for key in ("controller", "case", "gains", "robot"):
+            table.add_row(key, "", *(str(reports[name][key] or "-") for name in shown))
+        span = [f"{reports[name]['from_s']:g} to {reports[name]['to_s']:g}" for name in shown]
+        table.add_row("time (s)", "", *span, end_section=True)
+        _fill(table, lines([reports[name] for name in shown]))
+        console.print(table)
+    for name, report in reports.items():
+        console.print(f"{name}:")
+        for sentence in (*remarks(report), *notes(report)):
+            console.print(f"  {sentence}")
+
+
+def _fill(table: Table, shown: list[Line]) -> None:
+    for _, group in groupby(shown, key=lambda line: line.group):
+        lines_of_group = list(group)
+        for line in lines_of_group:
+            table.add_row(
+                line.group if line is lines_of_group[0] else "",
+                f"{line.name} ({line.unit})" if line.unit else line.name,
+                *line.texts,
+                end_section=line is lines_of_group[-1],
+            )
 
 
 class FlightProgress:

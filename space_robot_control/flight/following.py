@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import closing
 from typing import Any
 
 from space_robot_msgs_py.errors import FlightError
@@ -81,12 +82,12 @@ class _Follower:
     def bring_up(self, show: FlightProgress) -> None:
         """Configure all nodes, then activate them, the plant last."""
         show(0.0, "configuring the nodes")
-        driver = LifecycleDriver(self._monitor.node)
-        for nodes, transition in BRING_UP:
-            names = [f"{node}_node" for node in nodes]
-            for name in driver.change(names, transition, self._check_start):
-                words = self._graph.nodes[name.removesuffix("_node")].last_words()
-                raise FlightError(f"{name} refused to {transition}:\n{words}")
+        with closing(LifecycleDriver(self._monitor.node)) as driver:
+            for nodes, transition in BRING_UP:
+                names = [f"{node}_node" for node in nodes]
+                for name in driver.change(names, transition, self._check_start):
+                    words = self._graph.nodes[name.removesuffix("_node")].last_words()
+                    raise FlightError(f"{name} refused to {transition}:\n{words}")
         show.say(f"configured and active: {', '.join(ORDER)}")
         show(0.0, "waiting for the nodes")
 

@@ -58,6 +58,10 @@ class LifecycleDriver:
             for client in clients.values():
                 self._node.destroy_client(client)
 
+    def close(self) -> None:
+        """Let go of the node."""
+        self._executor.shutdown()
+
     def _wait(self, done: Callable[[], bool], check: Callable[[], None]) -> None:
         until = time.monotonic() + TIMEOUT_S
         while not done():

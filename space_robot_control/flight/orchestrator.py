@@ -37,7 +37,7 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
     check_bag_path(bag)
     require_ros()
     compile_kernels()
-    with ros_domain(flight.plan.domain) as domain, _stop_signals() as stopped:
+    with ros_domain(flight.plan.domain) as domain, stop_signals() as stopped:
         _say(f"flying on ROS_DOMAIN_ID={domain}, recording to {bag}")
         begin = time.monotonic()
         try:
@@ -104,7 +104,7 @@ def _check(report: dict[str, Any], flight: Flight) -> None:
 
 
 @contextmanager
-def _stop_signals() -> Iterator[list[int]]:
+def stop_signals() -> Iterator[list[int]]:
     """A list that SIGINT and SIGTERM fill; the nodes, in groups of their own, do not get them."""
     arrived: list[int] = []
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)

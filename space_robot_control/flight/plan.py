@@ -8,12 +8,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import ByteSize, Field
 
+from space_robot_msgs_py.bag.mcap_file import Compression
 from space_robot_msgs_py.configuration import named_file
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.fault import KINDS, parse_faults
-from space_robot_msgs_py.validation import Strict
+from space_robot_msgs_py.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.validation import Strict, read_yaml
 from space_robot_sim.faults import PlantFaults
 from space_robot_sim.plant import Plant
 from space_robot_sim.plant_settings import PlantNodeSettings
@@ -22,7 +24,15 @@ from space_robot_sim.robot import Robot
 from ..controller import Controller
 from ..mission import Mission
 from ..settings import ControllerNodeSettings, MissionNodeSettings, build_law
+from ..software import commit, versions
 from ..swaps import parse_swaps
+
+NODES = tuple(
+    settings.node
+    for settings in (
+        PlantNodeSettings, ControllerNodeSettings, MissionNodeSettings, RecorderNodeSettings,
+    )
+)  # fmt: skip
 
 
 class FlightPlan(Strict):
@@ -48,6 +58,10 @@ class FlightPlan(Strict):
     """Whether a controller that died or hangs is started again."""
     domain: Annotated[int | None, Field(ge=0, le=232)] = None
     """ROS domain to fly in (None: ROS_DOMAIN_ID, or a free one)."""
+    compression: Compression | None = None
+    """Of the bag (None: the recorder's own)."""
+    split_size: ByteSize | None = None
+    """Bytes after which the bag goes on in another file (None: the recorder's own)."""
     parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """Further parameters by node, dotted names."""
 
@@ -82,6 +96,10 @@ class FlightPlan(Strict):
                 **({"reference_timeout": 0.0} if self.realtime else {}),
             },
             MissionNodeSettings.node: {"mission": self.mission},
+            RecorderNodeSettings.node: {
+                **({} if self.compression is None else {"compression": self.compression}),
+                **({} if self.split_size is None else {"split_size": int(self.split_size)}),
+            },
         }
         return {**common, **specific.get(node, {}), **self.parameters.get(node, {})}
 
@@ -95,13 +113,18 @@ class Flight:
 
     def __init__(self, plan: FlightPlan) -> None:
         self.plan = plan
-        self.robot = Robot.from_yaml(named_file("robots", plan.robot))
+        robot_file = named_file("robots", plan.robot)
+        self._robot_content = read_yaml(robot_file)
+        self.robot = Robot.from_dict(self._robot_content, where=str(robot_file))
         self.plant_settings = PlantNodeSettings.resolve(plan.overrides(PlantNodeSettings.node))
         self.controller_settings = ControllerNodeSettings.resolve(
             plan.overrides(ControllerNodeSettings.node)
         )
         self.mission_settings = MissionNodeSettings.resolve(
             plan.overrides(MissionNodeSettings.node)
+        )
+        self.recorder_settings = RecorderNodeSettings.resolve(
+            plan.overrides(RecorderNodeSettings.node)
         )
         self.period = self.plant_settings.period
         self.timebase = self.plant_settings.timebase
@@ -129,8 +152,16 @@ class Flight:
         return plant, controller, mission
 
     @property
+    def gains_used(self) -> dict[str, list[float]]:
+        """The numbers of the law's gains, an axis each."""
+        return {name: row.tolist() for name, row in self.controller.law.gains.items()}
+
+    @property
     def description(self) -> dict[str, Any]:
-        """What is flown, as it is stored in a bag."""
+        """What is flown, as it is stored in a bag; enough to fly it again.
+
+        The same plan with the same software gives the same one: it tells no time and no machine.
+        """
         plan = self.plan
         return {
             "controller": self.controller.law.name,
@@ -143,9 +174,15 @@ class Flight:
             "command_latency_ticks": self.plant_settings.command_latency_ticks,
             "friction": plan.friction,
             "realtime": plan.realtime,
-            **({"faults": plan.faults, "seed": plan.seed} if plan.faults else {}),
+            "seed": plan.seed,
+            **({"faults": plan.faults} if plan.faults else {}),
             **({"swaps": plan.swaps} if plan.swaps else {}),
             **({"restart_controller": True} if plan.restart_controller else {}),
+            "parameters": {node: plan.overrides(node) for node in NODES},
+            "gains_used": self.gains_used,
+            "robot_file": self._robot_content,
+            "versions": versions(),
+            "commit": commit(),
         }
 
     def default_bag(self) -> Path:

@@ -64,7 +64,10 @@ def _recording(flight: Flight, bag: Path | None) -> Iterator[Messages | None]:
     if bag is None:
         yield None
         return
-    recorder = BagRecorder(bag, flight.description, flight.timebase)
+    settings = flight.recorder_settings
+    recorder = BagRecorder(
+        bag, flight.description, flight.timebase, settings.compression, settings.split_size
+    )
     try:
         yield Messages(flight, recorder)
     finally:

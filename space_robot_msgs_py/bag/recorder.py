@@ -12,6 +12,7 @@ from .. import topics
 from ..errors import FlightError, MessageError
 from ..samples import Timebase
 from .coverage import Coverage, excused_topics, lost_messages, message_tick
+from .mcap_file import Compression
 from .writer import BagWriter
 
 FLIGHT_KEY = "space_robot.flight"
@@ -24,22 +25,34 @@ CHUNK_AGE_S = 0.25
 class BagRecorder:
     """Takes serialized messages in any order between topics. Knows no ROS.
 
-    The log time of a message is its simulated stamp. A message that came before (a plant that
-    asked again, a mission that started anew) is counted and left out.
+    The log time of a message is its simulated stamp; its publish time is when it was sent, if
+    that is known. A message that came before (a plant that asked again, a mission that started
+    anew) is counted and left out.
 
     A bag that can no longer be written (disk full, folder gone) stops nobody: `failure` says why,
     later messages are counted and let go, and `close` raises.
     """
 
-    def __init__(self, path: Path, flight: Mapping[str, Any], timebase: Timebase) -> None:
+    def __init__(
+        self,
+        path: Path,
+        flight: Mapping[str, Any],
+        timebase: Timebase,
+        compression: Compression = "lz4",
+        split_size: int = 0,
+    ) -> None:
         """Open the bag; ``flight`` says what was flown and is stored with it.
+
+        A file of the bag that has ``split_size`` bytes is followed by another (0: never).
 
         Raises:
             InputError: the bag exists already, or cannot be written.
         """
-        self._flight = json.dumps(dict(flight))
         self._excused = excused_topics(flight)
-        self._writer = BagWriter(path, topics.ALL, {FLIGHT_KEY: self._flight})
+        self._writer = BagWriter(
+            path, topics.ALL, {FLIGHT_KEY: json.dumps(dict(flight))}, compression, split_size
+        )
+        self._chunk_bytes = min(CHUNK_BYTES, split_size or CHUNK_BYTES)
         self._timebase = timebase
         self.coverages = {topic.name: Coverage(topic) for topic in topics.ALL}
         self.failure = ""
@@ -50,8 +63,8 @@ class BagRecorder:
         self._flush_at = time.monotonic() + CHUNK_AGE_S
         self._closed = False
 
-    def record(self, topic: topics.Topic, data: bytes) -> None:
-        """Add one serialized message.
+    def record(self, topic: topics.Topic, data: bytes, sent_ns: int = 0) -> None:
+        """Add one serialized message, sent at ``sent_ns`` by the sender's clock (0: not known).
 
         One whose stamp cannot be right is kept at the time of the last good one.
         """
@@ -65,7 +78,7 @@ class BagRecorder:
         if not is_new or self.failure:
             return
         log_ns = self._timebase.stamp_ns(max(0, min(tick, coverage.last)))
-        if self._writer.write(topic, log_ns, data, tick) > CHUNK_BYTES:
+        if self._writer.write(topic, log_ns, sent_ns or log_ns, tick, data) > self._chunk_bytes:
             self.flush()
 
     def flush(self) -> None:
@@ -131,6 +144,7 @@ class BagRecorder:
     def _finish(self) -> None:
         counts = {
             name: {
+                "expected": c.received + lost,
                 "received": c.received,
                 "missing": lost,
                 "repeated": c.repeated,
@@ -138,13 +152,7 @@ class BagRecorder:
             }
             for (name, c), lost in zip(self.coverages.items(), self.lost.values(), strict=True)
         }
-        ticks = [t for c in self.coverages.values() if c.received for t in (c.first, c.last)]
-        stamp_ns = self._timebase.stamp_ns
-        self._writer.close(
-            {name: c.kept for name, c in self.coverages.items()},
-            (stamp_ns(min(ticks)), stamp_ns(max(ticks))) if ticks else None,
-            {FLIGHT_KEY: self._flight, COVERAGE_KEY: json.dumps(counts)},
-        )
+        self._writer.close({COVERAGE_KEY: json.dumps(counts)})
 
     def _fail(self, error: OSError) -> None:
         self.failure = error.strerror or str(error)

@@ -1,202 +1,161 @@
-"""A rosbag2 bag of one MCAP file, as Jazzy's ``ros2 bag`` writes it (metadata version 9)."""
+"""A rosbag2 bag of one or more MCAP files, as Jazzy's ``ros2 bag record`` writes them."""
 
 from __future__ import annotations
 
-import errno
-import os
-import sys
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
-import yaml
-from mcap.data_stream import RecordBuilder
-from mcap.records import DataEnd, Footer
-from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
+from mcap.records import Channel, Schema
 
 from ..definitions import definition, jazzy
 from ..errors import InputError
 from ..topics import Topic
+from .chunk import OpenChunk
+from .mcap_file import Compression, McapFile, record_bytes
+from .rosbag2_yaml import FileSummary, bag_information, qos_profiles, to_yaml
 
 DESCRIPTION = "space_robot"
-"""Name of the metadata record at the file's beginning."""
-_FOREVER = {"sec": 9223372036, "nsec": 854775807}
-
-
-def _qos(topic: Topic) -> list[dict[str, Any]]:
-    return [
-        {
-            "history": "keep_last",
-            "depth": topic.depth,
-            "reliability": "reliable",
-            "durability": "transient_local" if topic.transient_local else "volatile",
-            "deadline": dict(_FOREVER),
-            "lifespan": dict(_FOREVER),
-            "liveliness": "automatic",
-            "liveliness_lease_duration": dict(_FOREVER),
-            "avoid_ros_namespace_conventions": False,
-        }
-    ]
-
-
-class _PlainDumper(yaml.SafeDumper):
-    """YAML without anchors, which rosbag2's reader does not need to know."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
-
-
-def _yaml(value: Any) -> str:
-    return yaml.dump(value, Dumper=_PlainDumper, sort_keys=False, default_flow_style=False).strip()
-
-
-def _bare_end() -> bytes:
-    """The end of an MCAP file without a summary."""
-    builder = RecordBuilder()
-    DataEnd(data_section_crc=0).write(builder)
-    Footer(summary_start=0, summary_offset_start=0, summary_crc=0).write(builder)
-    return bytes(builder.end()) + MCAP0_MAGIC
+"""Name of our metadata records: one at each file's beginning, one at the bag's end."""
 
 
 class BagWriter:
     """Writes serialized messages; `flush` ends a chunk, `close` makes the bag whole."""
 
-    def __init__(self, path: Path, topics: Iterable[Topic], description: Mapping[str, str]) -> None:
-        """Create the bag's folder, and its file with ``description`` at the beginning.
+    def __init__(
+        self,
+        path: Path,
+        topics: Iterable[Topic],
+        description: Mapping[str, str],
+        compression: Compression = "lz4",
+        split_size: int = 0,
+    ) -> None:
+        """Create the bag's folder, and its first file.
+
+        Args:
+            path: the folder.
+            topics: all that will be written.
+            description: stands at every file's beginning.
+            compression: of the chunks.
+            split_size: bytes from which on the next chunk goes into a file of its own (0: never).
 
         Raises:
             InputError: it exists already, or cannot be written.
         """
         self.path = path
-        self._file_path = path / f"{path.name}_0.mcap"
+        self._topics = tuple(topics)
+        self._description = dict(description)
+        self._compression, self._split_size = compression, split_size
+        self._channels = {topic.name: number for number, topic in enumerate(self._topics, 1)}
+        self._definitions = self._schemas_and_channels()
+        self._first_records = record_bytes(*self._definitions)
+        self._chunk = OpenChunk(self._first_records)
+        self._files: list[McapFile] = []
         try:
             path.mkdir(parents=True)
-            self._file = self._file_path.open("wb")
-            # no chunk ends by itself: so it is known at any time what is in the file
-            self._writer = Writer(
-                self._file, chunk_size=sys.maxsize, compression=CompressionType.LZ4
-            )
-            self._writer.start(profile="ros2", library="space_robot")
-            self._writer.add_metadata(DESCRIPTION, dict(description))
-            self._topics = tuple(topics)
-            self._channels = {topic.name: self._register(topic) for topic in self._topics}
-            self.flush()
+            self._begin_file()
         except FileExistsError:
             raise InputError(f"{path}: exists already; a bag is never overwritten") from None
         except OSError as error:
             raise InputError(f"{path}: no bag can be written there ({error.strerror})") from None
 
-    def _register(self, topic: Topic) -> int:
-        text = definition(topic.type).encode()
-        schema = self._writer.register_schema(topic.type, "ros2msg", text)
-        return self._writer.register_channel(
-            topic.name,
-            "cdr",
-            schema,
-            {
-                "offered_qos_profiles": _yaml(_qos(topic)),
-                "topic_type_hash": jazzy().hash_rihs01(topic.type),
-            },
-        )
-
-    def write(self, topic: Topic, stamp_ns: int, data: bytes, sequence: int) -> int:
-        """Add a message at a simulated time; ``sequence`` is its tick.
+    def write(self, topic: Topic, log_ns: int, publish_ns: int, sequence: int, data: bytes) -> int:
+        """Add a message.
 
         Returns:
-            Bytes of messages in the open chunk.
+            Bytes in the open chunk.
         """
-        self._writer.add_message(
-            self._channels[topic.name], stamp_ns, data, stamp_ns, sequence & 0xFFFFFFFF
-        )
-        self._open_bytes += len(data)
-        return self._open_bytes
+        chunk = self._chunk
+        chunk.add(self._channels[topic.name], log_ns, publish_ns, sequence & 0xFFFFFFFF, data)
+        return len(chunk.content)
 
     def flush(self) -> None:
-        """End the open chunk and hand everything to the kernel.
+        """End the open chunk and hand it to the kernel.
 
         Raises:
-            OSError: that failed; the file has the whole chunks of before and perhaps more.
+            OSError: that failed; `abandon` leaves the whole chunks of before.
             FileNotFoundError: the file is no longer at its path.
         """
-        self._writer.flush()
-        self._whole_bytes, self._open_bytes = self._file.tell(), 0
-        with suppress(FileNotFoundError, NotADirectoryError):
-            if os.path.samestat(self._file_path.stat(), os.fstat(self._file.fileno())):
-                return
-        raise FileNotFoundError(errno.ENOENT, "its file was removed or moved away")
+        self._files[-1].check_in_place()
+        if not self._chunk:
+            return
+        if self._is_full():
+            self._end_file({})
+            self._begin_file()
+        self._files[-1].add_chunk(self._chunk)
+        self._whole_bytes = self._files[-1].size
+        self._chunk = OpenChunk(self._first_records if self._is_full() else b"")
 
-    def close(
-        self, counts: Mapping[str, int], span_ns: tuple[int, int] | None, custom: Mapping[str, str]
-    ) -> None:
-        """Finish the MCAP file and write metadata.yaml.
+    def close(self, custom: Mapping[str, str]) -> None:
+        """Finish the last file and write metadata.yaml, after a `flush`.
 
         Args:
-            counts: messages written a topic.
-            span_ns: first and last stamp (None: no message).
-            custom: the custom data of metadata.yaml.
+            custom: what goes, with the description, into the bag's custom data.
 
         Raises:
             OSError: that failed.
         """
-        information = self._information(counts, span_ns, dict(custom))
-        self._writer.add_metadata("rosbag2", {"serialized_metadata": _yaml(information)})
-        self._writer.finish()
-        self._file.close()
-        text = _yaml({"rosbag2_bagfile_information": information}) + "\n"
+        self._end_file(custom)
+        information = self._information({**self._description, **custom}, self._topics)
+        text = to_yaml({"rosbag2_bagfile_information": information}) + "\n"
         part = self.path / "metadata.yaml.part"
         part.write_text(text, encoding="utf-8")
         part.replace(self.path / "metadata.yaml")
 
     def abandon(self) -> None:
         """After a failure: leave the whole chunks and, if there is room, a valid MCAP end."""
-        if self._file.closed:
-            return
-        number = os.dup(self._file.fileno())
-        with suppress(OSError):
-            self._file.close()  # tries once more to write what is left in its buffer
-        with suppress(OSError):
-            os.ftruncate(number, self._whole_bytes)
-            os.pwrite(number, _bare_end(), self._whole_bytes)
-        os.close(number)
+        self._files[-1].abandon(self._whole_bytes)
 
-    def _information(
-        self, counts: Mapping[str, int], span_ns: tuple[int, int] | None, custom: dict[str, str]
-    ) -> dict[str, Any]:
-        count = sum(counts.values())
-        first_ns, last_ns = span_ns or (2**63 - 1, 2**63 - 1)
-        start = {"nanoseconds_since_epoch": first_ns}
-        duration = {"nanoseconds": last_ns - first_ns}
-        return {
-            "version": 9,
-            "storage_identifier": "mcap",
-            "duration": duration,
-            "starting_time": start,
-            "message_count": count,
-            "topics_with_message_count": [
-                {
-                    "topic_metadata": {
-                        "name": topic.name,
-                        "type": topic.type,
-                        "serialization_format": "cdr",
-                        "offered_qos_profiles": _qos(topic),
-                        "type_description_hash": jazzy().hash_rihs01(topic.type),
-                    },
-                    "message_count": counts[topic.name],
-                }
-                for topic in self._topics
-            ],
-            "compression_format": "",
-            "compression_mode": "",
-            "relative_file_paths": [self._file_path.name],
-            "files": [
-                {
-                    "path": self._file_path.name,
-                    "starting_time": start,
-                    "duration": duration,
-                    "message_count": count,
-                }
-            ],
-            "custom_data": custom or None,
-            "ros_distro": "jazzy",
-        }
+    def _is_full(self) -> bool:
+        return 0 < self._split_size <= self._files[-1].size
+
+    def _begin_file(self) -> None:
+        path = self.path / f"{self.path.name}_{len(self._files)}.mcap"
+        file = McapFile(path, self._definitions, self._compression)
+        self._files.append(file)
+        try:
+            self._add_records(self._description, ())  # no topics yet, as rosbag2 has it
+        except OSError:
+            self._files.pop().remove()
+            raise
+        self._whole_bytes = file.size
+
+    def _end_file(self, custom: Mapping[str, str]) -> None:
+        self._add_records({**self._description, **custom}, self._topics)
+        self._files[-1].finish()
+
+    def _add_records(self, custom: Mapping[str, str], topics: Sequence[Topic]) -> None:
+        file = self._files[-1]
+        file.add_metadata(DESCRIPTION, custom)
+        # rosbag2 has the bag's metadata at both ends of a file, too; `reindex` reads them
+        text = to_yaml(self._information(custom, topics))
+        file.add_metadata("rosbag2", {"serialized_metadata": text})
+
+    def _schemas_and_channels(self) -> list[Schema | Channel]:
+        """One schema a type, one channel a topic."""
+        types = dict.fromkeys(topic.type for topic in self._topics)
+        numbers = {name: number for number, name in enumerate(types, 1)}
+        schemas = [
+            Schema(id=number, name=name, encoding="ros2msg", data=definition(name).encode())
+            for name, number in numbers.items()
+        ]
+        channels = [
+            Channel(
+                id=self._channels[topic.name],
+                topic=topic.name,
+                message_encoding="cdr",
+                schema_id=numbers[topic.type],
+                metadata={
+                    "offered_qos_profiles": to_yaml(qos_profiles(topic)),
+                    "topic_type_hash": jazzy().hash_rihs01(topic.type),
+                },
+            )
+            for topic in self._topics
+        ]
+        return [*schemas, *channels]
+
+    def _information(self, custom: Mapping[str, str], topics: Sequence[Topic]) -> dict[str, object]:
+        counts = sum((file.counts for file in self._files), Counter[int]())
+        files = [FileSummary(f.path.name, f.span_ns, f.counts.total()) for f in self._files]
+        counted = [(topic, counts[self._channels[topic.name]]) for topic in topics]
+        return bag_information(files, counted, custom)

@@ -109,6 +109,12 @@ class In:
             taken = self.handle.take_message(self._type, True)
         return None if taken is None else taken[0]
 
+    def take_with_time(self) -> tuple[bytes, int] | None:
+        """`take`, with when it was sent by its sender's clock, ns since 1970."""
+        with self.handle:
+            taken = self.handle.take_message(self._type, True)
+        return None if taken is None else (taken[0], taken[1]["source_timestamp"])
+
 
 class Waiter:
     """Waits until a subscription has something to take."""

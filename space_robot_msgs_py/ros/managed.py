@@ -98,6 +98,11 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             health = Health("unconfigured")
         self._diagnostics.report(health)
 
+    def destroy_node(self) -> None:
+        """Let go of everything, what serves the node before the node."""
+        self._executor.shutdown()
+        super().destroy_node()
+
     def start(self) -> None:
         """Configure and activate.
 

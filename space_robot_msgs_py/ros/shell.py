@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import gc
 import signal
 import sys
@@ -91,6 +92,7 @@ def run_node(
     Exit code 0 at the end or on SIGINT or SIGTERM, 2 on bad input, 1 on a failed flight, each
     failure with one line on standard error.
     """
+    faulthandler.enable()  # a crash of the middleware leaves a word on where it was
     try:
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:  # RCLError is private; whatever it is, the arguments are at fault

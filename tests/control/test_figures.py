@@ -23,7 +23,7 @@ from matplotlib.transforms import Bbox
 from PIL import Image
 from scipy import signal
 
-from space_robot_control.analysis import tracking_error
+from space_robot_control.analysis import excerpt, tracking_error
 from space_robot_control.analysis.figures import (
     BaseTorque,
     chatter,
@@ -38,7 +38,7 @@ from space_robot_control.analysis.figures.quantity import Quantity, power_of_ten
 from space_robot_control.analysis.figures.side_by_side import common_limits
 from space_robot_control.analysis.figures.spectrum import power_spectral_density, welch
 from space_robot_control.analysis.figures.style import Look, house_style
-from space_robot_control.analysis.figures.waypoints import junction_ticks, waypoint_ticks
+from space_robot_control.analysis.waypoints import junction_ticks, waypoint_ticks
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_control.mission import Mission, MissionSettings
@@ -146,6 +146,12 @@ class TestWaypoints:
         ticks = waypoint_ticks(flown(times=times, duration=duration))
         assert len(ticks) == len(expected)
         assert np.all(np.abs(ticks - expected) <= 1)
+
+    def test_a_log_without_rest_has_none(self) -> None:
+        moving = excerpt(flown(), 5.0, 6.0)
+        assert waypoint_ticks(moving).tolist() == []
+        desired_joints(moving)
+        control_results(moving, "x")
 
     def test_both_ends_of_a_rest(self) -> None:
         log = flown(times=(0.0, 1.0, 2.0))

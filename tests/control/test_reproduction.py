@@ -195,7 +195,7 @@ def test_report_is_one_page_by_itself(twice: tuple[Path, Path, dict[str, Any]]) 
         assert urlparse(target).scheme in ("data", "", "https"), target
         if not urlparse(target).scheme:
             assert target.startswith("#") or target.endswith(".md"), target
-    assert record["provenance"]["packages"]["numba"] in page
+    assert record["provenance"]["versions"]["numba"] in page
     assert "Table III" in page, "the errata are part of it"
     assert "diverged at tick" in page
 

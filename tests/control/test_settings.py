@@ -27,7 +27,7 @@ from space_robot_msgs_py.configuration import (
     node_parameters,
 )
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.recorder_node import RecorderNodeSettings
+from space_robot_msgs_py.recorder_settings import RecorderNodeSettings
 from space_robot_sim.plant_settings import PlantNodeSettings
 
 SCHEMAS = (PlantNodeSettings, ControllerNodeSettings, MissionNodeSettings, RecorderNodeSettings)

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
+from random_robots import JOINTS
 
 from space_robot_control.time_delay_estimation import (
     LONGEST_GAP,
@@ -47,7 +48,7 @@ def vectors(size: int, low: float = -100.0, high: float = 100.0) -> st.SearchStr
 @st.composite
 def pairs(draw: st.DrawFn) -> tuple[Array, ...]:
     """h_bar, N, rate at a tick, and the acceleration until the next."""
-    axes = draw(st.integers(4, 12))
+    axes = 3 + draw(st.sampled_from(JOINTS))
     h_bar = draw(vectors(axes, 0.125, 100.0))
     return h_bar, draw(vectors(axes)), draw(vectors(axes, -5.0, 5.0)), draw(vectors(axes))
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from numpy.typing import NDArray
 from oracles import mujoco_forward_dynamics, pinocchio_forward_dynamics
-from random_robots import Case, State, cases, random_robot, random_state
+from random_robots import JOINTS, Case, State, cases, random_robot, random_state
 
 from space_robot_sim import Robot, bias_force, forward_dynamics, mass_matrix
 from space_robot_sim.dynamics.forward_dynamics import solve_spatial
@@ -61,7 +61,7 @@ def test_acceleration_agrees_with_mujoco(name: str, request: pytest.FixtureReque
         assert_close(acceleration_of(robot, state, force), expected, 1e-9)
 
 
-@pytest.mark.parametrize("n", [1, 2, 4, 9])
+@pytest.mark.parametrize("n", JOINTS)
 def test_acceleration_of_random_robots_agrees_with_mujoco(n: int) -> None:
     rng = np.random.default_rng(n)
     robot, state = random_robot(rng, n), random_state(rng, n)

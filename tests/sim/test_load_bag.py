@@ -15,7 +15,7 @@ from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_sim import load_bag
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "bags_reading.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "bags.md"
 
 
 @pytest.fixture(scope="module")

@@ -110,8 +110,8 @@ def test_step_agrees_with_an_adaptive_integrator(
 def test_integration_is_of_fourth_order() -> None:
     """Half the period, a sixteenth of the error."""
     rng = np.random.default_rng(3)
-    robot = random_robot(rng, 4)
-    torque = 60.0 * rng.normal(size=7)
+    robot = random_robot(rng, 3)
+    torque = 60.0 * rng.normal(size=6)
 
     def end_state(steps: int) -> Array:
         plant = plant_of(robot, 0.4 / steps, initial_quaternion=[0.3, -0.8, 0.4, 0.2])

@@ -10,7 +10,7 @@ from typing_extensions import Self
 
 from space_robot_msgs_py.flight_log import FlightLog
 
-from .waypoints import junction_ticks
+from ..waypoints import junction_ticks
 
 Array = NDArray[np.float64]
 
@@ -23,19 +23,24 @@ class BaseTorque(NamedTuple):
     period: float
     """s, of a tick."""
     junctions: NDArray[np.intp]
-    """Ticks at which one motion has ended and another begins."""
+    """Rows at which one motion has ended and another begins."""
+    start: float = 0.0
+    """s, time of the first row: not 0 in an excerpt of a flight."""
 
     @classmethod
     def of(cls, log: FlightLog) -> Self:
         """Of a whole flight."""
-        return cls(log.applied_torque[:, :3].copy(), log.timebase.period, junction_ticks(log))
+        period = log.timebase.period
+        return cls(
+            log.applied_torque[:, :3].copy(), period, junction_ticks(log), log.first_tick * period
+        )
 
     @property
     def time(self) -> Array:
         """(N,) s, of the ticks."""
-        return np.arange(len(self.torque), dtype=np.float64) * self.period
+        return self.start + np.arange(len(self.torque), dtype=np.float64) * self.period
 
     @property
-    def duration(self) -> float:
+    def end(self) -> float:
         """Of the flight, s."""
-        return len(self.torque) * self.period
+        return self.start + len(self.torque) * self.period

@@ -49,7 +49,11 @@ def junctions(flights: Mapping[str, BaseTorque]) -> Figure:
     Args:
         flights: of one mission, by the name of the law.
     """
-    moments = [flight.period * t for flight in flights.values() for t in flight.junctions[:1]]
+    moments = [
+        flight.start + flight.period * row
+        for flight in flights.values()
+        for row in flight.junctions[:1]
+    ]
     if not moments:
         return page(12.0, "None of these flights passes a junction of two segments.")
     stretch = Stretch(
@@ -72,7 +76,8 @@ def chatter(flights: Mapping[str, BaseTorque]) -> Figure:
     Args:
         flights: of one mission, by the name of the law.
     """
-    moment = max(flight.duration for flight in flights.values()) / 4.0
+    start = min(flight.start for flight in flights.values())
+    moment = start + (max(flight.end for flight in flights.values()) - start) / 4.0
     stretch = Stretch("base torque", slice(0, 3), moment, 0.0, CHATTER_STRETCH)
     columns = math.ceil(len(flights) / math.ceil(len(flights) / 4))
     height, spectrum_height = 32.0, 72.0
@@ -110,6 +115,8 @@ def _draw_spectra(axes: Axes, spectra: Mapping[str, tuple[Array, Array]]) -> Non
             frequency, density,
             color=look.colour, linestyle=look.dashes, marker=look.marker, markevery=marks.tolist(),
         )  # fmt: skip
+    if not axes.get_lines():  # all too short: one mark alone gives no scale
+        axes.set_xlim(0.1 * CHATTER_FREQUENCY, 10.0 * CHATTER_FREQUENCY)
     mark_moments(axes, np.array([CHATTER_FREQUENCY]))
     axes.set_xlabel("frequency (Hz)")
     axes.set_ylabel("PSD of base torque, x + y + z ((N m)²/Hz)")

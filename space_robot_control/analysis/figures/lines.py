@@ -60,7 +60,8 @@ def draw_lines(
 
 def tick_times(log: FlightLog) -> Array:
     """(N,) s, of the ticks of a log."""
-    return np.arange(log.ticks, dtype=np.float64) * log.timebase.period
+    ticks = log.first_tick + np.arange(log.ticks, dtype=np.float64)
+    return ticks * log.timebase.period
 
 
 def scattered_marks(samples: int, index: int, count: int) -> Indices:

@@ -24,6 +24,8 @@ _TICK, _NUMBER = 3.5, 7.0
 
 def draw_scales(axes: Axes, *, x_numbers: bool = True, y_numbers: bool = True) -> None:
     """Draw both scales of ``axes``, whose contents and limits do not change any more."""
+    axes.set_xlim(axes.get_xlim())  # found with the locators, which go
+    axes.set_ylim(axes.get_ylim())
     inches = axes.bbox.transformed(axes.figure.dpi_scale_trans.inverted())
     _draw_scale(axes, axes.xaxis, 72.0 * inches.height, x_numbers)
     _draw_scale(axes, axes.yaxis, 72.0 * inches.width, y_numbers)

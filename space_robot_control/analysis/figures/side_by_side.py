@@ -79,7 +79,7 @@ def draw_side_by_side(
             marks = None if torque.shape[1] > 1 else np.empty(0, np.intp)
             draw_lines(axes, 1e3 * time, torque, quantity, marks=marks, steps=steps)
         else:
-            axes.text(0.03, 0.5, f"ended at {flights[name].duration:g} s", color=GREY,
+            axes.text(0.03, 0.5, f"ended at {flights[name].end:g} s", color=GREY,
                       transform=axes.transAxes)  # fmt: skip
         axes.set_title(name + _cut(torque, low, high), loc="left")
         axes.set_ylabel(quantity.label if column == 0 else "")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.flight_log import FlightLog
 
 from ..metrics import tracking_error
+from ..waypoints import junction_ticks, waypoint_ticks
 from .lines import draw_lines, mark_moments, tick_times
 from .quantity import Quantity
 from .scale import draw_scales
@@ -27,7 +28,6 @@ from .style import (
     panel,
     title_height,
 )
-from .waypoints import junction_ticks, waypoint_ticks
 
 Array = NDArray[np.float64]
 

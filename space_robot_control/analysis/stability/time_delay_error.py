@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.flight_log import FlightLog
-from space_robot_sim.attitude import attitude_jacobian_inverse, rotate_back
+
+from ..generalised_motion import applied_force, mean_acceleration
 
 Array = NDArray[np.float64]
 
@@ -38,28 +39,6 @@ class ErrorDerivative:
     """When that was, s."""
     beta_robust: Array
     """The `ROBUST_PERCENTILE` of the same."""
-
-
-def rate(log: FlightLog) -> Array:
-    """(N, m) ``rhodot = [J0 omega_base, thetadot]`` (22), with J0 of (1)."""
-    eta, eps = log.quaternion[:, :1], log.quaternion[:, 1:]
-    epsdot = 0.5 * (eta * log.omega_base + np.cross(eps, log.omega_base))
-    return np.hstack([epsdot, log.joint_velocities])
-
-
-def mean_acceleration(log: FlightLog) -> Array:
-    """(N-1, m) mean rhodd over the interval that begins at each tick."""
-    return np.diff(rate(log), axis=0) / log.timebase.period
-
-
-def applied_force(log: FlightLog) -> Array:
-    """(N-1, m) ``F_S = J^-T tau`` over the interval that begins at each tick."""
-    force = log.applied_torque[1:].copy()
-    inverse = np.zeros((3, 3))
-    for k in range(len(force)):
-        attitude_jacobian_inverse(log.quaternion[k], inverse)
-        rotate_back(inverse, log.applied_torque[k + 1, :3], force[k, :3])
-    return force
 
 
 def time_delay_error(log: FlightLog, h_bar: Array) -> Array:

@@ -30,7 +30,7 @@ def waypoint_ticks(log: FlightLog) -> NDArray[np.intp]:
         if len(resting) == 0:  # the waypoint lies between two ticks
             resting = np.array([np.argmin(speed[begin:end])])
         ticks += [begin + resting[0], begin + resting[-1]]
-    return np.unique(ticks)
+    return np.unique(np.array(ticks, dtype=np.intp))  # an excerpt may have none
 
 
 def junction_ticks(log: FlightLog) -> NDArray[np.intp]:

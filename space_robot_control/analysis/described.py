@@ -1,0 +1,100 @@
+"""What a flight's description says beyond names: its robot, its actuators' limits, its Mbar.
+
+A bag carries the numbers. One that does not (an older one, or of another recorder) is taken at its
+names' word: the robot, case and gains of that name here and now.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.configuration import named_file
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_sim.plant_settings import PlantNodeSettings
+from space_robot_sim.robot import Robot
+
+from ..settings import ControllerNodeSettings, build_law
+from ..time_delay_estimation import low_pass_weight
+from .actuation import TorqueLimits
+
+Array = NDArray[np.float64]
+
+
+class NotDescribedError(InputError):
+    """The bag does not say what a figure needs; the message says what is missing."""
+
+
+def robot_of(log: FlightLog) -> Robot:
+    """The robot that was flown.
+
+    Raises:
+        InputError: it is not described, not here, or not that of the bag's joints.
+    """
+    flight = log.flight
+    if isinstance(content := flight.get("robot_file"), dict):
+        robot = Robot.from_dict(content, where="robot_file of the bag")
+    elif name := flight.get("robot"):
+        robot = Robot.from_yaml(named_file("robots", str(name)))
+    else:
+        raise NotDescribedError("the bag does not say which robot was flown")
+    if robot.joint_names != log.joint_names:
+        raise NotDescribedError(
+            f"robot {robot.name!r} has the joints {', '.join(robot.joint_names)}, "
+            f"the bag {', '.join(log.joint_names)}"
+        )
+    return robot
+
+
+def torque_limits(log: FlightLog) -> TorqueLimits:
+    """What the plant clipped the torques to.
+
+    Raises:
+        InputError: not even the case is named, or it is not here.
+    """
+    given = _parameters(log, PlantNodeSettings.node)
+    if not given:
+        given = {key: log.flight[key] for key in ("robot", "case", "mission") if key in log.flight}
+    if not given:
+        raise NotDescribedError("the bag does not say what the plant was told")
+    keys = ("base_torque_limit", "joint_torque_limit")
+    if all(key in given for key in keys):
+        base, joint = (float(given[key]) for key in keys)
+    else:
+        settings = PlantNodeSettings.resolve(given)
+        base, joint = settings.base_torque_limit, settings.joint_torque_limit
+    return TorqueLimits(base or np.inf, joint or np.inf)
+
+
+def estimator(log: FlightLog) -> tuple[Array, float]:
+    """(m,) Mbar of the law's time-delay estimate, and the weight of its low-pass (0: none).
+
+    Raises:
+        InputError: the law has no estimate, was swapped, or is not described.
+    """
+    flight = log.flight
+    if flight.get("swaps"):
+        raise NotDescribedError("laws were swapped in flight, so no one Mbar holds")
+    if not (name := flight.get("controller")):
+        raise NotDescribedError("the bag does not say which law was flown")
+    parameters = _parameters(log, ControllerNodeSettings.node)
+    if isinstance(gains := flight.get("gains_used"), dict):
+        h_bar = np.array(gains.get("h_bar", ()), dtype=np.float64)
+    else:
+        chosen: dict[str, Any] = {key: flight[key] for key in ("robot", "gains") if key in flight}
+        settings = ControllerNodeSettings.resolve({**chosen, **parameters, "controller": name})
+        h_bar = build_law(str(name), settings, log.axes).h_bar
+    if not h_bar.size:
+        raise NotDescribedError(f"{name} has no time-delay estimate")
+    corner = float(parameters.get("acceleration_filter_hz", 0.0))
+    smoothing = low_pass_weight(corner, log.timebase.period)
+    return np.broadcast_to(h_bar, log.axes), smoothing
+
+
+def _parameters(log: FlightLog, node: str) -> dict[str, Any]:
+    parameters = log.flight.get("parameters")
+    given = parameters.get(node) if isinstance(parameters, dict) else None
+    return dict(given) if isinstance(given, dict) else {}

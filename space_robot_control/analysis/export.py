@@ -1,0 +1,105 @@
+"""A flight as a CSV or Parquet file: whole or not at all, and never over another one."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from tempfile import mkstemp
+from typing import IO, Any
+
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.flight_log import FlightLog
+
+
+def check_free(path: Path) -> None:
+    """See that a file can be made there, before any work is done for it.
+
+    Raises:
+        InputError: it exists, or its folder cannot be made or written.
+    """
+    if path.exists():
+        raise InputError(f"{path}: exists already; it is not overwritten")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path.parent}: no folder can be made there ({error.strerror})") from None
+    if not os.access(path.parent, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: cannot be written (no permission for its folder)")
+
+
+def write_csv(log: FlightLog, path: Path) -> None:
+    """The columns of `analysis.columns` as text; a number that is not known is empty.
+
+    Raises:
+        InputError: the file exists or cannot be written.
+    """
+    from pyarrow import csv
+
+    from .columns import batches, schema
+
+    with whole_file(path) as file, csv.CSVWriter(file, schema(log)) as writer:
+        for batch in batches(log):
+            writer.write_batch(batch)
+
+
+def write_parquet(log: FlightLog, path: Path) -> None:
+    """The columns of `analysis.columns`, with the flight's description in the schema's metadata.
+
+    Raises:
+        InputError: the file exists or cannot be written.
+    """
+    from pyarrow import parquet
+
+    from .columns import batches, schema
+
+    with (
+        whole_file(path) as file,
+        parquet.ParquetWriter(
+            file, schema(log), compression="zstd", use_dictionary=False
+        ) as writer,
+    ):
+        for batch in batches(log):
+            writer.write_batch(batch)
+
+
+def write_text(text: str, path: Path) -> None:
+    """``text`` in UTF-8.
+
+    Raises:
+        InputError: the file exists or cannot be written.
+    """
+    with whole_file(path) as file:
+        file.write(text.encode())
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[IO[Any]]:
+    """A file to write that takes its name only when all is in it, and no name that is taken.
+
+    Raises:
+        InputError: the file exists, or it cannot be written.
+    """
+    check_free(path)
+    try:
+        descriptor, name = mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        unnamed = Path(name)
+        try:
+            with os.fdopen(descriptor, "wb") as file:
+                yield file
+            unnamed.chmod(0o666 & ~_umask())
+            os.link(unnamed, path)  # a rename would overwrite
+        finally:
+            with suppress(OSError):
+                unnamed.unlink()
+    except FileExistsError:
+        raise InputError(f"{path}: exists already; it is not overwritten") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,55 @@
+"""One self-contained HTML page about one flight or several."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import jinja2
+
+from .pictures import Picture
+from .table import DEFINITIONS, Report, lines, notes, remarks
+
+
+def render(
+    reports: Mapping[str, Report],
+    descriptions: Mapping[str, dict[str, Any]],
+    pictures: Sequence[Picture],
+) -> str:
+    """The page, without references to anything outside itself.
+
+    Args:
+        reports: of `analyse`, by name of the bag.
+        descriptions: what was flown, as the bags have it.
+        pictures: of all of them.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("space_robot_control.analysis", "templates"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    shown = lines(list(reports.values()))
+    groups = {group: [line for line in shown if line.group == group] for group in DEFINITIONS}
+    return environment.get_template("flights.html.j2").render(
+        reports=reports,
+        groups={group: found for group, found in groups.items() if found},
+        definitions=DEFINITIONS,
+        notes={name: [*remarks(r), *notes(r)] for name, r in reports.items()},
+        whole={name: _whole(report) for name, report in reports.items()},
+        descriptions={name: json.dumps(d, indent=1) for name, d in descriptions.items()},
+        pictures=[(picture.caption, _data(picture)) for picture in pictures],
+    )
+
+
+def _whole(report: Report) -> bool:
+    """Whether the bag holds the flight without loss, gap or damage."""
+    missing = any(report["lost"].values()) or report["filled_ticks"]
+    return not (missing or report["unfinished"] or report["damage"])
+
+
+def _data(picture: Picture) -> str:
+    return "data:image/svg+xml;base64," + base64.b64encode(picture.svg.read_bytes()).decode()

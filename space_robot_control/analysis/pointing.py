@@ -1,0 +1,72 @@
+"""Where the end effector points in the inertial frame: what the mission is flown for.
+
+The tool's pose follows from base attitude and joint angles (`space_robot_sim.tool.tool_pose`), once
+with the measured ones and once with the desired ones. The base's position is free in this mission
+("semi-floating"), so both poses share it and its drift is given separately.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_sim.robot import Robot
+from space_robot_sim.tool import tool_pose
+
+Array = NDArray[np.float64]
+
+ARCSEC = np.pi / 180.0 / 3600.0
+"""rad."""
+
+
+class PointingError(NamedTuple):
+    """Of the end effector, tick by tick."""
+
+    boresight: Array
+    """(N,) rad, between the measured and the desired direction of the tool's z axis."""
+    rotation: Array
+    """(N,) rad, of the one rotation that turns the desired frame into the measured one."""
+    position: Array
+    """(N,) m, between measured and desired position, the base at its measured position in both."""
+    base_drift: Array
+    """(N,) m, of the base's CoM from where it was at the first tick."""
+
+
+def pointing_error(log: FlightLog, robot: Robot) -> PointingError:
+    """The error of the tool's pose at every tick of a flight of ``robot``."""
+    actual, place = tool_pose(robot, _unit(log.quaternion), log.joint_positions)
+    desired, wanted = tool_pose(robot, _unit(log.reference_base[:, :4]), log.reference_joints[:, 0])
+    return PointingError(
+        boresight=angle_between(actual[:, :, 2], desired[:, :, 2]),
+        rotation=rotation_angle(actual, desired),
+        position=np.linalg.norm(place - wanted, axis=1),
+        base_drift=np.linalg.norm(log.base_position - log.base_position[:1], axis=1),
+    )
+
+
+def angle_between(first: Array, second: Array) -> Array:
+    """(N,) rad between unit vectors (N, 3), as exact for small angles as for large ones."""
+    across = np.linalg.norm(np.cross(first, second), axis=1)
+    angle: Array = np.arctan2(across, np.einsum("ij,ij->i", first, second))
+    return angle
+
+
+def rotation_angle(first: Array, second: Array) -> Array:
+    """(N,) rad of the rotation ``first second^T`` (N, 3, 3), exact for small angles.
+
+    ``sin = |vee(R - R^T)| / 2``, ``cos = (trace(R) - 1) / 2``.
+    """
+    axes = [(first[:, :, k], second[:, :, k]) for k in range(3)]
+    # vee(a b^T - b a^T) = b x a for each pair of columns; trace(R) is the sum of their products
+    sine = 0.5 * np.linalg.norm(sum(np.cross(b, a) for a, b in axes), axis=1)
+    cosine = 0.5 * (sum(np.einsum("ij,ij->i", a, b) for a, b in axes) - 1.0)
+    angle: Array = np.arctan2(sine, cosine)
+    return angle
+
+
+def _unit(quaternion: Array) -> Array:
+    unit: Array = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+    return unit

@@ -1,0 +1,201 @@
+"""A report, or several, as lines of text: what the terminal and the page both show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+from .pointing import ARCSEC
+from .settling import BAND
+
+Report = dict[str, Any]
+
+UNITS = {"attitude": "-", "joints": "rad", "base_torque": "N m", "torque": "N m"}
+NONE = "-"
+
+DEFINITIONS = {
+    "RMS, mean of axes": "mean over a column's axes of each axis' root mean square: what Table V "
+    "of the paper holds",
+    "RMS, eq. (64)": "a third of the root mean square of the vector: what the paper defines",
+    "maximum": "largest absolute value on any axis of the column",
+    "variation per s": "how far the torque moves up and down in a second, mean over the axes",
+    "power > 100 Hz": "share of the torque's power above 100 Hz, mean over the axes: chatter",
+    "settled after": "time from the last waypoint after which the error stays to the end within "
+    f"{BAND:g} (rad on joints; on the attitude's quaternion, where it is 4.1 arcsec)",
+    "saturation": "ticks at which a torque was at the actuator's limit",
+    "latency": "from a state's sending to its command's, by the wall clock; in brackets in ticks",
+    "commands": "ticks without an answer, and ticks after which the plant applied another torque "
+    "than was commanded for them",
+    "estimate error": "error N - N_hat of the time-delay estimate, from recorded motion and "
+    "torque; on the base in units of the generalised force of eps, about twice the torque",
+    "pointing": "angle between the measured and the desired direction of the end effector's z "
+    "axis in the inertial frame",
+    "rotation": "angle of the one rotation between the end effector's desired and measured frame",
+    "tool position": "distance from the desired position, the base at its measured position",
+    "base's drift": "of the base's centre of mass from where it began; nothing holds it",
+    "recording": "what is missing of the flight or was found wrong with the bag",
+}
+"""What each group of figures means, for someone who sees it for the first time."""
+
+
+class Line(NamedTuple):
+    """One figure of each report."""
+
+    group: str
+    """A key of `DEFINITIONS`."""
+    name: str
+    unit: str
+    texts: list[str]
+    """One a report; `NONE` where it does not have the figure."""
+
+
+def unit_of(column: str) -> str:
+    """The unit of a column of Table V."""
+    return next(unit for prefix, unit in UNITS.items() if column.startswith(prefix))
+
+
+def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
+    """All figures of the reports, a line each.
+
+    Args:
+        reports: of `analyse`.
+        brief: without RMS and chatter, which a table of their own shows.
+    """
+    found = [] if brief else list(_rms_and_chatter(reports))
+    found += _columns("maximum", reports, ("maxima",), unit_of, _number)
+    found += _columns("settled after", reports, ("settling", "settled_s"), lambda _: "s", _settled)
+    found += [
+        _line("saturation", "ticks at a limit", "", reports, _saturated),
+        *(
+            _line("latency", name, "ms", reports, partial(_latency, name=name))
+            for name in ("p50", "p99", "max")
+        ),
+        _line("commands", "unanswered", "", reports, lambda r: str(r["unanswered_ticks"])),
+        _line("commands", "not as commanded", "", reports, _differing),
+    ]
+    for kind in ("rms", "max"):
+        found += _columns(
+            "estimate error", reports, ("estimate_error", kind), lambda _: "N m", _number,
+            label=partial(_axes, kind=kind),
+        )  # fmt: skip
+    for group, key in (("pointing", "boresight_rad"), ("rotation", "rotation_rad")):
+        found += _columns(group, reports, ("pointing", key), lambda _: "", _angle, label=_upper)
+    for group, key in (("tool position", "tool_position_m"), ("base's drift", "base_drift_m")):
+        found += _columns(group, reports, ("pointing", key), lambda _: "m", _number, label=_upper)
+    found += [
+        _line("recording", "messages lost", "", reports, lambda r: str(sum(r["lost"].values()))),
+        _line("recording", "states filled in", "", reports, lambda r: str(r["filled_ticks"])),
+        _line("recording", "finished", "", reports, lambda r: "no" if r["unfinished"] else "yes"),
+        _line("recording", "damage found", "", reports, lambda r: str(len(r["damage"]))),
+    ]
+    return found
+
+
+def remarks(report: Report) -> list[str]:
+    """What the figures of a report do not say: damage, what is missing and why, in sentences."""
+    lost = {topic: count for topic, count in report["lost"].items() if count}
+    found = [f"messages lost: {lost or 'none'}"]
+    found += [text for text in (report["unfinished"], *report["damage"]) if text]
+    if report["unanswered_ticks"]:
+        found.append(f"ticks the controller did not answer in time: {report['unanswered_ticks']}")
+    if report["filled_ticks"]:
+        found.append(
+            f"ticks without a usable state, shown as the one before: {report['filled_ticks']}"
+        )
+    return found
+
+
+def notes(report: Report) -> list[str]:
+    """What is to be known of single figures: whence they count, or why there is none."""
+    missing = [f"no {key.replace('_', ' ')}: {why}" for key, why in report["unavailable"].items()]
+    if settling := report["settling"]:
+        return [f"settling is counted from the waypoint at {settling['after_s']:g} s", *missing]
+    return missing
+
+
+def _rms_and_chatter(reports: Sequence[Report]) -> Iterator[Line]:
+    for group, path in (
+        ("RMS, mean of axes", ("rms", "mean_axis")),
+        ("RMS, eq. (64)", ("rms", "eq64")),
+    ):
+        yield from _columns(group, reports, path, unit_of, _number)
+    yield from _columns(
+        "variation per s", reports, ("chatter", "total_variation_per_s"), lambda _: "N m/s", _number
+    )
+    yield from _columns(
+        "power > 100 Hz", reports, ("chatter", "power_above_100_hz"), lambda _: "", _number
+    )
+
+
+def _columns(
+    group: str,
+    reports: Sequence[Report],
+    path: tuple[str, ...],
+    unit: Callable[[str], str],
+    text: Callable[[Any], str],
+    label: Callable[[str], str] = str,
+) -> list[Line]:
+    """A line for every key below ``path`` in any of the reports."""
+    below = [_at(report, path) for report in reports]
+    keys = dict.fromkeys(key for values in below for key in values)
+    return [
+        Line(group, label(key), unit(key), [text(v[key]) if key in v else NONE for v in below])
+        for key in keys
+    ]
+
+
+def _at(report: Report, path: tuple[str, ...]) -> dict[str, Any]:
+    found: Any = report
+    for key in path:
+        found = (found or {}).get(key)
+    return found or {}
+
+
+def _line(
+    group: str, name: str, unit: str, reports: Sequence[Report], text: Callable[[Report], str]
+) -> Line:
+    return Line(group, name, unit, [text(report) for report in reports])
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}"
+
+
+def _angle(value: float) -> str:
+    readable = (
+        f"{value / ARCSEC:.3g} arcsec"
+        if value < 3600 * ARCSEC
+        else f"{value / ARCSEC / 3600:.3g} deg"
+    )
+    return f"{value:.3g} rad\n{readable}"
+
+
+def _settled(value: float | None) -> str:
+    return "never" if value is None else _number(value)
+
+
+def _saturated(report: Report) -> str:
+    found = report["saturation"]
+    if found is None:
+        return NONE
+    if found["base_torque_limit_n_m"] is None and found["joint_torque_limit_n_m"] is None:
+        return "no limits"
+    return f"{found['ticks']} ({found['share']:.2%})"
+
+
+def _latency(report: Report, name: str) -> str:
+    found = report["latency"]
+    return f"{found[f'{name}_ms']:.3g} ({found[f'{name}_ticks']:.3g})" if found else NONE
+
+
+def _differing(report: Report) -> str:
+    return str(report["misses"]["differing_ticks"]) if report["misses"] else NONE
+
+
+def _axes(key: str, kind: str) -> str:
+    return f"{key if key == 'base' else f'joints_{key}'} {_upper(kind)}"
+
+
+def _upper(kind: str) -> str:
+    return kind.upper() if kind == "rms" else kind

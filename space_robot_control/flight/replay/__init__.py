@@ -1,0 +1,1 @@
+"""A recorded flight played again to a live controller, its commands compared with the recorded."""

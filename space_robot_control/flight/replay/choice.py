@@ -1,0 +1,143 @@
+"""Which controller answers the replay: the one that flew, or another."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from space_robot_msgs_py.configuration import named_file
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.validation import one_of
+from space_robot_sim.robot import Robot
+
+from ...laws import ControlLaw, find_law
+from ...settings import (
+    ControllerNodeSettings,
+    available_laws,
+    build_law,
+    check_gains,
+    gain_files,
+)
+from ...swaps import parse_swaps
+
+NODE = ControllerNodeSettings.node
+OF_THE_GRAPH = ("wait_for", "fifo_priority", "autostart")
+"""Parameters that say how a controller fits into its graph; a replay has another."""
+
+
+class ControllerChoice:
+    """The parameters of the node to start: the recorded ones, what the user gives over them.
+
+    Robot and gains are the recorded numbers, whatever the files of this installation say today.
+    """
+
+    def __init__(
+        self, flight: Mapping[str, Any], folder: Path, controller: str = "", gains: str = "",
+        given: Mapping[str, Any] | None = None,
+    ) -> None:  # fmt: skip
+        """Put the parameters together and check them.
+
+        Args:
+            flight: the description in the bag; empty for a bag of another recorder.
+            folder: where to write recorded numbers as files, which the node will read.
+            controller: law to fly (empty: the recorded one).
+            gains: gain set to fly (empty: the recorded one).
+            given: further parameters of the node, over the recorded ones.
+
+        Raises:
+            InputError: something recorded or given does not exist here, or does not fit.
+        """
+        if not (flight or controller):
+            raise InputError(
+                "the bag does not say which law was flown: name it with --controller, and its "
+                "gains with --gains"
+            )
+        self._flight, self._folder = flight, folder
+        flown = recorded_parameters(flight)
+        self.gains_name = gains or str(flown.get("gains", "default"))
+        law = find_law(controller or str(flown["controller"]))
+        self.law_name = law.name
+        is_same_law = law.name == flight.get("controller", law.name)
+        self.parameters: dict[str, Any] = {
+            **flown,
+            **({"controller": controller} if controller else {}),
+            **({"gains": gains} if gains else {}),
+            **self._robot(flown),
+        }
+        """Of the node, by dotted name."""
+        recorded_gains = flight.get("gains_used", {})
+        if recorded_gains and is_same_law and not gains:
+            self.parameters["gains"] = self._gains_folder(law, recorded_gains)
+        self.parameters |= given or {}
+        self.swaps = [text for text in self.parameters.get("swaps", []) if text.strip()]
+        """Laws swapped to in flight."""
+        self.robot, now = self._check(law)
+        self.is_as_flown = is_same_law and (
+            not gains or gains == flown.get("gains") or _same(now.gains, recorded_gains)
+        )
+        """Whether law and gains are those that flew; what was ``given`` is not looked at."""
+
+    def _robot(self, flown: Mapping[str, Any]) -> dict[str, str]:
+        """The recorded robot as a file of its name, which also chooses its gains."""
+        if "robot_file" not in self._flight:
+            return {}
+        path = self._folder / f"{Path(str(flown.get('robot', 'paper'))).stem}.yaml"
+        _write(path, self._flight["robot_file"])
+        return {"robot": str(path)}
+
+    def _gains_folder(self, law: type[ControlLaw], recorded: Mapping[str, Any]) -> str:
+        """The recorded gains, beside those of the other laws as far as they are found here."""
+        folder = self._folder / "gains"
+        folder.mkdir()
+        try:
+            files = gain_files(str(self.parameters.get("robot", "paper")), self.gains_name)
+        except InputError:  # recorded elsewhere
+            files = {}
+        for name, file in files.items():
+            shutil.copyfile(file, folder / f"{name}.yaml")
+        section = {law.name: dict(recorded)}
+        _write(folder / f"{law.name}.yaml", {f"{NODE}_node": {"ros__parameters": section}})
+        return str(folder)
+
+    def _check(self, law: type[ControlLaw]) -> tuple[Robot, ControlLaw]:
+        """The robot, and the law as it will fly."""
+        settings = ControllerNodeSettings.resolve(
+            {name: value for name, value in self.parameters.items() if "." not in name}
+        )
+        robot = Robot.from_yaml(named_file("robots", settings.robot))
+        axes = robot.n + 3
+        built = {law.name: build_law(settings.controller, settings, axes)}
+        for name in available_laws(settings):
+            built.setdefault(name, build_law(name, settings, axes))
+        for swap in parse_swaps(settings.swaps, settings.period):
+            one_of(swap.name, built, "controller", " of swaps")
+        for name, value in self.parameters.items():
+            law_name, dot, gain = name.partition(".")
+            if dot:
+                one_of(law_name, built, "controller", f" in {NODE}.{name}")
+                tree = {**built[law_name].gains, gain: value}
+                check_gains(tree, type(built[law_name]), axes, f"{NODE} parameters")
+        return robot, built[law.name]
+
+
+def recorded_parameters(flight: Mapping[str, Any]) -> dict[str, Any]:
+    """What the flown controller was given; older bags have names only."""
+    recorded = flight.get("parameters", {}).get(NODE)
+    if recorded is None:
+        names = ("controller", "gains", "robot", "swaps", "period")
+        recorded = {name: flight[name] for name in names if name in flight}
+    return {name: value for name, value in recorded.items() if name not in OF_THE_GRAPH}
+
+
+def _same(now: Mapping[str, Any], recorded: Mapping[str, Any]) -> bool:
+    return {name: list(value) for name, value in now.items()} == {
+        name: list(value) for name, value in recorded.items()
+    }
+
+
+def _write(path: Path, content: Mapping[str, Any]) -> None:
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")

@@ -1,0 +1,162 @@
+"""Recorded commands beside those of the replay, tick by tick and bit by bit. Knows no ROS."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .commands import Array, Commands, Ticks
+
+
+class Difference(NamedTuple):
+    """A field that is not the same in both."""
+
+    field: str
+    recorded: float | str
+    replayed: float | str
+
+    @property
+    def amount(self) -> float | None:
+        """Replayed less recorded; None where that makes no sense."""
+        if isinstance(self.recorded, str) or isinstance(self.replayed, str):
+            return None
+        return self.replayed - self.recorded
+
+
+class Comparison:
+    """Commands of the ticks that were played."""
+
+    def __init__(
+        self, axis_names: tuple[str, ...], played: Ticks, recorded: Commands, replayed: Commands
+    ) -> None:
+        """``played``: the ticks whose state was sent to the controller."""
+        self.axis_names = axis_names
+        self._recorded, self._replayed = recorded, replayed
+        self._played = np.unique(played)
+        is_played = np.isin(recorded.ticks, self._played)
+        self.without_state = int(np.count_nonzero(~is_played))
+        """Commands recorded, though not the state they answer."""
+        self.ticks, at, again = np.intersect1d(
+            recorded.ticks[is_played], replayed.ticks, assume_unique=True, return_indices=True
+        )
+        """(K,) Ticks with both."""
+        self._at, self._again = np.flatnonzero(is_played)[at], again
+        self.recorded: Array = recorded.torque[self._at]
+        """(K, m) N m."""
+        self.replayed: Array = replayed.torque[again]
+        """(K, m) N m."""
+        self.unanswered: Ticks = np.setdiff1d(recorded.ticks[is_played], replayed.ticks)
+        """Ticks with a recorded command that have none now."""
+        self.unrecorded: Ticks = np.setdiff1d(replayed.ticks, recorded.ticks)
+        """Ticks with a command now that have none in the bag."""
+        self._same_torque = _bits(self.recorded) == _bits(self.replayed)
+        self.equal: NDArray[np.bool_] = self._same_torque.all(axis=1) & self._same_form()
+        """(K,) whether every field is the same, to the last bit."""
+
+    def _same_form(self) -> NDArray[np.bool_]:
+        ours = [[a == b for b in self._replayed.forms] for a in self._recorded.forms]
+        table = np.array(ours, dtype=bool).reshape(len(ours), -1)
+        same: NDArray[np.bool_] = table[
+            self._recorded.form[self._at], self._replayed.form[self._again]
+        ]
+        return same
+
+    @property
+    def is_identical(self) -> bool:
+        """Whether all are equal and none is missing on either side."""
+        missing = len(self.unanswered) + len(self.unrecorded) + self.without_state
+        unreadable = self._recorded.unreadable + self._replayed.unreadable
+        return bool(len(self.ticks) and self.equal.all() and not missing and not unreadable)
+
+    @property
+    def difference(self) -> Array:
+        """(K, m) N m, replayed less recorded."""
+        with np.errstate(invalid="ignore"):  # infinite ones
+            difference: Array = self.replayed - self.recorded
+        return difference
+
+    def first_difference(self) -> tuple[int, list[Difference]] | None:
+        """The first tick that is not equal, and its fields that are not."""
+        if self.equal.all():
+            return None
+        k = int(np.argmin(self.equal))
+        forms = (
+            self._recorded.forms[self._recorded.form[self._at[k]]],
+            self._replayed.forms[self._replayed.form[self._again[k]]],
+        )
+        differences = [
+            Difference(field, a, b)
+            for field, a, b in zip(forms[0]._fields, *forms, strict=True)
+            if a != b
+        ]
+        differences += [
+            Difference(
+                f"effort[{self.axis_names[i]}]",
+                float(self.recorded[k, i]),
+                float(self.replayed[k, i]),
+            )
+            for i in np.flatnonzero(~self._same_torque[k])
+        ]
+        return int(self.ticks[k]), differences
+
+    def report(self, period: float) -> dict[str, Any]:
+        """The numbers, for JSON and the table; ``period``: of a tick, s."""
+        first, difference = self.first_difference(), self.difference
+        return {
+            "played": len(self._played),
+            "compared": len(self.ticks),
+            "equal": int(np.count_nonzero(self.equal)),
+            "unanswered": len(self.unanswered),
+            "unrecorded": len(self.unrecorded),
+            "without_state": self.without_state,
+            "unreadable": {
+                "recorded": self._recorded.unreadable, "replayed": self._replayed.unreadable,
+            },
+            "identical": self.is_identical,
+            "first_difference": first and {
+                "tick": first[0],
+                "time_s": round(first[0] * period, 9),
+                "fields": [{**d._asdict(), "difference": d.amount} for d in first[1]],
+            },
+            "axes": {
+                name: {
+                    "recorded_rms": _rms(self.recorded[:, i]),
+                    "replayed_rms": _rms(self._replayed_torque[:, i]),
+                    "difference_rms": _rms(difference[:, i]),
+                    "difference_max": _largest(difference[:, i]),
+                }
+                for i, name in enumerate(self.axis_names)
+            },
+        }  # fmt: skip
+
+    @property
+    def _replayed_torque(self) -> Array:
+        """Of the ticks compared; of all, where nothing was recorded."""
+        return self.replayed if len(self._recorded.ticks) else self._replayed.torque
+
+    def table(self) -> tuple[Ticks, Array, Array]:
+        """Every tick with a command in either, and both torques; NaN where there is none."""
+        ticks = np.union1d(self._replayed.ticks, self.unanswered)
+        recorded, replayed = (np.full((len(ticks), len(self.axis_names)), np.nan) for _ in range(2))
+        for commands, torque in ((self._recorded, recorded), (self._replayed, replayed)):
+            _, there, place = np.intersect1d(
+                commands.ticks, ticks, assume_unique=True, return_indices=True
+            )
+            torque[place] = commands.torque[there]
+        return ticks, recorded, replayed
+
+
+def _bits(values: Array) -> NDArray[np.int64]:
+    return np.ascontiguousarray(values).view(np.int64)
+
+
+def _rms(values: Array) -> float | None:
+    finite = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(finite**2))) if len(finite) else None
+
+
+def _largest(values: Array) -> float | None:
+    finite = values[np.isfinite(values)]
+    return float(np.abs(finite).max()) if len(finite) else None

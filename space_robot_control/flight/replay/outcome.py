@@ -1,0 +1,98 @@
+"""What is to be replayed, and what came of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from space_robot_msgs_py.errors import FlightError
+
+from .choice import ControllerChoice
+from .comparison import Comparison
+from .reasons import reasons
+from .recording import Recording
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to replay, and how."""
+
+    bag: Path
+    controller: str = ""
+    """Law that answers (empty: the recorded one)."""
+    gains: str = ""
+    """Its gains (empty: the recorded ones)."""
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    """Further parameters of the controller."""
+    rate: float | None = None
+    """Times real time, by the wall clock (None: lockstep)."""
+    start_s: float = 0.0
+    """Simulated time of the first state."""
+    end_s: float = math.inf
+    """Simulated time before which the last state lies."""
+    remap: Mapping[str, str] = field(default_factory=dict)
+    """Our topic by the bag's."""
+    domain: int | None = None
+
+
+@dataclass(frozen=True)
+class Replay:
+    """What came of it."""
+
+    options: Options
+    choice: ControllerChoice
+    recording: Recording
+    comparison: Comparison
+    skipped: int
+    """States that the controller did not answer in flight, and was not sent now."""
+    elapsed_s: float
+    error: FlightError | None
+    """What ended it before its time."""
+
+    @property
+    def is_judged(self) -> bool:
+        """Whether the commands are to be the recorded ones."""
+        return self.choice.is_as_flown and self.recording.has_commands
+
+    @property
+    def has_passed(self) -> bool:
+        """Whether nothing is other than expected; another law is not expected to agree."""
+        return self.error is None and (self.comparison.is_identical or not self.is_judged)
+
+    def report(self) -> dict[str, Any]:
+        """Everything, for JSON and the table."""
+        flight, options = self.recording.flight, self.options
+        numbers = self.comparison.report(self.recording.timebase.period)
+        return {
+            "bag": str(options.bag),
+            "recorded": {key: flight.get(key) for key in ("controller", "gains", "swaps")},
+            "replayed": {
+                "controller": self.choice.law_name,
+                "gains": self.choice.gains_name,
+                "swaps": self.choice.swaps,
+                "set": dict(options.parameters),
+            },
+            "lockstep": options.rate is None,
+            "rate": options.rate,
+            "start_s": options.start_s,
+            "end_s": options.end_s if math.isfinite(options.end_s) else None,
+            **numbers,
+            "has_commands": self.recording.has_commands,
+            "judged": self.is_judged,
+            "passed": self.has_passed,
+            "reasons": [
+                *reasons(
+                    flight,
+                    begins_late=options.start_s > 0.0,
+                    by_the_clock=options.rate is not None,
+                    is_finished=self.recording.is_finished,
+                )
+            ],
+            "skipped": self.skipped,
+            "elapsed_s": self.elapsed_s,
+            "ticks_per_s": numbers["played"] / self.elapsed_s if self.elapsed_s else None,
+            "error": str(self.error) if self.error else None,
+        }

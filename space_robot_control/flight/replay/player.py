@@ -1,0 +1,223 @@
+"""The plant's and the mission's part of the graph, played from a recording."""
+
+from __future__ import annotations
+
+import os
+import time
+from array import array
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from types import TracebackType
+from typing import NamedTuple
+
+import numpy as np
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.errors import FlightError, InputError
+from space_robot_msgs_py.ros.process_environment import set_defaults
+
+from .commands import CommandList, Ticks
+from .recording import Reference, State
+
+CONTROLLER = "controller_node"
+STATES = (topics.JOINT_STATES, topics.BASE_STATE)
+REFERENCES = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
+AHEAD = 10
+"""Messages of each half of the reference that are sent ahead of need: as a rule half a second."""
+POLL_S = 0.02
+ASK_AGAIN_S = 0.5
+"""Without an answer for this long the state is sent again, as the plant does."""
+GIVE_UP_S = 10.0
+"""Without an answer for this long a tick counts as unanswered."""
+MOST_UNANSWERED = 3
+"""So many unanswered ticks in a row, and the controller counts as silent."""
+LISTENER_TIMEOUT_S = 30.0
+LAST_ANSWER_S = 1.0
+
+
+class _Stream(NamedTuple):
+    """One topic's messages of the reference."""
+
+    messages: Iterator[Reference]
+    ahead: deque[int]
+    """Ticks of those sent that are not needed yet."""
+
+
+class Player:
+    """Publishes recorded messages as a node ``replay_node``, and keeps the answers."""
+
+    def __init__(self, domain: int, answers: CommandList) -> None:
+        """Join the graph; `node` is for calling services.
+
+        Raises:
+            InputError: a plant or a mission is in this domain.
+        """
+        set_defaults()
+        import rclpy
+        from rclpy.context import Context
+        from rclpy.signals import SignalHandlerOptions
+
+        from space_robot_msgs_py.ros.endpoints import In, Out, TakenByLoop, Waiter, take_or_wait
+        from space_robot_msgs_py.ros.exclusive import Claim
+
+        self._take_or_wait = take_or_wait
+        self._context = Context()
+        rclpy.init(
+            args=[], context=self._context, domain_id=domain,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )  # fmt: skip
+        self.node = rclpy.create_node(
+            f"replay_node_{os.getpid()}", context=self._context,
+            start_parameter_services=False, enable_rosout=False,
+        )  # fmt: skip
+        try:
+            self._claim = Claim(self.node, [topic.name for topic in (*STATES, *REFERENCES)])
+        except InputError:
+            self._leave()
+            raise
+        self._outs = {t.name: Out(self.node, t) for t in (*STATES, *REFERENCES)}
+        self._joints, self._base = (self._outs[topic.name] for topic in STATES)
+        self._commands = In(self.node, topics.COMMAND, TakenByLoop())
+        self._waiter = Waiter(self.node, self._commands)
+        self._answers = answers
+        self._references: list[_Stream] = []
+        self._played = array("q")
+        self.check: Callable[[], None] = lambda: None
+        """Called while waiting; raises to give up."""
+
+    def __enter__(self) -> Player:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:  # fmt: skip
+        self._claim.release()
+        self._leave()
+
+    def _leave(self) -> None:
+        self.node.destroy_node()
+        self._context.try_shutdown()
+
+    @property
+    def played(self) -> Ticks:
+        """(N,) ticks whose states were sent."""
+        return np.array(self._played, dtype=np.int64)
+
+    def wait_for_controller(self) -> None:
+        """Return when the controller listens to all topics.
+
+        Raises:
+            InputError: somebody else publishes states or references here.
+            FlightError: it does not come.
+        """
+        from space_robot_msgs_py.ros.exclusive import foreign_publishers
+
+        until = time.monotonic() + LISTENER_TIMEOUT_S
+        while any(out.missing_listeners([CONTROLLER]) for out in self._outs.values()):
+            self.check()
+            if time.monotonic() > until:
+                raise FlightError(f"{CONTROLLER} does not listen for {LISTENER_TIMEOUT_S:.0f} s")
+            time.sleep(POLL_S)
+        if strangers := foreign_publishers(self.node, list(self._outs)):
+            topic, names = next(iter(strangers.items()))
+            raise InputError(
+                f"{topic} is also published by {', '.join(names)}: take another domain"
+            )
+
+    def lockstep(
+        self, states: Iterable[State], references: Iterable[Iterator[Reference]],
+        show: Callable[[int], None],
+    ) -> None:  # fmt: skip
+        """Send state after state, each when the one before has its answer.
+
+        Args:
+            states: in their order; those that were not answered in flight left out.
+            references: those of each topic in their order.
+            show: called now and then with the tick.
+
+        Raises:
+            FlightError: the controller has fallen silent, or `check` says so.
+        """
+        self._references = [_Stream(messages, deque()) for messages in references]
+        unanswered = 0
+        coming = iter(states)
+        state = next(coming, None)
+        while state is not None:
+            self._send_references(state.tick)
+            self._send(state)
+            following = next(coming, None)  # read while the controller computes
+            unanswered = 0 if self._is_answered(state) else unanswered + 1
+            if unanswered == MOST_UNANSWERED:
+                raise FlightError(
+                    f"the controller has not answered the {MOST_UNANSWERED} states up to "
+                    f"tick {state.tick}"
+                )
+            show(state.tick)
+            state = following
+
+    def by_the_clock(
+        self, states: Iterable[State], references: Iterable[Iterator[Reference]],
+        show: Callable[[int], None], period_s: float,
+    ) -> None:  # fmt: skip
+        """Send a tick's state every ``period_s`` of the wall clock, answered or not.
+
+        Time begins when the first one is answered. Arguments and errors: see `lockstep`.
+        """
+        self._references = [_Stream(messages, deque()) for messages in references]
+        began, first = 0.0, -1
+        for state in states:
+            self._send_references(state.tick)
+            if first < 0:
+                self._send(state)
+                self._is_answered(state)
+                began, first = time.perf_counter(), state.tick
+                continue
+            self._take_until(began + (state.tick - first) * period_s)
+            self._send(state)
+            show(state.tick)
+        self._take_until(time.perf_counter() + LAST_ANSWER_S)
+
+    def _send(self, state: State) -> None:
+        self._joints.publish(state.joints)
+        self._base.publish(state.base)
+        self._played.append(state.tick)
+
+    def _send_references(self, tick: int) -> None:
+        """Keep both streams ahead of ``tick``."""
+        for messages, ahead in self._references:
+            while ahead and ahead[0] <= tick:
+                ahead.popleft()
+            while len(ahead) < AHEAD and (reference := next(messages, None)):
+                self._outs[reference.topic.name].publish(reference.data)
+                if reference.tick > tick:
+                    ahead.append(reference.tick)
+
+    def _is_answered(self, state: State) -> bool:
+        """Wait for the answer to the state just sent; whether it has come."""
+        begin = time.monotonic()
+        ask_again = begin + ASK_AGAIN_S
+        while True:
+            data = self._take_or_wait(self._commands, self._waiter, POLL_S)
+            if data is not None:
+                if self._answers.add(data) == state.tick:
+                    return True
+                continue
+            self.check()
+            now = time.monotonic()
+            if now > begin + GIVE_UP_S:
+                return False
+            if now > ask_again:
+                ask_again = now + ASK_AGAIN_S
+                self._joints.publish(state.joints)
+                self._base.publish(state.base)
+
+    def _take_until(self, moment: float) -> None:
+        while True:
+            while (data := self._commands.take()) is not None:
+                self._answers.add(data)
+            left = moment - time.perf_counter()
+            if left <= 0.0:
+                return
+            self._waiter.wait(min(left, POLL_S))
+            self.check()

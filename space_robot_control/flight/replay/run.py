@@ -1,0 +1,178 @@
+"""A replay from its start to its report: a controller's process, the player, the comparison."""
+
+from __future__ import annotations
+
+import gc
+import math
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+from space_robot_msgs_py.errors import FlightError, InputError
+
+from ..compilation import compile_kernels
+from ..display import FlightProgress, flight_progress
+from ..domain import ros_domain
+from ..following import InterruptedFlightError
+from ..lifecycle import LifecycleDriver
+from ..orchestrator import require_ros, stop_signals
+from ..processes import Graph, NodeProcess, node_command, node_environment
+from .choice import ControllerChoice
+from .commands import CommandList, Commands, Ticks
+from .comparison import Comparison
+from .outcome import Options, Replay
+from .player import CONTROLLER, REFERENCES, Player
+from .recording import Recording, State
+
+SHOW_S = 0.2
+
+
+def replay(options: Options) -> Replay:
+    """Play the bag to a controller of its own and compare its commands with the recorded.
+
+    Raises:
+        InputError: bag or options cannot be used; nothing was started.
+        FlightError: the controller did not start.
+    """
+    recording = Recording(options.bag, options.remap)
+    with tempfile.TemporaryDirectory(prefix="space_robot_replay_") as folder:
+        choice = ControllerChoice(
+            recording.flight, Path(folder), options.controller, options.gains, options.parameters
+        )
+        require_ros()
+        return _Run(options, recording, choice).run()
+
+
+class _Run:
+    def __init__(self, options: Options, recording: Recording, choice: ControllerChoice) -> None:
+        self._options, self._recording, self._choice = options, recording, choice
+        period = recording.timebase.period
+        self._start = math.ceil(options.start_s / period - 1e-6)
+        self._stop: float = options.end_s
+        if math.isfinite(options.end_s):
+            self._stop = math.ceil(options.end_s / period - 1e-6)
+        self._recorded = self._read_commands()
+        if next(recording.states(self._start, self._stop), None) is None:
+            raise InputError(f"{options.bag}: no states in the part to be replayed")
+        self._skipped = 0
+        self._progress: FlightProgress | None = None
+        self._shown_at = 0.0
+
+    def _read_commands(self) -> Commands:
+        """Those to compare with; nobody knows what came after an unfinished bag's last one."""
+        recording = self._recording
+        commands = recording.commands(self._choice.robot.axis_names)
+        if recording.has_commands and not recording.is_finished and len(commands.ticks):
+            self._stop = min(self._stop, int(commands.ticks[-1]) + 1)
+        return commands.within(self._start, self._stop)
+
+    def run(self) -> Replay:
+        """Start the controller, play, stop it, compare."""
+        options, recording, choice = self._options, self._recording, self._choice
+        axes, error = choice.robot.axis_names, None
+        answers = CommandList(axes, recording.timebase)
+        parameters = dict(choice.parameters)
+        if options.rate is None and "reference_timeout" not in options.parameters:
+            # there is time to wait; by the wall clock, where the flight may have been, there is not
+            parameters.pop("reference_timeout", None)
+        compile_kernels()
+        command = {"controller": node_command("controller", {**parameters, "autostart": False})}
+        with (
+            ros_domain(options.domain) as domain,
+            stop_signals() as stopped,
+            Player(domain, answers) as player,
+            Graph(command, node_environment(domain)) as graph,
+        ):
+            controller = graph.nodes["controller"]
+            player.check = lambda: _check(controller, stopped)
+            _bring_up(controller, player)
+            begin = time.perf_counter()
+            with self._show() as show, _frozen():
+                try:
+                    self._play(player, show)
+                except FlightError as ended:
+                    error = ended
+            elapsed = time.perf_counter() - begin
+        played = player.played
+        if error and not len(played):
+            raise error
+        comparison = Comparison(
+            axes, played, self._recorded_until(played, error), answers.commands()
+        )
+        return Replay(options, choice, recording, comparison, self._skipped, elapsed, error)
+
+    def _recorded_until(self, played: Ticks, error: FlightError | None) -> Commands:
+        """Of a replay that ended early, or a bag that did, only what came until then."""
+        if error is None and self._recording.is_finished:
+            return self._recorded
+        return self._recorded.within(self._start, int(played.max()) + 1)
+
+    def _play(self, player: Player, show: Callable[[int], None]) -> None:
+        states = self._states()
+        references = [self._recording.references(topic, self._start) for topic in REFERENCES]
+        if self._options.rate is None:
+            player.lockstep(states, references, show)
+        else:
+            period = self._recording.timebase.period / self._options.rate
+            player.by_the_clock(states, references, show, period)
+
+    def _states(self) -> Iterator[State]:
+        """The states that the controller took; where it did not answer all, those answered."""
+        recording = self._recording
+        states = recording.states(self._start, self._stop)
+        if not recording.has_commands or recording.answers_are_complete:
+            yield from states
+            return
+        answered = set(self._recorded.ticks.tolist())
+        for state in states:
+            if state.tick in answered:
+                yield state
+            else:
+                self._skipped += 1
+
+    @contextmanager
+    def _show(self) -> Iterator[Callable[[int], None]]:
+        period = self._recording.timebase.period
+        count = min(float(self._recording.states_count), self._stop - self._start)
+        with flight_progress(count * period, f"replay, {self._choice.law_name}") as progress:
+
+            def show(tick: int) -> None:
+                now = time.monotonic()
+                if now > self._shown_at + SHOW_S:
+                    self._shown_at = now
+                    progress((tick - self._start) * period)
+
+            yield show
+            progress(count * period)
+
+
+def _bring_up(controller: NodeProcess, player: Player) -> None:
+    with closing(LifecycleDriver(player.node)) as driver:
+        for transition in ("configure", "activate"):
+            if driver.change([CONTROLLER], transition, player.check):
+                raise FlightError(
+                    f"{CONTROLLER} refused to {transition}:\n{controller.last_words()}"
+                )
+    player.wait_for_controller()
+
+
+def _check(controller: NodeProcess, stopped: list[int]) -> None:
+    if stopped:
+        raise InterruptedFlightError("the replay was stopped")
+    if controller.exit_code is not None:
+        raise FlightError(
+            f"{controller.obituary()} before the replay was over:\n{controller.last_words()}"
+        )
+
+
+@contextmanager
+def _frozen() -> Iterator[None]:
+    """What lives now need not be looked through while the replay lasts."""
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
