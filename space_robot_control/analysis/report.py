@@ -24,8 +24,13 @@ Array = NDArray[np.float64]
 def analyse(log: FlightLog) -> dict[str, Any]:
     """The flight's report, the same from a graph flight, an in-process one, or a bag.
 
-    A figure that this flight does not have is None; ``unavailable`` says why, by its key.
+    A figure that this flight does not have is None; ``unavailable`` says why, by its key. Of a
+    flight with gaps (a broken bag) the longest stretch without one is analysed; ``damage`` says so.
+
+    Raises:
+        InputError: no tick has both a state and a reference.
     """
+    log = _without_gaps(log)
     period, flight = log.timebase.period, log.flight
     report: dict[str, Any] = {
         "controller": flight.get("controller"),
@@ -55,6 +60,17 @@ def analyse(log: FlightLog) -> dict[str, Any]:
         "unfinished": log.unfinished,
         "damage": list(log.damage),
     }
+
+
+def _without_gaps(log: FlightLog) -> FlightLog:
+    found = log.longest_stretch()
+    if not found.ticks:
+        raise InputError("no tick has both a state and a reference")
+    if found.ticks < log.ticks:
+        start, stop = found.time[0], found.time[-1]
+        said = f"analysed from t = {start:.4f} to {stop:.4f} s, the longest stretch without a gap"
+        found.damage += (said,)
+    return found
 
 
 def _settling(log: FlightLog, period: float) -> dict[str, Any]:
