@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,15 +17,23 @@ TARGET = Target(10.0)
 
 
 def reproduce(options: Options) -> list[Result]:
-    """Wall time of ``space-robot reproduce`` into a folder that is thrown away."""
+    """Wall time of ``space-robot reproduce`` into a folder that is thrown away; and ``--brief``."""
     rows, duration = (ROWS[:1], 0.5) if options.short else (ROWS, None)
 
-    def once(loops: int) -> None:
-        for _ in range(loops):
-            with TemporaryDirectory() as folder:
-                run(rows, Path(folder) / "reproduction", duration=duration, jobs=cores())
+    def flown(brief: bool) -> Callable[[int], None]:
+        def once(loops: int) -> None:
+            for _ in range(loops):
+                with TemporaryDirectory() as folder:
+                    out = Path(folder) / "reproduction"
+                    run(rows, out, duration=duration, brief=brief, jobs=cores())
+
+        return once
 
     options.progress(f"reproduction of {len(rows)} rows on {cores()} processors")
-    seconds = interleave({"all": once}, options.batches(usual=3), warm_up=False)
-    name = f"{len(rows)} rows, {cores()} processes"
-    return [Result.timed(name, "s", seconds["all"], target=options.asked(TARGET))]
+    competitors = {"": flown(False), ", --brief": flown(True)}
+    seconds = interleave(competitors, options.batches(usual=3), warm_up=False)
+    target = options.asked(TARGET)
+    return [
+        Result.timed(f"{len(rows)} rows, {cores()} processes{how}", "s", taken, target=target)
+        for how, taken in seconds.items()
+    ]
