@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -96,8 +97,8 @@ class Case(NamedTuple):
 
 
 @st.composite
-def cases(draw: st.DrawFn, max_joints: int = max(JOINTS)) -> Case:
-    """Hypothesis strategy: robots of up to ``max_joints`` joints in random states."""
-    n = draw(st.sampled_from([n for n in JOINTS if n <= max_joints]))
+def cases(draw: st.DrawFn, joints: Sequence[int] = JOINTS) -> Case:
+    """Hypothesis strategy: robots with one of these numbers of joints in random states."""
+    n = draw(st.sampled_from(joints))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     return Case(random_robot(rng, n), random_state(rng, n), rng)

@@ -78,7 +78,7 @@ def test_lemma_1_is_about_the_robot_that_flies() -> None:
 
 
 @settings(max_examples=30)
-@given(cases(max_joints=7))
+@given(cases())
 def test_radius_is_the_norm_weighted_by_the_inertia(case: Case) -> None:
     """``H_S^1/2 W H_S^-1/2`` is symmetric: why a radius below 1 is enough."""
     robot, rng = case.robot, case.rng
