@@ -7,10 +7,9 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import jinja2
-
 from .pictures import Picture
 from .table import DEFINITIONS, Report, lines, notes, remarks
+from .template import template
 
 
 def render(
@@ -25,16 +24,9 @@ def render(
         descriptions: what was flown, as the bags have it.
         pictures: of all of them.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("space_robot_control.analysis", "templates"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
     shown = lines(list(reports.values()))
     groups = {group: [line for line in shown if line.group == group] for group in DEFINITIONS}
-    return environment.get_template("flights.html.j2").render(
+    return template("space_robot_control.analysis", "flights.html.j2").render(
         reports=reports,
         groups={group: found for group, found in groups.items() if found},
         definitions=DEFINITIONS,

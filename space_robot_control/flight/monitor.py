@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import time
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.definitions import decode
 from space_robot_msgs_py.plain_codecs import TelemetryCodec
-from space_robot_msgs_py.ros.process_environment import set_defaults
+
+from .visitor import Visitor
 
 DIAGNOSTICS = topics.Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100, ())
 
@@ -29,22 +29,10 @@ class Monitor:
     """Simulated time from /clock, errors from telemetry, the nodes' modes from /diagnostics."""
 
     def __init__(self, domain: int) -> None:
-        set_defaults()
-        import rclpy
-        from rclpy.context import Context
-        from rclpy.signals import SignalHandlerOptions
-
         from space_robot_msgs_py.ros.endpoints import In, TakenByLoop
 
-        self._context = Context()
-        rclpy.init(
-            args=[], context=self._context, domain_id=domain,
-            signal_handler_options=SignalHandlerOptions.NO,
-        )  # fmt: skip
-        self.node = rclpy.create_node(
-            f"flight_monitor_{os.getpid()}", context=self._context,
-            start_parameter_services=False, enable_rosout=False,
-        )  # fmt: skip
+        self._visitor = Visitor("flight_monitor", domain)
+        self.node = self._visitor.node
         group = TakenByLoop()
         self._clock = In(self.node, topics.CLOCK, group, depth=1)
         self._telemetry = In(self.node, topics.TELEMETRY, group, depth=1)
@@ -89,5 +77,4 @@ class Monitor:
 
     def close(self) -> None:
         """Leave the graph."""
-        self.node.destroy_node()
-        self._context.try_shutdown()
+        self._visitor.leave()

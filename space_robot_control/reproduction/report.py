@@ -6,11 +6,11 @@ import json
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import jinja2
 from markdown_it import MarkdownIt
 
 from space_robot_msgs_py.configuration import config_directory
 
+from ..analysis.template import template
 from .claims import Claim
 from .gallery import Picture
 from .table import Block
@@ -35,15 +35,8 @@ def render(
     Raises:
         InputError: the package's data files are not installed.
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("space_robot_control.reproduction", "templates"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
     parameter_texts = {name: json.dumps(value, indent=1) for name, value in parameters.items()}
-    return environment.get_template("report.html.j2").render(
+    return template("space_robot_control.reproduction", "report.html.j2").render(
         provenance=provenance, parameters=parameter_texts, claims=claims, tables=tables,
         chapters=chapters, errata=errata(),
     )  # fmt: skip

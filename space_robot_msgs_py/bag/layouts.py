@@ -121,9 +121,7 @@ def joint_trajectory(names: Sequence[str], timebase: Timebase) -> Describe:
     def describe(message: Any) -> Layout:
         order = name_order(message.joint_names, names, name)
         _check_spacing(message.points, timebase, name)
-        builder = CdrBuilder()
-        builder.header_slot(message.header.frame_id)
-        builder.strings(message.joint_names)
+        builder = _begin(message)
         builder.uint32(len(message.points))
         slots = []
         for point in message.points:
@@ -147,9 +145,7 @@ def base_state(message: Any) -> Layout:
     name_order(message.joint_names, [topics.BASE_FRAME], topics.BASE_STATE.name)
     if not (len(message.transforms) == len(message.twist) == len(message.wrench) == 1):
         raise MessageError(f"{topics.BASE_STATE.name}: one transform, twist, wrench expected")
-    builder = CdrBuilder()
-    builder.header_slot(message.header.frame_id)
-    builder.strings(message.joint_names)
+    builder = _begin(message)
     slots = _one_body(builder)
     columns = [0, 1, 2, 6, 3, 4, 5, *range(7, 13), *range(16, 19)]
     return Layout.of(builder.build(), slots, columns)
@@ -162,9 +158,7 @@ def base_trajectory(timebase: Timebase) -> Describe:
     def describe(message: Any) -> Layout:
         name_order(message.joint_names, [topics.BASE_FRAME], name)
         _check_spacing(message.points, timebase, name)
-        builder = CdrBuilder()
-        builder.header_slot(message.header.frame_id)
-        builder.strings(message.joint_names)
+        builder = _begin(message)
         builder.uint32(len(message.points))
         slots = []
         for point in message.points:
@@ -216,3 +210,11 @@ def first_number(message: Any) -> Layout:
     if not slot.count:
         raise MessageError(f"{topics.TELEMETRY.name}: no tick")
     return Layout.of(builder.build(), [Slot(slot.offset, 1)], [0])
+
+
+def _begin(message: Any) -> CdrBuilder:
+    """Header and names, with which these messages begin."""
+    builder = CdrBuilder()
+    builder.header_slot(message.header.frame_id)
+    builder.strings(message.joint_names)
+    return builder

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from array import array
 from collections import deque
@@ -14,8 +13,8 @@ import numpy as np
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.ros.process_environment import set_defaults
 
+from ..visitor import Visitor
 from .commands import CommandList, Ticks
 from .recording import Reference, State
 
@@ -52,28 +51,16 @@ class Player:
         Raises:
             InputError: a plant or a mission is in this domain.
         """
-        set_defaults()
-        import rclpy
-        from rclpy.context import Context
-        from rclpy.signals import SignalHandlerOptions
-
         from space_robot_msgs_py.ros.endpoints import In, Out, TakenByLoop, Waiter, take_or_wait
         from space_robot_msgs_py.ros.exclusive import Claim
 
         self._take_or_wait = take_or_wait
-        self._context = Context()
-        rclpy.init(
-            args=[], context=self._context, domain_id=domain,
-            signal_handler_options=SignalHandlerOptions.NO,
-        )  # fmt: skip
-        self.node = rclpy.create_node(
-            f"replay_node_{os.getpid()}", context=self._context,
-            start_parameter_services=False, enable_rosout=False,
-        )  # fmt: skip
+        self._visitor = Visitor("replay_node", domain)
+        self.node = self._visitor.node
         try:
             self._claim = Claim(self.node, [topic.name for topic in (*STATES, *REFERENCES)])
         except InputError:
-            self._leave()
+            self._visitor.leave()
             raise
         self._outs = {t.name: Out(self.node, t) for t in (*STATES, *REFERENCES)}
         self._joints, self._base = (self._outs[topic.name] for topic in STATES)
@@ -93,11 +80,7 @@ class Player:
         traceback: TracebackType | None,
     ) -> None:  # fmt: skip
         self._claim.release()
-        self._leave()
-
-    def _leave(self) -> None:
-        self.node.destroy_node()
-        self._context.try_shutdown()
+        self._visitor.leave()
 
     @property
     def played(self) -> Ticks:

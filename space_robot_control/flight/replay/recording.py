@@ -16,16 +16,13 @@ from rosbags.rosbag2 import ReaderError
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.coverage import excused_topics, message_tick
 from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.reader import REQUIRED
 from space_robot_msgs_py.bag.recorder import FLIGHT_KEY
 from space_robot_msgs_py.errors import InputError, MessageError
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.topics import Topic
 
 from .commands import CommandList, Commands
-
-PLAYED = (
-    topics.JOINT_STATES, topics.BASE_STATE, topics.REFERENCE_JOINTS, topics.REFERENCE_BASE,
-)  # fmt: skip
 
 UNREADABLE = (ReaderError, OSError, ValueError, LookupError, RuntimeError, struct.error)
 
@@ -62,7 +59,7 @@ class Recording:
             self._bag = open_bag(path)
             counts = self._bag.counts()
             flight = json.loads(self._bag.custom_data().get(FLIGHT_KEY, "{}"))
-        for topic in PLAYED:
+        for topic in REQUIRED:
             if not counts.get(name := self._name(topic)):
                 there = ", ".join(sorted(n for n, count in counts.items() if count)) or "nothing"
                 raise InputError(f"{path}: no messages on {name}; there is {there}")
