@@ -14,7 +14,7 @@ from space_robot_msgs_py.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.configuration import named_file
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.health import Health, Level
-from space_robot_msgs_py.plain_codecs import TelemetryCodec
+from space_robot_msgs_py.plain_codecs import LawCodec, TelemetryCodec
 from space_robot_msgs_py.reference_codec import ReferenceCodec
 from space_robot_msgs_py.ros.endpoints import (
     SPIN_S,
@@ -64,11 +64,13 @@ class ControllerLoop:
         self._commands = CommandCodec(robot.axis_names, timebase)
         self._reference_codec = ReferenceCodec(robot.joint_names, timebase)
         self._telemetry = TelemetryCodec(robot.axis_names)
+        self._law = LawCodec(timebase)
         self._state = RobotState.allocate(robot.n)
         node, group = shell.node, TakenByLoop()
         self._command_out = Out(node, topics.COMMAND)
         self._telemetry_out = Out(node, topics.TELEMETRY)
-        self.outputs = (self._command_out, self._telemetry_out)
+        self._law_out = Out(node, topics.LAW)
+        self.outputs = (self._command_out, self._telemetry_out, self._law_out)
         self._joints_in = In(node, topics.JOINT_STATES, group)
         self._base_in = In(node, topics.BASE_STATE, group)
         self._reference_joints_in = In(node, topics.REFERENCE_JOINTS, group)
@@ -144,9 +146,11 @@ class ControllerLoop:
         if reference is None:
             return
         controller = self._controller
-        self._laws.swap_at(tick)
-        if controller.law is not self._laws.chosen:
-            controller.law = self._laws.chosen
+        change = self._laws.change_at(tick)
+        if change:
+            self._law_out.publish(self._law.encode(change.law))
+            if controller.law is not self._laws.chosen:
+                controller.law = self._laws.chosen
         self._state.tick = tick
         mode = self._supervisor.mode
         command = self._supervisor.answer(self._state, *reference)
@@ -155,6 +159,8 @@ class ControllerLoop:
         self._answer = self._commands.encode(command)
         self._command_out.publish(self._answer)
         self._answered, self._state_at = tick, time.monotonic()
+        if change:
+            self._laws.tell(change)
         if tick % self._settings.telemetry_decimation == 0:
             self._telemetry_out.publish(self._telemetry.encode(tick, controller.telemetry()))
 

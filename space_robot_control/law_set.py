@@ -6,16 +6,18 @@ from typing import Any
 
 import numpy as np
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.parameter import Parameter
 
 from space_robot_msgs_py.configuration import nest
 from space_robot_msgs_py.errors import SpaceRobotError
 from space_robot_msgs_py.ros.parameters import overrides
 from space_robot_msgs_py.ros.shell import Shell
-from space_robot_msgs_py.samples import RobotState
+from space_robot_msgs_py.samples import LawInForce, RobotState
 from space_robot_msgs_py.validation import one_of
 from space_robot_sim.robot import Robot
 
 from .controller import Controller
+from .law_history import LawChange, same
 from .laws import ControlLaw, find_law
 from .settings import ControllerNodeSettings, available_laws, build_law, check_gains
 from .swaps import Swap, parse_swaps
@@ -36,6 +38,11 @@ class LawSet:
         for name in dict.fromkeys([first, *available_laws(settings)]):
             self._laws[name] = self._declared(settings.controller if name == first else name)
         self.chosen = self._laws[first]
+        self._may_differ = True
+        """Whether law or gains may be others than at the last tick answered."""
+        self._before: LawInForce | None = None
+        """What was in force at that tick."""
+        self._was_swapped = False
         self._swaps: list[Swap] = parse_swaps(settings.swaps, settings.period)
         for swap in self._swaps:
             one_of(swap.name, self._laws, "controller", " of swaps")
@@ -48,10 +55,33 @@ class LawSet:
             controller = Controller(robot, law, self._settings.period)
             controller.update(rest, np.zeros((3, robot.n)), np.eye(10)[0])
 
-    def swap_at(self, tick: int) -> None:
-        """Choose the law of the swaps that are due."""
+    def change_at(self, tick: int) -> LawChange | None:
+        """Choose the law of the swaps that are due; what is in force, if not as before.
+
+        Called once for each tick that is answered.
+        """
         while self._swaps and self._swaps[0].tick <= tick:
-            self._choose(self._laws[self._swaps.pop(0).name])
+            self.chosen = self._laws[self._swaps.pop(0).name]
+            self._may_differ = self._was_swapped = True
+        if not self._may_differ:
+            return None
+        self._may_differ = False
+        before, law = self._before, self.chosen.in_force(tick, is_first=self._before is None)
+        if before and same(before, law):
+            return None
+        self._before = law
+        return LawChange(before, law)
+
+    def tell(self, change: LawChange) -> None:
+        """Log a change, and let the parameter ``controller`` follow a planned swap."""
+        when = (
+            f"from tick {change.law.tick} on (t = {change.law.tick * self._settings.period:.4f} s)"
+        )
+        self._shell.log(f"controller: {change}, {when}")
+        if self._was_swapped:
+            self._was_swapped = False
+            name = Parameter("controller", value=change.law.name)  # type: ignore[no-untyped-call]
+            self._shell.node.set_parameters([name])
 
     def close(self) -> None:
         """Take no more changes."""
@@ -70,11 +100,6 @@ class LawSet:
             )  # fmt: skip
         return law
 
-    def _choose(self, law: ControlLaw) -> None:
-        if law is not self.chosen:
-            self._shell.log(f"controller {self.chosen.name} -> {law.name}")
-        self.chosen = law
-
     def _on_set(self, parameters: list[Any]) -> SetParametersResult:
         """Check all changes first, then make them; the loop sees them at its next tick."""
         gains = {name: dict(law.gains) for name, law in self._laws.items()}
@@ -92,5 +117,5 @@ class LawSet:
             return SetParametersResult(successful=False, reason=str(error))
         for name, law in self._laws.items():
             law.gains = gains[name]
-        self._choose(chosen)
+        self.chosen, self._may_differ = chosen, True
         return SetParametersResult(successful=True)

@@ -44,6 +44,10 @@ class CdrBuilder:
         self._numbers: list[tuple[int, int]] = []
         self._padding: list[tuple[int, int]] = []
 
+    def uint8(self, value: int) -> None:
+        """A constant uint8 (also a bool)."""
+        self._bytes.append(value)
+
     def uint32(self, value: int) -> None:
         """A constant uint32 (also a sequence's length)."""
         self._align(4)

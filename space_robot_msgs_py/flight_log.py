@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .samples import RobotState, Timebase
+from .samples import LawInForce, RobotState, Timebase
 
 Array = NDArray[np.float64]
 
@@ -64,6 +64,8 @@ class FlightLog:
     """(N,) s from the state's sending to its answer's, by the clock of the wall (NaN: none)."""
     telemetry: Array | None = None
     """(N, 4, n+3) s, u, N_hat, e of the controller; of flights in this process only."""
+    laws: tuple[LawInForce, ...] = ()
+    """Every change of law or gains in flight, the first law first; empty: not recorded."""
     first_tick: int = 0
     """Tick of row 0; not 0 only in an excerpt of a flight."""
 

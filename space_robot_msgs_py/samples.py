@@ -6,6 +6,7 @@ float64, allocated once by the owner and overwritten in place.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -102,3 +103,15 @@ class ReferenceChunk:
     def stop(self) -> int:
         """Tick after the last row."""
         return self.start + len(self.joints)
+
+
+class LawInForce(NamedTuple):
+    """The control law, with its gains, that commands from a tick on."""
+
+    tick: int
+    """First tick that is answered with it."""
+    name: str
+    gains: Mapping[str, tuple[float, ...]]
+    """A value an axis of each gain."""
+    is_first: bool = False
+    """Whether the controller begins with it: a controller that was started again does so, too."""

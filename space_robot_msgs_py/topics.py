@@ -23,6 +23,8 @@ class Topic(NamedTuple):
     """One message a tick, so a gap in its stamps is a loss."""
     transient_local: bool = False
     """Late joiners get the last ``depth`` messages."""
+    is_event: bool = False
+    """A message whenever something happens, so a gap in its stamps is no loss."""
 
 
 TO_CONTROLLER = ("controller_node", "recorder_node")
@@ -49,6 +51,10 @@ REFERENCE_BASE = Topic(
 TELEMETRY = Topic(
     "/controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, ("recorder_node",)
 )
+LAW = Topic(
+    "/controller/law", "rcl_interfaces/msg/ParameterEvent", 100, ("recorder_node",),
+    transient_local=True, is_event=True,
+)  # fmt: skip
 CLOCK = Topic(
     "/clock",
     "rosgraph_msgs/msg/Clock",
@@ -57,5 +63,7 @@ CLOCK = Topic(
     transient_local=True,
 )
 
-ALL = (JOINT_STATES, BASE_STATE, COMMAND, REFERENCE_JOINTS, REFERENCE_BASE, TELEMETRY, CLOCK)
+ALL = (
+    JOINT_STATES, BASE_STATE, COMMAND, REFERENCE_JOINTS, REFERENCE_BASE, TELEMETRY, LAW, CLOCK,
+)  # fmt: skip
 BY_NAME = {topic.name: topic for topic in ALL}

@@ -14,11 +14,12 @@ from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.flight_log import FlightLog
-from space_robot_msgs_py.plain_codecs import ClockCodec, TelemetryCodec
+from space_robot_msgs_py.plain_codecs import ClockCodec, LawCodec, TelemetryCodec
 from space_robot_msgs_py.reference_codec import ReferenceCodec
 from space_robot_msgs_py.samples import Command
 
 from ..closed_loop import close_loop
+from ..law_history import same
 from .plan import Flight
 
 STRETCH_TICKS = 2000
@@ -36,6 +37,7 @@ class Messages:
         self._references = ReferenceCodec(robot.joint_names, timebase)
         self._telemetry = TelemetryCodec(robot.axis_names)
         self._clock = ClockCodec()
+        self._law = LawCodec(timebase)
 
     def stretch(self, log: FlightLog, start: int, stop: int) -> None:
         """What mission, plant and controller send in the ticks ``start`` to ``stop``."""
@@ -43,6 +45,7 @@ class Messages:
         assert log.telemetry is not None
         record, flight = self._recorder.record, self._flight
         chunk_ticks = flight.mission_settings.chunk_ticks
+        laws = [law for law in log.laws if start <= law.tick < stop]
         for tick in range(start, stop):
             if tick % chunk_ticks == 0:
                 joints, base = self._references.encode(flight.mission.chunk(tick, chunk_ticks))
@@ -52,6 +55,8 @@ class Messages:
             record(topics.JOINT_STATES, joints)
             record(topics.BASE_STATE, base)
             record(topics.COMMAND, self._commands.encode(Command(tick, log.commanded_torque[tick])))
+            if laws and laws[0].tick == tick:
+                record(topics.LAW, self._law.encode(laws.pop(0)))
             if tick % flight.plant_settings.clock_decimation == 0:
                 record(topics.CLOCK, self._clock.encode(flight.timebase.stamp_ns(tick)))
             if tick % flight.controller_settings.telemetry_decimation == 0:
@@ -112,6 +117,9 @@ def simulate(
             progress(start)
             if start in swaps and swaps[start].name != controller.law.name:
                 controller.law = swaps[start]
+            law = controller.law.in_force(start, is_first=not log.laws)
+            if not log.laws or not same(log.laws[-1], law):
+                log.laws += (law,)
             close_loop(plant, controller, log, start, stop)
             if messages:
                 messages.stretch(log, start, stop)

@@ -10,6 +10,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.samples import LawInForce
+
 Array = NDArray[np.float64]
 
 
@@ -70,6 +72,11 @@ class ControlLaw(ABC):
     def gains(self, gains: Mapping[str, Array]) -> None:
         for row, name in zip(self.gain_matrix, self.gain_descriptions, strict=True):
             row[:] = gains[name]
+
+    def in_force(self, tick: int, is_first: bool = False) -> LawInForce:
+        """The law with its present gains, for the record: it commands from ``tick`` on."""
+        gains = {name: tuple(row.tolist()) for name, row in self.gains.items()}
+        return LawInForce(tick, self.name, gains, is_first)
 
     @classmethod
     def uses_time_delay_estimate(cls) -> bool:

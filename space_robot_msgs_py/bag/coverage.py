@@ -49,8 +49,10 @@ class Coverage:
     """Ticks passed over, which may still come late."""
 
     def take(self, tick: int) -> bool:
-        """Count a message; False if one of this tick has come already."""
-        if self.received and tick <= self.last:
+        """Count a message; False if one of this tick has come already (events: never)."""
+        if self.topic.is_event:
+            self.last = max(self.last, tick)
+        elif self.received and tick <= self.last:
             if tick not in self._holes:
                 self.repeated += 1
                 return False
@@ -72,7 +74,7 @@ class Coverage:
     def take_all(self, ticks: NDArray[np.int64]) -> NDArray[np.bool_]:
         """`take` of many, in their order; those that only go forward are counted at once."""
         steps = np.diff(ticks, prepend=[self.last] if self.received else [])
-        if not len(ticks) or np.any((steps < 1) | (steps > LONGEST_JUMP)):
+        if self.topic.is_event or not len(ticks) or np.any((steps < 1) | (steps > LONGEST_JUMP)):
             return np.fromiter((self.take(int(tick)) for tick in ticks), np.bool_, len(ticks))
         self._guard.passes(int(ticks[0]))
         if not self.received:
@@ -95,6 +97,8 @@ class Coverage:
 
     def missing(self, last_tick: int) -> int:
         """Messages that were sent but are not here, for a flight from tick 0 to ``last_tick``."""
+        if self.topic.is_event:
+            return 0
         if self.topic.per_tick:
             return last_tick + 1 - self.received
         if self.received == 0:

@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import topics
+from ..errors import MessageError
 from ..flight_log import REFERENCE, STATE, FlightLog
-from ..samples import Timebase
+from ..plain_codecs import LawCodec
+from ..samples import LawInForce, Timebase
 from .batch import Batch
 from .coverage import LONGEST_JUMP, Coverage
 from .kernels import NO_STAMP, read_stamps
@@ -73,6 +75,8 @@ class Rows:
             topics.TELEMETRY: first_number,
         }
         self._numbers = {topic: Numbers(topic.type, d) for topic, d in describe.items()}
+        self._laws: list[LawInForce] = []
+        self._law_faults: list[str] = []
 
     def oddities(self, excused: bool) -> list[str]:
         """Messages that could not be used; strange stamps are no news if ``excused``."""
@@ -81,6 +85,8 @@ class Rows:
             for topic, numbers in self._numbers.items()
             if numbers.misfits
         ]
+        if faults := self._law_faults:
+            found.append(f"{len(faults)} messages on {topics.LAW.name} do not fit ({faults[0]})")
         for name, coverage in self.coverages.items():
             if coverage.strange and not excused:
                 found.append(
@@ -100,6 +106,9 @@ class Rows:
         if len(fresh) < len(batch):
             batch, ticks = batch.select(fresh), ticks[fresh]
         self._believed += _TICKS_A_MESSAGE * len(batch)
+        if topic is topics.LAW:
+            self._note_laws(batch, ticks)
+            return
         self._grow(coverage.last + 1)
         if topic in (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE):
             for which, values in self._numbers[topic].read(batch):
@@ -115,6 +124,8 @@ class Rows:
     def finish(self, ticks: int) -> FlightLog:
         """The log, cut to ``ticks`` rows."""
         log = self.log
+        last_of_tick = {law.tick: law for law in self._laws if law.tick < ticks}
+        log.laws = tuple(law for _, law in sorted(last_of_tick.items()))
         for column in self._columns():
             column.resize((ticks, *column.shape[1:]), refcheck=False)
         if topics.COMMAND.name not in self.coverages:
@@ -138,7 +149,7 @@ class Rows:
         known = stamps != NO_STAMP
         ticks, rest = np.divmod(stamps - self._origin_ns, self.log.timebase.period_ns)
         known &= rest == 0
-        if topic.per_tick:
+        if topic.per_tick or topic.is_event:
             known &= ticks >= 0
         return ticks, known
 
@@ -177,6 +188,13 @@ class Rows:
         sent_ns = batch.publish_ns[which]
         self._sent_ns["state" if topic is topics.BASE_STATE else "command"][ticks] = sent_ns
         self._wall_clock = self._wall_clock or bool(np.any(sent_ns != batch.log_ns[which]))
+
+    def _note_laws(self, batch: Batch, ticks: NDArray[np.int64]) -> None:
+        for i, tick in enumerate(ticks.tolist()):
+            try:
+                self._laws.append(LawCodec.decode(batch.message(i), tick))
+            except MessageError as error:
+                self._law_faults.append(str(error))
 
     def _columns(self) -> list[NDArray[Any]]:
         return [

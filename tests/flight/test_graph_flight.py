@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from space_robot_control.analysis import analyse
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.definitions import jazzy
 from space_robot_msgs_py.flight_log import FlightLog
@@ -45,13 +47,25 @@ def test_graph_and_in_process_flights_agree_to_the_last_bit(
     assert here == there
 
 
-def test_all_laws_are_swapped_at_the_same_ticks_in_both(fly: Callable[..., Flown]) -> None:
+def test_all_laws_are_swapped_at_the_same_ticks_in_both(
+    fly: Callable[..., Flown], tmp_path: Path
+) -> None:
     swaps = ["0.1:ctc", "0.2:ctc_smc", "0.3:tde_smc", "0.4:tde_tsmc"]
     flown = fly(*SHORT, *(word for swap in swaps for word in ("--swap", swap)))
-    log = simulate(Flight(FlightPlan(swaps=swaps, duration=0.5)))
+    log = simulate(Flight(FlightPlan(swaps=swaps, duration=0.5)), tmp_path / "bag")
     recorded = read_flight(flown.bag)
     for column in STATE_COLUMNS:
         np.testing.assert_array_equal(getattr(recorded, column), getattr(log, column), column)
+    assert recorded.laws == log.laws == read_flight(tmp_path / "bag").laws
+    in_order = ["tde_stc", "ctc", "ctc_smc", "tde_smc", "tde_tsmc"]
+    assert [(law.tick, law.name) for law in log.laws] == [
+        (200 * i, name) for i, name in enumerate(in_order)
+    ]
+    graph, here = (
+        [data for _, data in open_bag(bag).messages(topics.LAW)]
+        for bag in (flown.bag, tmp_path / "bag")
+    )
+    assert graph == here
 
 
 def test_nothing_is_lost_and_every_tick_is_in_the_bag(fly: Callable[..., Flown]) -> None:

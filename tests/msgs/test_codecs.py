@@ -25,8 +25,8 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.cdr import header_stamp_ns
 from space_robot_msgs_py.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.plain_codecs import ClockCodec, TelemetryCodec
-from space_robot_msgs_py.samples import Command, RobotState, Timebase
+from space_robot_msgs_py.plain_codecs import ClockCodec, LawCodec, TelemetryCodec
+from space_robot_msgs_py.samples import Command, LawInForce, RobotState, Timebase
 
 Array = NDArray[np.float64]
 
@@ -116,11 +116,54 @@ def test_clock_is_read_as_a_clock(read: Any) -> None:
     assert seconds(message.clock) == (12, 345_678_901)
 
 
+@READERS
+@pytest.mark.parametrize("is_first", [True, False])
+def test_law_is_read_as_a_parameter_event(read: Any, is_first: bool) -> None:
+    law = LawInForce(7, "tde_smc", {"h_bar": (1.5, 2.0), "lambda": (-0.0, 5e-324)}, is_first)
+    data = LawCodec(TIMEBASE).encode(law)
+    message = read(data, topics.LAW.type)
+    assert seconds(message.stamp) == (0, 3_500_000)
+    assert message.node == "/controller_node"
+    given, other = message.new_parameters, message.changed_parameters
+    given, other = (given, other) if is_first else (other, given)
+    assert len(other) == len(message.deleted_parameters) == 0
+    assert [p.name for p in given] == ["controller", "tde_smc.h_bar", "tde_smc.lambda"]
+    assert [p.value.type for p in given] == [4, 8, 8]
+    assert given[0].value.string_value == "tde_smc"
+    for parameter, values in zip(given[1:], law.gains.values(), strict=True):
+        sent = np.array(parameter.value.double_array_value)
+        assert sent.tobytes() == np.array(values).tobytes()
+
+
+@given(
+    st.text(min_size=1, max_size=9).filter(lambda name: "\0" not in name),
+    st.dictionaries(st.text("abc_1.", min_size=1), st.lists(st.floats(), max_size=9), max_size=5),
+    st.booleans(),
+)
+def test_law_round_trip(name: str, gains: dict[str, list[float]], is_first: bool) -> None:
+    """Whatever names and numbers: the same bits come back, from our bytes and from ROS's."""
+    law = LawInForce(3, name, {k: tuple(v) for k, v in gains.items()}, is_first)
+    data = LawCodec(TIMEBASE).encode(law)
+    theirs = serialization().serialize_message(by_rclpy(data, topics.LAW.type))
+    assert repr(LawCodec.decode(data, 3)) == repr(LawCodec.decode(theirs, 3)) == repr(law)
+
+
+def test_a_parameter_event_that_names_no_law_is_an_error() -> None:
+    law = LawInForce(0, "ctc", {"k_p": (1.0,)})
+    data = LawCodec(TIMEBASE).encode(law)
+    with pytest.raises(MessageError, match="no parameter 'controller'"):
+        LawCodec.decode(data.replace(b"controller\0", b"kontroller\0"), 0)
+    at = data.index(b"ctc.k_p\0") + 8
+    with pytest.raises(MessageError, match=r"ctc\.k_p is no list of numbers"):
+        LawCodec.decode(data[:at] + b"\x03" + data[at + 1 :], 0)
+
+
 def test_every_message_begins_with_its_stamp() -> None:
     """So that a recorder can tell the tick without decoding."""
     joints, base = StateCodec(joint_names(2), TIMEBASE).encode(random_sample(2, 1, tick=9))
     command = CommandCodec(BASE_AXES, TIMEBASE).encode(Command(9, np.zeros(3)))
-    for data in (joints, base, command, ClockCodec().encode(TIMEBASE.stamp_ns(9))):
+    law = LawCodec(TIMEBASE).encode(LawInForce(9, "ctc", {}))
+    for data in (joints, base, command, law, ClockCodec().encode(TIMEBASE.stamp_ns(9))):
         assert header_stamp_ns(data) == 4_500_000
 
 
