@@ -43,12 +43,12 @@ clean:
 	find $(PACKAGES) tests -name __pycache__ -prune -exec rm -rf {} +
 
 # Stamps: what is installed in .venv, renewed when the packaging changes.
-$(VENV)/.flies: setup.py setup.cfg pyproject.toml | $(VENV)/.made
+$(VENV)/.flies: setup.py pyproject.toml | $(VENV)/.made
 	@echo "installing space_robot and ROS 2 into $(VENV): a minute or two, once"
 	@$(PIP_INSTALL) --editable '.[ros]'
 	@touch $@
 
-$(VENV)/.tests: setup.py setup.cfg pyproject.toml | $(VENV)/.made
+$(VENV)/.tests: setup.py pyproject.toml | $(VENV)/.made
 	@echo "installing space_robot, ROS 2 and the tests' tools into $(VENV): some minutes, once"
 	@$(PIP_INSTALL) --editable '.[ros,test]'
 	@touch $(VENV)/.flies $@

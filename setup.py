@@ -6,8 +6,8 @@ from setuptools import find_packages, setup
 
 NAME = "space_robot"
 
-# What `ros2 run` starts: scripts of three lines. As data files they land in lib/space_robot,
-# where it looks, whether pip or colcon installs them.
+# What `ros2 run` starts, all alike: each hands its name to bin/space-robot. As data files they land
+# in lib/space_robot, where it looks, whether pip or colcon installs them.
 EXECUTABLES = [str(path) for path in sorted(Path("resource/executables").iterdir())]
 
 CONFIG = [
@@ -48,6 +48,9 @@ setup(
         "zstandard>=0.22",
     ],
     extras_require={
+        # beside ROS 2 Jazzy from apt: its messages are compiled for Ubuntu's NumPy 1.26, with which
+        # pyarrow 26 does not work
+        "apt": ["colcon-common-extensions", "numpy<2", "pyarrow<26"],
         # tests/benchmarks; bsk (Basilisk) holds back numpy and matplotlib, so a venv of its own
         "bench": ["bsk", "hypothesis", "mujoco", "pin"],
         # ROS 2 Jazzy from wheels; never a requirement, for apt's ROS must stay untouched

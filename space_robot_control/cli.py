@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -19,6 +20,13 @@ from .commands.replay import replay
 from .commands.reproduce import reproduce
 from .commands.soak import soak
 from .commands.stability import stability
+
+NODE_MODULES = {
+    "plant_node": "space_robot_sim.plant_node",
+    "controller_node": "space_robot_control.controller_node",
+    "mission_node": "space_robot_control.mission_node",
+    "recorder_node": "space_robot_msgs_py.recorder_node",
+}
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -147,7 +155,13 @@ cli.add_command(stability)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Entry point: one clear line on standard error instead of a traceback."""
+    """Entry point: one clear line on standard error instead of a traceback.
+
+    ``space-robot plant_node`` and the like, which ``ros2 run`` starts, are the nodes themselves.
+    """
+    if arguments is None and sys.argv[1:] and (module := NODE_MODULES.get(sys.argv[1])):
+        del sys.argv[1]  # rclpy and the node read the rest
+        import_module(module).main()
     try:
         cli.main(args=arguments, prog_name="space-robot", standalone_mode=False)
     except click.exceptions.Exit as exit_:
@@ -163,11 +177,6 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except KeyboardInterrupt:
         sys.exit(130)
     sys.exit(0)
-
-
-def run(command: str) -> NoReturn:
-    """``ros2 run space_robot COMMAND``."""
-    main([command, *sys.argv[1:]])
 
 
 if __name__ == "__main__":

@@ -1,22 +1,43 @@
-"""Fixtures for all tests, and the hypothesis profile: the same examples on every run."""
+"""Fixtures for all tests; the hypothesis profile: the same examples on every run; what may lack."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, settings
+
+try:
+    from hypothesis import HealthCheck, settings
+except ImportError:
+    pass  # every module that needs it is skipped
+else:
+    settings.register_profile(
+        "ci", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+    )
+    settings.load_profile("ci")
 
 from space_robot_control.flight.domain import ros_domain
 from space_robot_sim.robot import Robot
 
 ROBOTS = Path(__file__).resolve().parent.parent / "config" / "robots"
 
-settings.register_profile(
-    "ci", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
-)
-settings.load_profile("ci")
+TOOLS = ("cvxpy", "hypothesis", "mujoco", "pinocchio")
+"""Of the tests only. Where `colcon test` finds one missing, the modules that use it are skipped,
+whichever of their helpers imports it."""
+
+
+class _MissingTool:
+    """The last finder asked for a module, so only if no other has found it."""
+
+    @staticmethod
+    def find_spec(name: str, path: object = None, target: object = None) -> None:
+        if name in TOOLS:
+            pytest.skip(f"{name} is not installed", allow_module_level=True)
+
+
+sys.meta_path.append(_MissingTool())
 
 
 @pytest.fixture(scope="session")

@@ -1,0 +1,157 @@
+"""What pip, colcon and rosdep are told: one list, and executables that find their interpreter."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from space_robot_control.cli import NODE_MODULES, cli
+from space_robot_control.flight.processes import MODULES
+from space_robot_msgs_py import topics
+
+ROOT = Path(__file__).resolve().parents[1]
+EXECUTABLES = sorted((ROOT / "resource/executables").iterdir())
+TOOLS = ("mujoco", "cvxpy", "hypothesis", "pinocchio")
+ROSDEP = {"pyyaml": "yaml"}
+"""Names of rosdep's keys, behind python3-, where they are not the package's."""
+
+
+def setup_keyword(name: str) -> Any:
+    """A literal that setup.py hands to setuptools."""
+    tree = ast.parse((ROOT / "setup.py").read_text("utf-8"))
+    (call,) = (n for n in ast.walk(tree) if isinstance(n, ast.Call) and n.keywords and
+               isinstance(n.func, ast.Name) and n.func.id == "setup")  # fmt: skip
+    return ast.literal_eval(next(k.value for k in call.keywords if k.arg == name))
+
+
+def packages(requirements: list[str]) -> set[str]:
+    """Names of packages, as pip compares them."""
+    return {re.split(r"[^\w.-]", text)[0].lower().replace("_", "-") for text in requirements}
+
+
+def dependencies(kind: str) -> set[str]:
+    """What package.xml lists."""
+    tree = ElementTree.parse(ROOT / "package.xml")
+    return {item.text or "" for item in tree.iter(kind)}
+
+
+def from_pip() -> set[str]:
+    """Packages that the comment in package.xml leaves to pip."""
+    text = (ROOT / "package.xml").read_text("utf-8")
+    match = re.search(r"<!-- From pip.*?:\s(.*?)\. -->", text, re.DOTALL)
+    assert match is not None
+    return set(match.group(1).replace(",", " ").split())
+
+
+def test_package_xml_has_what_setup_py_requires() -> None:
+    """By its rosdep key, or in the comment on those that have none."""
+    from_rosdep = {name for name in dependencies("exec_depend") if name.startswith("python3-")}
+    required = packages(setup_keyword("install_requires"))
+    left_to_rosdep = {f"python3-{ROSDEP.get(name, name)}" for name in required - from_pip()}
+    assert from_pip() <= required
+    assert from_rosdep == left_to_rosdep
+
+
+def test_package_xml_has_the_packages_of_all_messages() -> None:
+    ros = dependencies("exec_depend")
+    assert {topic.type.split("/")[0] for topic in topics.ALL} <= ros
+    wheels = packages(setup_keyword("extras_require")["ros"])
+    assert "rclpy" in ros
+    assert "ros-jazzy-rclpy" in wheels
+
+
+def test_tests_depend_on_what_setup_py_says() -> None:
+    tested = packages(setup_keyword("extras_require")["test"])
+    assert {name.removeprefix("python3-") for name in dependencies("test_depend")} <= tested
+
+
+def test_the_recipe_for_apt_takes_its_packages_from_setup_py() -> None:
+    """No list of packages in README that could grow stale."""
+    text = (ROOT / "README.md").read_text("utf-8")
+    (installed,) = re.findall(r"pip install (.*?) &&", text)
+    assert installed == '"./src/space_robot[apt]"'
+    assert "apt" in setup_keyword("extras_require")
+
+
+def test_there_is_one_executable_for_each_command_and_node() -> None:
+    assert {path.name for path in EXECUTABLES} == {*cli.commands, *NODE_MODULES}
+    assert len({path.read_text("utf-8") for path in EXECUTABLES}) == 1
+    assert all(os.access(path, os.X_OK) for path in EXECUTABLES)
+    assert {f"{node}_node": module for node, module in MODULES.items()} == NODE_MODULES
+
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The package installed as colcon does it."""
+    pytest.importorskip("setuptools")
+    build, prefix = tmp_path_factory.mktemp("build"), tmp_path_factory.mktemp("prefix")
+    subprocess.run(
+        [
+            sys.executable, "setup.py", "-q", "egg_info", "--egg-base", str(build),
+            "build", "--build-base", str(build), "install", "--prefix", str(prefix),
+            "--record", str(build / "log"), "--single-version-externally-managed",
+        ],
+        cwd=ROOT, check=True, capture_output=True, env={**os.environ, "PYTHONPATH": ""},
+    )  # fmt: skip
+    return prefix
+
+
+def start(prefix: Path, name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """An installed executable, where the first Python of the PATH is another one."""
+    (library,) = prefix.glob("lib/python*/site-packages")
+    return subprocess.run(
+        [prefix / "lib/space_robot" / name, *arguments], text=True, capture_output=True,
+        cwd=prefix, timeout=60,
+        env={**os.environ, "PYTHONPATH": str(library), "PATH": os.defpath},
+    )  # fmt: skip
+
+
+def test_an_installed_command_runs_with_the_python_that_installed_it(prefix: Path) -> None:
+    assert start(prefix, "fly", "--help").stdout.startswith("Usage: space-robot fly [OPTIONS]")
+
+
+def test_an_installed_node_runs_with_the_python_that_installed_it(prefix: Path) -> None:
+    """It reads the rest of its command line."""
+    pytest.importorskip("rclpy")
+    ended = start(prefix, "mission_node", "--ros-args", "-p", "no_such:=1")
+    assert ended.returncode == 2, ended.stderr
+    assert ended.stderr.startswith("mission_node: error: ")
+    assert "'no_such'" in ended.stderr
+
+
+def test_the_command_is_where_colcon_extends_the_path(prefix: Path) -> None:
+    assert os.access(prefix / "bin/space-robot", os.X_OK)
+
+
+HIDE = """
+import importlib.machinery as machinery
+find = machinery.PathFinder.find_spec
+def hide(name, path=None, target=None):
+    return None if name in {names!r} else find(name, path, target)
+machinery.PathFinder.find_spec = hide
+"""
+
+
+def test_all_modules_are_collected_without_ros_and_the_tools_of_tests(tmp_path: Path) -> None:
+    """Where only pytest and what the package requires are installed."""
+    ros = ("rclpy", *sorted({topic.type.split("/")[0] for topic in topics.ALL}))
+    (tmp_path / "hide.py").write_text(HIDE.format(names=(*TOOLS, *ros)))
+    run = subprocess.run(
+        [sys.executable, "-m", "pytest", "-p", "hide",
+         "-p", "no:cacheprovider", "--collect-only", "-rs"],
+        cwd=ROOT, text=True, capture_output=True, timeout=120,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)]),
+             "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
+    )  # fmt: skip
+    assert run.returncode == 0, run.stdout[-2000:]
+    skipped = run.stdout.partition("short test summary")[2]
+    assert "hypothesis is not installed" in skipped
+    assert "could not import 'rclpy'" in skipped
