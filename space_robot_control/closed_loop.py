@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled import function_pointer, kernel
+from space_robot_msgs_py.errors import DivergedError
 from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_sim.plant import RATE_LIMIT, Block, Plant, advance
 
@@ -43,21 +44,23 @@ class Rows(NamedTuple):
 
 
 def close_loop(plant: Plant, controller: Controller, log: FlightLog, start: int, stop: int) -> None:
-    """Fly the ticks ``start`` to ``stop`` of ``log``, whose reference is filled in.
+    """Fly the ticks ``start`` to ``stop``, all of them in ``log``, whose reference is filled in.
 
     A law with a kernel flies in compiled code; any other at the speed of Python. Both run the
     same kernels, as the nodes do.
 
     Raises:
-        FlightError: the flight diverged or met a state that no command answers.
+        FlightError: the flight diverged or met a state that no command answers. What was flown
+            up to there is in ``log``, see `measured_ticks`.
     """
     law = controller.law
     if not isinstance(law, CompiledLaw):
-        _close_loop_in_python(plant, controller, Rows.of(log), start, stop)
+        _close_loop_in_python(plant, controller, log, start, stop)
         return
     tick, fastest, found = fly_ticks(
         law_pointer(type(law).kernel), law.gain_matrix, law.memory, law.h_bar, law.uses_model,
-        plant.block, plant.late, controller.block, Rows.of(log), start, stop, plant.period,
+        plant.block, plant.late, controller.block, Rows.of(log), log.first_tick, start, stop,
+        plant.period,
     )  # fmt: skip
     plant.state.tick = tick
     if found != USABLE:
@@ -66,19 +69,25 @@ def close_loop(plant: Plant, controller: Controller, log: FlightLog, start: int,
         raise plant.diverged(fastest)
 
 
+def measured_ticks(plant: Plant, error: Exception) -> int:
+    """How many states ``plant`` had sent when `close_loop` raised ``error``.
+
+    A state that the law could not answer was sent; one that the plant itself found to be beyond
+    all physics was not. `Plant.tick` is how many of them were answered.
+    """
+    return plant.tick + (not isinstance(error, DivergedError))
+
+
 def _close_loop_in_python(
-    plant: Plant, controller: Controller, rows: Rows, start: int, stop: int
+    plant: Plant, controller: Controller, log: FlightLog, start: int, stop: int
 ) -> None:
+    rows = Rows.of(log)
     for tick in range(start, stop):
-        state = plant.state
-        rows.base_position[tick], rows.quaternion[tick] = state.base_position, state.quaternion
-        rows.base_velocity[tick], rows.omega_base[tick] = state.base_velocity, state.omega_base
-        rows.joint_positions[tick] = state.joint_positions
-        rows.joint_velocities[tick] = state.joint_velocities
-        rows.applied_torque[tick] = state.applied_torque
-        command = controller.update(state, rows.reference_joints[tick], rows.reference_base[tick])
-        rows.commanded_torque[tick] = command.torque
-        rows.telemetry[tick] = controller.telemetry()
+        row = tick - log.first_tick
+        log.put(plant.state)
+        command = controller.update(plant.state, *log.reference(tick))
+        rows.commanded_torque[row] = command.torque
+        rows.telemetry[row] = controller.telemetry()
         plant.step(command)
 
 
@@ -95,10 +104,12 @@ def law_pointer(law: Callable[..., None]) -> Any:
 @kernel
 def fly_ticks(
     law: Callable[..., None], gains: Array, law_memory: Array, h_bar: Array, uses_model: bool,
-    plant_block: Block, late: Array, controller_block: Block, rows: Rows, start: int, stop: int,
-    period: float,
+    plant_block: Block, late: Array, controller_block: Block, rows: Rows, first_tick: int,
+    start: int, stop: int, period: float,
 ) -> tuple[int, float, int]:  # fmt: skip
     """The loop of `close_loop` for a law given as a function pointer.
+
+    ``first_tick`` is that of row 0.
 
     Returns:
         The tick reached, the fastest rate there, and what the controller found its state to be.
@@ -106,25 +117,26 @@ def fly_ticks(
     plant, memory = plant_block[0], controller_block[0]
     fastest = 0.0
     for k in range(start, stop):
-        rows.base_position[k] = plant.base_position
-        rows.quaternion[k] = plant.quaternion
-        rows.base_velocity[k] = plant.base_velocity
-        rows.omega_base[k] = plant.omega_base
-        rows.joint_positions[k] = plant.joint_positions
-        rows.joint_velocities[k] = plant.joint_velocities
-        rows.applied_torque[k] = plant.applied_torque
-        torque = rows.commanded_torque[k]
+        row = k - first_tick
+        rows.base_position[row] = plant.base_position
+        rows.quaternion[row] = plant.quaternion
+        rows.base_velocity[row] = plant.base_velocity
+        rows.omega_base[row] = plant.omega_base
+        rows.joint_positions[row] = plant.joint_positions
+        rows.joint_velocities[row] = plant.joint_velocities
+        rows.applied_torque[row] = plant.applied_torque
+        torque = rows.commanded_torque[row]
         found = answer(
             memory, law, gains, law_memory, h_bar, uses_model, k, plant.quaternion,
             plant.omega_base, plant.joint_positions, plant.joint_velocities, plant.applied_torque,
-            rows.reference_joints[k], rows.reference_base[k], torque, period,
+            rows.reference_joints[row], rows.reference_base[row], torque, period,
         )  # fmt: skip
         if found != USABLE:
             return k, fastest, found
-        rows.telemetry[k, 0] = law_memory[0]
-        rows.telemetry[k, 1] = law_memory[1]
-        rows.telemetry[k, 2] = memory.n_hat
-        rows.telemetry[k, 3] = memory.error
+        rows.telemetry[row, 0] = law_memory[0]
+        rows.telemetry[row, 1] = law_memory[1]
+        rows.telemetry[row, 2] = memory.n_hat
+        rows.telemetry[row, 3] = memory.error
         fastest = advance(plant, late, torque, k, period)
         if not fastest <= RATE_LIMIT:
             return k + 1, fastest, USABLE

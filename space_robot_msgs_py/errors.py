@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .flight_log import FlightLog
+
 
 class SpaceRobotError(Exception):
     """Base of this project's errors; the message says what was given, what is allowed, where."""
@@ -26,6 +31,9 @@ class MessageError(SpaceRobotError, ValueError):
 
 class FlightError(SpaceRobotError):
     """A flight ended before its time."""
+
+    log: FlightLog | None = None
+    """What was flown until then, where somebody kept it."""
 
 
 class DivergedError(FlightError):

@@ -67,7 +67,7 @@ class FlightLog:
     laws: tuple[LawInForce, ...] = ()
     """Every change of law or gains in flight, the first law first; empty: not recorded."""
     first_tick: int = 0
-    """Tick of row 0; not 0 only in an excerpt of a flight."""
+    """Tick of row 0; not 0 in a part of a flight."""
 
     @classmethod
     def allocate(cls, ticks: int, joint_names: tuple[str, ...], timebase: Timebase) -> FlightLog:
@@ -117,7 +117,7 @@ class FlightLog:
         if not len(starts):
             return self.truncated(0)
         longest = int(np.argmax(stops - starts))
-        return self._rows(int(starts[longest]), int(stops[longest]))
+        return self.rows(int(starts[longest]), int(stops[longest]))
 
     @property
     def axes(self) -> int:
@@ -126,7 +126,7 @@ class FlightLog:
 
     def put(self, state: RobotState) -> None:
         """Copy a state into its tick's row."""
-        k = state.tick
+        k = state.tick - self.first_tick
         self.base_position[k] = state.base_position
         self.quaternion[k] = state.quaternion
         self.base_velocity[k] = state.base_velocity
@@ -137,21 +137,24 @@ class FlightLog:
 
     def state(self, tick: int) -> RobotState:
         """The state of a tick, as the plant measured it."""
+        k = tick - self.first_tick
         return RobotState(
-            tick, self.base_position[tick], self.quaternion[tick], self.base_velocity[tick],
-            self.omega_base[tick], self.joint_positions[tick], self.joint_velocities[tick],
-            self.applied_torque[tick],
+            tick, self.base_position[k], self.quaternion[k], self.base_velocity[k],
+            self.omega_base[k], self.joint_positions[k], self.joint_velocities[k],
+            self.applied_torque[k],
         )  # fmt: skip
 
     def reference(self, tick: int) -> tuple[Array, Array]:
         """The joints' (3, n) and the base's (10,) row of a tick."""
-        return self.reference_joints[tick], self.reference_base[tick]
+        k = tick - self.first_tick
+        return self.reference_joints[k], self.reference_base[k]
 
     def truncated(self, ticks: int) -> FlightLog:
         """The first ``ticks`` rows."""
-        return self._rows(0, ticks)
+        return self.rows(0, ticks)
 
-    def _rows(self, start: int, stop: int) -> FlightLog:
+    def rows(self, start: int, stop: int) -> FlightLog:
+        """The rows ``start`` to ``stop``: views, not copies. Counts stay those of the whole log."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         rows: dict[str, Any] = {
             k: v[start:stop] for k, v in values.items() if isinstance(v, np.ndarray)

@@ -72,7 +72,7 @@ def differing_commands(
         How many differ, and of how many that were compared (those with a command); None if no
         command is known.
     """
-    if log.commanded_torque is None:
+    if log.commanded_torque is None or np.isnan(log.commanded_torque).all():
         return None
     ends = slice(latency_ticks + 1, log.ticks)
     applied, limit = log.applied_torque[ends], limits.of_axes(log.axes)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields, replace
-from typing import Any
 
 import numpy as np
 
@@ -46,11 +44,7 @@ def excerpt(log: FlightLog, from_s: float | None, to_s: float | None) -> FlightL
     first, stop = (math.ceil(t / period - ROUNDING) - log.first_tick for t in (low, high))
     if first >= stop:
         raise InputError(f"{given}: no tick lies between (one every {period:g} s)")
-    values = {f.name: getattr(log, f.name) for f in fields(log)}
-    rows: dict[str, Any] = {
-        name: value[first:stop] for name, value in values.items() if isinstance(value, np.ndarray)
-    }
-    cut = replace(log, **rows, first_tick=log.first_tick + first)
+    cut = log.rows(first, stop)
     if cut.commanded_torque is not None:
         cut.unanswered = int(np.count_nonzero(np.isnan(cut.commanded_torque[:, 0])))
     return cut

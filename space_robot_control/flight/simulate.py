@@ -1,10 +1,15 @@
-"""A flight in this process: the same plant, mission and controller, without ROS."""
+"""A flight in this process: the same plant, mission and controller, without ROS.
+
+It is flown in blocks, so that one of any length needs the memory of one block (`fly_blocks`).
+`simulate` is for those who need the whole flight as one log.
+"""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +17,14 @@ import numpy as np
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.codecs import CommandCodec, StateCodec
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_msgs_py.plain_codecs import ClockCodec, LawCodec, TelemetryCodec
 from space_robot_msgs_py.reference_codec import ReferenceCodec
-from space_robot_msgs_py.samples import Command
+from space_robot_msgs_py.samples import Command, LawInForce
 
-from ..closed_loop import close_loop
+from ..analysis.blocks import block_bounds
+from ..closed_loop import close_loop, measured_ticks
 from ..law_history import same
 from .plan import Flight
 
@@ -39,8 +45,11 @@ class Messages:
         self._clock = ClockCodec()
         self._law = LawCodec(timebase)
 
-    def stretch(self, log: FlightLog, start: int, stop: int) -> None:
-        """What mission, plant and controller send in the ticks ``start`` to ``stop``."""
+    def stretch(self, log: FlightLog, start: int, stop: int, answered: int) -> None:
+        """What mission, plant and controller send in the ticks ``start`` to ``stop``.
+
+        All of them are in ``log``; the controller answers those before ``answered``.
+        """
         assert log.commanded_torque is not None
         assert log.telemetry is not None
         record, flight = self._recorder.record, self._flight
@@ -54,13 +63,16 @@ class Messages:
             joints, base = self._states.encode(log.state(tick))
             record(topics.JOINT_STATES, joints)
             record(topics.BASE_STATE, base)
-            record(topics.COMMAND, self._commands.encode(Command(tick, log.commanded_torque[tick])))
-            if laws and laws[0].tick == tick:
-                record(topics.LAW, self._law.encode(laws.pop(0)))
             if tick % flight.plant_settings.clock_decimation == 0:
                 record(topics.CLOCK, self._clock.encode(flight.timebase.stamp_ns(tick)))
+            if tick >= answered:
+                continue
+            row = tick - log.first_tick
+            record(topics.COMMAND, self._commands.encode(Command(tick, log.commanded_torque[row])))
+            if laws and laws[0].tick == tick:
+                record(topics.LAW, self._law.encode(laws.pop(0)))
             if tick % flight.controller_settings.telemetry_decimation == 0:
-                s, u, n_hat, e = log.telemetry[tick]
+                s, u, n_hat, e = log.telemetry[row]
                 record(topics.TELEMETRY, self._telemetry.encode(tick, (s, u, n_hat, e)))
 
 
@@ -79,29 +91,41 @@ def _recording(flight: Flight, bag: Path | None) -> Iterator[Messages | None]:
         recorder.close()
 
 
-def unflown(flight: Flight) -> FlightLog:
-    """The log of ``flight`` before it starts: the reference alone is known."""
-    log = FlightLog.allocate(flight.ticks, flight.robot.joint_names, flight.timebase)
+def unflown(flight: Flight, start: int = 0, stop: int | None = None) -> FlightLog:
+    """The log of the ticks ``start`` to ``stop`` (None: the last) before they are flown.
+
+    The reference alone is known.
+    """
+    ticks = (flight.ticks if stop is None else stop) - start
+    log = FlightLog.allocate(ticks, flight.robot.joint_names, flight.timebase)
+    log.first_tick = start
     log.flight = flight.description
     log.lost = {topic.name: 0 for topic in topics.ALL}
     log.commanded_torque = np.empty_like(log.applied_torque)
     log.telemetry = np.empty((log.ticks, 4, log.axes))
-    reference = flight.mission.chunk(0, log.ticks)
+    reference = flight.mission.chunk(start, log.ticks)
     log.reference_joints, log.reference_base = reference.joints, reference.base
     return log
 
 
-def simulate(
+def fly_blocks(
     flight: Flight,
     bag: Path | None = None,
     progress: Callable[[int], None] = lambda tick: None,
-) -> FlightLog:
-    """Fly every tick of ``flight`` and return what happened.
+    block_of: Callable[[int, int], FlightLog] | None = None,
+) -> Iterator[FlightLog]:
+    """Fly every tick of ``flight`` and hand out what happened, block by block.
+
+    A flight that ends early hands out the block it ended in, up to the last state that was
+    measured, before the error is raised; a state that was not answered has a command of NaN. All
+    that was flown is then in the bag.
 
     Args:
         flight: a checked plan; its plant is flown on from where it stands.
         bag: where to write the messages the graph would have sent (None: nowhere).
         progress: called now and then with the ticks flown.
+        block_of: the log to write the ticks from the first to before the second into, whose
+            reference is filled in (None: a new one for every block).
 
     Raises:
         FlightError: the flight diverged or met a singular attitude; the bag is closed.
@@ -109,19 +133,93 @@ def simulate(
     """
     if flight.plan.faults:
         raise InputError(f"faults {flight.plan.faults}: they need the graph of nodes: use `fly`")
-    plant, controller, ticks = flight.plant, flight.controller, flight.ticks
-    log, swaps = unflown(flight), dict(flight.swaps)
-    cuts = sorted({*range(0, ticks, STRETCH_TICKS), *(k for k in swaps if k < ticks), ticks})
+    block_of = block_of or (lambda start, stop: unflown(flight, start, stop))
+    laws: tuple[LawInForce, ...] = ()
     with _recording(flight, bag) as messages:
-        for start, stop in itertools.pairwise(cuts):
-            progress(start)
-            if start in swaps and swaps[start].name != controller.law.name:
-                controller.law = swaps[start]
-            law = controller.law.in_force(start, is_first=not log.laws)
-            if not log.laws or not same(log.laws[-1], law):
-                log.laws += (law,)
-            close_loop(plant, controller, log, start, stop)
-            if messages:
-                messages.stretch(log, start, stop)
-    progress(ticks)
+        for start, stop in block_bounds(flight.ticks):
+            block = block_of(start, stop)
+            block.laws = laws
+            try:
+                _fly_block(flight, block, messages, progress)
+            except Exception as error:
+                measured = measured_ticks(flight.plant, error)
+                yield _ended_early(block, measured - start, flight.plant.tick - start)
+                raise
+            yield block
+            laws = block.laws
+    progress(flight.ticks)
+
+
+def simulate(
+    flight: Flight,
+    bag: Path | None = None,
+    progress: Callable[[int], None] = lambda tick: None,
+) -> FlightLog:
+    """`fly_blocks` into one log.
+
+    Raises:
+        FlightError: as there; its ``log`` is what was flown.
+        InputError: as there, or a log of the whole flight would not fit into memory.
+    """
+    _check_memory(flight)
+    log, flown = unflown(flight), 0
+    try:
+        for block in fly_blocks(flight, bag, progress, log.rows):
+            flown += block.ticks
+            log.unanswered, log.laws = block.unanswered, block.laws
+    except FlightError as error:
+        error.log = log.truncated(flown)
+        raise
     return log
+
+
+def _fly_block(
+    flight: Flight, block: FlightLog, messages: Messages | None, progress: Callable[[int], None]
+) -> None:
+    plant, controller, swaps = flight.plant, flight.controller, dict(flight.swaps)
+    first, end = block.first_tick, block.first_tick + block.ticks
+    cuts = {*range(first, end, STRETCH_TICKS), *(k for k in swaps if first <= k < end), end}
+    for start, stop in itertools.pairwise(sorted(cuts)):
+        progress(start)
+        if start in swaps and swaps[start].name != controller.law.name:
+            controller.law = swaps[start]
+        law = controller.law.in_force(start, is_first=not block.laws)
+        if not block.laws or not same(block.laws[-1], law):
+            block.laws += (law,)
+        try:
+            close_loop(plant, controller, block, start, stop)
+        except Exception as error:
+            if messages:
+                messages.stretch(block, start, measured_ticks(plant, error), plant.tick)
+            raise
+        if messages:
+            messages.stretch(block, start, stop, stop)
+
+
+def _ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:
+    """The first ``measured`` rows; those from ``answered`` on have no command."""
+    assert block.commanded_torque is not None
+    assert block.telemetry is not None
+    block.commanded_torque[answered:] = np.nan
+    block.telemetry[answered:] = np.nan
+    block.unanswered = measured - answered
+    block.laws = tuple(law for law in block.laws if law.tick < block.first_tick + answered)
+    return block.truncated(measured)
+
+
+def _check_memory(flight: Flight) -> None:
+    """See that a log of the whole flight has room.
+
+    Raises:
+        InputError: it has not.
+    """
+    from psutil import virtual_memory
+
+    row = unflown(flight, 0, 1)
+    columns = (value for f in fields(row) if isinstance(value := getattr(row, f.name), np.ndarray))
+    needed, free = flight.ticks * sum(c.nbytes for c in columns), virtual_memory().available
+    if needed > free:
+        raise InputError(
+            f"duration {flight.ticks * flight.period:g} s: the whole flight in memory needs "
+            f"{needed / 1e9:.1f} GB, {free / 1e9:.1f} GB are free: fly a shorter one"
+        )
