@@ -17,10 +17,15 @@ from .ros.endpoints import In, Out, TakenByLoop
 from .ros.shell import Shell, run_node
 
 SILENCE_S = 0.3
-"""Told to stop, the recorder leaves when nothing has come for this long."""
+"""Told to stop, the recorder leaves when nothing sent before has come for this long."""
+DRAIN_S = 5.0
+"""But it leaves after this long in any case, whatever still comes."""
 QUEUE_DEPTH = 20_000
 TURN = 100
 """Messages taken of one topic before the next has its turn."""
+AHEAD_OF_NEED = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
+"""What was said of them while nothing was recorded is of the time after it, too."""
+NEVER_NS = 1 << 63
 NICENESS = 5
 """The loop goes first where cores are short; the queues hold seconds of traffic."""
 
@@ -43,6 +48,10 @@ class RecorderLoop:
         group = TakenByLoop()
         self._inputs = [In(shell.node, topic, group, QUEUE_DEPTH) for topic in topics.ALL]
         self._told = False
+        self._from_ns = 0
+        """When recording was taken up again, by the senders' clock; 0: it never paused."""
+        self._until_ns: int | None = None
+        """When this recorder was told to stop; None while it records."""
         shell.log(f"recording to {path}")
 
     @property
@@ -51,23 +60,30 @@ class RecorderLoop:
         return self._recorder.failure
 
     def run(self) -> None:
-        """Record until told to stop and everything sent has come."""
+        """Record until told to stop."""
         os.nice(max(0, NICENESS - os.nice(0)))
-        last_arrival = time.monotonic()
-        while not self._shell.stopping or time.monotonic() - last_arrival < SILENCE_S:
-            # in turns: a backlog of one topic must not hold up the others
-            counts = [self._take_some(entry) for entry in self._inputs]
-            if any(counts):
-                last_arrival = time.monotonic()
-            self._recorder.flush_if_due()
-            self._tell_failure()
+        if self._until_ns is not None:  # active again
+            self._from_ns, self._until_ns = time.time_ns(), None
+        while not self._shell.stopping:
+            _, busy = self._take_round()
             self._shell.serve()
-            if max(counts) < TURN:
+            if not busy:
                 time.sleep(self._settings.drain_period)
-        self._recorder.flush()
+        self.stand_down()
 
     def stand_down(self) -> None:
-        """Everything sent is in the bag when `run` returns."""
+        """Take what was sent until now, and no more: an inactive recorder's file does not grow."""
+        if self._until_ns is not None:
+            return
+        self._until_ns = time.time_ns()
+        told = last_arrival = time.monotonic()
+        while (now := time.monotonic()) < min(last_arrival + SILENCE_S, told + DRAIN_S):
+            recorded, busy = self._take_round()
+            if recorded:
+                last_arrival = now
+            if not busy:
+                time.sleep(self._settings.drain_period)
+        self._recorder.flush()
 
     def health(self) -> Health:
         """What has come, and whether it is kept."""
@@ -86,13 +102,32 @@ class RecorderLoop:
         self._shell.log(f"{self._recorder.received} messages received, missing: {lost or 0}")
         self._recorder.close()
 
-    def _take_some(self, entry: In) -> int:
+    def _take_round(self) -> tuple[bool, bool]:
+        """Give each topic its turn; whether something was recorded, whether more is waiting.
+
+        In turns: a backlog of one topic must not hold up the others.
+        """
+        recorded = waiting = False
+        for entry in self._inputs:
+            taken, kept = self._take_some(entry)
+            recorded, waiting = recorded or kept > 0, waiting or taken == TURN
+        self._recorder.flush_if_due()
+        self._tell_failure()
+        return recorded, waiting
+
+    def _take_some(self, entry: In) -> tuple[int, int]:
+        """How many messages were taken, and how many of them are to be recorded."""
+        kept = 0
+        begin_ns = 0 if entry.topic in AHEAD_OF_NEED else self._from_ns
+        until_ns = NEVER_NS if self._until_ns is None else self._until_ns
         for count in range(TURN):
             if (taken := entry.take_with_time()) is None:
-                return count
-            self._recorder.record(entry.topic, *taken)
+                return count, kept
+            if begin_ns <= taken[1] <= until_ns:
+                self._recorder.record(entry.topic, *taken)
+                kept += 1
             os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
-        return TURN
+        return TURN, kept
 
     def _tell_failure(self) -> None:
         if self.failure and not self._told:

@@ -56,7 +56,12 @@ class Shell:
         self.node.get_logger().info(text)
 
     def serve(self) -> None:
-        """Let services run and report the health if it is time again; call it often."""
+        """Let services run and report the health if it is time again; call it often.
+
+        Not once the loop must return: a transition would take its topics from under its hands.
+        """
+        if self.stopping:
+            return
         now = time.monotonic()
         if now >= self._next_service:
             self._next_service = now + SERVICE_PERIOD_S

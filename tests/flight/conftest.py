@@ -6,11 +6,15 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import pytest
 from flights import Flown, Start, ros_environment, space_robot
 
 from space_robot_control.flight.processes import MODULES
+
+if TYPE_CHECKING:
+    from ground import Ground
 
 
 @pytest.fixture(scope="session")
@@ -53,3 +57,14 @@ def start(domain: int) -> Iterator[Start]:
         if process.poll() is None:
             process.kill()
         process.communicate()
+
+
+@pytest.fixture
+def ground(domain: int) -> Iterator[Ground]:
+    """A node of the test in the same domain."""
+    pytest.importorskip("rclpy")
+    from ground import Ground
+
+    it = Ground(domain)
+    yield it
+    it.close()

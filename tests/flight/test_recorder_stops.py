@@ -1,0 +1,92 @@
+"""The recorder told to stop while the plant flies: at a definite moment, with a whole bag."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from flights import Start
+
+from space_robot_msgs_py.bag.reader import read_coverage, read_flight
+
+pytest.importorskip("rclpy")
+
+if TYPE_CHECKING:
+    from ground import Ground
+
+Nodes = dict[str, "subprocess.Popen[str]"]
+
+
+@pytest.fixture
+def bag(tmp_path: Path) -> Path:
+    return tmp_path / "bag"
+
+
+@pytest.fixture
+def flying(start: Start, ground: Ground, bag: Path) -> Nodes:
+    """The four nodes, some ticks after the first."""
+    recorder = start("recorder", bag=bag)
+    ground.until(lambda: "recorder_node" in ground.monitor.modes, "the recorder")
+    nodes = {"recorder": recorder, "mission": start("mission")}
+    nodes["controller"] = start("controller", wait_for="[plant_node, recorder_node]")
+    nodes["plant"] = start("plant", wait_for="[controller_node, mission_node, recorder_node]")
+    go_on(ground)
+    return nodes
+
+
+def go_on(ground: Ground, seconds: float = 0.1) -> None:
+    """Let some simulated time pass."""
+    ground.monitor.poll()
+    begin = ground.monitor.simulated_s
+    ground.until(lambda: ground.monitor.simulated_s > begin + seconds, "a flight")
+
+
+def size(bag: Path) -> int:
+    return sum(file.stat().st_size for file in bag.glob("*.mcap"))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_in_flight(
+    flying: Nodes, ground: Ground, bag: Path, number: signal.Signals
+) -> None:
+    recorder = flying["recorder"]
+    recorder.send_signal(number)
+    output, _ = recorder.communicate(timeout=30)
+    assert recorder.returncode == 0, output
+    assert flying["plant"].poll() is None
+    assert read_coverage(bag)["/joint_states"]["received"] > 100  # of a finished bag only
+
+
+def test_inactive_it_writes_nothing_and_then_goes_on(
+    flying: Nodes, ground: Ground, bag: Path
+) -> None:
+    assert ground.change("recorder", "deactivate")
+    inactive = size(bag)
+    go_on(ground, 0.5)
+    assert size(bag) == inactive
+    assert ground.change("recorder", "activate")
+    go_on(ground, 0.3)
+    assert ground.change("recorder", "deactivate")
+    assert ground.change("recorder", "cleanup")  # while the plant flies
+    assert ground.state("recorder") == "unconfigured"
+    assert all(node.poll() is None for node in flying.values())
+    log = read_flight(bag)
+    assert not log.unfinished
+    assert any("lack state or reference" in text for text in log.damage)
+    flying["recorder"].send_signal(signal.SIGINT)
+    assert flying["recorder"].wait(30) == 0
+
+
+@pytest.mark.parametrize("node", ["recorder", "controller", "mission", "plant"])
+def test_cleaned_up_in_flight(flying: Nodes, ground: Ground, node: str) -> None:
+    """Both requests are on their way at once: none may reach a loop that still runs."""
+    assert all(ground.change_at_once(node, flying[node], "deactivate", "cleanup"))
+    assert ground.state(node) == "unconfigured"
+    assert flying[node].poll() is None
+    flying[node].send_signal(signal.SIGINT)
+    output, _ = flying[node].communicate(timeout=30)
+    assert flying[node].returncode == 0, output
+    assert "Invalid" not in output
