@@ -15,13 +15,14 @@ export PYTHONPYCACHEPREFIX := $(CURDIR)/$(VENV)/pycache
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
 
-.PHONY: help setup fly test lint clean
+.PHONY: help setup fly test lint mutation clean
 
 help:
 	@echo "make setup               .venv with the package and ROS 2 Jazzy"
 	@echo "make fly [ARGS=...]      fly case 1 under TDE-STC, e.g. make fly ARGS='--controller ctc'"
 	@echo "make test [ARGS=...]     style, types and tests; ARGS go to pytest"
 	@echo "make lint                style and types only"
+	@echo "make mutation [ARGS=...] small faults put in, one at a time: do the tests notice?"
 	@echo "make clean               delete .venv and what was built or cached here"
 	@echo "PYTHON=python3.12 chooses the Python (3.10 to 3.13) of a new .venv."
 
@@ -37,6 +38,10 @@ lint: $(VENV)/.tests
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
+
+mutation: $(VENV)/.tests
+	@$(PIP_INSTALL) --editable '.[ros,test,mutation]'
+	$(VENV)/bin/python tests/mutation $(ARGS)
 
 clean:
 	rm -rf $(VENV) build install log *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache

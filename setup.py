@@ -53,6 +53,7 @@ setup(
         "apt": ["colcon-common-extensions", "numpy<2", "pyarrow<26"],
         # tests/benchmarks; bsk (Basilisk) holds back numpy and matplotlib, so a venv of its own
         "bench": ["bsk", "hypothesis", "mujoco", "pin"],
+        "mutation": ["cosmic-ray"],  # tests/mutation
         # ROS 2 Jazzy from wheels; never a requirement, for apt's ROS must stay untouched
         "ros": [
             "ros-jazzy-common-interfaces",

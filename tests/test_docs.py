@@ -15,7 +15,7 @@ from space_robot_control.cli import cli
 from space_robot_msgs_py import topics
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 PREFIXES = (
     "", "space_robot_control.", "space_robot_msgs_py.", "space_robot_sim.",
     "space_robot_sim.dynamics.",

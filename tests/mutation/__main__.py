@@ -1,0 +1,117 @@
+"""Do the tests notice small faults? ``python tests/mutation`` puts them in, one at a time.
+
+A mutant is one change of one line: a sign, a comparison, a number, a statement left out. Lines are
+drawn at random, the same ones for the same seed. Mutants that no test could notice (they change
+nothing) are for the reader to name: the survivors are listed with their change.
+"""
+
+from __future__ import annotations
+
+import difflib
+import queue
+import sys
+import tempfile
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from random import Random
+
+import click
+from areas import AREAS, ROOT
+from mutants import Mutant, sample
+from rich.console import Console
+from rich.table import Table
+from trial import Copy, Outcome
+
+Result = tuple[str, Mutant, Outcome]
+
+
+def change(mutant: Mutant) -> str:
+    """What a mutant changes, as a diff without its head."""
+    before = (ROOT / mutant.module).read_text("utf-8").splitlines()
+    lines = difflib.unified_diff(before, mutant.text().splitlines(), n=0, lineterm="")
+    return "\n".join(line for line in lines if not line.startswith(("---", "+++", "@@")))
+
+
+def table(results: list[Result]) -> Table:
+    """The score of each area."""
+    shown = Table()
+    for name in ("area", "mutants", "killed", "survived", "score"):
+        shown.add_column(name, justify="left" if name == "area" else "right")
+    for area in (*dict.fromkeys(area for area, _, _ in results), "all"):
+        verdicts = [o.verdict for name, _, o in results if area in (name, "all")]
+        survived = verdicts.count("survived")
+        killed = len(verdicts) - survived
+        shown.add_row(
+            area, str(len(verdicts)), str(killed), str(survived), f"{killed / len(verdicts):.0%}"
+        )
+    return shown
+
+
+@click.command()
+@click.option("--area", "areas", multiple=True, type=click.Choice(list(AREAS)), help="[all]")
+@click.option("--count", default=10, show_default=True, help="Mutants of each area.")
+@click.option("--seed", default=0, show_default=True, help="Of the sample.")
+@click.option("--jobs", default=1, show_default=True, help="Mutants tried at a time.")
+@click.option("--list", "only_list", is_flag=True, help="Show the sample, try nothing.")
+def main(areas: tuple[str, ...], count: int, seed: int, jobs: int, only_list: bool) -> None:
+    """Try a random sample of mutants on the tests near them, and list those that survive."""
+    console = Console(width=160 if not sys.stdout.isatty() else None)
+    chosen: list[tuple[str, Mutant]] = []
+    for area in areas or AREAS:
+        modules = list(AREAS[area].modules())
+        chosen += [(area, m) for m in sample(modules, count, Random(f"{seed} {area}"))]
+    if only_list:
+        for area, mutant in chosen:
+            console.print(f"{area}: {mutant.module}:{mutant.line}", change(mutant), markup=False)
+        return
+    results: list[Result] = []
+    with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
+        copies: queue.Queue[Copy] = queue.Queue()
+        for number in range(jobs):
+            copies.put(Copy(Path(folder) / str(number)))
+        limits, lock = _Limits(), threading.Lock()
+
+        def work(area: str, mutant: Mutant) -> None:
+            copy = copies.get()
+            try:
+                tests = AREAS[area].tests_of(mutant.module)
+                outcome = copy.trial(mutant, tests, limits.of(area, copy, tests))
+            finally:
+                copies.put(copy)
+            with lock:
+                results.append((area, mutant, outcome))
+                console.print(
+                    f"{len(results)}/{len(chosen)} {area} {mutant.module}:{mutant.line} "
+                    f"{outcome.verdict} {outcome.by} ({outcome.seconds:.0f} s)",
+                    markup=False, highlight=False,
+                )  # fmt: skip
+                if outcome.verdict == "survived":
+                    console.print(change(mutant), markup=False, highlight=False)
+
+        with ThreadPoolExecutor(jobs) as pool:
+            for future in [pool.submit(work, area, mutant) for area, mutant in chosen]:
+                future.result()
+    console.print(table(results))
+    for area, mutant, outcome in results:
+        if outcome.verdict == "survived":
+            console.print(f"{area}: {mutant.module}:{mutant.line}", markup=False)
+            console.print(change(mutant), markup=False, highlight=False)
+
+
+class _Limits:
+    """How long the tests of an area may take: thrice what they take on the code as it is."""
+
+    def __init__(self) -> None:
+        self._seconds: dict[tuple[str, int], float] = {}
+
+    def of(self, area: str, copy: Copy, tests: list[str]) -> float:
+        """In seconds; runs them once in each copy, which also fills its cache of kernels."""
+        key = (area, id(copy))
+        if key not in self._seconds:
+            self._seconds[key] = 60.0 + 3.0 * copy.baseline(tests).seconds
+        return self._seconds[key]
+
+
+if __name__ == "__main__":
+    main()
