@@ -68,11 +68,10 @@ def _report(report: dict[str, Any], as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(report, indent=2))
         return
-    from rich.console import Console
-
     from .flight.display import print_report
+    from .terminal import terminal
 
-    print_report(report, Console())
+    print_report(report, terminal())
 
 
 @cli.command()

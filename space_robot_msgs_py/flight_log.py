@@ -68,6 +68,11 @@ class FlightLog:
     """Every change of law or gains in flight, the first law first; empty: not recorded."""
     first_tick: int = 0
     """Tick of row 0; not 0 in a part of a flight."""
+    trusted: bool = True
+    """Whether ``flight`` is the user's own word, so that files and modules it names may be opened.
+
+    A bag may be anybody's: of one it is so only if the user says so.
+    """
 
     @classmethod
     def allocate(cls, ticks: int, joint_names: tuple[str, ...], timebase: Timebase) -> FlightLog:

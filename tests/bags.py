@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 from mcap.reader import make_reader
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -17,7 +18,7 @@ from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.bag.recorder import BagRecorder
+from space_robot_msgs_py.bag.recorder import FLIGHT_KEY, BagRecorder
 from space_robot_msgs_py.definitions import definition, jazzy
 from space_robot_msgs_py.flight_log import REFERENCE, STATE, FlightLog
 from space_robot_msgs_py.samples import Timebase
@@ -133,3 +134,16 @@ def mcap_of(path: Path, entries: Iterable[Entry], **options: Any) -> Path:
             writer.add_message(channels[name], log_ns, data, log_ns)
         writer.finish()
     return path
+
+
+def redescribed(bag: Path, description: str | None) -> Path:
+    """The bag with another text as its flight's description, or with none; changed in place."""
+    file = bag / "metadata.yaml"
+    content = yaml.safe_load(file.read_text("utf-8"))
+    noted = content["rosbag2_bagfile_information"]["custom_data"]
+    noted.pop(FLIGHT_KEY, None)
+    if description is not None:
+        noted[FLIGHT_KEY] = description
+    noted["kept"] = "so that the copies in the MCAP file are not asked"
+    file.write_text(yaml.safe_dump(content), "utf-8")
+    return bag

@@ -1,11 +1,13 @@
 """What a flight's description says beyond names: its robot, its actuators' limits, its Mbar.
 
 A bag carries the numbers. One that does not (an older one, or of another recorder) is taken at its
-names' word: the robot, case and gains of that name here and now.
+names' word: the robot, case and gains of that name here and now. Files and modules that it names
+are opened only if it is trusted (`FlightLog.trusted`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from space_robot_sim.robot import Robot
 
 from ..settings import ControllerNodeSettings, build_law
 from ..time_delay_estimation import low_pass_weight
+from ..trust import check_file, check_law
 from .actuation import TorqueLimits
 
 Array = NDArray[np.float64]
@@ -38,6 +41,7 @@ def robot_of(log: FlightLog) -> Robot:
     if isinstance(content := flight.get("robot_file"), dict):
         robot = Robot.from_dict(content, where="robot_file of the bag")
     elif name := flight.get("robot"):
+        _check_files(log, {"robot": name})
         robot = Robot.from_yaml(named_file("robots", str(name)))
     else:
         raise NotDescribedError("the bag does not say which robot was flown")
@@ -62,10 +66,10 @@ def torque_limits(log: FlightLog) -> TorqueLimits:
         raise NotDescribedError("the bag does not say what the plant was told")
     keys = ("base_torque_limit", "joint_torque_limit")
     if all(key in given for key in keys):
-        base, joint = (float(given[key]) for key in keys)
-    else:
-        settings = PlantNodeSettings.resolve(given)
-        base, joint = settings.base_torque_limit, settings.joint_torque_limit
+        given = {key: given[key] for key in keys}
+    _check_files(log, given)
+    settings = PlantNodeSettings.resolve(given)
+    base, joint = settings.base_torque_limit, settings.joint_torque_limit
     return TorqueLimits(base or np.inf, joint or np.inf)
 
 
@@ -85,13 +89,26 @@ def estimator(log: FlightLog) -> tuple[Array, float]:
         h_bar = np.array(gains.get("h_bar", ()), dtype=np.float64)
     else:
         chosen: dict[str, Any] = {key: flight[key] for key in ("robot", "gains") if key in flight}
-        settings = ControllerNodeSettings.resolve({**chosen, **parameters, "controller": name})
-        h_bar = build_law(str(name), settings, log.axes).h_bar
+        chosen = {**chosen, **parameters, "controller": name}
+        _check_files(log, chosen)
+        if not log.trusted:
+            check_law(str(name))
+        h_bar = build_law(str(name), ControllerNodeSettings.resolve(chosen), log.axes).h_bar
     if not h_bar.size:
         raise NotDescribedError(f"{name} has no time-delay estimate")
-    corner = float(parameters.get("acceleration_filter_hz", 0.0))
-    smoothing = low_pass_weight(corner, log.timebase.period)
+    if h_bar.shape not in ((log.axes,), (1,)):
+        raise NotDescribedError(f"gains_used of the bag: h_bar: {log.axes} values were expected")
+    key = "acceleration_filter_hz"
+    settings = ControllerNodeSettings.resolve({key: parameters[key]} if key in parameters else {})
+    smoothing = low_pass_weight(settings.acceleration_filter_hz, log.timebase.period)
     return np.broadcast_to(h_bar, log.axes), smoothing
+
+
+def _check_files(log: FlightLog, given: Mapping[str, Any]) -> None:
+    """See that nothing but what is shipped is read, unless the bag is trusted."""
+    if not log.trusted:
+        for what in ("robot", "case", "mission", "gains"):
+            check_file(what, str(given.get(what, "")))
 
 
 def _parameters(log: FlightLog, node: str) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from .figures import (
     pointing,
     save_figure,
 )
+from .table import flown
 
 
 class Picture(NamedTuple):
@@ -101,6 +102,4 @@ def _drawn(figure: Figure) -> Callable[[], Figure]:
 
 def title(name: str, log: FlightLog) -> str:
     """What was flown, in a line."""
-    flight = log.flight
-    known = [f"{key} {flight[key]}" for key in ("case", "gains") if flight.get(key)]
-    return f"{name}: " + ", ".join([str(flight.get("controller") or "unknown law"), *known])
+    return f"{name}: {flown(log.flight)}"

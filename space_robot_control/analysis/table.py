@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -48,6 +48,13 @@ class Line(NamedTuple):
     unit: str
     texts: list[str]
     """One a report; `NONE` where it does not have the figure."""
+
+
+def flown(described: Mapping[str, Any]) -> str:
+    """What was flown, in a few words; ``described``: a report, or the description in a bag."""
+    law = described.get("controller")
+    known = [f"{key} {described[key]}" for key in ("case", "gains") if described.get(key)]
+    return ", ".join([str(law or "unknown law"), *known])
 
 
 def unit_of(column: str) -> str:

@@ -8,7 +8,9 @@ from typing import Any
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
+from ..terminal import say, show
 from .result import Result
 
 
@@ -23,26 +25,25 @@ def print_section(title: str, results: Sequence[Result], console: Console) -> No
     table.add_column("asked", overflow="fold")
     for result in results:
         table.add_row(*cells(result))
-    console.print(table)
+    show(table, console)
     for result in results:
         if result.note:
-            console.print(f"{result.name}: {result.note}", markup=False, highlight=False)
+            say(console, f"{result.name}: {result.note}")
 
 
 def print_machine(machine: dict[str, Any], console: Console) -> None:
     """One line on the machine."""
     build = [name.upper() for name, is_so in machine["python_build"].items() if is_so]
     packages = ", ".join(f"{name} {number}" for name, number in machine["packages"].items())
-    console.print(
+    say(
+        console,
         f"{machine['cpu']}, {machine['cpus_allowed']} of {machine['cpus']} processors, load "
         f"{machine['load_average'][0]:g}; Python {machine['python']} "
         f"({', '.join(build) or 'no PGO, no LTO'}), {packages}",
-        markup=False,
-        highlight=False,
     )
 
 
-def cells(result: Result) -> list[str]:
+def cells(result: Result) -> list[str | Text]:
     """The texts of a row."""
     low, high = result.spread
     beside = ""
@@ -58,17 +59,18 @@ def cells(result: Result) -> list[str]:
     ]
 
 
-def _asked(result: Result) -> str:
+def _asked(result: Result) -> Text:
     target = result.target
     if target is None:
-        return ""
+        return Text()
     of = "times better " if target.of == "ratio" else ""
     text = f"{of}{result.relation} {target.limit:g}"
     if target.aim is not None:
         text += f" (aim {target.aim:g})"
     if result.reached_aim:
-        return f"{text}: [green]aim reached"
-    return f"{text}: [green]reached" if result.reached else f"{text}: [red]missed"
+        return Text.assemble(f"{text}: ", ("aim reached", "green"))
+    verdict = ("reached", "green") if result.reached else ("missed", "red")
+    return Text.assemble(f"{text}: ", verdict)
 
 
 def _number(value: float) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from .options import REMAP
+from .options import REMAP, TRUST
 
 
 @click.command()
@@ -43,6 +43,7 @@ from .options import REMAP
 @click.option("--from", "from_s", type=float, metavar="T", help="Begin at T simulated seconds.")
 @click.option("--to", "to_s", type=float, metavar="T", help="End before T simulated seconds.")
 @REMAP
+@TRUST
 @click.option(
     "--json", "as_json", is_flag=True, help="Print the report as JSON: a list of several."
 )
@@ -55,12 +56,14 @@ def analyze(
     from_s: float | None,
     to_s: float | None,
     remap: dict[str, str],
+    trust: bool,
     as_json: bool,
 ) -> None:
     """Figures of merit of recorded flights: one bag, or several side by side.
 
     RMS, maxima, settling, chatter, saturation, latency, the error of the time-delay estimate, and
     where the end effector pointed. docs/analysis.md says what each means.
+    Modules and files that a bag names are not opened without --trust.
 
     \b
     Examples:
@@ -94,7 +97,7 @@ def analyze(
     reports: dict[str, dict[str, Any]] = {}
     descriptions: dict[str, dict[str, Any]] = {}
     for name, bag in zip(names, bags, strict=True):
-        log = excerpt(read_flight(bag, remap), from_s, to_s)
+        log = excerpt(read_flight(bag, remap, trust), from_s, to_s)
         reports[name], descriptions[name] = analyse(log), log.flight
         for write, paths in exports:
             write(log, paths[name])
@@ -121,11 +124,10 @@ def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
         found = list(reports.values())
         click.echo(json.dumps(found[0] if len(found) == 1 else found, indent=2))
         return
-    from rich.console import Console
-
     from ..flight.display import print_comparison, print_figures, print_report
+    from ..terminal import terminal
 
-    console = Console()
+    console = terminal()
     if len(reports) > 1:
         print_comparison(reports, console)
         return

@@ -70,16 +70,14 @@ def bench(
 
 
 def _show(name: str, results: list[Result]) -> None:
-    from rich.console import Console
-
     from ..bench.display import print_section
+    from ..terminal import terminal
 
-    print_section(name, results, Console())
+    print_section(name, results, terminal())
 
 
 def _show_machine(machine: dict[str, Any]) -> None:
-    from rich.console import Console
-
     from ..bench.display import print_machine
+    from ..terminal import terminal
 
-    print_machine(machine, Console())
+    print_machine(machine, terminal())

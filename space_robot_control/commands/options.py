@@ -71,6 +71,11 @@ REMAP = click.option(
     help="Take their topic for ours, as /arm/states:=/joint_states; may be repeated.",
 )  # fmt: skip
 
+TRUST = click.option(
+    "--trust", is_flag=True,
+    help="Import the module:Class and read the files that the bag names: runs the bag's code.",
+)  # fmt: skip
+
 OPTIONS: dict[str, Decorator] = {
     "controller": click.option(
         "--controller", default="tde_stc", show_default=True,

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from .options import OPTIONS, REMAP, check_writable
+from .options import OPTIONS, REMAP, TRUST, check_writable
 
 
 @click.command()
@@ -40,6 +40,7 @@ from .options import OPTIONS, REMAP, check_writable
     help="Picture of both torques by axis, as PNG and SVG.",
 )  # fmt: skip
 @REMAP
+@TRUST
 @click.option(
     "--domain",
     type=click.IntRange(0, 232),
@@ -65,6 +66,8 @@ def replay(
 
     With another --controller or other --gains there is nothing to be equal to: shown is what
     they would have commanded on the same history (open loop), with exit code 0.
+
+    A bag may be anybody's: modules and files that it names are not opened without --trust.
 
     \b
     Examples:
@@ -106,11 +109,10 @@ def replay(
     if as_json:
         click.echo(json.dumps(report, indent=2, allow_nan=False))
     else:
-        from rich.console import Console
-
         from ..flight.replay.display import print_replay
+        from ..terminal import terminal
 
-        print_replay(report, Console())
+        print_replay(report, terminal())
     if done.error:
         raise done.error
     if not done.has_passed:

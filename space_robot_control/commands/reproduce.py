@@ -71,26 +71,29 @@ def reproduce(
 
 
 def _summary(record: dict[str, Any], out: Path) -> None:
-    from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
+
+    from ..terminal import say, show, terminal
 
     table = Table("claim", "measured", "limit", "")
     for claim in record["claims"]:
-        verdict = "[green]holds" if claim["holds"] else "[red]fails"
+        verdict = Text("holds", "green") if claim["holds"] else Text("fails", "red")
         table.add_row(
             claim["text"], f"{claim['value']:.4g}", f"{claim['relation']} {claim['limit']:g}",
             verdict,
         )  # fmt: skip
-    console = Console()
+    console = terminal()
     if record["claims"]:
-        console.print(table)
+        show(table, console)
     diverged = {
         (cell["controller"], cell["gains"], cell["diverged_tick"])
         for cell in record["cells"]
         if cell["diverged_tick"] is not None
     }
     for controller, gains, tick in sorted(diverged):
-        console.print(f"{controller} with {gains} gains diverges at tick {tick}")
-    console.print(
-        f"written to {out}/: report.html, table_v.md, table_v.csv, table_v.json, figures/"
+        say(console, f"{controller} with {gains} gains diverges at tick {tick}")
+    say(
+        console,
+        f"written to {out}/: report.html, table_v.md, table_v.csv, table_v.json, figures/",
     )

@@ -60,10 +60,9 @@ def soak(
       space-robot soak --minutes 480 --seed 7 --output soak.json
       space-robot soak --minutes 2 --duration 1 --json | jq '.each[] | select(.survived | not)'
     """
-    from rich.console import Console
-
     from ..flight.soak import soak as run
     from ..flight.soak.display import print_soak
+    from ..terminal import terminal
 
     if output:
         check_writable(output)
@@ -71,7 +70,7 @@ def soak(
     report = done.report()
     put_json(report, as_json, output)
     if not as_json:
-        print_soak(report, Console())
+        print_soak(report, terminal())
     if failed := report["flights"] - report["survived"]:
         from space_robot_msgs_py.errors import FlightError
 

@@ -44,14 +44,13 @@ def stability(initial_error: float, as_json: bool, plot: Path | None, **options:
     """  # fmt: skip
     import json
 
-    from rich.console import Console
-
     from space_robot_msgs_py.validation import check
 
     from ..analysis.stability import report, study
     from ..analysis.stability.display import print_study
     from ..flight.compilation import compile_kernels
     from ..flight.plan import FlightPlan
+    from ..terminal import terminal
 
     plan = check(FlightPlan, options, "options")
     if plot:
@@ -67,7 +66,7 @@ def stability(initial_error: float, as_json: bool, plot: Path | None, **options:
     if as_json:
         click.echo(json.dumps(report(found), indent=2, allow_nan=False))
     else:
-        print_study(found, Console())
+        print_study(found, terminal())
 
 
 def _make_folder(path: Path) -> None:

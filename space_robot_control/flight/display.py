@@ -11,7 +11,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from ..analysis.table import Line, lines, notes, remarks, unit_of
+from ..analysis.table import Line, flown, lines, notes, remarks, unit_of
+from ..terminal import say, show, terminal
 
 LABELS = 44
 """Columns of the terminal that names and units take beside the figures of several bags."""
@@ -21,10 +22,7 @@ NARROWEST = 17
 
 def print_report(report: dict[str, Any], console: Console) -> None:
     """The RMS and chatter table of a flight."""
-    title = (
-        f"{report['controller']}, case {report['case']}, gains {report['gains']}: "
-        f"{report['ticks']} ticks, {report['duration_s']:g} s"
-    )
+    title = f"{flown(report)}: {report['ticks']} ticks, {report['duration_s']:g} s"
     table = Table(title=title, title_justify="left")
     table.add_column("")
     for column in ("unit", "RMS, mean of axes", "RMS, eq. (64)"):
@@ -39,9 +37,9 @@ def print_report(report: dict[str, Any], console: Console) -> None:
         table.add_row(
             key, unit_of(key), f"{value:{form}}", f"{report['rms']['eq64'][key]:{form}}", *chatter
         )
-    console.print(table)
+    show(table, console)
     for remark in remarks(report):
-        console.print(remark)
+        say(console, remark)
 
 
 def print_figures(report: dict[str, Any], console: Console) -> None:
@@ -50,9 +48,9 @@ def print_figures(report: dict[str, Any], console: Console) -> None:
     for justify in ("left", "left", "right"):
         table.add_column("", justify=justify)
     _fill(table, lines([report], brief=True))
-    console.print(table)
+    show(table, console)
     for note in notes(report):
-        console.print(note)
+        say(console, note)
 
 
 def print_comparison(reports: dict[str, dict[str, Any]], console: Console) -> None:
@@ -71,11 +69,11 @@ def print_comparison(reports: dict[str, dict[str, Any]], console: Console) -> No
         span = [f"{reports[name]['from_s']:g} to {reports[name]['to_s']:g}" for name in shown]
         table.add_row("time (s)", "", *span, end_section=True)
         _fill(table, lines([reports[name] for name in shown]))
-        console.print(table)
+        show(table, console)
     for name, report in reports.items():
-        console.print(f"{name}:")
+        say(console, f"{name}:")
         for sentence in (*remarks(report), *notes(report)):
-            console.print(f"  {sentence}")
+            say(console, f"  {sentence}")
 
 
 def _fill(table: Table, shown: list[Line]) -> None:
@@ -103,19 +101,19 @@ class FlightProgress:
 
     def say(self, text: str) -> None:
         """A line above the progress, which stays."""
-        self._progress.console.print(text, highlight=False, markup=False, soft_wrap=True)
+        say(self._progress.console, text)
 
 
 @contextmanager
 def flight_progress(total_s: float, what: str) -> Iterator[FlightProgress]:
     """A progress line for a flight of ``total_s``."""
-    console = Console(stderr=True)
+    console = terminal(stderr=True)
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=24),
         TextColumn("{task.completed:.1f}/{task.total:.1f} s simulated"),
         TimeElapsedColumn(),
-        TextColumn("{task.fields[remark]}"),
+        TextColumn("{task.fields[remark]}", markup=False),
     )
     with Progress(*columns, console=console, refresh_per_second=5) as progress:
         yield FlightProgress(progress, total_s, what)
@@ -125,7 +123,7 @@ def flight_progress(total_s: float, what: str) -> Iterator[FlightProgress]:
 def counting_progress(what: str) -> Iterator[Callable[[int], Callable[[], None]]]:
     """A progress line for things that are done one by one; see `reproduce` for its use."""
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(bar_width=24),
         TextColumn("{task.completed:.0f}/{task.total:.0f}"),
         TimeElapsedColumn(),
@@ -133,7 +131,7 @@ def counting_progress(what: str) -> Iterator[Callable[[int], Callable[[], None]]
     with ExitStack() as stack:
 
         def begin(total: int) -> Callable[[], None]:
-            console = Console(stderr=True)
+            console = terminal(stderr=True)
             progress = stack.enter_context(
                 Progress(*columns, console=console, refresh_per_second=5)
             )

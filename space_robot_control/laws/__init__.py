@@ -45,8 +45,9 @@ def find_law(name: str) -> type[ControlLaw]:
         raise InputError(f"unknown controller {name!r}: {allowed}")
     try:
         law = getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise InputError(f"controller {name!r} cannot be imported ({error}): {allowed}") from None
+    except Exception as error:  # the module is the user's, and may raise anything
+        why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        raise InputError(f"controller {name!r} cannot be imported ({why}): {allowed}") from None
     if not _is_law(law):
         raise InputError(f"controller {name!r} is not a ControlLaw: {allowed}")
     found: type[ControlLaw] = law

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..topics import Topic
 from .batch import Batch
+from .findings import SHOWN
 from .mcap_storage import McapStorage
 from .metadata import METADATA, BagInformation, parse_information
 from .rosbags_storage import RosbagsStorage
@@ -124,10 +125,14 @@ class McapBag(Bag):
         information, recorded = self._information, self.recorded()
         if not information or not recorded:
             return found
-        for name, count in information.counts.items():
-            true = max(recorded.get(name, 0), self._counts[name])
-            if count != true:
-                found.append(f"{METADATA}: {count} messages on {name}, but {true} in the bag")
+        wrong = [
+            f"{METADATA}: {count} messages on {name}, but {true} in the bag"
+            for name, count in information.counts.items()
+            if count != (true := max(recorded.get(name, 0), self._counts[name]))
+        ]
+        found += wrong[:SHOWN]
+        if len(wrong) > SHOWN:
+            found.append(f"{METADATA}: so it is with {len(wrong) - SHOWN:,} more topics")
         if self._counts == recorded and self._span_ns and information.span_ns != self._span_ns:
             claimed, true_span = (
                 f"{start / 1e9:.9g} to {stop / 1e9:.9g} s"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,20 @@ from numpy.typing import NDArray
 from ..samples import Timebase
 
 _STRETCHES = 3
+SHOWN = 12
+"""Names in a sentence."""
 
 
 def printable(text: str) -> str:
     """One line, whatever a broken bag had for names."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)
+
+
+def some_of(names: Iterable[str]) -> str:
+    """The first of some names, and how many there are more; a bag may have thousands."""
+    there = list(names)
+    more = f", and {len(there) - SHOWN:,} more" if len(there) > SHOWN else ""
+    return ", ".join(there[:SHOWN]) + more
 
 
 def missing_ticks(whole: NDArray[np.bool_], timebase: Timebase) -> list[str]:

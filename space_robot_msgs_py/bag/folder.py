@@ -8,6 +8,7 @@ from mcap.writer import MCAP0_MAGIC
 
 from ..errors import InputError
 from .contents import Bag, McapBag, StoredBag
+from .findings import some_of
 from .mcap_storage import McapStorage
 from .metadata import METADATA, BagInformation, read_information
 
@@ -64,10 +65,10 @@ def _listed(
     missing = [name for name in names if not (path / name).exists()]
     others = [file for file in there if file.name not in names]
     if missing:
-        damage.append(f"{path / METADATA} names {', '.join(missing)}, not there")
+        damage.append(f"{path / METADATA} names {some_of(missing)}, not there")
     if others:
         what = "left out" if files else "read instead"
-        damage.append(f"{METADATA} does not name {', '.join(f.name for f in others)}: {what}")
+        damage.append(f"{METADATA} does not name {some_of(f.name for f in others)}: {what}")
     return files or others
 
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .. import topics
 from ..definitions import decode
@@ -19,10 +18,11 @@ from ..samples import Timebase
 from .batch import Batch
 from .contents import Bag
 from .coverage import LONGEST_JUMP, Coverage, excused_topics, lost_messages, unanswered_ticks
+from .description import read_description
 from .findings import missing_ticks, printable, unread_messages
 from .folder import custom_data, open_bag
 from .gaps import fill_gaps
-from .recorder import COVERAGE_KEY, FLIGHT_KEY
+from .recorder import COVERAGE_KEY
 from .rows import Rows, stamps_of
 from .selection import Selection
 
@@ -31,11 +31,12 @@ REQUIRED = (
 )  # fmt: skip
 DEFAULT_PERIOD = 0.0005
 """Of a bag that does not tell its period, s."""
-LONGEST_PERIOD = 10.0
 _STAMPS_LOOKED_AT = 200
 
 
-def read_flight(path: Path, remap: Mapping[str, str] | None = None) -> FlightLog:
+def read_flight(
+    path: Path, remap: Mapping[str, str] | None = None, trust: bool = False
+) -> FlightLog:
     """Read a flight; what is broken is left out and told (`FlightLog.damage`).
 
     Ticks between the first and the last that have no whole state and reference are NaN. Of a bag
@@ -44,18 +45,22 @@ def read_flight(path: Path, remap: Mapping[str, str] | None = None) -> FlightLog
     Args:
         path: the folder of a rosbag2 bag, or a single .mcap or .db3 file.
         remap: our topic by the bag's, as in ``{"/arm/joint_states": "/joint_states"}``.
+        trust: whether files and modules that its description names may be opened by those who
+            ask for more than the bag holds (`FlightLog.trusted`); here none is opened.
 
     Raises:
         InputError: no bag is there, it cannot be read, a needed topic is missing, empty, or of
             another type, or not one tick is whole. One line.
     """
     try:
-        return _read(open_bag(Path(path)), remap or {})
+        log = _read(open_bag(Path(path)), remap or {})
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
     except InputError as error:
         text = printable(str(error))
         raise InputError(text if str(path) in text else f"{path}: {text}") from None
+    log.trusted = trust
+    return log
 
 
 def read_coverage(path: Path) -> dict[str, dict[str, int]]:
@@ -75,7 +80,13 @@ def _coverage(noted: Mapping[str, str]) -> dict[str, dict[str, int]]:
         counts = json.loads(noted.get(COVERAGE_KEY, "{}"))
     except (ValueError, RecursionError):
         return {}
-    return counts if isinstance(counts, dict) else {}
+    if not isinstance(counts, dict):
+        return {}
+    return {
+        name: each
+        for name, each in counts.items()
+        if isinstance(each, dict) and all(type(count) is int for count in each.values())
+    }
 
 
 def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
@@ -86,7 +97,7 @@ def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
         rows.take(topic, batch)
     for topic in REQUIRED:
         if not rows.counts[topic.name]:
-            raise _missing(topic, bag, selection)
+            raise missing(topic, bag, selection)
     log, excused = rows.log, excused_topics(flight)
     log.flight = flight
     gone = _gone(selection, rows)
@@ -112,16 +123,17 @@ def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
 def _description(bag: Bag) -> tuple[dict[str, Any], list[str]]:
     """What was flown, as recorded, and what is wrong with that."""
     try:
-        flight = json.loads(bag.custom_data().get(FLIGHT_KEY, "{}"))
-    except (ValueError, RecursionError):
-        flight = None
-    if isinstance(flight, dict):
-        return flight, []
-    return {}, ["the description of the flight cannot be read"]
+        return read_description(bag.custom_data()), []
+    except InputError as error:
+        return {}, [str(error)]
 
 
-def _empty_rows(bag: Bag, selection: Selection, flight: dict[str, Any], damage: list[str]) -> Rows:
-    """Rows for the joints and the period of the bag's first states."""
+def first_states(bag: Bag, selection: Selection) -> tuple[tuple[str, ...], list[int]]:
+    """Names of the joints, and the first stamps in ns.
+
+    Raises:
+        InputError: there is none, or none that can be read.
+    """
     names: tuple[str, ...] = ()
     stamps: list[int] = []
     for topic, batch in selection.batches():
@@ -131,8 +143,15 @@ def _empty_rows(bag: Bag, selection: Selection, flight: dict[str, Any], damage: 
         if names and len(stamps) >= _STAMPS_LOOKED_AT:
             break
     if not names:
-        raise _missing(topics.JOINT_STATES, bag, selection)
-    timebase = _timebase(np.array(stamps), flight, damage)
+        raise missing(topics.JOINT_STATES, bag, selection)
+    return names, stamps
+
+
+def _empty_rows(bag: Bag, selection: Selection, flight: dict[str, Any], damage: list[str]) -> Rows:
+    """Rows for the joints and the period of the bag's first states."""
+    names, stamps = first_states(bag, selection)
+    timebase, doubt = timebase_of(stamps, flight)
+    damage += doubt
     first_tick, rest = divmod(stamps[0], timebase.period_ns)
     counted = "period" in flight or (not rest and 0 <= first_tick <= LONGEST_JUMP)
     return Rows(names, timebase, 0 if counted else stamps[0])
@@ -146,30 +165,35 @@ def _joint_names(batch: Batch) -> tuple[str, ...]:
     return ()
 
 
-def _timebase(stamps: NDArray[np.int64], flight: dict[str, Any], damage: list[str]) -> Timebase:
-    """The period that was flown with: as described, if the stamps are not against it."""
+def timebase_of(
+    first_stamps: Sequence[int], flight: Mapping[str, Any]
+) -> tuple[Timebase, list[str]]:
+    """The period that was flown with: as described, if the stamps (ns) are not against it.
+
+    With it what is wrong with the description's.
+    """
     described = flight.get("period")
-    steps = np.diff(stamps)
+    steps = np.diff(np.array(first_stamps, np.int64))
     found, counts = np.unique(steps[steps > 0], return_counts=True)
     likely_ns = int(found[np.argmax(counts)]) if len(found) else None
-    if isinstance(described, (int, float)) and 1e-9 <= described <= LONGEST_PERIOD:
+    if described is not None:
         described_ns = round(described * 1e9)
         if likely_ns is None or likely_ns == described_ns:
-            return Timebase(described_ns)
+            return Timebase(described_ns), []
         if likely_ns % described_ns == 0 and excused_topics(flight):
-            return Timebase(described_ns)  # states were kept back
+            return Timebase(described_ns), []  # states were kept back
     if likely_ns is None:
-        return Timebase(round(DEFAULT_PERIOD * 1e9))
-    if described is not None:
-        damage.append(f"described with a period of {described} s, flown with {likely_ns / 1e9} s")
-    return Timebase(likely_ns)
+        return Timebase(round(DEFAULT_PERIOD * 1e9)), []
+    told = f"described with a period of {described} s, flown with {likely_ns / 1e9} s"
+    return Timebase(likely_ns), [] if described is None else [told]
 
 
-def _missing(topic: topics.Topic, bag: Bag, selection: Selection) -> InputError:
+def missing(topic: topics.Topic, bag: Bag, selection: Selection) -> InputError:
+    """Why a bag without a topic's messages cannot be read."""
     selection.topics()  # a topic to remap that is not there comes first
     if topic.name in selection.wrong:
         return InputError(f"{topic.name} is {selection.wrong[topic.name]}")
-    context = [*_not_finished(bag), *bag.damage, f"it has {selection.listing()}"]
+    context = [*_not_finished(bag), *bag.damage, selection.listing_instead_of(topic)]
     return InputError(f"no messages on {topic.name} ({'; '.join(context)})")
 
 

@@ -9,6 +9,7 @@ from ..errors import InputError
 from ..validation import one_of
 from .batch import Batch
 from .contents import Bag
+from .findings import some_of
 
 
 class Selection:
@@ -70,13 +71,24 @@ class Selection:
 
     def listing(self) -> str:
         """The bag's topics in words."""
-        return ", ".join(sorted(self._bag.topics())) or "no topics"
+        return some_of(sorted(self._bag.topics())) or "no topics"
+
+    def listing_instead_of(self, topic: graph.Topic) -> str:
+        """The topics with messages in words, those first that may be the one that is looked for."""
+        kinds, counts = self._bag.topics(), self._bag.counts()
+        names = [name for name in sorted(kinds) if counts.get(name)]
+        names.sort(key=lambda name: not _is_type(kinds[name], topic))
+        return f"it has {some_of(names)}" if names else "no topic of it has any"
 
     def _fits(self, topic: graph.Topic, kind: str, encoding: str) -> bool:
         if encoding != "cdr":
             self.wrong[topic.name] = f"encoded as {encoding!r}, 'cdr' is needed"
-        elif kind and kind.replace("/msg/", "/") != topic.type.replace("/msg/", "/"):
+        elif kind and not _is_type(kind, topic):
             self.wrong[topic.name] = f"of type {kind}, {topic.type} is needed"
         else:
             return True
         return False
+
+
+def _is_type(kind: str, topic: graph.Topic) -> bool:
+    return kind.replace("/msg/", "/") == topic.type.replace("/msg/", "/")

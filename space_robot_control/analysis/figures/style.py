@@ -35,6 +35,7 @@ DASHES: tuple[Any, ...] = ("-", "--", "-.", (0, (5, 1, 1, 1, 1, 1)), (0, (8, 2))
 
 _SETTINGS: Any = {
     "font.family": "DejaVu Sans",  # comes with matplotlib
+    "text.parse_math": False,  # a $ in a name is a $
     "font.size": 8.0,
     "axes.titlesize": 8.0,
     "axes.labelsize": 8.0,
@@ -153,10 +154,12 @@ def legend_above(
         Line2D([], [], color=x.colour, marker=x.marker, linestyle=x.dashes if dashed else "-")
         for x in looks
     ]
-    figure.legend(
-        handles, names, loc="lower left", bbox_to_anchor=_share(figure, left, top),
+    legend = figure.legend(
+        handles, ["-"] * len(names), loc="lower left", bbox_to_anchor=_share(figure, left, top),
         ncols=legend_columns(names, width),
     )  # fmt: skip
+    for text, name in zip(legend.get_texts(), names, strict=True):
+        text.set_text(name)  # a label that begins with _ would be left out
 
 
 def _share(figure: Figure, left: float, top: float) -> tuple[float, float]:

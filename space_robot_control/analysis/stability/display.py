@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from ...terminal import say, show
 from .check import Check
 from .study import Study
 from .super_twisting import SuperTwisting
@@ -19,25 +20,25 @@ def print_study(study: Study, console: Console) -> None:
     """All tables and a closing sentence."""
     flight = study.flight
     what = flight.description
-    console.print(
+    say(
+        console,
         f"{what['controller']}, case {what['case']}, gains {what['gains']}, robot "
         f"{what['robot']}: {flight.ticks * flight.period:g} s, "
         f"joint friction {'on' if flight.plan.friction else 'off'}",
-        highlight=False,
-        soft_wrap=True,
     )
-    console.print(_lemma_1(study))
-    console.print(_time_delay_error(study))
+    show(_lemma_1(study), console)
+    show(_time_delay_error(study), console)
     twisting, names = study.super_twisting, study.axis_names
     if twisting is None:
-        console.print(
+        say(
+            console,
             f"(46) to (77) are about the gains k_1 and k_2: they do not apply to "
-            f"{what['controller']}."
+            f"{what['controller']}.",
         )
         return
     for table in (_gain_conditions, _circle_criterion, _paper_lmi, _lmi, _matrices, _reaching):
-        console.print(table(names, twisting))
-    console.print(_closing(study, twisting), highlight=False, soft_wrap=True)
+        show(table(names, twisting), console)
+    say(console, _closing(study, twisting))
 
 
 def _table(title: str, *columns: str) -> Table:

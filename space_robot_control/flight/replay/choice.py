@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from ...settings import (
     gain_files,
 )
 from ...swaps import parse_swaps
+from ...trust import check_file, check_law, is_plain
 
 NODE = ControllerNodeSettings.node
 OF_THE_GRAPH = ("wait_for", "fifo_priority", "autostart")
@@ -37,7 +39,7 @@ class ControllerChoice:
 
     def __init__(
         self, flight: Mapping[str, Any], folder: Path, controller: str = "", gains: str = "",
-        given: Mapping[str, Any] | None = None,
+        given: Mapping[str, Any] | None = None, trust: bool = False,
     ) -> None:  # fmt: skip
         """Put the parameters together and check them.
 
@@ -47,45 +49,78 @@ class ControllerChoice:
             controller: law to fly (empty: the recorded one).
             gains: gain set to fly (empty: the recorded one).
             given: further parameters of the node, over the recorded ones.
+            trust: whether modules and files that the description names may be opened.
 
         Raises:
             InputError: something recorded or given does not exist here, or does not fit.
         """
-        if not (flight or controller):
+        given = given or {}
+        controller = str(given.get("controller", controller))
+        gains = str(given.get("gains", gains))
+        flown = recorded_parameters(flight)
+        if not (named := controller or flown.get("controller") or flight.get("controller")):
             raise InputError(
                 "the bag does not say which law was flown: name it with --controller, and its "
                 "gains with --gains"
             )
-        self._flight, self._folder = flight, folder
-        flown = recorded_parameters(flight)
-        self.gains_name = gains or str(flown.get("gains", "default"))
-        law = find_law(controller or str(flown["controller"]))
-        self.law_name = law.name
-        is_same_law = law.name == flight.get("controller", law.name)
-        self.parameters: dict[str, Any] = {
-            **flown,
+        self._flight, self._folder, self._trust = flight, folder, trust
+        self._said = {
             **({"controller": controller} if controller else {}),
             **({"gains": gains} if gains else {}),
-            **self._robot(flown),
+            **given,
         }
+        """By the user; all else is the bag's word."""
+        if not trust:
+            self._check_laws(str(named), flown)
+        self.gains_name = gains or str(flown.get("gains", "default"))
+        self._left_out = ""
+        """Gains that were flown, but are not read."""
+        law = find_law(str(named))
+        self.law_name = law.name
+        is_same_law = law.name == flight.get("controller", law.name)
+        self.parameters: dict[str, Any] = {**flown, **self._robot(flown)}
         """Of the node, by dotted name."""
         recorded_gains = flight.get("gains_used", {})
         if recorded_gains and is_same_law and not gains:
             self.parameters["gains"] = self._gains_folder(law, recorded_gains)
-        self.parameters |= given or {}
+        self.parameters |= self._said
+        if not trust:
+            self._check_files(flown)
         self.swaps = [text for text in self.parameters.get("swaps", []) if text.strip()]
         """Laws swapped to in flight."""
-        self.robot, now = self._check(law)
+        try:
+            self.robot, now = self._check(law)
+        except InputError as error:
+            if not self._left_out:
+                raise
+            raise InputError(
+                f"{error}; the gains flown are of {self._left_out!r}, read only with --trust"
+            ) from None
         self.is_as_flown = is_same_law and (
             not gains or gains == flown.get("gains") or _same(now.gains, recorded_gains)
         )
         """Whether law and gains are those that flew; what was ``given`` is not looked at."""
 
+    def _check_laws(self, named: str, flown: Mapping[str, Any]) -> None:
+        """See that no law but those shipped, or given by the user, is imported."""
+        if "controller" not in self._said:
+            check_law(named)
+        if "swaps" not in self._said:
+            for swap in filter(str.strip, flown.get("swaps", ())):
+                check_law(swap.partition(":")[2].strip())
+
+    def _check_files(self, flown: Mapping[str, Any]) -> None:
+        """See that no file is read whose path the bag tells."""
+        for what in ("robot", "gains"):
+            if what not in self._said and self.parameters.get(what) == flown.get(what, ""):
+                check_file(what, str(flown[what]))
+
     def _robot(self, flown: Mapping[str, Any]) -> dict[str, str]:
         """The recorded robot as a file of its name, which also chooses its gains."""
         if "robot_file" not in self._flight:
             return {}
-        path = self._folder / f"{Path(str(flown.get('robot', 'paper'))).stem}.yaml"
+        name = Path(str(flown.get("robot", "paper"))).stem
+        path = self._folder / f"{name if is_plain(name) else 'recorded'}.yaml"
         _write(path, self._flight["robot_file"])
         return {"robot": str(path)}
 
@@ -93,10 +128,12 @@ class ControllerChoice:
         """The recorded gains, beside those of the other laws as far as they are found here."""
         folder = self._folder / "gains"
         folder.mkdir()
-        try:
-            files = gain_files(str(self.parameters.get("robot", "paper")), self.gains_name)
-        except InputError:  # recorded elsewhere
-            files = {}
+        files: dict[str, Path] = {}
+        if self._trust or is_plain(self.gains_name):
+            with suppress(InputError):  # recorded elsewhere
+                files = gain_files(str(self.parameters.get("robot", "paper")), self.gains_name)
+        else:
+            self._left_out = self.gains_name
         for name, file in files.items():
             shutil.copyfile(file, folder / f"{name}.yaml")
         section = {law.name: dict(recorded)}

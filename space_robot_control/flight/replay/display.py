@@ -6,8 +6,10 @@ from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
+
+from ...analysis.table import flown as words_of
+from ...terminal import say, show
 
 COUNTS = {
     "played": "states sent",
@@ -23,21 +25,21 @@ ALWAYS = ("played", "compared", "equal")
 
 def print_replay(report: dict[str, Any], console: Console) -> None:
     """Print the report of `run.Replay`."""
-    console.print(title(report), highlight=False, markup=False, soft_wrap=True)
+    say(console, title(report))
     table = Table(show_header=False)
     table.add_column()
     table.add_column(justify="right", no_wrap=True)
     for name, count in counts(report):
         table.add_row(name, count)
-    console.print(table)
+    show(table, console)
     if first := report["first_difference"]:
         _print_first(first, console)
     if not report["identical"]:
         _print_axes(report, console)
         for reason in report["reasons"] if report["judged"] else ():
-            console.print(f"may differ: {reason}", highlight=False, markup=False, soft_wrap=True)
+            say(console, f"may differ: {reason}")
     if report["passed"]:
-        console.print(verdict(report), highlight=False, markup=False, soft_wrap=True)
+        say(console, verdict(report))
 
 
 def title(report: dict[str, Any]) -> str:
@@ -69,8 +71,8 @@ def verdict(report: dict[str, Any]) -> str:
         return "the commands are the recorded ones, to the last bit"
     if not report["judged"]:
         return (
-            f"{flown['controller']}, gains {flown['gains']}, was flown: the differences are what "
-            "the other would have commanded on the same history (open loop)"
+            f"{words_of(flown)} was flown: the differences are what the other would have "
+            "commanded on the same history (open loop)"
         )
     if first:
         when = f"tick {first['tick']} (t = {first['time_s']:.4f} s)"
@@ -88,10 +90,10 @@ def _print_first(first: dict[str, Any], console: Console) -> None:
     for field in first["fields"]:
         amount = field["difference"]
         table.add_row(
-            escape(field["field"]), str(field["recorded"]), str(field["replayed"]),
+            field["field"], str(field["recorded"]), str(field["replayed"]),
             "" if amount is None else f"{amount:.3g}",
         )  # fmt: skip
-    console.print(table)
+    show(table, console)
 
 
 def _print_axes(report: dict[str, Any], console: Console) -> None:
@@ -101,4 +103,4 @@ def _print_axes(report: dict[str, Any], console: Console) -> None:
         table.add_column(name, justify="left" if name == "axis" else "right")
     for axis, numbers in report["axes"].items():
         table.add_row(axis, *("-" if v is None else f"{v:.4g}" for v in numbers.values()))
-    console.print(table)
+    show(table, console)

@@ -36,6 +36,8 @@ class Options:
     remap: Mapping[str, str] = field(default_factory=dict)
     """Our topic by the bag's."""
     domain: int | None = None
+    trust: bool = False
+    """Whether modules and files that the bag names may be opened."""
 
 
 @dataclass(frozen=True)

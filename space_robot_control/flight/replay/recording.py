@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-import json
 import math
-import struct
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rosbags.rosbag2 import ReaderError
-
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.coverage import excused_topics, message_tick
+from space_robot_msgs_py.bag.description import read_description
+from space_robot_msgs_py.bag.findings import printable
 from space_robot_msgs_py.bag.folder import open_bag
-from space_robot_msgs_py.bag.reader import REQUIRED
-from space_robot_msgs_py.bag.recorder import FLIGHT_KEY
+from space_robot_msgs_py.bag.reader import REQUIRED, first_states, missing, timebase_of
+from space_robot_msgs_py.bag.selection import Selection
 from space_robot_msgs_py.errors import InputError, MessageError
-from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.topics import Topic
 
 from .commands import CommandList, Commands
-
-UNREADABLE = (ReaderError, OSError, ValueError, LookupError, RuntimeError, struct.error)
 
 
 class State(NamedTuple):
@@ -54,21 +49,25 @@ class Recording:
             InputError: no bag is there, it cannot be read, or has no states or references.
         """
         self.path = path
-        self._names = {ours: theirs for theirs, ours in (remap or {}).items()}
         with self._readable():
             self._bag = open_bag(path)
-            counts = self._bag.counts()
-            flight = json.loads(self._bag.custom_data().get(FLIGHT_KEY, "{}"))
-        for topic in REQUIRED:
-            if not counts.get(name := self._name(topic)):
-                there = ", ".join(sorted(n for n, count in counts.items() if count)) or "nothing"
-                raise InputError(f"{path}: no messages on {name}; there is {there}")
+            self._selection = Selection(self._bag, remap or {})
+            flight = read_description(self._bag.custom_data())
+            counts: Counter[Topic] = Counter()
+            for topic, batch in self._selection.batches():
+                counts[topic] += len(batch)
+            for topic in REQUIRED:
+                if not counts[topic]:
+                    raise missing(topic, self._bag, self._selection)
+            _, stamps = first_states(self._bag, self._selection)
+            self.timebase, doubts = timebase_of(stamps, flight)
+            if doubts:
+                raise InputError(doubts[0])
         self.flight: dict[str, Any] = flight
         """What was flown, as recorded; empty for a bag of another recorder."""
-        self.timebase = Timebase(round(float(flight.get("period", 0.0005)) * 1e9))
-        self.states_count = counts[self._name(topics.JOINT_STATES)]
+        self.states_count = counts[topics.JOINT_STATES]
         """Ticks, about."""
-        self.has_commands = bool(counts.get(self._name(topics.COMMAND)))
+        self.has_commands = bool(counts[topics.COMMAND])
         self.is_finished = self._bag.finished
         self.answers_are_complete = bool(flight) and topics.COMMAND.name not in excused_topics(
             flight
@@ -121,22 +120,19 @@ class Recording:
         if begun:
             yield begun
 
-    def _name(self, topic: Topic) -> str:
-        """Of a topic in this bag."""
-        return self._names.get(topic.name, topic.name)
-
     def _messages(self, *wanted: Topic) -> Iterator[tuple[Topic, bytes]]:
-        by_name = {self._name(topic): topic for topic in wanted}
-        named = [topic._replace(name=name) for name, topic in by_name.items()]
         with self._readable():
-            for name, data in self._bag.messages(*named):
-                yield by_name[name], data
+            for topic, batch in self._selection.batches():
+                if topic in wanted:
+                    yield from ((topic, batch.message(i)) for i in range(len(batch)))
 
     @contextmanager
     def _readable(self) -> Iterator[None]:
         try:
             yield
-        except InputError:
-            raise
-        except UNREADABLE as error:
-            raise InputError(f"{self.path}: cannot be read as a flight ({error})") from None
+        except InputError as error:
+            text = printable(str(error))
+            raise InputError(text if str(self.path) in text else f"{self.path}: {text}") from None
+        except OSError as error:
+            why = error.strerror or error
+            raise InputError(f"{self.path}: cannot be read ({why})") from None

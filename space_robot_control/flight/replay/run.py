@@ -39,8 +39,9 @@ def replay(options: Options) -> Replay:
     recording = Recording(options.bag, options.remap)
     with tempfile.TemporaryDirectory(prefix="space_robot_replay_") as folder:
         choice = ControllerChoice(
-            recording.flight, Path(folder), options.controller, options.gains, options.parameters
-        )
+            recording.flight, Path(folder), options.controller, options.gains, options.parameters,
+            options.trust,
+        )  # fmt: skip
         require_ros()
         return _Run(options, recording, choice).run()
 

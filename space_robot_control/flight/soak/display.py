@@ -7,6 +7,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from ...terminal import say, show
+
 
 def print_soak(report: dict[str, Any], console: Console) -> None:
     """Print the report of `run.Soak`."""
@@ -19,7 +21,7 @@ def print_soak(report: dict[str, Any], console: Console) -> None:
     table.add_column()
     for row in rows(report):
         table.add_row(*row)
-    console.print(table)
+    show(table, console)
     for flown in report["each"]:
         if flown["survived"]:
             continue
@@ -27,7 +29,8 @@ def print_soak(report: dict[str, Any], console: Console) -> None:
         lines.append(f"again: {flown['command']}")
         if flown["bag"]:
             lines.append(f"bag: {flown['bag']}")
-        console.print("\n  ".join(lines), markup=False, highlight=False, soft_wrap=True)
+        for line in lines:
+            say(console, line if line is lines[0] else f"  {line}")
 
 
 def rows(report: dict[str, Any]) -> list[tuple[str, str, str]]:

@@ -1,0 +1,106 @@
+"""What a bag says of its flight, checked: a bag may be anybody's, and its words anything.
+
+One schema for all who read descriptions. Keys that it does not know are taken as they are: newer
+software may have noted more.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue
+
+from ..errors import InputError
+from ..validation import check
+from .findings import printable
+from .recorder import FLIGHT_KEY
+
+WHERE = "the description of the flight"
+LONGEST_PERIOD = 10.0
+"""s; with more than that nothing is flown."""
+_DEEPEST = 32
+"""Lists and mappings within one another."""
+_LARGEST = sys.float_info.max
+
+
+def _printable(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("letters that can be shown were expected")
+    return text
+
+
+Text = Annotated[str, AfterValidator(_printable)]
+Count = Annotated[int, Field(ge=0, le=2**63 - 1)]
+
+
+class _Open(BaseModel):
+    """Takes keys it does not know; types are not changed."""
+
+    model_config = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class _Told(_Open):
+    """What a node was told, as far as it names things; the rest is for the node's own schema."""
+
+    robot: Text = ""
+    mission: Text = ""
+    case: Text = ""
+    controller: Text = ""
+    gains: Text = ""
+    swaps: list[Text] = Field(default_factory=list)
+    faults: list[Text] = Field(default_factory=list)
+
+
+class _Description(_Open):
+    controller: Text = ""
+    case: Text = ""
+    gains: Text = ""
+    robot: Text = ""
+    mission: Text = ""
+    period: Annotated[float, Field(ge=1e-9, le=LONGEST_PERIOD)] = 0.0005
+    ticks: Count = 0
+    command_latency_ticks: Annotated[int, Field(ge=0, le=10**6)] = 0
+    friction: bool = True
+    realtime: bool = False
+    seed: Count = 0
+    faults: list[Text] = Field(default_factory=list)
+    swaps: list[Text] = Field(default_factory=list)
+    restart_controller: bool = False
+    parameters: dict[Text, _Told] = Field(default_factory=dict)
+    gains_used: dict[Text, list[float]] = Field(default_factory=dict)
+    robot_file: dict[Text, JsonValue] = Field(default_factory=dict)
+
+
+def read_description(noted: Mapping[str, str]) -> dict[str, Any]:
+    """What was flown, from a bag's ``custom_data``; empty for a bag of another recorder.
+
+    Raises:
+        InputError: it is there but cannot be used; one line that names the key.
+    """
+    if (text := noted.get(FLIGHT_KEY)) is None:
+        return {}
+    try:
+        content = json.loads(text)
+    except (ValueError, RecursionError):
+        raise InputError(f"{WHERE} cannot be read") from None
+    if not isinstance(content, dict):
+        raise InputError(f"{WHERE} cannot be read: a mapping was expected")
+    if fault := next(_unwritable(content, "", _DEEPEST), ""):
+        raise InputError(f"{WHERE} cannot be used: {printable(fault)}")
+    check(_Description, content, f"{WHERE} cannot be used")
+    return content
+
+
+def _unwritable(value: Any, key: str, depth: int) -> Iterator[str]:
+    """What cannot be written as JSON again, wherever it stands, known key or not."""
+    if depth == 0:
+        yield f"{key[:80]}: nested too deeply"
+    elif isinstance(value, (dict, list)):
+        inside = value.items() if isinstance(value, dict) else enumerate(value)
+        for name, inner in inside:
+            yield from _unwritable(inner, f"{key}.{name}" if key else str(name), depth - 1)
+    elif isinstance(value, (int, float)) and not -_LARGEST <= value <= _LARGEST:
+        yield f"{key[:80]}: a finite number was expected"
