@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -129,20 +130,42 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
       space-robot simulate --no-friction --case 2 --json
       space-robot simulate --bag flights/in_process
     """
-    from .analysis import analyse
+    from contextlib import closing
+
+    from space_robot_msgs_py.errors import FlightError
+
+    from .analysis import Analysis
     from .flight.compilation import compile_kernels
     from .flight.display import flight_progress
     from .flight.plan import check_bag_path
-    from .flight.simulate import simulate as run
+    from .flight.room import room_remark
+    from .flight.simulate import fly_blocks
 
     flight = _plan(**options)
     if bag:
         check_bag_path(bag)
+        if remark := room_remark(flight, bag):
+            click.echo(remark, err=True)
     compile_kernels()
-    period = flight.period
+    period, analysis, began = flight.period, Analysis(), time.monotonic()
     with flight_progress(flight.ticks * period, flight.controller.law.name) as show:
-        log = run(flight, bag, lambda tick: show(tick * period, ""))
-    _report(analyse(log), as_json)
+
+        def progress(tick: int) -> None:
+            rate = tick * period / (time.monotonic() - began)
+            show(tick * period, f"{rate:.0f} times real time")
+
+        failure = None
+        with closing(fly_blocks(flight, bag, progress)) as blocks:
+            try:
+                for block in blocks:
+                    analysis.add(block)
+            except FlightError as error:
+                failure = error
+    if analysis.ticks:
+        report = analysis.report()
+        _report({**report, "failure": str(failure)} if failure else report, as_json)
+    if failure:
+        raise failure
 
 
 cli.add_command(analyze)

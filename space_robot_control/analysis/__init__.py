@@ -3,15 +3,18 @@
 | module | figures |
 |---|---|
 | `metrics` | RMS in both definitions, maxima, chatter |
+| `spectrum` | power above 100 Hz |
 | `settling` | time until the error stays small after a motion |
 | `actuation` | saturation, latency, commands that were not applied |
 | `estimate_error` | error of the time-delay estimate |
 | `pointing` | end effector's pointing in the inertial frame |
 | `report` | all of them, as a dictionary |
+
+All are summed up over blocks of a flight (`blocks`), so that it may be longer than memory.
 """
 
 from .excerpt import excerpt
 from .metrics import tracking_error
-from .report import analyse
+from .report import Analysis, analyse
 
-__all__ = ["analyse", "excerpt", "tracking_error"]
+__all__ = ["Analysis", "analyse", "excerpt", "tracking_error"]

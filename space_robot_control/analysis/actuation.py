@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.flight_log import FlightLog
 
+from .blocks import Figure, last_rows
 from .generalised_motion import measured_rows
 
 Array = NDArray[np.float64]
@@ -27,56 +29,106 @@ class TorqueLimits(NamedTuple):
         return np.array([self.base] * 3 + [self.joint] * (axes - 3))
 
 
-def saturated_ticks(log: FlightLog, limits: TorqueLimits) -> int:
+class Saturation(Figure):
     """Ticks at which the torque applied on some axis was at its limit.
 
     The plant clips to the limit, so "at" is exact but for the rounding of whoever recorded.
     """
-    at_limit = np.abs(log.applied_torque) >= limits.of_axes(log.axes) * (1.0 - 1e-9)
-    return int(np.count_nonzero(at_limit.any(axis=1)))
+
+    def __init__(self, limits: TorqueLimits) -> None:
+        self._limits = limits
+        self._ticks = self._rows = 0
+
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows."""
+        limit = self._limits.of_axes(log.axes) * (1.0 - 1e-9)
+        at_limit = np.abs(log.applied_torque) >= limit
+        self._ticks += int(np.count_nonzero(at_limit.any(axis=1)))
+        self._rows += log.ticks
+
+    def result(self) -> dict[str, Any]:
+        """Limits (None: none), ticks, and their share."""
+        base, joint = self._limits
+        return {
+            "base_torque_limit_n_m": base if np.isfinite(base) else None,
+            "joint_torque_limit_n_m": joint if np.isfinite(joint) else None,
+            "ticks": self._ticks,
+            "share": self._ticks / self._rows,
+        }
 
 
-def latency(latency_s: Array, period: float) -> dict[str, float] | None:
-    """Percentiles of the time from a state's sending to its answer's, by the wall clock.
+class Latency(Figure):
+    """Percentiles of the time from a state's sending to its answer's, by the wall clock."""
 
-    Args:
-        latency_s: (N,) s, NaN where there was no answer.
-        period: s, of a tick.
+    def __init__(self, period: float) -> None:
+        """``period``: s, of a tick."""
+        self._period = period
+        self._known: list[Array] = []
 
-    Returns:
-        ``p50_ms``, ``p99_ms``, ``max_ms``, the same as ``..._ticks``, and the ``answers`` they
-        are of; None if there is not one.
-    """
-    known = latency_s[np.isfinite(latency_s)]
-    if not len(known):
-        return None
-    values = dict(zip(PERCENTILES, np.percentile(known, list(PERCENTILES.values())), strict=True))
-    return {
-        **{f"{name}_ms": float(1e3 * value) for name, value in values.items()},
-        **{f"{name}_ticks": float(value / period) for name, value in values.items()},
-        "answers": len(known),
-    }
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows; where a graph was flown, 8 bytes a tick are kept."""
+        if log.latency_s is not None:
+            self._known.append(log.latency_s[np.isfinite(log.latency_s)])
+
+    def result(self) -> dict[str, float]:
+        """``p50_ms``, ``p99_ms``, ``max_ms``, as ``..._ticks``, and how many ``answers``."""
+        known = np.concatenate([np.empty(0), *self._known])
+        if not len(known):
+            raise InputError("no wall-clock times of states and commands: not flown as a graph")
+        found = np.percentile(known, list(PERCENTILES.values()))
+        values = dict(zip(PERCENTILES, found, strict=True))
+        return {
+            **{f"{name}_ms": float(1e3 * value) for name, value in values.items()},
+            **{f"{name}_ticks": float(value / self._period) for name, value in values.items()},
+            "answers": len(known),
+        }
 
 
-def differing_commands(
-    log: FlightLog, latency_ticks: int, limits: TorqueLimits
-) -> tuple[int, int] | None:
+class Misses(Figure):
     """Ticks after which the plant applied something else than what was commanded for them.
 
     The torque applied over the interval that begins at tick k is reported with the state of tick
     k+1; commanded for it was the answer to tick ``k - latency_ticks``, clipped to the limits. In
     lockstep they are the same to the last bit. By the wall clock the plant holds the command
     before where an answer is late.
-
-    Returns:
-        How many differ, and of how many that were compared (those with a command); None if no
-        command is known.
     """
-    if log.commanded_torque is None or np.isnan(log.commanded_torque).all():
-        return None
-    ends = slice(latency_ticks + 1, log.ticks)
-    applied, limit = log.applied_torque[ends], limits.of_axes(log.axes)
-    commanded = np.clip(log.commanded_torque[: len(applied)], -limit, limit)
-    known = np.isfinite(commanded).all(axis=1) & measured_rows(log)[ends]
-    differ = np.any(applied != commanded, axis=1) & known
-    return int(np.count_nonzero(differ)), int(np.count_nonzero(known))
+
+    def __init__(self, latency_ticks: int, limits: TorqueLimits) -> None:
+        self._delay, self._limits = latency_ticks + 1, limits
+        self._before: FlightLog | None = None
+        """The last row."""
+        self._due: Array | None = None
+        """(K, m) commands of the last rows, K up to the delay."""
+        self._known = self._unanswered = 0
+        self.differing = self.compared = 0
+        """Ticks that differ, and those that were compared: they have a command."""
+
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows."""
+        measured = measured_rows(log, self._before)
+        self._before, self._unanswered = last_rows(log, 1), log.unanswered
+        if log.commanded_torque is None:
+            return
+        self._known += int(np.count_nonzero(np.isfinite(log.commanded_torque[:, 0])))
+        commands = log.commanded_torque
+        if self._due is not None:
+            commands = np.concatenate([self._due, commands])
+        # the first row that applies one of them is ``delay`` rows behind the first of them
+        applied = log.applied_torque[max(0, log.ticks + self._delay - len(commands)) :]
+        limit = self._limits.of_axes(log.axes)
+        commanded = np.clip(commands[: len(applied)], -limit, limit)
+        known = np.isfinite(commanded).all(axis=1) & measured[log.ticks - len(applied) :]
+        differ = np.any(applied != commanded, axis=1) & known
+        self.differing += int(np.count_nonzero(differ))
+        self.compared += int(np.count_nonzero(known))
+        self._due = commands[-self._delay :].copy()
+
+    def result(self) -> dict[str, int]:
+        """Unanswered, compared and differing ticks."""
+        if not self._known:
+            raise InputError("the commands were not recorded")
+        return {
+            "unanswered_ticks": self._unanswered,
+            "compared_ticks": self.compared,
+            "differing_ticks": self.differing,
+        }

@@ -8,12 +8,22 @@ the mean acceleration over it. Both are in a bag, so N_hat follows without the t
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.flight_log import FlightLog
 
-from .generalised_motion import applied_force, mean_acceleration, measured_rows
+from .blocks import Figure, joined, last_rows
+from .generalised_motion import (
+    applied_force,
+    continuous_quaternion,
+    mean_acceleration,
+    measured_rows,
+)
+from .metrics import AxisMaximum, AxisRms, Table, axis_groups
 
 Array = NDArray[np.float64]
 
@@ -27,38 +37,105 @@ def neglected_force(log: FlightLog, h_bar: Array) -> Array:
     return applied_force(log) - h_bar * mean_acceleration(log)
 
 
-def delayed_estimate(neglected: Array, smoothing: float = 0.0, rest: bool = True) -> Array:
-    """(N-1, m) ``N_hat`` at the ticks 1 to N-1, as the controller forms it.
+class DelayedEstimate:
+    """``N_hat`` as the controller forms it, from `neglected_force` in parts."""
 
-    Args:
-        neglected: (N-1, m) `neglected_force`.
-        smoothing: weight of a new pair in the low-pass, see
-            `time_delay_estimation.low_pass_weight`; 0: no low-pass.
-        rest: whether the rows begin at the flight's start, at rest; else the low-pass begins at
-            the first row.
+    def __init__(self, smoothing: float = 0.0, rest: bool = True) -> None:
+        """Begin without rows.
+
+        Args:
+            smoothing: weight of a new pair in the low-pass, see
+                `time_delay_estimation.low_pass_weight`; 0: no low-pass.
+            rest: whether the rows begin at the flight's start, at rest; else the low-pass begins
+                at the first row.
+        """
+        self._smoothing, self._rest = smoothing, rest
+        self._state: Array | None = None
+
+    def of(self, neglected: Array) -> Array:
+        """(K, m) ``N_hat`` at the ends of the intervals of ``neglected`` (K, m)."""
+        smoothing = self._smoothing
+        if not (0.0 < smoothing < 1.0 and len(neglected)):
+            return neglected
+        from scipy.signal import lfilter  # slow to import, and hardly ever needed
+
+        if self._state is None:
+            before = np.zeros_like(neglected[:1]) if self._rest else neglected[:1]
+            self._state = (1.0 - smoothing) * before
+        estimate: Array
+        estimate, self._state = lfilter(
+            [smoothing], [1.0, smoothing - 1.0], neglected, axis=0, zi=self._state
+        )
+        return estimate
+
+
+class EstimateErrors:
+    """``N - N_hat`` of a flight in parts, in the units of `neglected_force`.
+
+    It is known from the third row on, at the tick before. Ticks whose state was filled in
+    (`FlightLog.filled`), and their neighbours, are left out: what stands there was not measured.
     """
-    if not 0.0 < smoothing < 1.0:
-        return neglected
-    from scipy.signal import lfilter  # slow to import, and hardly ever needed
 
-    before = np.zeros_like(neglected[:1]) if rest else neglected[:1]
-    estimate: Array
-    estimate, _ = lfilter(
-        [smoothing], [1.0, smoothing - 1.0], neglected, axis=0, zi=(1.0 - smoothing) * before
-    )
-    return estimate
+    def __init__(self, h_bar: Array, smoothing: float = 0.0, rest: bool = True) -> None:
+        """``h_bar``: (m,); the others as in `DelayedEstimate`."""
+        self._h_bar = h_bar
+        self._estimates = DelayedEstimate(smoothing, rest)
+        self._before: FlightLog | None = None
+        """The last two rows, or the only one."""
+        self._side = 1.0
+        """1 if Q continues from Q in these rows, -1 if from -Q."""
+        self._measured = np.empty(0, np.bool_)
+        """Of these rows."""
+        self._estimate = np.empty((0, len(h_bar)))
+        """At the last row."""
+
+    def of(self, log: FlightLog) -> Array:
+        """(K, m) those that become known with the rows of ``log``."""
+        before = self._before
+        rows = joined(before, log)
+        recorded = rows.quaternion
+        rows = replace(rows, quaternion=self._side * continuous_quaternion(rows))
+        measured = np.concatenate([self._measured, measured_rows(log, before)])
+        seen = max(0, rows.ticks - log.ticks - 1)  # intervals
+        with np.errstate(divide="ignore", invalid="ignore"):  # J0 may be singular
+            neglected = neglected_force(rows.rows(seen, rows.ticks), self._h_bar)
+        estimates = np.concatenate([self._estimate, self._estimates.of(neglected)])
+        error: Array = neglected[len(neglected) - len(estimates) + 1 :] - estimates[:-1]
+        there = measured[:-2] & measured[1:-1] & measured[2:]
+        self._before, self._measured = (
+            last_rows(replace(rows, quaternion=recorded), 2),
+            measured[-2:],
+        )
+        self._side = 1.0 if np.array_equal(rows.quaternion[-2:][0], recorded[-2:][0]) else -1.0
+        self._estimate = estimates[-1:].copy()
+        if log.filled:
+            error = error[there]
+        return error
 
 
-def estimate_error(log: FlightLog, h_bar: Array, smoothing: float = 0.0) -> Array:
-    """(K, m) ``N - N_hat`` at the ticks 1 to N-2, in the units of `neglected_force`.
+class EstimateError(Figure):
+    """RMS and largest absolute value of `EstimateErrors`, by group of axes."""
 
-    Ticks whose state was filled in (`FlightLog.filled`), and their neighbours, are left out: what
-    stands there was not measured.
-    """
-    neglected = neglected_force(log, h_bar)
-    estimate = delayed_estimate(neglected, smoothing, rest=log.first_tick == 0)
-    error = neglected[1:] - estimate[:-1]
-    if log.filled:
-        there = measured_rows(log)
-        error = error[there[:-2] & there[1:-1] & there[2:]]
-    return error
+    def __init__(self, log: FlightLog, h_bar: Array, smoothing: float) -> None:
+        """``log``: the first rows; the others as in `EstimateErrors`."""
+        self._errors = EstimateErrors(h_bar, smoothing, rest=log.first_tick == 0)
+        self._rms, self._maximum = AxisRms(log.axes), AxisMaximum(log.axes)
+
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows."""
+        errors = self._errors.of(log)
+        self._rms.add(errors**2)
+        self._maximum.add(errors)
+
+    def result(self) -> Table:
+        """``rms`` and ``max`` by group."""
+        if not self._rms.rows:
+            raise InputError("three measured states in a row are needed")
+        each, largest = self._rms.value, self._maximum.value
+        if not np.isfinite(each).all():
+            raise InputError("the base turned by 180 degrees, where J0 of (1) is singular")
+        groups = axis_groups(len(each) - 3)
+        return {
+            "rms": {name: float(np.mean(each[axes])) for name, axes in groups.items()},
+            "max": {name: float(np.max(largest[axes])) for name, axes in groups.items()},
+        }

@@ -10,13 +10,21 @@ from space_robot_msgs_py.flight_log import FlightLog
 Array = NDArray[np.float64]
 
 
-def measured_rows(log: FlightLog) -> NDArray[np.bool_]:
-    """(N,) whether a tick's state was measured: one that was filled in repeats the one before."""
+def measured_rows(log: FlightLog, before: FlightLog | None = None) -> NDArray[np.bool_]:
+    """(N,) whether a tick's state was measured: one that was filled in repeats the one before.
+
+    ``before``: rows before those of ``log`` (None: the flight begins with it).
+    """
     there = np.ones(log.ticks, dtype=bool)
     if log.filled:
-        state = np.hstack([log.quaternion, log.omega_base, log.joint_positions])
-        there[1:] = np.any(state[1:] != state[:-1], axis=1)
+        state = _state(log)
+        last = state[:1] + np.nan if before is None else _state(before)[-1:]
+        there = np.any(np.diff(state, axis=0, prepend=last) != 0.0, axis=1)
     return there
+
+
+def _state(log: FlightLog) -> Array:
+    return np.hstack([log.quaternion, log.omega_base, log.joint_positions])
 
 
 def continuous_quaternion(log: FlightLog) -> Array:

@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.flight_log import FlightLog
 
-Array = NDArray[np.float64]
+from .blocks import Figure, blocks_of
+from .spectrum import PowerAbove
 
-CHATTER_FREQUENCY = 100.0
-"""Hz; power above it is chatter."""
-LONG = 200_000
-"""Samples from which on the spectrum is of the next length that is fast, padded with zeros."""
+Array = NDArray[np.float64]
+Table = dict[str, dict[str, float]]
 
 
 def axis_groups(n: int) -> dict[str, slice]:
@@ -27,6 +26,16 @@ def axis_groups(n: int) -> dict[str, slice]:
     if n > 3:
         groups[f"4_{n}"] = slice(6, 3 + n)
     return groups
+
+
+def error_columns(axes: int) -> dict[str, slice]:
+    """Which of the m = n+3 axes each error column of Table V is of."""
+    return _columns(axis_groups(axes - 3), "attitude", "joints")
+
+
+def torque_columns(axes: int) -> dict[str, slice]:
+    """Which of the m = n+3 axes each torque column of Table V is of."""
+    return _columns(axis_groups(axes - 3), "base_torque", "torque")
 
 
 def tracking_error(log: FlightLog) -> Array:
@@ -40,101 +49,192 @@ def tracking_error(log: FlightLog) -> Array:
     return error
 
 
-def axis_rms(values: Array) -> Array:
-    """Each axis' RMS; ``values`` (N, axes)."""
-    rms: Array = np.sqrt(np.mean(values**2, axis=0))
-    return rms
+def largest_of_columns(values: Array) -> Array:
+    """(N,) largest absolute value of each row; faster than NumPy's own over short rows."""
+    return reduce(np.maximum, np.abs(values.T))
+
+
+class AxisRms:
+    """RMS of each axis, of rows (N, axes) that come in parts."""
+
+    def __init__(self, axes: int) -> None:
+        self.rows = 0
+        self._squares = np.zeros(axes)
+
+    def add(self, squares: Array) -> None:
+        """Take the squares of further rows."""
+        self.rows += len(squares)
+        self._squares += np.sum(squares, axis=0)
+
+    @property
+    def value(self) -> Array:
+        """(axes,)."""
+        rms: Array = np.sqrt(self._squares / self.rows)
+        return rms
+
+
+class AxisMaximum:
+    """Largest absolute value of each axis, of rows (N, axes) that come in parts."""
+
+    def __init__(self, axes: int) -> None:
+        self.value = np.zeros(axes)
+        """(axes,)."""
+
+    def add(self, values: Array) -> None:
+        """Take further rows."""
+        self.value = np.maximum(self.value, np.max(np.abs(values), axis=0, initial=0.0))
+
+
+class Eq64:
+    """(64): a third of the RMS of the vector (for other than three axes, that share of it)."""
+
+    def __init__(self) -> None:
+        self._sum, self._rows, self._axes = 0.0, 0, 1
+
+    def add(self, squares: Array) -> None:
+        """Take the squares of further rows (N, axes)."""
+        self._sum += float(np.sum(_sum_of_columns(squares)))
+        self._rows += len(squares)
+        self._axes = squares.shape[1]
+
+    @property
+    def value(self) -> float:
+        """In the unit of the axes."""
+        return float(np.sqrt(self._sum / self._rows) / self._axes)
 
 
 def mean_axis_rms(values: Array) -> float:
     """Mean over the axes of each axis' RMS; ``values`` (N, axes)."""
-    return float(np.mean(axis_rms(values)))
+    figure = AxisRms(values.shape[1])
+    figure.add(values**2)
+    return float(np.mean(figure.value))
 
 
 def eq64_rms(values: Array) -> float:
-    """(64): a third of the RMS of the vector (for other than three axes, that share of it)."""
-    return float(np.sqrt(np.mean(_sum_of_columns(values**2))) / values.shape[1])
+    """`Eq64` of ``values`` (N, axes)."""
+    figure = Eq64()
+    figure.add(values**2)
+    return figure.value
 
 
-def total_variation_per_second(values: Array, period: float) -> float:
-    """Mean over the axes of ``sum |x_k+1 - x_k|`` per second."""
-    if len(values) < 2:
-        return 0.0
-    variation = np.sum(np.abs(np.diff(values, axis=0)), axis=0)
-    return float(np.mean(variation) / ((len(values) - 1) * period))
+class TotalVariation:
+    """``sum |x_k+1 - x_k|`` of each axis."""
+
+    def __init__(self, axes: int) -> None:
+        self._variation, self._rows = np.zeros(axes), 0
+        self._last = np.empty((0, axes))
+
+    def add(self, values: Array) -> None:
+        """Take further rows (N, axes); the step from the last row before counts."""
+        steps = np.diff(values, axis=0, prepend=self._last)
+        self._variation += np.sum(np.abs(steps), axis=0)
+        self._last = values[-1:].copy()
+        self._rows += len(values)
+
+    def per_second(self, axes: slice, period: float) -> float:
+        """Mean over some axes, per second of rows that are ``period`` s apart."""
+        if self._rows < 2:
+            return 0.0
+        return float(np.mean(self._variation[axes]) / ((self._rows - 1) * period))
 
 
-def power_above(values: Array, period: float, frequency: float = CHATTER_FREQUENCY) -> float:
-    """Mean over the axes of the share of power above ``frequency`` Hz (Hann window)."""
-    if len(values) < 2 or 0.5 / period <= frequency:
-        return 0.0
-    window = np.hanning(len(values))[:, np.newaxis]  # keeps slow motion from leaking upwards
-    length = _transform_length(len(values))
-    power = np.abs(np.fft.rfft(window * values, length, axis=0)) ** 2
-    f = np.fft.rfftfreq(length, period)
-    power[(f > 0.0) & (f < 0.5 / period * (1.0 - 1e-12))] *= 2.0  # the negative frequencies' half
-    total = np.sum(power, axis=0)
-    high = np.sum(power[f > frequency], axis=0)
-    return float(np.mean(np.divide(high, total, out=np.zeros_like(high), where=total > 0.0)))
-
-
-def _transform_length(samples: int) -> int:
-    """``samples``, or a little more where that is long: a prime takes five times as long."""
-    if samples < LONG:
-        return samples
-    from scipy.fft import next_fast_len  # half a second to import
-
-    return int(next_fast_len(samples, real=True))
-
-
-def rms(log: FlightLog) -> dict[str, dict[str, float]]:
+class Rms(Figure):
     """The RMS of errors and torques, by definition and column of Table V."""
-    found: dict[str, dict[str, float]] = {"mean_axis": {}, "eq64": {}}
-    for values, names in (
-        (tracking_error(log), error_columns(log.axes)),
-        (log.applied_torque, torque_columns(log.axes)),
-    ):
-        each = axis_rms(values)
-        for name, axes in names.items():
-            found["mean_axis"][name] = float(np.mean(each[axes]))
-            found["eq64"][name] = eq64_rms(values[:, axes])
-    return found
+
+    def __init__(self, axes: int) -> None:
+        self._each = AxisRms(axes), AxisRms(axes)
+        self._columns = error_columns(axes), torque_columns(axes)
+        self._eq64 = {name: Eq64() for columns in self._columns for name in columns}
+
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows."""
+        for each, columns, values in zip(
+            self._each, self._columns, (error, log.applied_torque), strict=True
+        ):
+            squares = values**2
+            each.add(squares)
+            for name, axes in columns.items():
+                self._eq64[name].add(squares[:, axes])
+
+    def result(self) -> Table:
+        """By definition and column."""
+        return {
+            "mean_axis": {
+                name: float(np.mean(each.value[axes]))
+                for each, columns in zip(self._each, self._columns, strict=True)
+                for name, axes in columns.items()
+            },
+            "eq64": {name: eq64.value for name, eq64 in self._eq64.items()},
+        }
 
 
-def chatter(log: FlightLog) -> dict[str, dict[str, float]]:
-    """How rough the torques are, by measure and column of Table V."""
-    torques = {name: log.applied_torque[:, axes] for name, axes in torque_columns(log.axes).items()}
-    period = log.timebase.period
-    return {
-        "total_variation_per_s": {
-            name: total_variation_per_second(torque, period) for name, torque in torques.items()
-        },
-        "power_above_100_hz": {
-            name: power_above(torque, period) for name, torque in torques.items()
-        },
-    }
+class Maxima(Figure):
+    """Largest |error| and |torque| on any axis, by column of Table V."""
+
+    def __init__(self, axes: int) -> None:
+        self._error, self._torque = AxisMaximum(axes), AxisMaximum(axes)
+
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows."""
+        self._error.add(error)
+        self._torque.add(log.applied_torque)
+
+    def result(self) -> dict[str, float]:
+        """By column, in its unit."""
+        axes = len(self._error.value)
+        return {
+            name: float(np.max(each.value[columns]))
+            for each, names in (
+                (self._error, error_columns(axes)),
+                (self._torque, torque_columns(axes)),
+            )
+            for name, columns in names.items()
+        }
 
 
-def maxima(log: FlightLog) -> dict[str, float]:
-    """Largest |error| and |torque| on any axis, by column of Table V, in its unit."""
-    found: dict[str, float] = {}
-    for values, names in (
-        (tracking_error(log), error_columns(log.axes)),
-        (log.applied_torque, torque_columns(log.axes)),
-    ):
-        each = np.max(np.abs(values), axis=0)
-        found |= {name: float(np.max(each[axes])) for name, axes in names.items()}
-    return found
+class Chatter(Figure):
+    """How rough the applied torques are, by measure and column of Table V."""
+
+    def __init__(self, axes: int, period: float) -> None:
+        self._period, self._columns = period, torque_columns(axes)
+        self._variation, self._power = TotalVariation(axes), PowerAbove(axes, period)
+
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows."""
+        self._variation.add(log.applied_torque)
+        self._power.add(log.applied_torque)
+
+    def result(self) -> Table:
+        """By measure and column."""
+        shares = self._power.shares()
+        return {
+            "total_variation_per_s": {
+                name: self._variation.per_second(axes, self._period)
+                for name, axes in self._columns.items()
+            },
+            "power_above_100_hz": {
+                name: float(np.mean(shares[axes])) for name, axes in self._columns.items()
+            },
+        }
 
 
-def error_columns(axes: int) -> dict[str, slice]:
-    """Which of the m = n+3 axes each error column of Table V is of."""
-    return _columns(axis_groups(axes - 3), "attitude", "joints")
+def rms(log: FlightLog) -> Table:
+    """`Rms` of a whole log."""
+    figure = Rms(log.axes)
+    _add_all(figure, log)
+    return figure.result()
 
 
-def torque_columns(axes: int) -> dict[str, slice]:
-    """Which of the m = n+3 axes each torque column of Table V is of."""
-    return _columns(axis_groups(axes - 3), "base_torque", "torque")
+def chatter(log: FlightLog) -> Table:
+    """`Chatter` of a whole log."""
+    figure = Chatter(log.axes, log.timebase.period)
+    _add_all(figure, log)
+    return figure.result()
+
+
+def _add_all(figure: Figure, log: FlightLog) -> None:
+    for block in blocks_of(log):
+        figure.add(block, tracking_error(block))
 
 
 def _columns(groups: dict[str, slice], base: str, prefix: str) -> dict[str, slice]:

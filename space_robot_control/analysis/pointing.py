@@ -16,6 +16,9 @@ from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_sim.robot import Robot
 from space_robot_sim.tool import tool_pose
 
+from .blocks import Figure
+from .metrics import AxisMaximum, AxisRms, Table
+
 Array = NDArray[np.float64]
 
 ARCSEC = np.pi / 180.0 / 3600.0
@@ -35,15 +38,46 @@ class PointingError(NamedTuple):
     """(N,) m, of the base's CoM from where it was at the first tick."""
 
 
-def pointing_error(log: FlightLog, robot: Robot) -> PointingError:
-    """The error of the tool's pose at every tick of a flight of ``robot``."""
+class Pointing(Figure):
+    """RMS, maximum and last value of each figure of a `PointingError`."""
+
+    def __init__(self, log: FlightLog, robot: Robot) -> None:
+        """``log``: the first rows; the base's drift counts from there."""
+        self._robot, self._start = robot, log.base_position[:1].copy()
+        figures = len(PointingError._fields)
+        self._rms, self._maximum = AxisRms(figures), AxisMaximum(figures)
+        self._end: Array = np.empty(0)
+
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows."""
+        values = np.stack(pointing_error(log, self._robot, self._start)).T
+        self._rms.add(values**2)
+        self._maximum.add(values)
+        self._end = values[-1]
+
+    def result(self) -> Table:
+        """``rms``, ``max`` and ``end`` by figure."""
+        names = ("boresight_rad", "rotation_rad", "tool_position_m", "base_drift_m")
+        kinds = {"rms": self._rms.value, "max": self._maximum.value, "end": self._end}
+        return {
+            name: {kind: float(values[i]) for kind, values in kinds.items()}
+            for i, name in enumerate(names)
+        }
+
+
+def pointing_error(log: FlightLog, robot: Robot, start: Array | None = None) -> PointingError:
+    """The error of the tool's pose at every tick of a flight of ``robot``.
+
+    ``start``: (1, 3) m, where the base was when the flight began (None: at the first tick here).
+    """
+    start = log.base_position[:1] if start is None else start
     actual, place = tool_pose(robot, _unit(log.quaternion), log.joint_positions)
     desired, wanted = tool_pose(robot, _unit(log.reference_base[:, :4]), log.reference_joints[:, 0])
     return PointingError(
         boresight=angle_between(actual[:, :, 2], desired[:, :, 2]),
         rotation=rotation_angle(actual, desired),
         position=np.linalg.norm(place - wanted, axis=1),
-        base_drift=np.linalg.norm(log.base_position - log.base_position[:1], axis=1),
+        base_drift=np.linalg.norm(log.base_position - start, axis=1),
     )
 
 

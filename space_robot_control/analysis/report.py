@@ -6,19 +6,20 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.flight_log import FlightLog
 
-from .actuation import TorqueLimits, differing_commands, latency, saturated_ticks
-from .described import NotDescribedError, estimator, robot_of, torque_limits
-from .estimate_error import estimate_error
-from .metrics import axis_groups, axis_rms, chatter, error_columns, maxima, rms, tracking_error
-from .pointing import PointingError, pointing_error
-from .settling import BAND, last_waypoint, settling_time
+from .actuation import Latency, Misses, Saturation, TorqueLimits
+from .blocks import Figure, blocks_of
+from .described import estimator, robot_of, torque_limits
+from .estimate_error import EstimateError
+from .metrics import Chatter, Maxima, Rms, tracking_error
+from .pointing import Pointing
+from .settling import Settling
 
-Array = NDArray[np.float64]
+DESCRIBED = ("controller", "case", "gains", "robot")
+"""What a report repeats of a flight's description."""
 
 
 def analyse(log: FlightLog) -> dict[str, Any]:
@@ -30,36 +31,72 @@ def analyse(log: FlightLog) -> dict[str, Any]:
     Raises:
         InputError: no tick has both a state and a reference.
     """
-    log = _without_gaps(log)
-    period, flight = log.timebase.period, log.flight
-    report: dict[str, Any] = {
-        "controller": flight.get("controller"),
-        "case": flight.get("case"),
-        "gains": flight.get("gains"),
-        "robot": flight.get("robot"),
-        "ticks": log.ticks,
-        "duration_s": log.ticks * log.timebase.period_ns / 1e9,
-        "from_s": log.first_tick * log.timebase.period_ns / 1e9,
-        "to_s": (log.first_tick + log.ticks) * log.timebase.period_ns / 1e9,
-        "rms": rms(log),
-        "maxima": maxima(log),
-        "chatter": chatter(log),
-    }
-    unavailable: dict[str, str] = {}
-    for name, figure in _FIGURES.items():
-        try:
-            report[name] = figure(log, period)
-        except InputError as error:
-            report[name], unavailable[name] = None, str(error)
-    return {
-        **report,
-        "unavailable": unavailable,
-        "lost": log.lost,
-        "unanswered_ticks": log.unanswered,
-        "filled_ticks": log.filled,
-        "unfinished": log.unfinished,
-        "damage": list(log.damage),
-    }
+    analysis = Analysis()
+    for block in blocks_of(_without_gaps(log)):
+        analysis.add(block)
+    return analysis.report()
+
+
+class Analysis:
+    """`analyse` of a flight that comes block by block, as `blocks_of` cuts it and without gaps."""
+
+    def __init__(self) -> None:
+        self.ticks = 0
+        """Rows so far."""
+        self._figures: dict[str, Figure] = {}
+        self._unavailable: dict[str, str] = {}
+        self._head: dict[str, Any] = {}
+        self._tail: dict[str, Any] = {}
+
+    def add(self, block: FlightLog) -> None:
+        """Take the next block."""
+        if not self.ticks:
+            self._begin(block)
+        error = tracking_error(block)
+        for figure in self._figures.values():
+            figure.add(block, error)
+        self.ticks += block.ticks
+        self._tail = {
+            "lost": block.lost,
+            "unanswered_ticks": block.unanswered,
+            "filled_ticks": block.filled,
+            "unfinished": block.unfinished,
+            "damage": list(block.damage),
+        }
+
+    def report(self) -> dict[str, Any]:
+        """The report of all blocks so far, at least one."""
+        unavailable: dict[str, str] = {}
+        figures: dict[str, Any] = {}
+        for name in _FIGURES:
+            figures[name] = None
+            if name not in self._figures:
+                unavailable[name] = self._unavailable[name]
+                continue
+            try:
+                figures[name] = self._figures[name].result()
+            except InputError as error:
+                unavailable[name] = str(error)
+        stop, period_ns = self._first_tick + self.ticks, self._period_ns
+        return {
+            **self._head,
+            "ticks": self.ticks,
+            "duration_s": self.ticks * period_ns / 1e9,
+            "from_s": self._first_tick * period_ns / 1e9,
+            "to_s": stop * period_ns / 1e9,
+            **figures,
+            "unavailable": unavailable,
+            **self._tail,
+        }
+
+    def _begin(self, block: FlightLog) -> None:
+        self._first_tick, self._period_ns = block.first_tick, block.timebase.period_ns
+        self._head = {key: block.flight.get(key) for key in DESCRIBED}
+        for name, figure in _FIGURES.items():
+            try:
+                self._figures[name] = figure(block)
+            except InputError as error:
+                self._unavailable[name] = str(error)
 
 
 def _without_gaps(log: FlightLog) -> FlightLog:
@@ -73,89 +110,23 @@ def _without_gaps(log: FlightLog) -> FlightLog:
     return found
 
 
-def _settling(log: FlightLog, period: float) -> dict[str, Any]:
-    start = last_waypoint(log)
-    if start is None:
-        raise NotDescribedError("the arm does not come to rest with flight left after it")
-    error = tracking_error(log)
-    return {
-        "band": BAND,
-        "after_s": (log.first_tick + start) * period,
-        "settled_s": {
-            name: settling_time(error[:, axes], start, period)
-            for name, axes in error_columns(log.axes).items()
-        },
-    }
-
-
-def _saturation(log: FlightLog, period: float) -> dict[str, Any]:
-    limits = torque_limits(log)
-    ticks = saturated_ticks(log, limits)
-    return {
-        "base_torque_limit_n_m": limits.base if np.isfinite(limits.base) else None,
-        "joint_torque_limit_n_m": limits.joint if np.isfinite(limits.joint) else None,
-        "ticks": ticks,
-        "share": ticks / log.ticks,
-    }
-
-
-def _latency(log: FlightLog, period: float) -> dict[str, float]:
-    found = None if log.latency_s is None else latency(log.latency_s, period)
-    if found is None:
-        raise NotDescribedError("no wall-clock times of states and commands: not flown as a graph")
-    return found
-
-
-def _misses(log: FlightLog, period: float) -> dict[str, int]:
+def _misses(log: FlightLog) -> Misses:
     try:
         limits = torque_limits(log)
     except InputError:
         limits = TorqueLimits(np.inf, np.inf)
-    found = differing_commands(log, int(log.flight.get("command_latency_ticks", 0)), limits)
-    if found is None:
-        raise NotDescribedError("the commands were not recorded")
-    return {
-        "unanswered_ticks": log.unanswered,
-        "compared_ticks": found[1],
-        "differing_ticks": found[0],
-    }
+    return Misses(int(log.flight.get("command_latency_ticks", 0)), limits)
 
 
-def _estimate_error(log: FlightLog, period: float) -> dict[str, dict[str, float]]:
-    h_bar, smoothing = estimator(log)
-    error = estimate_error(log, h_bar, smoothing)
-    if not len(error):
-        raise NotDescribedError("three measured states in a row are needed")
-    each, largest = axis_rms(error), np.max(np.abs(error), axis=0)
-    groups = axis_groups(log.axes - 3)
-    return {
-        "rms": {name: float(np.mean(each[axes])) for name, axes in groups.items()},
-        "max": {name: float(np.max(largest[axes])) for name, axes in groups.items()},
-    }
-
-
-def _pointing(log: FlightLog, period: float) -> dict[str, dict[str, float]]:
-    return summary(pointing_error(log, robot_of(log)))
-
-
-def summary(error: PointingError) -> dict[str, dict[str, float]]:
-    """RMS, maximum and last value of each figure of a pointing error."""
-    names = ("boresight_rad", "rotation_rad", "tool_position_m", "base_drift_m")
-    return {
-        name: {
-            "rms": float(np.sqrt(np.mean(values**2))),
-            "max": float(np.max(values)),
-            "end": float(values[-1]),
-        }
-        for name, values in zip(names, error, strict=True)
-    }
-
-
-_FIGURES: dict[str, Callable[[FlightLog, float], dict[str, Any]]] = {
-    "settling": _settling,
-    "saturation": _saturation,
-    "latency": _latency,
+_FIGURES: dict[str, Callable[[FlightLog], Figure]] = {
+    "rms": lambda log: Rms(log.axes),
+    "maxima": lambda log: Maxima(log.axes),
+    "chatter": lambda log: Chatter(log.axes, log.timebase.period),
+    "settling": Settling,
+    "saturation": lambda log: Saturation(torque_limits(log)),
+    "latency": lambda log: Latency(log.timebase.period),
     "misses": _misses,
-    "estimate_error": _estimate_error,
-    "pointing": _pointing,
+    "estimate_error": lambda log: EstimateError(log, *estimator(log)),
+    "pointing": lambda log: Pointing(log, robot_of(log)),
 }
+"""By key of the report, each made from a flight's first block."""

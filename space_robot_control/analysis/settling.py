@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.flight_log import FlightLog
 
-from .waypoints import waypoint_ticks
+from .blocks import Figure
+from .metrics import error_columns, largest_of_columns
+from .waypoints import Waypoints
 
 Array = NDArray[np.float64]
 
@@ -17,42 +22,58 @@ SHORTEST_WATCH = 0.1
 """s of flight after a waypoint without which nothing can be said of settling there."""
 
 
-def last_waypoint(log: FlightLog) -> int | None:
-    """Row of the last waypoint with `SHORTEST_WATCH` of flight after it; None: there is none.
-
-    A waypoint is where all desired joint velocities vanish, the start of the flight included. The
-    last one of the paper's mission is its last tick, so that the one at 15 s is taken.
-    """
-    watched = log.ticks - round(SHORTEST_WATCH / log.timebase.period)
-    ticks = waypoint_ticks(log)
-    ticks = ticks[ticks <= watched]
-    if not len(ticks) or np.max(np.abs(log.reference_joints[ticks[-1], 1])) > _slow(log):
-        return None
-    return int(ticks[-1])
-
-
-def settling_time(error: Array, start: int, period: float, band: float = BAND) -> float | None:
-    """The shortest time after row ``start`` from which ``error`` stays within ``band`` to its end.
+class Settling(Figure):
+    """The shortest time after the last waypoint from which each error column stays in `BAND`.
 
     As in control engineering (e.g. Ogata, Modern Control Engineering, 5-3), with a band in
     absolute terms: a tracking error has no final value to take a share of.
-
-    Args:
-        error: (N, axes); the largest of the axes counts.
-        start: row of the waypoint.
-        period: s, from row to row.
-        band: unit of the error.
-
-    Returns:
-        s; 0 where it never leaves the band, None where it is outside at the end.
     """
-    outside = np.flatnonzero(np.max(np.abs(error[start:]), axis=1) > band)
-    if not len(outside):
-        return 0.0
-    settled = int(outside[-1]) + 1
-    return None if settled == len(error) - start else settled * period
 
+    def __init__(self, log: FlightLog, band: float = BAND) -> None:
+        """``log``: the first rows; ``band``: unit of the error, for the largest of the axes."""
+        self._first_tick, self._period, self._band = log.first_tick, log.timebase.period, band
+        self._waypoints = Waypoints()
+        self._outside = dict.fromkeys(error_columns(log.axes), -1)
+        """Last row outside the band, by column."""
 
-def _slow(log: FlightLog) -> float:
-    """rad/s below which the arm counts as resting: an excerpt may hold no rest at all."""
-    return 1e-3 * float(np.max(np.abs(log.reference_joints[:, 1])))
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows."""
+        before = self._waypoints.rows
+        for name, axes in error_columns(log.axes).items():
+            outside = largest_of_columns(error[:, axes]) > self._band
+            if outside.any():
+                self._outside[name] = before + len(error) - 1 - int(np.argmax(outside[::-1]))
+        self._waypoints.add(log.reference_joints)
+        self._waypoints.forget_before(self._last_watched)
+
+    def result(self) -> dict[str, Any]:
+        """The band, the time counted from, and s by column: None if outside at the end."""
+        start = self.last_waypoint
+        if start is None:
+            raise InputError("the arm does not come to rest with flight left after it")
+        return {
+            "band": self._band,
+            "after_s": (self._first_tick + start) * self._period,
+            "settled_s": {name: self._settled(row, start) for name, row in self._outside.items()},
+        }
+
+    @property
+    def last_waypoint(self) -> int | None:
+        """Row of the last waypoint with `SHORTEST_WATCH` of flight after it; None: there is none.
+
+        A waypoint is where all desired joint velocities vanish, the start of the flight included.
+        The last one of the paper's mission is its last tick, so that the one at 15 s is taken.
+        """
+        rows = self._waypoints.found()
+        watched = rows[rows <= self._last_watched]
+        return int(watched[-1]) if len(watched) else None
+
+    @property
+    def _last_watched(self) -> int:
+        return self._waypoints.rows - round(SHORTEST_WATCH / self._period)
+
+    def _settled(self, outside: int, start: int) -> float | None:
+        if outside < start:
+            return 0.0
+        settled = outside + 1
+        return None if settled == self._waypoints.rows else (settled - start) * self._period

@@ -7,7 +7,7 @@ It is flown in blocks, so that one of any length needs the memory of one block (
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
@@ -113,7 +113,7 @@ def fly_blocks(
     bag: Path | None = None,
     progress: Callable[[int], None] = lambda tick: None,
     block_of: Callable[[int, int], FlightLog] | None = None,
-) -> Iterator[FlightLog]:
+) -> Generator[FlightLog, None, None]:
     """Fly every tick of ``flight`` and hand out what happened, block by block.
 
     A flight that ends early hands out the block it ended in, up to the last state that was

@@ -6,12 +6,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from random_logs import random_log
 
 from space_robot_control.analysis import analyse, excerpt
 from space_robot_control.analysis.described import estimator
 from space_robot_control.analysis.estimate_error import (
-    delayed_estimate,
-    estimate_error,
+    DelayedEstimate,
+    EstimateErrors,
     neglected_force,
 )
 from space_robot_control.flight.plan import Flight, FlightPlan
@@ -23,10 +26,19 @@ def flown(**options: Any) -> FlightLog:
     return simulate(Flight(FlightPlan.model_validate({"duration": 0.3, **options})))
 
 
+def estimate_error(
+    log: FlightLog, h_bar: np.ndarray, smoothing: float = 0.0, cuts: tuple[int, ...] = ()
+) -> np.ndarray:
+    """Of a whole log, or of parts that begin at some rows."""
+    errors = EstimateErrors(h_bar, smoothing, rest=log.first_tick == 0)
+    parts = zip((0, *cuts), (*cuts, log.ticks), strict=True)
+    return np.concatenate([errors.of(log.rows(start, stop)) for start, stop in parts])
+
+
 def assert_same_estimate(log: FlightLog) -> None:
     assert log.telemetry is not None
     h_bar, smoothing = estimator(log)
-    estimate = delayed_estimate(neglected_force(log, h_bar), smoothing, rest=log.first_tick == 0)
+    estimate = DelayedEstimate(smoothing, rest=log.first_tick == 0).of(neglected_force(log, h_bar))
     expected = log.telemetry[1:, 2]
     # the difference of two rates over half a millisecond amplifies their last bits
     np.testing.assert_allclose(estimate, expected, rtol=1e-9, atol=1e-9)
@@ -76,6 +88,67 @@ def test_an_excerpt_has_the_errors_of_its_ticks() -> None:
     h_bar, _ = estimator(log)
     whole, part = estimate_error(log, h_bar), estimate_error(excerpt(log, 0.1, 0.2), h_bar)
     np.testing.assert_array_equal(part, whole[200 : 200 + len(part)])
+
+
+CUTS = st.sets(st.integers(1, 49), max_size=6).map(lambda cuts: tuple(sorted(cuts)))
+
+
+@given(st.sampled_from([1, 3, 6, 7]), st.integers(0, 99), CUTS, st.booleans(), st.booleans())
+def test_parts_make_the_whole(
+    n: int, seed: int, cuts: tuple[int, ...], filled: bool, smoothed: bool
+) -> None:
+    """To the last bit, but for the sign of the base's part: Q and -Q are the same attitude."""
+    log, smoothing = random_log(n, 50, seed), 0.3 if smoothed else 0.0
+    h_bar = np.array(log.flight["gains_used"]["h_bar"])
+    if filled:
+        log.filled = 5
+        for k in np.random.default_rng(seed).integers(1, 50, 5):
+            for name in ("quaternion", "omega_base", "joint_positions", "joint_velocities"):
+                getattr(log, name)[k] = getattr(log, name)[k - 1]
+    whole = estimate_error(log, h_bar, smoothing)
+    np.testing.assert_array_equal(estimate_error(log, h_bar, smoothing, cuts), whole)
+
+
+@pytest.mark.parametrize("n", [1, 3, 6, 7])
+def test_it_is_that_of_a_plain_loop(n: int) -> None:
+    """(33), (35), (36) with J0 of (1) and (22), tick by tick in plain NumPy."""
+    log = random_log(n, 20, n)
+    h_bar = np.array(log.flight["gains_used"]["h_bar"])
+    period, before, neglected = log.timebase.period, None, []
+    quaternions: list[np.ndarray] = []
+    for q in log.quaternion:
+        quaternions.append(-q if quaternions and np.dot(q, quaternions[-1]) < 0.0 else q.copy())
+    for k in range(20):
+        eta, (x, y, z) = quaternions[k][0], quaternions[k][1:]
+        skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        jacobian = 0.5 * (eta * np.eye(3) + skew)
+        rate = np.concatenate([jacobian @ log.omega_base[k], log.joint_velocities[k]])
+        if before is not None:
+            old_jacobian, old_rate = before
+            force = log.applied_torque[k].copy()
+            force[:3] = np.linalg.inv(old_jacobian).T @ force[:3]
+            neglected.append(force - h_bar * (rate - old_rate) / period)
+        before = jacobian, rate
+    expected = np.diff(neglected, axis=0)
+    np.testing.assert_allclose(estimate_error(log, h_bar), expected, rtol=1e-9, atol=1e-7)
+    report = analyse(log)["estimate_error"]
+    groups = {"base": [0, 1, 2], "1_3" if n > 1 else "1_1": list(range(3, 3 + min(n, 3)))}
+    if n > 3:
+        groups[f"4_{n}"] = list(range(6, n + 3))
+    for name, axes in groups.items():
+        rms = [float(np.sqrt(np.mean(expected[:, i] ** 2))) for i in axes]
+        assert report["rms"][name] == pytest.approx(sum(rms) / len(rms), rel=1e-9)
+        assert report["max"][name] == pytest.approx(np.abs(expected[:, axes]).max(), rel=1e-9)
+
+
+@pytest.mark.filterwarnings("error")
+def test_at_180_degrees_there_is_none() -> None:
+    """J0 is singular there; it was NaN in JSON, and a warning on the terminal."""
+    log = random_log(6, 20, 1)
+    log.quaternion[7] = [0.0, 0.6, 0.8, 0.0]
+    report = analyse(log)
+    assert report["estimate_error"] is None
+    assert "180 degrees" in report["unavailable"]["estimate_error"]
 
 
 def test_filled_ticks_are_passed_over() -> None:

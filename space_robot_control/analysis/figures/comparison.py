@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
-from ..metrics import CHATTER_FREQUENCY
+from ..spectrum import CHATTER_FREQUENCY
 from .base_torque import BaseTorque
 from .lines import mark_moments, scattered_marks
 from .quantity import power_of_ten
