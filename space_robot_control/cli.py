@@ -142,6 +142,7 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
     from .flight.simulate import fly_blocks
 
     flight = _plan(**options)
+    flight.check_in_process()
     if bag:
         check_bag_path(bag)
         if remark := room_remark(flight, bag):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +12,16 @@ from pydantic import Field
 
 from space_robot_msgs_py.configuration import (
     NodeSettings,
+    Texts,
     Tree,
     config_directory,
-    named_file,
+    mission_file,
+    nest,
     node_parameters,
 )
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.validation import one_of, read_yaml
+from space_robot_msgs_py.validation import one_of, read_yaml, short
+from space_robot_msgs_py.yaml_text import check_file, is_folder
 
 from .laws import ControlLaw, find_law, laws
 from .mission import MissionSettings
@@ -28,6 +31,7 @@ Array = NDArray[np.float64]
 STRICTLY_POSITIVE = ("h_bar", "delta")
 """Gains that divide or invert something; the others may be zero."""
 DEFAULT_SETS = "default_sets.yaml"
+PARAMETERS = "controller parameters"
 
 
 class ControllerNodeSettings(NodeSettings):
@@ -44,7 +48,7 @@ class ControllerNodeSettings(NodeSettings):
     telemetry_decimation: Annotated[int, Field(ge=1, le=10**6)] = Field(
         20, description="ticks between two messages on /controller/telemetry"
     )
-    swaps: list[str] = Field(
+    swaps: Texts = Field(
         [""], description="laws to swap to in flight, each as T:LAW with T in simulated seconds"
     )
     acceleration_filter_hz: Annotated[float, Field(ge=0.0, le=1e5)] = Field(
@@ -62,7 +66,7 @@ class ControllerNodeSettings(NodeSettings):
     state_timeout: Annotated[float, Field(ge=0.001, le=1e6)] = Field(
         2.0, description="s by the wall clock without a state until that is reported"
     )
-    wait_for: list[str] = Field(
+    wait_for: Texts = Field(
         [""], description="names of nodes that must listen before the first command"
     )
 
@@ -86,8 +90,7 @@ class MissionNodeSettings(MissionSettings, NodeSettings):
     @classmethod
     def layers(cls, selected: Mapping[str, str]) -> list[Path]:
         """The mission's own file over the graph's."""
-        mission = selected["mission"] or Path(selected["robot"]).stem
-        return [*super().layers(selected), named_file("missions", mission)]
+        return [*super().layers(selected), mission_file(selected["robot"], selected["mission"])]
 
 
 def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
@@ -101,26 +104,45 @@ def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
     """
     path = Path(gain_set)
     if gain_set.endswith((".yaml", ".yml")):
-        if not path.is_file():
-            raise InputError(f"{path}: no such file")
+        check_file(path)
         return {path.stem: path}
     if "/" in gain_set:
-        files = {file.stem: file for file in sorted(path.glob("*.yaml"))}
-        if not files:
-            raise InputError(f"{path}: no folder with gain files (<law>.yaml)")
-        return files
+        return _gains_folder(path)
     folder = config_directory() / "gains" / Path(robot).stem
-    if not folder.is_dir():
+    sets = _shipped_sets(robot)
+    if not sets:
         raise InputError(
-            f"no gains for robot {Path(robot).stem!r} in {folder.parent}: "
+            f"no gains for robot {short(Path(robot).stem)} in {folder.parent}: "
             "name a folder of <law>.yaml files as gains"
         )
-    sets = sorted(entry.name for entry in folder.iterdir() if entry.is_dir())
     if gain_set == "default":
         chosen = read_yaml(folder / DEFAULT_SETS)
         return {law: folder / name / f"{law}.yaml" for law, name in chosen.items()}
-    one_of(gain_set, ["default", *sets], "gain set", f" of robot {Path(robot).stem!r}")
+    one_of(gain_set, ["default", *sets], "gain set", f" of robot {short(Path(robot).stem)}")
     return {file.stem: file for file in sorted((folder / gain_set).glob("*.yaml"))}
+
+
+def gains_as_path(gain_set: str, robot: str) -> str:
+    """What a user means by the name of a gain set: ``g`` is ``g/``, a folder, where no set is so.
+
+    Not for names out of bags: these open no folder of the user's.
+    """
+    if "/" in gain_set or gain_set in ("default", *_shipped_sets(robot)):
+        return gain_set
+    return f"{gain_set}/" if gain_set and is_folder(Path(gain_set)) else gain_set
+
+
+def _shipped_sets(robot: str) -> list[str]:
+    folder = config_directory() / "gains" / Path(robot).stem
+    entries = folder.iterdir() if is_folder(folder) else ()
+    return sorted(entry.name for entry in entries if entry.is_dir())
+
+
+def _gains_folder(path: Path) -> dict[str, Path]:
+    files = {file.stem: file for file in sorted(path.glob("*.yaml"))} if is_folder(path) else {}
+    if not files:
+        raise InputError(f"{short(str(path))}: no folder with gain files (<law>.yaml)")
+    return files
 
 
 def read_gains(path: Path, law: type[ControlLaw], axes: int) -> dict[str, Array]:
@@ -148,25 +170,48 @@ def check_gains(content: Tree, law: type[ControlLaw], axes: int, where: str) -> 
         key = f"{where}: {law.name}.{name}"
         if name not in content:
             raise InputError(f"{key}: missing ({description})")
-        try:
-            values = np.array(content[name], dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InputError(f"{key}: numbers were expected, got {content[name]!r}") from None
+        values = _numbers(content[name])
+        if values is None:
+            raise InputError(f"{key}: numbers were expected, got {short(content[name])}")
         if values.shape not in ((axes,), (1,)):
             raise InputError(
                 f"{key}: {axes} values (base x, y, z and the joints) or 1 were expected, "
-                f"got {content[name]!r}"
+                f"got {short(content[name])}"
             )
         low = "above 0" if name in STRICTLY_POSITIVE else "0 or more"
         fits = values > 0.0 if name in STRICTLY_POSITIVE else values >= 0.0
         if not np.all(fits & np.isfinite(values)):
-            raise InputError(f"{key}: finite values {low} were expected, got {content[name]!r}")
+            raise InputError(
+                f"{key}: finite values {low} were expected, got {short(content[name])}"
+            )
         gains[name] = np.ascontiguousarray(np.broadcast_to(values, axes))
     return gains
 
 
-def build_law(name: str, settings: ControllerNodeSettings, axes: int) -> ControlLaw:
+def _numbers(value: Any) -> Array | None:
+    """A list of numbers; None if it is anything else: truth values and texts are no numbers."""
+    if isinstance(value, np.ndarray):
+        return value
+    if not isinstance(value, (list, tuple)):
+        return None
+    if not all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in value):
+        return None
+    try:
+        return np.array(value, dtype=np.float64)
+    except OverflowError:
+        return None
+
+
+def build_law(
+    name: str, settings: ControllerNodeSettings, axes: int, given: Mapping[str, Any] | None = None
+) -> ControlLaw:
     """A law by name (or ``module:Class``) with the gains that the settings choose.
+
+    Args:
+        name: of the law.
+        settings: they choose its gains.
+        axes: m = n+3.
+        given: gains that come over those.
 
     Raises:
         InputError: unknown law, gain set without it, or gains that do not fit.
@@ -178,7 +223,44 @@ def build_law(name: str, settings: ControllerNodeSettings, axes: int) -> Control
             f"gains {settings.gains!r} have no file for controller {law.name!r}, "
             f"only for {', '.join(sorted(files))}"
         )
-    return law(read_gains(files[law.name], law, axes), settings.period)
+    gains = read_gains(files[law.name], law, axes)
+    if given:
+        gains = check_gains({**gains, **given}, law, axes, PARAMETERS)
+    return law(gains, settings.period)
+
+
+def build_laws(
+    settings: ControllerNodeSettings, axes: int, given: Mapping[str, Tree] | None = None
+) -> dict[str, ControlLaw]:
+    """The laws a controller can fly, by name: the one in force first, then those of the gain set.
+
+    Args:
+        settings: they choose the law in force and the gains.
+        axes: m = n+3.
+        given: gains by law that come over those of the files.
+
+    Raises:
+        InputError: a law that is not there, or gains that do not fit.
+    """
+    given = given or {}
+    first = find_law(settings.controller).name
+    wanted = {first: settings.controller}
+    for name in available_laws(settings):
+        wanted.setdefault(name, name)
+    for name in given:
+        one_of(name, wanted, "law", f" in {PARAMETERS} (gains are <law>.<gain>)")
+    return {law: build_law(name, settings, axes, given.get(law)) for law, name in wanted.items()}
+
+
+def split_gains(parameters: Mapping[str, Any]) -> tuple[Tree, dict[str, Tree]]:
+    """The controller's own parameters, and the gains ``<law>.<gain>`` by law."""
+    own, gains = Tree(), {}
+    for name, value in nest(parameters).items():
+        if isinstance(value, dict) and name not in ControllerNodeSettings.model_fields:
+            gains[name] = value
+        else:
+            own[name] = value
+    return own, gains
 
 
 def available_laws(settings: ControllerNodeSettings) -> list[str]:

@@ -12,14 +12,18 @@ from inspect import isclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, get_origin
 
-from pydantic import BaseModel, Field
+from pydantic import AfterValidator, BaseModel, Field
 from typing_extensions import Self
 
 from .errors import InputError
 from .samples import Timebase
-from .validation import Strict, check, read_yaml
+from .validation import Strict, check, read_yaml, short
+from .yaml_text import check_file
 
 Tree = dict[str, Any]
+
+Texts = Annotated[list[str], AfterValidator(lambda texts: texts or [""])]
+"""Texts of which empty ones count for nothing: ROS has no empty list of strings."""
 
 GRAPH_FILE = "space_robot.yaml"
 """The file of the graph's defaults in the config folder."""
@@ -46,17 +50,32 @@ def named_file(kind: str, name: str) -> Path:
     """
     if name.endswith((".yaml", ".yml")):
         path = Path(name)
-        if not path.is_file():
-            raise InputError(f"{path}: no such file")
+        check_file(path)
         return path
     folder = config_directory() / kind
     names = sorted(file.stem for file in folder.glob("*.yaml"))
     if name not in names:
         raise InputError(
-            f"unknown {kind.rstrip('s')} {name!r}: choose one of {', '.join(names)}, "
+            f"unknown {kind.rstrip('s')} {short(name)}: choose one of {', '.join(names)}, "
             "or a path to a .yaml file"
         )
     return folder / f"{name}.yaml"
+
+
+def mission_file(robot: str, mission: str) -> Path:
+    """The file of a mission, of the robot's own if it is empty.
+
+    Raises:
+        InputError: there is none, or no such robot; names those there are.
+    """
+    if mission:
+        return named_file("missions", mission)
+    named_file("robots", robot)  # first: else its mission would be said to be unknown
+    name = Path(robot).stem
+    try:
+        return named_file("missions", name)
+    except InputError as error:
+        raise InputError(f"robot {short(robot)} has no mission of its own, {error}") from None
 
 
 def node_parameters(path: Path, node: str) -> Tree:
@@ -71,8 +90,11 @@ def node_parameters(path: Path, node: str) -> Tree:
             raise InputError(
                 f"{path}: {name}: 'ros__parameters' was expected below the node's name"
             )
-        if name.strip("/") in ("**", f"{node}_node"):
-            merged = merge(merged, nest(content["ros__parameters"] or {}))
+        given = content["ros__parameters"] or {}
+        if not isinstance(given, dict):
+            raise InputError(f"{path}: {name}: parameters were expected, got {short(given)}")
+        if str(name).strip("/") in ("**", f"{node}_node"):
+            merged = merge(merged, nest(given))
     return merged
 
 
@@ -86,20 +108,26 @@ def merge(below: Tree, above: Mapping[str, Any]) -> Tree:
     return merged
 
 
-def nest(flat: Mapping[str, Any]) -> Tree:
-    """``{"a.b": 1}`` to ``{"a": {"b": 1}}``."""
+def nest(flat: Mapping[Any, Any]) -> Tree:
+    """``{"a.b": 1}`` to ``{"a": {"b": 1}}``.
+
+    Raises:
+        InputError: something is given as a value and as a group of values.
+    """
     tree: Tree = {}
     for key, value in flat.items():
-        head, _, rest = key.partition(".")
+        head, _, rest = str(key).partition(".")
         inner = nest({rest: value}) if rest else nest(value) if isinstance(value, dict) else value
+        if head in tree and isinstance(tree[head], dict) is not isinstance(inner, dict):
+            raise InputError(f"{head}: given as a value, and as a group of values")
         tree = merge(tree, {head: inner})
     return tree
 
 
-def flatten(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """``{"a": {"b": 1}}`` to ``("a.b", 1)``, leaf by leaf."""
+def flatten(tree: Mapping[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """``{"a": {"b": 1}}`` to ``("a.b", 1)``, leaf by leaf; an empty mapping is one."""
     for key, value in tree.items():
-        if isinstance(value, Mapping):
+        if isinstance(value, Mapping) and value:
             yield from flatten(value, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", value
@@ -114,7 +142,7 @@ class NodeSettings(Strict):
     """Fields that choose configuration files."""
 
     robot: str = Field("paper", description="a robot of config/robots, or a path to its YAML")
-    period: Annotated[float, Field(ge=1e-5, le=1.0)] = Field(
+    period: Annotated[float, Field(ge=1e-5, le=0.1)] = Field(
         0.0005, description="length of a tick, s; the same for all nodes"
     )
     fifo_priority: Annotated[int, Field(ge=0, le=98)] = Field(
@@ -143,18 +171,16 @@ class NodeSettings(Strict):
         Raises:
             InputError: naming the file or override at fault.
         """
-        given = nest(overrides)
-        tree: Tree = {}
+        where = f"{cls.node} parameters"
+        given, tree = nest(overrides), Tree()
         base = node_parameters(config_directory() / GRAPH_FILE, cls.node)
-        selected = {
-            name: str(given.get(name, base.get(name, cls.model_fields[name].default)))
-            for name in cls.selectors
-        }
+        chosen = check(cls, merge(base, given), where)
+        selected = {name: str(getattr(chosen, name)) for name in cls.selectors}
         for path in cls.layers(selected):
             layer = node_parameters(path, cls.node)
             check(cls, merge(tree, layer), str(path))
             tree = merge(tree, layer)
-        return check(cls, merge(tree, given), f"{cls.node} parameters")
+        return check(cls, merge(tree, given), where)
 
 
 def leaves(schema: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, Any]]:

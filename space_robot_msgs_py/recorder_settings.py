@@ -12,6 +12,9 @@ from .configuration import NodeSettings
 LEAST_SPLIT_SIZE = 65_536
 """Every file has 20 kB of definitions and indexes, whatever its messages."""
 
+LARGEST_SPLIT_SIZE = 2**62
+"""A ROS parameter holds no more."""
+
 
 class RecorderNodeSettings(NodeSettings):
     """Parameters of recorder_node."""
@@ -35,6 +38,8 @@ class RecorderNodeSettings(NodeSettings):
     @field_validator("split_size")
     @classmethod
     def _worth_a_file(cls, size: ByteSize) -> ByteSize:
-        if 0 < size < LEAST_SPLIT_SIZE:
-            raise ValueError(f"0 (one file) or at least {LEAST_SPLIT_SIZE} bytes")
+        if size and not LEAST_SPLIT_SIZE <= size <= LARGEST_SPLIT_SIZE:
+            raise ValueError(
+                f"0 (one file) or {LEAST_SPLIT_SIZE} to {LARGEST_SPLIT_SIZE} bytes are allowed"
+            )
         return size

@@ -6,39 +6,29 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
-import yaml
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 
 from .errors import InputError
-
-try:
-    from yaml import CSafeLoader as SafeLoader  # four times as fast
-except ImportError:  # PyYAML was built without libyaml
-    from yaml import SafeLoader  # type: ignore[assignment]
+from .yaml_text import YamlTextError, parse_yaml, read_file
 
 
 class Strict(BaseModel):
-    """Base of everything read from a file: unknown keys are errors, values do not change."""
+    """Base of what is read from files, parameters and options: no other keys, no other types.
 
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, coerce_numbers_to_str=True
-    )
+    A whole number may stand for a decimal one, and a number for a name (``case: 1``).
+    """
 
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
-class _UniqueKeyLoader(SafeLoader):
-    """Takes a key that occurs twice for the mistake it is."""
-
-    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
-        seen = set()
-        for key_node, _ in node.value:
-            key = self.construct_object(key_node, deep=True)
-            if key in seen:
-                raise yaml.constructor.ConstructorError(
-                    problem=f"the key {key!r} occurs twice", problem_mark=key_node.start_mark
-                )
-            seen.add(key)
-        mapping: dict[Any, Any] = super().construct_mapping(node, deep)
-        return mapping
+    @field_validator("*", mode="before")
+    @classmethod
+    def _meant(cls, value: Any, field: ValidationInfo) -> Any:
+        if isinstance(value, tuple):
+            return list(value)
+        wanted = cls.model_fields[field.field_name or ""].annotation
+        if wanted is str and isinstance(value, (int, float)) and not isinstance(value, bool):
+            return str(value)
+        return value
 
 
 Schema = TypeVar("Schema", bound=BaseModel)
@@ -48,18 +38,13 @@ def read_yaml(path: Path) -> dict[str, Any]:
     """The mapping in a YAML file.
 
     Raises:
-        InputError: the file is missing, unreadable, not YAML, or not a mapping.
+        InputError: the file is missing, unreadable, no file, not YAML, or not a mapping.
     """
+    text = read_file(path)
     try:
-        content = yaml.load(path.read_text(encoding="utf-8"), Loader=_UniqueKeyLoader)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read ({error})") from None
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        line = f"line {mark.line + 1}: " if mark else ""
-        raise InputError(f"{path}: {line}not YAML ({getattr(error, 'problem', error)})") from None
+        content = parse_yaml(text)
+    except YamlTextError as error:
+        raise InputError(f"{path}: {error}") from None
     if not isinstance(content, dict):
         raise InputError(f"{path}: a mapping was expected, got {type(content).__name__}")
     return content
@@ -84,8 +69,10 @@ def _one_line(error: ValidationError, schema: type[BaseModel], where: str) -> st
     )
     first = faults[0]
     key = ".".join(str(part) for part in first["loc"])
-    given = "" if first["type"] == "missing" else f", got {_short(first['input'])}"
+    given = "" if first["type"] == "missing" else f", got {short(first['input'])}"
     text = first["msg"].removeprefix("Value error, ")
+    if first["type"] == "model_type":
+        text = "a mapping was expected"
     if first["type"] == "extra_forbidden":
         allowed = _allowed_keys(schema, first["loc"][:-1])
         text, given = f"unknown key{given}: choose one of {', '.join(allowed)}", ""
@@ -103,8 +90,12 @@ def _allowed_keys(schema: Any, location: tuple[int | str, ...]) -> list[str]:
     return sorted(schema.model_fields)
 
 
-def _short(value: Any) -> str:
-    text = repr(value)
+def short(value: Any) -> str:
+    """A value as an error shows it, in one line of at most 80 characters."""
+    try:
+        text = repr(value)
+    except ValueError:  # a whole number of more digits than Python likes to print
+        text = f"a number of type {type(value).__name__}"
     return text if len(text) <= 80 else text[:77] + "..."
 
 
@@ -116,5 +107,7 @@ def one_of(given: str, allowed: Iterable[str], what: str, context: str = "") -> 
     """
     names = list(allowed)
     if given not in names:
-        raise InputError(f"unknown {what} {given!r}{context}: choose one of {', '.join(names)}")
+        raise InputError(
+            f"unknown {what} {short(given)}{context}: choose one of {', '.join(names)}"
+        )
     return given

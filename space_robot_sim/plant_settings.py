@@ -8,10 +8,13 @@ from typing import Annotated, ClassVar
 
 from pydantic import AfterValidator, Field
 
-from space_robot_msgs_py.configuration import NodeSettings, named_file
+from space_robot_msgs_py.configuration import NodeSettings, Texts, mission_file, named_file
 from space_robot_msgs_py.fault import PLANT_KINDS, Fault, parse_faults
 
 from .plant import PlantSettings
+
+MOST_TICKS = 10**9
+"""Of a flight."""
 
 
 def _readable(texts: list[str]) -> list[str]:
@@ -29,7 +32,7 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         "", description="a mission of config/missions (empty: the robot's), or a path"
     )
     case: str = Field("1", description="a case of config/cases, or a path to its YAML")
-    ticks: Annotated[int, Field(ge=0, le=10**9)] = Field(
+    ticks: Annotated[int, Field(ge=0, le=MOST_TICKS)] = Field(
         0, description="ticks to fly, then exit (0: until stopped)"
     )
     realtime: bool = Field(
@@ -45,10 +48,10 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         3.0,
         description="s by the wall clock a tick waits for its command in lockstep (0: for ever)",
     )
-    wait_for: list[str] = Field(
+    wait_for: Texts = Field(
         [""], description="names of nodes that must listen before the first tick"
     )
-    faults: Annotated[list[str], AfterValidator(_readable)] = Field(
+    faults: Annotated[Texts, AfterValidator(_readable)] = Field(
         [""], description="faults to bring about, each KIND@T[-END][:ARGUMENT], see docs/faults.md"
     )
     fault_seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(
@@ -65,6 +68,6 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         """The mission tells where the arm starts, the case what disturbs it."""
         return [
             *super().layers(selected),
-            named_file("missions", selected["mission"] or Path(selected["robot"]).stem),
+            mission_file(selected["robot"], selected["mission"]),
             named_file("cases", selected["case"]),
         ]

@@ -11,43 +11,107 @@ import click
 
 Decorator = Callable[[Any], Any]
 NODES = ("plant", "controller", "mission", "recorder")
+_SCENARIO_PARAMETERS = f"{__name__}.parameters"
+"""Key of a scenario's parameters in the context's ``meta``."""
 
 
 def _parameters(
     context: click.Context, option: click.Parameter, given: Any
 ) -> dict[str, dict[str, Any]]:
-    """``plant.hold_ticks=40`` to ``{"plant": {"hold_ticks": 40}}``."""
-    import yaml
-
-    from space_robot_msgs_py.validation import one_of
-
-    tree: dict[str, dict[str, Any]] = {}
+    """``plant.hold_ticks=40`` to ``{"plant": {"hold_ticks": 40}}``, over the scenario's."""
+    tree: dict[str, dict[str, Any]] = context.meta.pop(_SCENARIO_PARAMETERS, {})
     for text in given:
-        name, equals, value = text.partition("=")
-        node, _, parameter = name.partition(".")
-        if not (equals and parameter):
-            raise click.BadParameter(f"{text!r}: NODE.PARAM=VALUE expected")
-        one_of(node, NODES, "node", f" in --set {text}")
-        tree.setdefault(node, {})[parameter] = yaml.safe_load(value)
+        _set(tree, text, "--set")
     return tree
+
+
+def _set(tree: dict[str, dict[str, Any]], text: str, where: str) -> None:
+    """Put ``plant.hold_ticks=40`` into ``tree``."""
+    from space_robot_msgs_py.configuration import flatten
+    from space_robot_msgs_py.errors import InputError
+    from space_robot_msgs_py.validation import one_of, short
+    from space_robot_msgs_py.yaml_text import YamlTextError, parse_yaml
+
+    name, equals, value = text.partition("=")
+    node, _, parameter = name.partition(".")
+    if not (equals and parameter):
+        raise InputError(f"{where} {short(text)}: NODE.PARAM=VALUE expected")
+    one_of(node, NODES, "node", f" in {where} {short(text)}")
+    try:
+        parsed = parse_yaml(value)
+    except YamlTextError as error:
+        raise InputError(f"{where} {short(name)}: {error}") from None
+    tree.setdefault(node, {}).update(flatten({parameter: parsed}))
 
 
 def _scenario(context: click.Context, option: click.Parameter, path: Path | None) -> None:
     """Take a scenario's values as the options' defaults."""
     if path is None:
         return
-    from space_robot_msgs_py.configuration import flatten
     from space_robot_msgs_py.validation import one_of, read_yaml
 
-    names = [parameter.name for parameter in context.command.params if parameter.name]
+    options = {
+        parameter.name: parameter
+        for parameter in context.command.params
+        if parameter.name and parameter.name not in ("scenario", "help")
+    }
     content = read_yaml(path)
     for key in content:
-        one_of(
-            key, [name for name in names if name not in ("scenario", "help")], "key", f" in {path}"
+        one_of(key, options, "key", f" in {path}")
+    if (parameters := content.pop("parameters", None)) is not None:
+        context.meta[_SCENARIO_PARAMETERS] = _scenario_parameters(parameters, str(path))
+    values = {k: _scenario_value(options[k], v, f"{path}: {k}") for k, v in content.items()}
+    context.default_map = {**(context.default_map or {}), **values}
+
+
+def _scenario_parameters(given: Any, where: str) -> dict[str, dict[str, Any]]:
+    """``parameters`` of a scenario: by node and name, or as ``--set`` has them."""
+    from space_robot_msgs_py.configuration import flatten, nest
+    from space_robot_msgs_py.errors import InputError
+    from space_robot_msgs_py.validation import one_of, short
+
+    tree: dict[str, dict[str, Any]] = {}
+    if isinstance(given, list) and all(isinstance(text, str) for text in given):
+        for text in given:
+            _set(tree, text, f"{where}: parameters")
+    elif isinstance(given, dict) and all(isinstance(values, dict) for values in given.values()):
+        for node, values in given.items():
+            one_of(node, NODES, "node", f" in {where}: parameters")
+            tree[node] = dict(flatten(nest(values)))
+    else:
+        raise InputError(
+            f"{where}: parameters: a mapping of nodes to their parameters was expected, "
+            f"got {short(given)}"
         )
-    if isinstance(parameters := content.get("parameters"), dict):
-        content["parameters"] = [f"{k}={json.dumps(v)}" for k, v in flatten(parameters)]
-    context.default_map = {**(context.default_map or {}), **content}
+    return tree
+
+
+def _scenario_value(option: click.Parameter, value: Any, where: str) -> Any:
+    """A scenario's value, if it is of the type that its option takes.
+
+    Raises:
+        InputError: it is of another.
+    """
+    from space_robot_msgs_py.errors import InputError
+    from space_robot_msgs_py.validation import short
+
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    is_text = isinstance(value, str)
+    if option.multiple if isinstance(option, click.Option) else False:
+        wanted = "a list of texts"
+        fits = isinstance(value, list) and all(isinstance(text, str) for text in value)
+    elif isinstance(option.type, click.types.BoolParamType):
+        wanted, fits = "true or false", isinstance(value, bool)
+    elif isinstance(option.type, click.types.IntParamType):
+        wanted, fits = "a whole number", is_number and isinstance(value, int)
+    elif isinstance(option.type, click.types.FloatParamType):
+        wanted, fits = "a number", is_number
+    else:  # a number may stand for a name
+        wanted, fits = "a text", (is_text and "\0" not in value) or is_number
+        value = str(value) if is_number else value
+    if not fits:
+        raise InputError(f"{where}: {wanted} was expected, got {short(value)}")
+    return value
 
 
 def _remap(context: click.Context, option: click.Parameter, given: Any) -> dict[str, str]:

@@ -20,7 +20,7 @@ from .compilation import compile_kernels
 from .domain import ros_domain
 from .following import follow
 from .plan import Flight, check_bag_path
-from .processes import MODULES, Graph, node_command, node_environment
+from .processes import Graph, node_command, node_environment
 
 
 def fly(flight: Flight, bag: Path) -> dict[str, Any]:
@@ -79,8 +79,7 @@ def require_ros() -> None:
 
 def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
     """The parameters of every node of a flight that is recorded to ``bag``."""
-    plan = flight.plan
-    parameters = {node: plan.overrides(node) for node in MODULES}
+    parameters = {node: dict(given) for node, given in flight.parameters.items()}
     parameters["plant"] |= {
         "ticks": flight.ticks,
         "wait_for": ["controller_node", "mission_node", "recorder_node"],

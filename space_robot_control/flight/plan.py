@@ -11,28 +11,22 @@ from typing import Annotated, Any
 from pydantic import ByteSize, Field
 
 from space_robot_msgs_py.bag.mcap_file import Compression
-from space_robot_msgs_py.configuration import named_file
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.fault import KINDS, parse_faults
-from space_robot_msgs_py.recorder_settings import RecorderNodeSettings
-from space_robot_msgs_py.validation import Strict, read_yaml
+from space_robot_msgs_py.validation import Strict, one_of, short
 from space_robot_sim.faults import PlantFaults
 from space_robot_sim.plant import Plant
-from space_robot_sim.plant_settings import PlantNodeSettings
-from space_robot_sim.robot import Robot
+from space_robot_sim.plant_settings import MOST_TICKS
 
 from ..controller import Controller
 from ..mission import Mission
-from ..settings import ControllerNodeSettings, MissionNodeSettings, build_law
+from ..settings import build_laws
 from ..software import commit, versions
 from ..swaps import parse_swaps
+from .node_settings import FlightSettings
+from .robots import Robots
 
-NODES = tuple(
-    settings.node
-    for settings in (
-        PlantNodeSettings, ControllerNodeSettings, MissionNodeSettings, RecorderNodeSettings,
-    )
-)  # fmt: skip
+NO_FRICTION = {"friction.coulomb": 0.0, "friction.viscous": 0.0}
 
 
 class FlightPlan(Strict):
@@ -73,39 +67,45 @@ class FlightPlan(Strict):
         """
         return [str(f) for f in parse_faults(self.faults, KINDS) if KINDS[f.kind].where == where]
 
-    def overrides(self, node: str) -> dict[str, Any]:
-        """The parameters a node is given, by dotted name."""
-        common: dict[str, Any] = {"robot": self.robot}
-        specific: dict[str, dict[str, Any]] = {
-            PlantNodeSettings.node: {
+    def options(self) -> dict[str, dict[str, Any]]:
+        """What the options, without ``parameters``, say to each node, by dotted name."""
+        return {
+            "plant": {
+                "robot": self.robot,
                 "mission": self.mission,
                 "case": self.case,
                 "realtime": self.realtime,
                 "command_latency_ticks": self.command_latency_ticks,
                 "fifo_priority": self.fifo_priority,
-                "faults": self.faults_of("plant") or [""],
+                "faults": self.faults_of("plant"),
                 "fault_seed": self.seed,
-                **({} if self.friction else {"friction.coulomb": 0.0, "friction.viscous": 0.0}),
+                **({} if self.friction else NO_FRICTION),
             },
-            ControllerNodeSettings.node: {
+            "controller": {
+                "robot": self.robot,
                 "controller": self.controller,
                 "gains": self.gains,
                 "fifo_priority": self.fifo_priority,
-                "swaps": self.swaps or [""],
-                # by the wall clock there is no time to wait
-                **({"reference_timeout": 0.0} if self.realtime else {}),
+                "swaps": self.swaps,
             },
-            MissionNodeSettings.node: {"mission": self.mission},
-            RecorderNodeSettings.node: {
+            "mission": {"robot": self.robot, "mission": self.mission},
+            "recorder": {
                 **({} if self.compression is None else {"compression": self.compression}),
                 **({} if self.split_size is None else {"split_size": int(self.split_size)}),
             },
         }
-        return {**common, **specific.get(node, {}), **self.parameters.get(node, {})}
+
+    def with_parameters(self, node: str, values: dict[str, Any]) -> FlightPlan:
+        """The same plan with further parameters of a node, by dotted name."""
+        parameters = {**self.parameters, node: {**self.parameters.get(node, {}), **values}}
+        return self.model_copy(update={"parameters": parameters})
 
 
 class Flight:
     """A checked plan: the settings of every node and the objects they make.
+
+    What is flown is in the settings, not in the options of the ``plan``: single parameters come
+    over them.
 
     Raises:
         InputError: anything the plan names does not exist or does not fit together.
@@ -113,48 +113,84 @@ class Flight:
 
     def __init__(self, plan: FlightPlan) -> None:
         self.plan = plan
-        robot_file = named_file("robots", plan.robot)
-        self._robot_content = read_yaml(robot_file)
-        self.robot = Robot.from_dict(self._robot_content, where=str(robot_file))
-        self.plant_settings = PlantNodeSettings.resolve(plan.overrides(PlantNodeSettings.node))
-        self.controller_settings = ControllerNodeSettings.resolve(
-            plan.overrides(ControllerNodeSettings.node)
-        )
-        self.mission_settings = MissionNodeSettings.resolve(
-            plan.overrides(MissionNodeSettings.node)
-        )
-        self.recorder_settings = RecorderNodeSettings.resolve(
-            plan.overrides(RecorderNodeSettings.node)
-        )
-        self.period = self.plant_settings.period
-        self.timebase = self.plant_settings.timebase
-        self.orchestrator_faults = parse_faults(plan.faults_of("orchestrator"), KINDS)
-        self.plant, self.controller, self.mission = self._build()
-        duration = self.mission.duration if plan.duration is None else plan.duration
-        if duration <= 0.0:
-            raise InputError("the mission has a single waypoint: give a duration")
-        self.ticks = max(1, math.floor(duration / self.period + 1e-6))
-
-    def _build(self) -> tuple[Plant, Controller, Mission]:
-        plant = Plant(self.robot, self.plant_settings, self.period)
-        PlantFaults(
-            self.plant_settings.parsed_faults, self.plan.seed, self.robot, self.period
-        )  # checks them before anything starts
-        mission = Mission(self.robot.n, self.mission_settings, self.period)
-        settings, axes = self.controller_settings, self.robot.n + 3
-        law = build_law(self.plan.controller, settings, axes)
+        settings = FlightSettings.resolve(plan.options(), plan.parameters)
+        self.plant_settings = settings.plant
+        self.controller_settings = settings.controller
+        self.mission_settings = settings.mission
+        self.recorder_settings = settings.recorder
+        self.period = settings.plant.period
+        self.timebase = settings.plant.timebase
+        self._robots = Robots(settings)
+        self.robot = self._robots.plant
+        axes = self.robot.n + 3
+        laws = build_laws(settings.controller, axes, settings.gains)
         self.swaps = [
-            (swap.tick, build_law(swap.name, settings, axes))
-            for swap in parse_swaps(settings.swaps, self.period)
+            (tick, laws[one_of(name, laws, "controller", " of swaps")])
+            for tick, name in parse_swaps(settings.controller.swaps, self.period)
         ]
         """Ticks and the laws in force from there on."""
-        controller = Controller(self.robot, law, self.period, settings.acceleration_filter_hz)
-        return plant, controller, mission
+        self.parameters = settings.parameters(laws)
+        """What every node is given over its files, by dotted name."""
+        self.orchestrator_faults = parse_faults(plan.faults_of("orchestrator"), KINDS)
+        self.law = next(iter(laws.values()))
+        """In force at the start."""
+        self.plant = Plant(self.robot, settings.plant, self.period)
+        PlantFaults(
+            settings.plant.parsed_faults, settings.plant.fault_seed, self.robot, self.period
+        )  # checks them before anything starts
+        self.mission = Mission(self.robot.n, settings.mission, self.period)
+        self.controller = Controller(
+            self._robots.controller, self.law, self.period,
+            settings.controller.acceleration_filter_hz,
+        )  # fmt: skip
+        self.ticks = self._ticks()
+
+    def _ticks(self) -> int:
+        duration = self.mission.duration if self.plan.duration is None else self.plan.duration
+        if duration <= 0.0:
+            raise InputError("the mission has a single waypoint: give a duration")
+        ticks = max(1, math.floor(duration / self.period + 1e-6))
+        if ticks > MOST_TICKS:
+            raise InputError(
+                f"duration must be at most {MOST_TICKS * self.period:g} s "
+                f"({MOST_TICKS} ticks of {self.period:g} s), got {duration:g} s"
+            )
+        return ticks
+
+    def check_in_process(self) -> None:
+        """See that the flight does without a graph of nodes.
+
+        Raises:
+            InputError: it asks for something that only nodes have.
+        """
+        if self.faults:
+            asked = f"faults {self.faults}"
+        elif self.plant_settings.realtime:
+            asked = "realtime"
+        elif self.plant_settings.fifo_priority or self.controller_settings.fifo_priority:
+            asked = "fifo_priority"
+        else:
+            return
+        raise InputError(f"{asked}: that needs the graph of nodes: use `fly`")
+
+    @property
+    def faults(self) -> list[str]:
+        """All that will fail, as text."""
+        in_plant = [text for text in self.plant_settings.faults if text.strip()]
+        if in_plant == self.plan.faults_of("plant"):
+            return self.plan.faults
+        return [*in_plant, *self.plan.faults_of("orchestrator")]
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether the joints have any."""
+        friction = self.plant_settings.friction
+        return friction.coulomb > 0.0 or friction.viscous > 0.0
 
     @property
     def gains_used(self) -> dict[str, list[float]]:
-        """The numbers of the law's gains, an axis each."""
-        return {name: row.tolist() for name, row in self.controller.law.gains.items()}
+        """The numbers of the gains of the law in force at the start, an axis each."""
+        return {name: row.tolist() for name, row in self.law.gains.items()}
 
     @property
     def description(self) -> dict[str, Any]:
@@ -162,25 +198,28 @@ class Flight:
 
         The same plan with the same software gives the same one: it tells no time and no machine.
         """
-        plan = self.plan
+        plant, controller, mission = (
+            self.plant_settings, self.controller_settings, self.mission_settings,
+        )  # fmt: skip
+        swaps = [text for text in controller.swaps if text.strip()]
         return {
-            "controller": self.controller.law.name,
-            "case": plan.case,
-            "gains": plan.gains,
+            "controller": self.law.name,
+            "case": plant.case,
+            "gains": controller.gains,
             "robot": self.robot.name,
-            "mission": plan.mission or self.robot.name,
+            "mission": mission.mission or Path(mission.robot).stem,
             "period": self.period,
             "ticks": self.ticks,
-            "command_latency_ticks": self.plant_settings.command_latency_ticks,
-            "friction": plan.friction,
-            "realtime": plan.realtime,
-            "seed": plan.seed,
-            **({"faults": plan.faults} if plan.faults else {}),
-            **({"swaps": plan.swaps} if plan.swaps else {}),
-            **({"restart_controller": True} if plan.restart_controller else {}),
-            "parameters": {node: plan.overrides(node) for node in NODES},
+            "command_latency_ticks": plant.command_latency_ticks,
+            "friction": self.has_friction,
+            "realtime": plant.realtime,
+            "seed": plant.fault_seed,
+            **({"faults": self.faults} if self.faults else {}),
+            **({"swaps": swaps} if swaps else {}),
+            **({"restart_controller": True} if self.plan.restart_controller else {}),
+            "parameters": self.parameters,
             "gains_used": self.gains_used,
-            "robot_file": self._robot_content,
+            **self._robots.description,
             "versions": versions(),
             "commit": commit(),
         }
@@ -188,9 +227,8 @@ class Flight:
     def default_bag(self) -> Path:
         """``flights/<controller>_case<case>_<time>`` below the current folder."""
         stamp = datetime.now(timezone.utc).strftime("%Y%m%d-%H%M%S")
-        return (
-            Path("flights") / f"{self.controller.law.name}_case{Path(self.plan.case).stem}_{stamp}"
-        )
+        case = Path(self.plant_settings.case).stem
+        return Path("flights") / f"{self.law.name}_case{case}_{stamp}"
 
 
 def check_bag_path(path: Path) -> None:
@@ -199,13 +237,16 @@ def check_bag_path(path: Path) -> None:
     Raises:
         InputError: it exists, or its nearest existing folder cannot be written.
     """
-    if path.exists():
-        raise InputError(f"{path}: exists already; a bag is never overwritten")
-    parent = next(p for p in path.absolute().parents if p.exists())
+    parent = path
     try:
+        if path.exists():
+            raise InputError(f"{path}: exists already; a bag is never overwritten")
+        parent = next(p for p in path.absolute().parents if p.exists())
         with TemporaryDirectory(dir=parent):
             pass
     except OSError as error:
         raise InputError(
             f"{path}: no bag can be written there ({parent}: {error.strerror})"
         ) from None
+    except ValueError as error:
+        raise InputError(f"{short(str(path))}: no name of a folder ({error})") from None

@@ -129,10 +129,9 @@ def fly_blocks(
 
     Raises:
         FlightError: the flight diverged or met a singular attitude; the bag is closed.
-        InputError: the bag cannot be written, or faults are to be injected.
+        InputError: the bag cannot be written, or the flight needs a graph of nodes.
     """
-    if flight.plan.faults:
-        raise InputError(f"faults {flight.plan.faults}: they need the graph of nodes: use `fly`")
+    flight.check_in_process()
     block_of = block_of or (lambda start, stop: unflown(flight, start, stop))
     laws: tuple[LawInForce, ...] = ()
     with _recording(flight, bag) as messages:

@@ -72,6 +72,8 @@ class _Description(_Open):
     parameters: dict[Text, _Told] = Field(default_factory=dict)
     gains_used: dict[Text, list[float]] = Field(default_factory=dict)
     robot_file: dict[Text, JsonValue] = Field(default_factory=dict)
+    controller_robot: Text = ""
+    controller_robot_file: dict[Text, JsonValue] = Field(default_factory=dict)
 
 
 def read_description(noted: Mapping[str, str]) -> dict[str, Any]:

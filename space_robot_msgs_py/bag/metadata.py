@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import yaml
 from pydantic import BaseModel, Field, ValidationError
 
 from ..errors import InputError
 from ..validation import check, read_yaml
+from ..yaml_text import parse_yaml
 
 METADATA = "metadata.yaml"
 
@@ -74,22 +74,14 @@ def read_information(path: Path) -> BagInformation:
         InputError: there is none, or it is no rosbag2 metadata.
     """
     file = path / METADATA
-    try:
-        content = read_yaml(file)
-    except (TypeError, RecursionError):  # keys that are no words, brackets without end
-        raise InputError(f"{file}: not the metadata of a rosbag2 bag") from None
-    except InputError:
-        raise
-    except ValueError as error:
-        raise InputError(f"{file}: not YAML ({error})") from None
-    return _check(content.get("rosbag2_bagfile_information"), str(file))
+    return _check(read_yaml(file).get("rosbag2_bagfile_information"), str(file))
 
 
 def parse_information(text: str) -> BagInformation | None:
     """The same from the metadata record in an MCAP file; None if it is none."""
     try:
-        return BagInformation.model_validate(yaml.safe_load(text))
-    except (yaml.YAMLError, ValidationError, TypeError, ValueError, RecursionError):
+        return BagInformation.model_validate(parse_yaml(text))
+    except (InputError, ValidationError):
         return None
 
 

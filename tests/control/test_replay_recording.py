@@ -88,7 +88,7 @@ def described(**options: Any) -> dict[str, Any]:
     law = flight.controller.law
     return {
         **flight.description,
-        "parameters": {"controller": flight.plan.overrides("controller")},
+        "parameters": {"controller": flight.parameters["controller"]},
         "gains_used": {name: row.tolist() for name, row in law.gains.items()},
         "robot_file": read_yaml(named_file("robots", flight.plan.robot)),
     }

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from space_robot_control import software
-from space_robot_control.flight.plan import NODES, Flight, FlightPlan
+from space_robot_control.flight.node_settings import NODES
+from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.processes import MODULES
 from space_robot_control.flight.simulate import simulate
 from space_robot_control.settings import ControllerNodeSettings, build_law

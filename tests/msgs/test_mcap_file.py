@@ -254,7 +254,7 @@ def test_bag_without_a_message_is_one(tmp_path: Path) -> None:
     ("parameter", "value", "said"),
     [
         ("compression", "gzip", "'none', 'lz4' or 'zstd', got 'gzip'"),
-        ("split_size", "1K", "at least 65536 bytes"),
+        ("split_size", "1K", "65536 to 4611686018427387904 bytes"),
         ("split_size", -5, "split_size"),
         ("split_size", "many", "split_size: could not parse .* got 'many'"),
     ],

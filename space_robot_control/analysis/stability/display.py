@@ -24,7 +24,7 @@ def print_study(study: Study, console: Console) -> None:
         console,
         f"{what['controller']}, case {what['case']}, gains {what['gains']}, robot "
         f"{what['robot']}: {flight.ticks * flight.period:g} s, "
-        f"joint friction {'on' if flight.plan.friction else 'off'}",
+        f"joint friction {'on' if flight.has_friction else 'off'}",
     )
     show(_lemma_1(study), console)
     show(_time_delay_error(study), console)

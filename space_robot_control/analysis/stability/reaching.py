@@ -51,9 +51,7 @@ def off_mission_plan(flight: Flight, initial_error: float) -> FlightPlan:
         "initial_quaternion": [float(eta), *eps.tolist()],
         "initial_joints_deg": np.degrees(start.joints[0, 0] - initial_error).tolist(),
     }
-    parameters = dict(flight.plan.parameters)
-    parameters["plant"] = {**parameters.get("plant", {}), **plant}
-    return flight.plan.model_copy(update={"parameters": parameters})
+    return flight.plan.with_parameters("plant", plant)
 
 
 def ripple(s: Array) -> Array:

@@ -21,7 +21,7 @@ def report(study: Study) -> dict[str, Any]:
     flight, lemma_1 = study.flight, study.lemma_1
     found = {
         **{key: flight.description[key] for key in ("controller", "case", "gains", "robot")},
-        "friction": flight.plan.friction,
+        "friction": flight.has_friction,
         "duration_s": flight.ticks * flight.period,
         "axes": study.axis_names,
         "lemma_1": {

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.flight_log import FlightLog
 
-from ...flight.plan import Flight, FlightPlan
+from ...flight.plan import NO_FRICTION, Flight, FlightPlan
 from ...laws import laws
 from .lemma_1 import Contraction, contraction
 from .reaching import off_mission_plan, reaching, ripple
@@ -81,8 +81,8 @@ def study(plan: FlightPlan, initial_error: float, fly: Fly) -> Study:
         return error_derivative(time_delay_error(of, h_bar), period)
 
     error, frictionless = derivative(log), None
-    if plan.friction:
-        without = plan.model_copy(update={"friction": False})
+    if flight.has_friction:
+        without = plan.with_parameters("plant", NO_FRICTION)
         frictionless = derivative(fly(Flight(without), "without friction"))
     twisting = None
     if log.telemetry is not None and {"k_1", "k_2"} <= gains.keys():

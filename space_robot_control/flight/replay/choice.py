@@ -22,6 +22,7 @@ from ...settings import (
     build_law,
     check_gains,
     gain_files,
+    gains_as_path,
 )
 from ...swaps import parse_swaps
 from ...trust import check_file, check_law, is_plain
@@ -63,6 +64,7 @@ class ControllerChoice:
                 "the bag does not say which law was flown: name it with --controller, and its "
                 "gains with --gains"
             )
+        gains = gains_as_path(gains, str(flown.get("robot", "paper")))
         self._flight, self._folder, self._trust = flight, folder, trust
         self._said = {
             **({"controller": controller} if controller else {}),
@@ -117,11 +119,12 @@ class ControllerChoice:
 
     def _robot(self, flown: Mapping[str, Any]) -> dict[str, str]:
         """The recorded robot as a file of its name, which also chooses its gains."""
-        if "robot_file" not in self._flight:
+        content = self._flight.get("controller_robot_file", self._flight.get("robot_file"))
+        if content is None:
             return {}
         name = Path(str(flown.get("robot", "paper"))).stem
         path = self._folder / f"{name if is_plain(name) else 'recorded'}.yaml"
-        _write(path, self._flight["robot_file"])
+        _write(path, content)
         return {"robot": str(path)}
 
     def _gains_folder(self, law: type[ControlLaw], recorded: Mapping[str, Any]) -> str:

@@ -50,7 +50,7 @@ def judge(flight: Flight, report: dict[str, Any] | None, bag: Path) -> Outcome:
     read is told.
     """
     outcome = Outcome()
-    kinds = [fault.kind for fault in parse_faults(flight.plan.faults, KINDS)]
+    kinds = [fault.kind for fault in parse_faults(flight.faults, KINDS)]
     if report is not None:
         outcome.restarts = report["graph"]["restarts"]
         outcome.wrong += unplanned_deaths(kinds, report["graph"]["events"])

@@ -1,0 +1,111 @@
+"""The settings of all nodes of a flight, resolved once: nodes, `simulate` and labels agree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from space_robot_msgs_py.configuration import NodeSettings, Tree, flatten, nest
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.validation import one_of
+from space_robot_sim.plant_settings import PlantNodeSettings
+
+from ..laws import ControlLaw
+from ..settings import ControllerNodeSettings, MissionNodeSettings, gains_as_path, split_gains
+
+SCHEMAS: tuple[type[NodeSettings], ...] = (
+    PlantNodeSettings, ControllerNodeSettings, MissionNodeSettings, RecorderNodeSettings,
+)  # fmt: skip
+NODES = tuple(schema.node for schema in SCHEMAS)
+
+_WAITING = "a flight's nodes wait for one another as they must"
+NOT_TO_BE_SET = {
+    "plant.ticks": "use --duration",
+    "plant.wait_for": _WAITING,
+    "controller.wait_for": _WAITING,
+    "recorder.bag": "use --bag",
+    "recorder.flight": "it is what the flight's options say",
+    "recorder.robot": "use --robot",
+    **{f"{node}.autostart": "the flight starts its nodes together" for node in NODES},
+}
+"""Parameters that the flight itself gives, and what to do instead."""
+
+Given = Mapping[str, Mapping[str, Any]]
+"""Parameters by node and dotted name."""
+
+
+class FlightSettings(NamedTuple):
+    """Of every node, and the gains that were given by themselves."""
+
+    plant: PlantNodeSettings
+    controller: ControllerNodeSettings
+    mission: MissionNodeSettings
+    recorder: RecorderNodeSettings
+    gains: dict[str, Tree]
+    """By law; they come over those of the gain set."""
+    given: dict[str, tuple[str, ...]]
+    """Dotted names of what was given to each node, over its files."""
+
+    @classmethod
+    def resolve(cls, options: Given, parameters: Given) -> FlightSettings:
+        """Settings from the files, the options over them, and single parameters over all.
+
+        Raises:
+            InputError: a parameter that is wrong, or that cannot be set so.
+        """
+        check_may_be_set(parameters)
+        given = {
+            node: dict(flatten(nest({**options.get(node, {}), **parameters.get(node, {})})))
+            for node in NODES
+        }
+        plant = PlantNodeSettings.resolve(given["plant"])
+        if plant.realtime:  # by the wall clock there is no time to wait
+            given["controller"] = {"reference_timeout": 0.0, **given["controller"]}
+        own, gains = split_gains(given["controller"])
+        controller = ControllerNodeSettings.resolve(own)
+        path = gains_as_path(controller.gains, controller.robot)
+        settings = cls(
+            plant,
+            controller.model_copy(update={"gains": path}),
+            MissionNodeSettings.resolve(given["mission"]),
+            RecorderNodeSettings.resolve(given["recorder"]),
+            gains,
+            {node: tuple(names) for node, names in given.items()},
+        )
+        settings._check_periods()
+        return settings
+
+    def parameters(self, laws: Mapping[str, ControlLaw]) -> dict[str, dict[str, Any]]:
+        """What was given to each node by dotted name: resolved values, of the declared types."""
+        gains = {
+            f"{name}.{gain}": values.tolist()
+            for name, law in laws.items()
+            for gain, values in law.gains.items()
+        }
+        found = {}
+        for node, names in self.given.items():
+            settings: NodeSettings = getattr(self, node)
+            resolved = dict(flatten(settings.model_dump())) | gains
+            found[node] = {name: resolved[name] for name in names if name in resolved}
+        return found
+
+    def _check_periods(self) -> None:
+        periods = {node: getattr(self, node).period for node in NODES}
+        if len(set(periods.values())) > 1:
+            said = ", ".join(f"{node} {period:g}" for node, period in periods.items())
+            how = " ".join(f"--set {node}.period=S" for node in NODES)
+            raise InputError(f"the period must be the same for all nodes, got {said} s: use {how}")
+
+
+def check_may_be_set(parameters: Given) -> None:
+    """See that parameters are for nodes there are, and are not the flight's own.
+
+    Raises:
+        InputError: names what does it instead.
+    """
+    for node, values in parameters.items():
+        one_of(node, NODES, "node", " in parameters")
+        for name, _ in flatten(nest(values)):
+            if why := NOT_TO_BE_SET.get(f"{node}.{name}"):
+                raise InputError(f"{node}.{name} cannot be set: {why}")

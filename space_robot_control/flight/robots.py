@@ -1,0 +1,47 @@
+"""The robots of a flight: what the plant is, and what the controller takes it for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from space_robot_msgs_py.configuration import named_file
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.validation import read_yaml
+from space_robot_sim.robot import Robot
+
+from .node_settings import FlightSettings
+
+
+class Robots:
+    """The robots that plant and controller are told; their joints are the same.
+
+    Raises:
+        InputError: a robot that is not there, or has other joints than the plant's.
+    """
+
+    def __init__(self, settings: FlightSettings) -> None:
+        self._contents: dict[str, dict[str, Any]] = {}
+        self.plant, self.controller, mission = (
+            self._read(node.robot)
+            for node in (settings.plant, settings.controller, settings.mission)
+        )
+        self._names = settings.plant.robot, settings.controller.robot
+        for node, robot in (("controller", self.controller), ("mission", mission)):
+            if robot.joint_names != self.plant.joint_names:
+                raise InputError(
+                    f"the robots of plant and {node} must have the same joints, got "
+                    f"{self.plant.name!r} with {', '.join(self.plant.joint_names)} and "
+                    f"{robot.name!r} with {', '.join(robot.joint_names)}"
+                )
+
+    def _read(self, name: str) -> Robot:
+        file = named_file("robots", name)
+        content = self._contents.setdefault(name, read_yaml(file))
+        return Robot.from_dict(content, where=str(file))
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """The plant's robot as its file has it, and the controller's where that is another."""
+        plant, controller = (self._contents[name] for name in self._names)
+        own = {"controller_robot": self.controller.name, "controller_robot_file": controller}
+        return {"robot_file": plant, **({} if controller == plant else own)}
