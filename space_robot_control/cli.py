@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 import click
 
 from space_robot_msgs_py.errors import SpaceRobotError
+from space_robot_msgs_py.lifeline import hold_to_standard_input
 
 from .commands.analyze import analyze
 from .commands.bench import bench
@@ -21,6 +22,7 @@ from .commands.replay import replay
 from .commands.reproduce import reproduce
 from .commands.soak import soak
 from .commands.stability import stability
+from .interruption import Interrupted, raising_signals
 
 NODE_MODULES = {
     "plant_node": "space_robot_sim.plant_node",
@@ -181,25 +183,33 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Entry point: one clear line on standard error instead of a traceback.
 
     ``space-robot plant_node`` and the like, which ``ros2 run`` starts, are the nodes themselves.
+    Exit code 2 on bad input, 1 on a failed flight, 128 and its number on a signal.
     """
     if arguments is None and sys.argv[1:] and (module := NODE_MODULES.get(sys.argv[1])):
         del sys.argv[1]  # rclpy and the node read the rest
         import_module(module).main()
+    hold_to_standard_input()  # if another command of this project has started this one
+    with raising_signals():
+        sys.exit(_run(arguments))
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    """The exit code of a command."""
     try:
         cli.main(args=arguments, prog_name="space-robot", standalone_mode=False)
     except click.exceptions.Exit as exit_:
-        sys.exit(exit_.exit_code)
-    except click.Abort:
-        sys.exit(130)
+        return exit_.exit_code
+    except click.Abort as abort:  # click's word for KeyboardInterrupt, and for the input's end
+        interrupted = abort.__cause__
+        click.echo(f"space-robot: {interrupted}", err=True)
+        return interrupted.exit_code if isinstance(interrupted, Interrupted) else 130
     except click.ClickException as error:
         error.show()
-        sys.exit(2)
+        return 2
     except SpaceRobotError as error:
         click.echo(f"space-robot: error: {error}", err=True)
-        sys.exit(error.exit_code)
-    except KeyboardInterrupt:
-        sys.exit(130)
-    sys.exit(0)
+        return error.exit_code
+    return 0
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.reader import read_coverage
 from space_robot_msgs_py.errors import FlightError
+from space_robot_msgs_py.run_module import module_command
 
 from ..flight.domain import ros_domain
 from ..flight.orchestrator import flight_parameters, require_ros
@@ -88,12 +88,9 @@ def fly_graph(flight: Flight, empty: bool = False, timed: bool = True) -> GraphR
             if timed
         }
         commands = {
-            node: [
-                sys.executable, "-m", *stopwatches.get(node, [module]),
-                *ros_arguments(parameters[node]),
-            ]
+            node: module_command(*stopwatches.get(node, [module]), *ros_arguments(parameters[node]))
             for node, module in MODULES.items()
-        }  # fmt: skip
+        }
         with Graph(commands, node_environment(domain)) as graph:
             use = _watch(graph)
         coverage = read_coverage(bag)
@@ -115,11 +112,9 @@ def naive_ticks_per_s(ticks: int) -> float:
     with tempfile.TemporaryDirectory(prefix="space_robot_bench_") as folder, ros_domain() as domain:
         file = Path(folder) / "rate"
         commands = {
-            node: [
-                sys.executable, "-m", "space_robot_control.bench.naive", node, str(file), str(ticks)
-            ]
+            node: module_command("space_robot_control.bench.naive", node, str(file), str(ticks))
             for node in ("controller", "plant")
-        }  # fmt: skip
+        }
         with Graph(commands, node_environment(domain)) as graph:
             _watch(graph)
         return float(file.read_text("utf-8"))

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.lifeline import hold_to_standard_input
 from space_robot_msgs_py.ros.endpoints import message_type, qos
 from space_robot_msgs_py.ros.process_environment import set_defaults
 
@@ -106,6 +107,7 @@ def main() -> None:
     """See the module."""
     role, file, ticks = sys.argv[1:]
     rclpy.init(args=[])
+    hold_to_standard_input()
     node = rclpy.create_node(f"naive_{role}")
     try:
         if role == "plant":

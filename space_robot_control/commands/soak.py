@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from ..interruption import Interrupted
 from .options import OUTPUT, check_writable, put_json
 
 
@@ -53,7 +54,7 @@ def soak(
     stopped processes are among them. A flight survives if it comes to its end, no node dies that
     was not killed, every torque is finite, no message is lost that no fault explains, its bag can
     be read, and no process is left. Those that do not are listed, each with the command that flies
-    it again. Exit code 0 if all survived, else 1. Ctrl-C shows what was flown so far.
+    it again. Exit code 0 if all survived, else 1. Ctrl-C shows what was flown so far (then 130).
 
     \b
     Examples:
@@ -71,6 +72,8 @@ def soak(
     put_json(report, as_json, output)
     if not as_json:
         print_soak(report, terminal())
+    if done.interrupted_by:
+        raise Interrupted(done.interrupted_by)
     if failed := report["flights"] - report["survived"]:
         from space_robot_msgs_py.errors import FlightError
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import subprocess
-import sys
 
 import click
 import numpy as np
 
 from space_robot_msgs_py.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.compiled import cache_directory
+from space_robot_msgs_py.lifeline import hold_to_standard_input
+from space_robot_msgs_py.run_module import module_command
 from space_robot_msgs_py.samples import Command, RobotState
 
 from ..laws import laws
 from .plan import Flight, FlightPlan
+from .processes import child_process
 from .simulate import simulate
 
 MARK = "complete"
@@ -29,8 +31,9 @@ def compile_kernels() -> None:
     if mark.exists():
         return
     click.echo("compiling the dynamics and the laws (once, about half a minute) ...", err=True)
-    with subprocess.Popen([sys.executable, "-m", __name__], stdout=subprocess.DEVNULL):
+    with child_process(module_command(__name__), stdout=subprocess.DEVNULL) as helper:
         _step_plant()
+        helper.wait()
     for law in laws():
         simulate(Flight(FlightPlan(controller=law, duration=0.002)))
     _step_plant()
@@ -58,4 +61,5 @@ def _answer_and_exchange() -> None:
 
 
 if __name__ == "__main__":
+    hold_to_standard_input()
     _answer_and_exchange()

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from contextlib import closing
 from typing import Any
 
 from space_robot_msgs_py.errors import FlightError
 
+from ..interruption import exit_code
 from .display import FlightProgress, flight_progress
+from .foreign import ForeignNodes
 from .injection import Injector
 from .lifecycle import LifecycleDriver
 from .monitor import Event, Monitor
@@ -20,13 +23,16 @@ POLL_S = 0.1
 INJECTING_POLL_S = 0.01
 STALL_TIMEOUT_S = 60.0
 ORDER = ("recorder", "mission", "controller", "plant")
-BRING_UP = ((ORDER, "configure"), *(((node,), "activate") for node in ORDER))
+NODE_NAMES = tuple(f"{node}_node" for node in ORDER)
 
 
 class InterruptedFlightError(FlightError):
     """The user stopped the flight."""
 
-    exit_code = 130
+    def __init__(self, text: str, number: int) -> None:
+        """``number``: of the signal."""
+        super().__init__(text)
+        self.number, self.exit_code = number, exit_code(number)
 
 
 def follow(
@@ -44,6 +50,7 @@ def follow(
 
     Raises:
         InterruptedFlightError: the user has ended the flight.
+        InputError: others publish its topics, or have its nodes' names.
         FlightError: it cannot go on.
     """
     monitor = Monitor(domain)
@@ -65,6 +72,7 @@ class _Follower:
         self.total_s = flight.ticks * flight.period
         self._last_clock_s = self.total_s - flight.plant_settings.clock_decimation * flight.period
         self._graph, self._monitor, self._stopped = graph, monitor, stopped
+        self._foreign = ForeignNodes(monitor.node, NODE_NAMES)
         self._injector = Injector(flight.orchestrator_faults, graph)
         again = {**parameters["controller"], "wait_for": ["plant_node"]}
         self._watch = Watch(
@@ -83,23 +91,30 @@ class _Follower:
         """Configure all nodes, then activate them, the plant last."""
         show(0.0, "configuring the nodes")
         with closing(LifecycleDriver(self._monitor.node)) as driver:
-            for nodes, transition in BRING_UP:
-                names = [f"{node}_node" for node in nodes]
-                for name in driver.change(names, transition, self._check_start):
-                    words = self._graph.nodes[name.removesuffix("_node")].last_words()
-                    raise FlightError(f"{name} refused to {transition}:\n{words}")
+            self._change(driver, NODE_NAMES, "configure")
+            self._foreign.wait(self._check_start)
+            for name in NODE_NAMES:
+                self._change(driver, [name], "activate")
         show.say(f"configured and active: {', '.join(ORDER)}")
         show(0.0, "waiting for the nodes")
+
+    def _change(self, driver: LifecycleDriver, names: Sequence[str], transition: str) -> None:
+        for name in driver.change(names, transition, self._check_start):
+            words = self._graph.nodes[name.removesuffix("_node")].last_words()
+            raise FlightError(f"{name} refused to {transition}:\n{words}")
 
     def until_landed(self, show: FlightProgress) -> None:
         """Watch, inject, show."""
         monitor, injector = self._monitor, self._injector
         while not self._watch.has_landed:
             if self._stopped:
-                raise InterruptedFlightError(f"stopped at {monitor.simulated_s:.2f} s")
+                raise InterruptedFlightError(
+                    f"stopped at {monitor.simulated_s:.2f} s", self._stopped[0]
+                )
             time.sleep(INJECTING_POLL_S if injector.is_busy else POLL_S)
             news = [*monitor.poll(), *injector.poll(monitor.simulated_s)]
             news += self._watch.poll(monitor.simulated_s)
+            self._foreign.watch()
             self._show_progress(show)
             if monitor.simulated_s < self._last_clock_s:  # what ends then is meant to
                 for event in news:
@@ -112,7 +127,7 @@ class _Follower:
         self._graph.stop()
         self._watch.bury_recorder()
         if self._stopped:
-            raise InterruptedFlightError("stopped when the flight had landed")
+            raise InterruptedFlightError("stopped when the flight had landed", self._stopped[0])
         self._monitor.poll()  # the nodes' last reports
         return {
             "events": [event._asdict() for event in self._events],
@@ -124,7 +139,7 @@ class _Follower:
     def _check_start(self) -> None:
         self._graph.check()
         if self._stopped:
-            raise InterruptedFlightError("stopped before the flight began")
+            raise InterruptedFlightError("stopped before the flight began", self._stopped[0])
 
     def _show_progress(self, show: FlightProgress) -> None:
         monitor, now = self._monitor, time.monotonic()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import signal
+import shutil
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,10 +12,13 @@ from typing import Any
 
 import click
 
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.errors import FlightError
+from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
 from ..analysis import analyse
+from ..interruption import handled_signals
 from .compilation import compile_kernels
 from .domain import ros_domain
 from .following import follow
@@ -30,9 +33,9 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
     flight from being whole though it was flown to its end.
 
     Raises:
-        InputError: the bag cannot be made; nothing was started.
-        FlightError: a node died, the graph stalled, messages were lost, or the user stopped it;
-            the bag is closed and no process left.
+        InputError: the bag cannot be made, or the domain is taken.
+        FlightError: a node died, the graph stalled, messages were lost, or the user stopped it.
+            The bag is closed, or gone if no tick was flown; no process is left.
     """
     check_bag_path(bag)
     require_ros()
@@ -48,9 +51,12 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
             }
             with Graph(commands, node_environment(domain)) as graph:
                 what_happened = follow(graph, flight, parameters, domain, stopped)
-        except FlightError as error:
-            kept = f"; what was flown is in {bag}" if _has_messages(bag) else ""
-            raise type(error)(f"{error}{kept}") from None
+        except SpaceRobotError as error:
+            if _has_states(bag):
+                error.args = (f"{error}; what was flown is in {bag}",)
+            else:
+                shutil.rmtree(bag, ignore_errors=True)
+            raise
         _say(f"flown and recorded in {time.monotonic() - begin:.1f} s, start-up included")
     report = analyse(read_flight(bag, trust=True))
     report["graph"] = what_happened
@@ -58,8 +64,12 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
     return report
 
 
-def _has_messages(bag: Path) -> bool:
-    return any(file.stat().st_size > 0 for file in bag.glob("*.mcap"))
+def _has_states(bag: Path) -> bool:
+    """Whether a tick was flown."""
+    try:
+        return next(open_bag(bag).messages(topics.JOINT_STATES), None) is not None
+    except (InputError, OSError):
+        return False
 
 
 def require_ros() -> None:
@@ -104,15 +114,10 @@ def _check(report: dict[str, Any], flight: Flight) -> None:
 
 @contextmanager
 def stop_signals() -> Iterator[list[int]]:
-    """A list that SIGINT and SIGTERM fill; the nodes, in groups of their own, do not get them."""
+    """A list that SIGINT, SIGTERM and SIGHUP fill; the nodes, in their own groups, get none."""
     arrived: list[int] = []
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    previous = {n: signal.signal(n, lambda n, frame: arrived.append(n)) for n in numbers}
-    try:
+    with handled_signals(lambda number, frame: arrived.append(number)):
         yield arrived
-    finally:
-        for number, handler in previous.items():
-            signal.signal(number, handler)
 
 
 def _say(text: str) -> None:

@@ -7,16 +7,17 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from space_robot_msgs_py import lifeline
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.ros.process_environment import DEFAULTS
+from space_robot_msgs_py.run_module import clean_environment, module_command
 
 PACKAGE = "space_robot"
 MODULES = {
@@ -41,7 +42,9 @@ def has_ros2_run() -> bool:
 
 def node_environment(domain: int) -> dict[str, str]:
     """What a node's process is started with: the project's defaults unless the user set others."""
-    return {**DEFAULTS, **os.environ, "ROS_DOMAIN_ID": str(domain)}
+    return {
+        **DEFAULTS, **clean_environment(), **lifeline.held(), "ROS_DOMAIN_ID": str(domain),
+    }  # fmt: skip
 
 
 def node_command(node: str, parameters: Mapping[str, Any]) -> list[str]:
@@ -49,7 +52,7 @@ def node_command(node: str, parameters: Mapping[str, Any]) -> list[str]:
     command = (
         ["ros2", "run", PACKAGE, f"{node}_node"]
         if has_ros2_run()
-        else [sys.executable, "-m", MODULES[node]]
+        else module_command(MODULES[node])
     )
     return command + ros_arguments(parameters)
 
@@ -62,8 +65,27 @@ def ros_arguments(parameters: Mapping[str, Any]) -> list[str]:
     return arguments
 
 
+@contextmanager
+def child_process(command: Sequence[str], **options: Any) -> Iterator[subprocess.Popen[bytes]]:
+    """A process that does not outlive the context, nor this process; ``options``: of `Popen`.
+
+    It must be one that holds to its standard input, see `lifeline`.
+    """
+    environment = {**clean_environment(), **lifeline.held(), **options.pop("env", {})}
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, env=environment, start_new_session=True, **options
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.terminate()
+
+
 class NodeProcess:
-    """One node in a process group of its own, its output kept in a file."""
+    """One node in a process group of its own, its output kept in a file.
+
+    Its standard input is a lifeline: when this process ends, however it does, so does the node.
+    """
 
     def __init__(self, node: str, command: Sequence[str], environment: Mapping[str, str]):
         self.node = node
@@ -71,7 +93,7 @@ class NodeProcess:
         self._output = tempfile.TemporaryFile()  # noqa: SIM115  (closed in `close`)
         self._process = subprocess.Popen(
             command,
-            stdin=subprocess.DEVNULL, stdout=self._output, stderr=subprocess.STDOUT,
+            stdin=subprocess.PIPE, stdout=self._output, stderr=subprocess.STDOUT,
             env=dict(environment), start_new_session=True,
         )  # fmt: skip
 
@@ -130,8 +152,10 @@ class NodeProcess:
         self._process.wait()
 
     def close(self) -> None:
-        """Let go of its output."""
+        """Let go of its output and its lifeline."""
         self._output.close()
+        if self._process.stdin:
+            self._process.stdin.close()
 
 
 class Graph:

@@ -1,7 +1,7 @@
 """The control laws, one file each.
 
 Your own: one class derived from `ControlLaw` and one YAML of its gains. A file put in this
-folder is found by its law's ``name``; a class anywhere on the Python path is named
+folder is found by its law's ``name``; a class on PYTHONPATH is named
 ``module:Class`` wherever a controller's name is asked for.
 """
 

@@ -1,24 +1,19 @@
-"""Only one of each: a topic of this graph has one publisher in a ROS domain.
+"""Only one of each: in a ROS domain a node's name is its own, and a topic has one publisher.
 
 Two plants or two controllers in one domain would answer each other's ticks. Nodes of this project
-keep each other out with a lock that the kernel releases however a process ends: discovery would not
-do, which lists a killed node for another 20 s, under the name of its successor. Other nodes take no
-lock; discovery finds those.
+keep each other out with `locks`. Other nodes take none; discovery finds those.
 """
 
 from __future__ import annotations
 
-import fcntl
-import os
-import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack
-from pathlib import Path
 
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from ..errors import InputError
+from ..locks import FileLock, HeldError, node_lock, topic_lock
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
 """What discovery calls the node of a publisher until its participant has said, if it ever does."""
@@ -43,52 +38,48 @@ class Claim:
             raise
 
     def _take(self, domain: int, topic: str, holder: str) -> None:
-        descriptor = _open(lock_path(domain, topic))
-        self._held.callback(os.close, descriptor)
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            other = os.pread(descriptor, 200, 0).decode(errors="replace") or "another node"
+            lock = FileLock(topic_lock(domain, topic), holder)
+        except HeldError as error:
             raise InputError(
-                f"{topic} of ROS domain {domain} is already published by {other}"
+                f"{topic} of ROS domain {domain} is already published by {error.holder.name}"
             ) from None
-        os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, f"{holder} (pid {os.getpid()})".encode(), 0)
+        self._held.callback(lock.release)
 
     def release(self) -> None:
         """Let others have the topics."""
         self._held.close()
 
 
-def lock_path(domain: int, topic: str) -> Path:
-    """The file that is locked by the publisher of a topic; it stays when the lock goes."""
-    # a ROS name has no dots, so no two topics share a file
-    return Path(tempfile.gettempdir()) / f"space_robot_{domain}{topic.replace('/', '.')}.lock"
+def claim_name(node: Node) -> FileLock:
+    """This process' right to its node's name: who calls a service by name means one node.
 
-
-def _open(path: Path) -> int:
-    """Open a lock file, for all users: a domain is the whole machine's."""
-    flags = os.O_RDWR | os.O_NOFOLLOW
+    Raises:
+        InputError: another node of this project has it, or no lock can be had.
+    """
+    domain, name = node.context.get_domain_id(), node.get_fully_qualified_name()
     try:
-        if path.exists():  # Linux refuses O_CREAT for others' files in /tmp
-            return os.open(path, flags)
-        descriptor = os.open(path, flags | os.O_CREAT, 0o666)
-        os.fchmod(descriptor, 0o666)  # past the umask
-        return descriptor
-    except OSError as error:
-        raise InputError(f"{path}: no lock can be taken there ({error.strerror})") from None
+        return FileLock(node_lock(domain, name), node.get_name())
+    except HeldError as error:
+        raise InputError(
+            f"ROS domain {domain} has a {name} already: {error.holder.name}; end that one, "
+            "or take another domain (ROS_DOMAIN_ID) or name (--ros-args -r __node:=...)"
+        ) from None
 
 
-def foreign_publishers(node: Node, topic_names: Sequence[str]) -> dict[str, list[str]]:
+def foreign_publishers(
+    node: Node, topic_names: Sequence[str], own: Sequence[str] = ()
+) -> dict[str, list[str]]:
     """Full names of nodes other than this one that publish these topics; none: no entry.
 
-    By name, as discovery sees it now: a killed node of this one's name is no stranger.
+    By name, as discovery sees it now: a killed node of this one's name is no stranger. ``own``:
+    full names of further nodes that are none.
     """
-    own = node.get_fully_qualified_name()
+    known = {node.get_fully_qualified_name(), *own}
     strangers = {}
     for topic in topic_names:
         infos = node.get_publishers_info_by_topic(topic)
-        names = {_full_name(info) for info in infos} - {own}
+        names = {_full_name(info) for info in infos} - known
         if names:
             strangers[topic] = sorted(names)
     return strangers

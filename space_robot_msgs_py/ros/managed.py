@@ -18,9 +18,10 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from ..configuration import NodeSettings
 from ..errors import InputError, SpaceRobotError
 from ..health import Health, Level
+from ..locks import FileLock
 from .diagnostics import Diagnostics
 from .endpoints import Out
-from .exclusive import Claim, foreign_publishers
+from .exclusive import Claim, claim_name, foreign_publishers
 from .parameters import declare_settings, refuse_unknown
 
 Schema = TypeVar("Schema", bound=NodeSettings)
@@ -72,6 +73,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         """Whether the loop's `run` is on the stack."""
         self._topics: list[str] = []
         self._claim: Claim | None = None
+        self._name: FileLock | None = None
         self.error: SpaceRobotError | None = None
         """Why the last transition failed."""
         description = ParameterDescriptor(
@@ -98,10 +100,20 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             health = Health("unconfigured")
         self._diagnostics.report(health)
 
+    def claim_name(self) -> None:
+        """Be the only node of this name in the domain; before anything is served.
+
+        Raises:
+            InputError: another node of this project has the name.
+        """
+        self._name = claim_name(self)
+
     def destroy_node(self) -> None:
         """Let go of everything, what serves the node before the node."""
         self._executor.shutdown()
         super().destroy_node()
+        if self._name:
+            self._name.release()
 
     def start(self) -> None:
         """Configure and activate.

@@ -20,6 +20,7 @@ from rclpy.signals import SignalHandlerOptions  # noqa: E402
 
 from ..configuration import NodeSettings  # noqa: E402
 from ..errors import InputError, SpaceRobotError  # noqa: E402
+from ..lifeline import hold_to_standard_input  # noqa: E402
 from .endpoints import Out  # noqa: E402
 from .managed import Loop, ManagedNode  # noqa: E402
 from .scheduling import ask_for_fifo  # noqa: E402
@@ -40,8 +41,9 @@ class Shell:
         self.signalled = False
         """Whether the process has been told to end."""
         self._next_service = 0.0
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._stop)
+        hold_to_standard_input()
 
     def _stop(self, number: int, frame: object) -> None:
         self.signalled = True
@@ -94,8 +96,8 @@ def run_node(
 ) -> NoReturn:
     """Run a node until its loop returns while active, or until it is shut down.
 
-    Exit code 0 at the end or on SIGINT or SIGTERM, 2 on bad input, 1 on a failed flight, each
-    failure with one line on standard error.
+    Exit code 0 at the end or on SIGINT, SIGTERM or SIGHUP, 2 on bad input, 1 on a failed flight,
+    each failure with one line on standard error.
     """
     faulthandler.enable()  # a crash of the middleware leaves a word on where it was
     try:
@@ -109,6 +111,7 @@ def run_node(
     shell = Shell(node)
     code = 0
     try:
+        node.claim_name()
         if node.autostart:
             node.start()
         _live(node, shell)

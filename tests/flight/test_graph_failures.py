@@ -64,7 +64,7 @@ def test_interrupted_flight_leaves_a_closed_bag_and_no_process(
     process, nodes = _start(tmp_path / "bag")
     process.send_signal(number)
     _, standard_error = process.communicate(timeout=60)
-    assert process.returncode == 130
+    assert process.returncode == 128 + number
     assert "stopped at" in standard_error
     assert "Traceback" not in standard_error
     _assert_gone(nodes)

@@ -87,9 +87,9 @@ def test_deactivated_controller_leaves_no_torque_and_comes_back(
 @pytest.mark.parametrize(
     ("second", "said"),
     [
-        ("plant", "/joint_states of ROS domain"),
-        ("controller", "/command of ROS domain"),
-        ("mission", "/reference/joints of ROS domain"),
+        ("plant", "has a /plant_node already"),
+        ("controller", "has a /controller_node already"),
+        ("mission", "has a /mission_node already"),
     ],
 )
 def test_a_second_node_of_a_kind_is_refused_by_name(
@@ -101,7 +101,7 @@ def test_a_second_node_of_a_kind_is_refused_by_name(
     output, _ = other.communicate(timeout=60)
     assert other.returncode == 2
     assert said in output
-    assert f"already published by {second}_node (pid {first.pid})" in output
+    assert f"{second}_node (pid {first.pid})" in output
     assert first.poll() is None
 
 

@@ -98,7 +98,8 @@ def test_ctrl_c_ends_with_the_table(tmp_path: Path) -> None:
         time.sleep(0.1)
     os.kill(soak.pid, signal.SIGINT)
     output, errors = soak.communicate(timeout=60)
-    assert soak.returncode == 0, errors
+    assert soak.returncode == 130, errors
+    assert errors.strip().splitlines()[-1] == "space-robot: stopped by SIGINT"
     assert "interrupted" in output
     assert "Traceback" not in errors
     assert json.loads(file.read_text("utf-8"))["flights"] == 0

@@ -11,8 +11,6 @@ import time
 from collections.abc import Callable, Iterator
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.ros.process_environment import DEFAULTS, set_defaults
@@ -22,8 +20,8 @@ rclpy = pytest.importorskip("rclpy")
 
 from space_robot_msgs_py.ros.exclusive import (  # noqa: E402
     Claim,
+    claim_name,
     foreign_publishers,
-    lock_path,
 )
 
 PUBLISHER = """
@@ -40,8 +38,6 @@ publisher = node.create_publisher(String, "/command", 1)
 print("ready", flush=True)
 time.sleep(60)
 """
-
-NAMES = st.lists(st.from_regex(r"[a-z][a-z0-9_]{0,5}", fullmatch=True), min_size=1, max_size=3)
 
 
 @pytest.fixture
@@ -131,10 +127,14 @@ def test_strangers_are_named_and_own_publishers_are_not(
     assert _eventually(lambda: foreign_publishers(node, topics) == {"/command": ["/controller"]})
 
 
-@given(st.integers(0, 232), NAMES, st.integers(0, 232), NAMES)
-def test_every_topic_of_every_domain_has_its_own_lock(
-    domain: int, topic: list[str], other_domain: int, other: list[str]
+def test_two_nodes_of_one_name_are_refused(
+    make_node: Callable[..., rclpy.node.Node], domain: int
 ) -> None:
-    same = (domain, topic) == (other_domain, other)
-    paths = lock_path(domain, "/" + "/".join(topic)), lock_path(other_domain, "/" + "/".join(other))
-    assert (paths[0] == paths[1]) == same
+    """Whoever asks /recorder_node to configure means one of them."""
+    name = claim_name(make_node("recorder_node"))
+    said = f"ROS domain {domain} has a /recorder_node already: recorder_node (pid {os.getpid()})"
+    with pytest.raises(InputError, match=re.escape(said)):
+        claim_name(make_node("recorder_node"))
+    claim_name(make_node("recorder_node", namespace="/other")).release()
+    name.release()
+    claim_name(make_node("recorder_node")).release()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -10,16 +9,18 @@ import time
 from pathlib import Path
 
 from space_robot_msgs_py.errors import FlightError
+from space_robot_msgs_py.run_module import module_command
 
 from ...flight.domain import ros_domain
 from ...flight.monitor import Monitor
 from ...flight.orchestrator import require_ros
+from ...flight.processes import child_process
 from ..measure import Options, interleave, repeated
 from ..result import Result, Target
 
 HELP_ASKED = Target(0.3)
 FIRST_TICK_ASKED = Target(5.0)
-COMMAND = [sys.executable, "-m", "space_robot_control.cli"]
+COMMAND = module_command("space_robot_control.cli")
 
 
 def start_up(options: Options) -> list[Result]:
@@ -53,18 +54,21 @@ def _run(command: list[str]) -> None:
 
 def _first_tick_s() -> float:
     """From the command to the plant's first state, as another process hears it."""
-    with tempfile.TemporaryDirectory(prefix="space_robot_bench_") as folder, ros_domain() as domain:
+    with ros_domain() as domain:
+        pass  # it is free, and the flight takes it
+    with tempfile.TemporaryDirectory(prefix="space_robot_bench_") as folder:
         monitor = Monitor(domain)
         begin = time.monotonic()
         command = [*COMMAND, "fly", "--duration", "1", "--bag", str(Path(folder) / "bag")]
-        environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
-        with subprocess.Popen(
-            command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        ) as flight:
+        with child_process(
+            command, env={"ROS_DOMAIN_ID": str(domain)},
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        ) as flight:  # fmt: skip
             while not monitor.has_begun and flight.poll() is None:
                 time.sleep(0.005)
                 monitor.poll()
             first_tick = time.monotonic() - begin
+            flight.wait()
         monitor.close()
     if flight.returncode != 0:
         raise FlightError(f"{' '.join(command)}: exit code {flight.returncode}")

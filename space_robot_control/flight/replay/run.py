@@ -161,7 +161,7 @@ def _bring_up(controller: NodeProcess, player: Player) -> None:
 
 def _check(controller: NodeProcess, stopped: list[int]) -> None:
     if stopped:
-        raise InterruptedFlightError("the replay was stopped")
+        raise InterruptedFlightError("the replay was stopped", stopped[0])
     if controller.exit_code is not None:
         raise FlightError(
             f"{controller.obituary()} before the replay was over:\n{controller.last_words()}"

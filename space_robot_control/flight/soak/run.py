@@ -17,6 +17,7 @@ import psutil
 
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
+from ...interruption import Interrupted
 from ..compilation import compile_kernels
 from ..following import InterruptedFlightError
 from ..orchestrator import fly, require_ros
@@ -76,7 +77,8 @@ class Soak:
 
     seed: int
     flights: list[Flown] = field(default_factory=list)
-    interrupted: bool = False
+    interrupted_by: int = 0
+    """Signal that ended it; 0: its time was over."""
     shared_memory_files: tuple[int, int] = (0, 0)
     """Of Fast DDS, at the start and at the end."""
 
@@ -88,7 +90,7 @@ class Soak:
         own = [flown.own_memory_mb for flown in self.flights]
         return {
             "seed": self.seed,
-            "interrupted": self.interrupted,
+            "interrupted": self.interrupted_by != 0,
             "flights": len(self.flights),
             "survived": sum(flown.outcome.survived for flown in self.flights),
             "faults": kinds.total(),
@@ -137,8 +139,8 @@ def soak(
             plan = draw_flight(seed, number, duration_s)
             done.flights.append(_fly(number, plan, folder / f"flight_{number:04d}", bool(bags)))
             say(done.flights[-1].line())
-    except (InterruptedFlightError, KeyboardInterrupt):
-        done.interrupted = True
+    except (InterruptedFlightError, Interrupted) as ended:
+        done.interrupted_by = ended.number
         if not bags:
             shutil.rmtree(folder / f"flight_{len(done.flights) + 1:04d}", ignore_errors=True)
     finally:

@@ -1,0 +1,77 @@
+"""Nodes of others in a flight's domain, that would speak or be spoken to in place of its own."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.errors import InputError
+
+DISCOVERY_S = 2.0
+"""A node that was there before is discovered in 0.1 to 1.8 s (Fast DDS of Jazzy, measured)."""
+WATCHED_S = 6.0
+"""One that is discovered later has come later: the nodes warn of it, the flight goes on."""
+LOOK_S = 0.1
+LASTING = 10
+"""Looks in a row: an own node that is just being discovered has no name yet."""
+
+
+class ForeignNodes:
+    """Refuses a domain where others publish the flight's topics or have its nodes' names."""
+
+    def __init__(self, node: Any, names: Sequence[str]) -> None:
+        """``node``: an rclpy node to look with; ``names``: of the flight's nodes."""
+        self._node, self._names = node, [f"/{name}" for name in names]
+        self._joined_at = self._look_at = time.monotonic()
+        self._seen: Counter[str] = Counter()
+
+    def wait(self, check: Callable[[], None]) -> None:
+        """Return when everybody who was there before should be known.
+
+        Args:
+            check: called while waiting; raises to give up.
+
+        Raises:
+            InputError: there is a foreign publisher, or a namesake of a node.
+        """
+        while True:
+            check()
+            self._look(self._publishers() + self._namesakes())
+            if time.monotonic() > self._joined_at + DISCOVERY_S and not self._seen:
+                return
+            time.sleep(LOOK_S)
+
+    def watch(self) -> None:
+        """Look again now and then, until they are known for sure; call it often.
+
+        Raises:
+            InputError: there is a foreign publisher.
+        """
+        now = time.monotonic()
+        if now >= self._look_at and now < self._joined_at + WATCHED_S:
+            self._look_at = now + LOOK_S
+            self._look(self._publishers())
+
+    def _look(self, found: Sequence[str]) -> None:
+        self._seen = Counter({what: self._seen[what] + 1 for what in found})
+        for what, times in self._seen.items():
+            if times >= LASTING:
+                raise InputError(
+                    f"{what}: end that, or take another domain with --domain, or ROS_DOMAIN_ID"
+                )
+
+    def _publishers(self) -> list[str]:
+        from space_robot_msgs_py.ros.exclusive import foreign_publishers
+
+        found = foreign_publishers(self._node, [topic.name for topic in topics.ALL], self._names)
+        return [f"{topic} is also published by {', '.join(n)}" for topic, n in found.items()]
+
+    def _namesakes(self) -> list[str]:
+        return [
+            f"another {name} is in this ROS domain"
+            for name in self._names
+            if self._node.count_services(f"{name}/change_state") > 1
+        ]
