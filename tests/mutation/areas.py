@@ -24,7 +24,7 @@ class Area(NamedTuple):
     def tests_of(self, module: Path) -> list[str]:
         """Tests of the area, those that bear the module's name first."""
         tests = [path.relative_to(ROOT) for pattern in self.tests for path in _found(pattern)]
-        return [str(path) for path in sorted(tests, key=lambda t: (module.stem not in t.stem, t))]
+        return [str(path) for path in sorted(tests, key=lambda test: module.stem not in test.stem)]
 
 
 def _found(pattern: str) -> list[Path]:

@@ -1,0 +1,137 @@
+"""Tables and numbers that README and docs/ show are those that the commands print."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shown import ROOT, block, check, differences, run
+
+from space_robot_control.settings import ControllerNodeSettings, MissionNodeSettings
+from space_robot_msgs_py.configuration import NodeSettings, leaves
+from space_robot_msgs_py.recorder_settings import RecorderNodeSettings
+from space_robot_sim import load_bag
+from space_robot_sim.plant_settings import PlantNodeSettings
+
+
+@pytest.fixture(scope="module")
+def bags(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The two bags of docs/analysis.md, made by its first two commands."""
+    folder = tmp_path_factory.mktemp("flights")
+    run("simulate", "--bag", str(folder / "one"))
+    run("simulate", "--controller", "tde_smc", "--case", "3", "--bag", str(folder / "two"))
+    return folder
+
+
+def test_the_table_of_readme_is_what_simulate_prints() -> None:
+    """So what `fly` prints: they are the same to the bit."""
+    shown = block("README.md", "tde_stc, case 1, gains default:", "messages lost: none")
+    check(shown, run("simulate"), "tde_stc, case 1")
+
+
+def test_the_example_of_analysis_is_what_analyze_prints(bags: Path) -> None:
+    """Line by line; the page leaves out those that Table V has, too."""
+    shown = block("docs/analysis.md", "┏━━", "└──")
+    printed = run("analyze", str(bags / "one"), str(bags / "two"), columns=100)
+    lines = [line.strip() for line in printed.splitlines()]
+    missing = [s for s in shown if not any(not [*differences([s], [line])] for line in lines)]
+    assert not missing, "\n".join([*missing, "", printed])
+
+
+def test_a_bag_is_as_large_as_the_page_says(bags: Path) -> None:
+    """To a hundredth: versions of lz4 compress a little differently."""
+    text = (ROOT / "docs/bags.md").read_text("utf-8")
+    (size,) = re.findall(r"\| `lz4` \(default\) \| ([\d.]+) MB", text)
+    written = sum(path.stat().st_size for path in (bags / "one").iterdir())
+    assert float(size) == pytest.approx(written / 1e6, rel=0.01)
+
+
+NODES: dict[str, type[NodeSettings]] = {
+    "all": NodeSettings,
+    "plant": PlantNodeSettings,
+    "controller": ControllerNodeSettings,
+    "mission": MissionNodeSettings,
+    "recorder": RecorderNodeSettings,
+}
+
+
+@pytest.mark.parametrize("node", list(NODES))
+def test_the_page_on_configuration_names_every_parameter(node: str) -> None:
+    """A group of them by its first word; `<law>.<gain>` and `autostart` are in no schema."""
+    text = (ROOT / "docs/configuration.md").read_text("utf-8")
+    (row,) = re.findall(rf"^\| {node} \| (.*) \|$", text, re.MULTILINE)
+    given = set(re.findall(r"`([^`]+)`", row))
+    names = {name for name, _ in leaves(NODES[node])}
+    if node == "all":
+        names |= {"autostart"}
+    else:
+        names -= {name for name, _ in leaves(NodeSettings)}
+        names |= {"<law>.<gain>"} if node == "controller" else set()
+    groups = {name.removesuffix(".*") for name in given if name.endswith(".*")}
+    grouped = {n if n.split(".")[0] not in groups else n.split(".")[0] + ".*" for n in names}
+    assert given == grouped
+
+
+def test_the_page_on_stability_has_the_numbers_of_its_command() -> None:
+    """Case 1 under TDE-STC, the first command of the page."""
+    report = json.loads(run("stability", "--json"))
+    twisting, lemma = report["super_twisting"], report["lemma_1"]
+    lmi, unlike = twisting["lmi"], report["time_delay_error"]["without_friction"]["beta"]
+    excess = [axis["value"] / axis["limit"] for axis in twisting["beta_below_k_2"]]
+    bounds = twisting["reaching"]["reaching_time_s_below_bound"]
+    reaching = [(axis["value"], axis["limit"]) for axis in bounds]
+    base, joints = reaching[:3], reaching[3:]
+    eigenvalues = [axis["value"] for axis in lmi["residual_of_paper_m_at_beta_0_gamma_0"]]
+    gammas = [axis["gamma"] for axis in lmi["assumed_beta_half_of_tolerated"]]
+    without_friction = [beta / k_2 for beta, k_2 in zip(unlike, twisting["k_2"], strict=True)]
+    shown = block("docs/stability.md", "| Lemma 1, spectral norm", "| reaching time below (56)")
+    assert not [*differences(shown, [
+        f"| Lemma 1, spectral norm of W below 1 | fails: {lemma['spectral_norm']['max']:.3f} |",
+        f"| the same with the spectral radius | holds: {lemma['spectral_radius']['max']:.3f} |",
+        "| `K_2 > beta`, also circle criterion (73) | fails on every axis, by factors of "
+        f"{min(excess):.0f} and more; without friction by {min(without_friction):.0f} to "
+        f"{max(without_friction):.0f} |",
+        "| `K_1^2 > 4 K_2` | holds on every axis |",
+        f"| LMI (51) with the M of (48) | fails: largest eigenvalue {min(eigenvalues):.2f} to "
+        f"{max(eigenvalues):.2f}, with beta = gamma = 0 |",
+        "| LMI (51) with M free, beta measured | no gamma |",
+        f"| the same, beta = K_2 / 2 | gamma {min(gammas):.4f} (base) to {max(gammas):.3f} |",
+        f"| reaching time below (56) for beta = K_2 / 2 | holds: {max(t for t, _ in base):.1f} s < "
+        f"{min(limit for _, limit in base):.0f} s (base), {min(t for t, _ in joints):.2f} to "
+        f"{max(t for t, _ in joints):.2f} s < {min(limit for _, limit in joints):.0f} to "
+        f"{max(limit for _, limit in joints):.0f} s (joints) |",
+    ])]  # fmt: skip
+    verdicts = [axis["holds"] for axis in twisting["4_k_2_below_k_1_squared"]]
+    assert all(verdicts)
+    assert not any(axis["holds"] for axis in twisting["beta_below_k_2"])
+    assert set(lmi["measured_beta"]) == {None}
+
+
+def test_the_first_difference_of_the_page_on_replay_is_that_of_the_two_gains(
+    tmp_path: Path,
+) -> None:
+    """Until tick 1 both flights are the same, so a replay sees what the second one flies."""
+    options = ("simulate", "--duration", "0.001", "--bag")
+    run(*options, str(tmp_path / "mine"))
+    gains = (ROOT / "config/gains/paper/printed/tde_stc.yaml").read_text("utf-8")
+    (tmp_path / "tde_stc.yaml").write_text(
+        re.sub(r"k_1: \[.*?\]", f"k_1: {[0.2] * 9}", gains, flags=re.DOTALL)
+    )
+    run(*options, str(tmp_path / "other"), "--gains", str(tmp_path / "tde_stc.yaml"))
+    recorded, replayed = (
+        load_bag(tmp_path / name).commanded_torque for name in ("mine", "other")
+    )  # fmt: skip
+    assert np.array_equal(recorded[0], replayed[0])
+    (first,) = np.flatnonzero(recorded[1] != replayed[1])[:1]
+    difference = replayed[1, first] - recorded[1, first]
+    (line,) = block("docs/replay.md", "effort[joint4]", "effort[joint4]")
+    name, *shown = line.split()
+    assert name == f"effort[{load_bag(tmp_path / 'mine').joint_names[first - 3]}]"
+    assert [float(text) for text in shown] == [
+        pytest.approx(recorded[1, first], rel=1e-9),
+        pytest.approx(replayed[1, first], rel=1e-9),
+        pytest.approx(difference, abs=0.005e-6),
+    ]
