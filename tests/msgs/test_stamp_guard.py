@@ -29,6 +29,7 @@ def passing(guard: StampGuard, ticks: list[int]) -> list[bool]:
 @given(st.integers(0, 10**9), steps)
 def test_stamps_that_rise_are_believed(begin: int, steps: list[int]) -> None:
     guard, ticks = StampGuard(JUMP), rising(begin, steps)
+    assert guard.last == -1, "none yet"
     assert all(passing(guard, ticks))
     assert guard.last == ticks[-1]
 

@@ -70,13 +70,15 @@ def main(areas: tuple[str, ...], count: int, seed: int, jobs: int, only_list: bo
         copies: queue.Queue[Copy] = queue.Queue()
         for number in range(jobs):
             copies.put(Copy(Path(folder) / str(number)))
-        limits, lock = _Limits(), threading.Lock()
+        limits = {
+            area: _limit(area, copies, console) for area in dict.fromkeys(a for a, _ in chosen)
+        }
+        lock = threading.Lock()
 
         def work(area: str, mutant: Mutant) -> None:
             copy = copies.get()
             try:
-                tests = AREAS[area].tests_of(mutant.module)
-                outcome = copy.trial(mutant, tests, limits.of(area, copy, tests))
+                outcome = copy.trial(mutant, AREAS[area].tests_of(mutant.module), limits[area])
             finally:
                 copies.put(copy)
             with lock:
@@ -99,18 +101,13 @@ def main(areas: tuple[str, ...], count: int, seed: int, jobs: int, only_list: bo
             console.print(change(mutant), markup=False, highlight=False)
 
 
-class _Limits:
-    """How long the tests of an area may take: thrice what they take on the code as it is."""
-
-    def __init__(self) -> None:
-        self._seconds: dict[tuple[str, int], float] = {}
-
-    def of(self, area: str, copy: Copy, tests: list[str]) -> float:
-        """In seconds; runs them once in each copy, which also fills its cache of kernels."""
-        key = (area, id(copy))
-        if key not in self._seconds:
-            self._seconds[key] = 60.0 + 3.0 * copy.baseline(tests).seconds
-        return self._seconds[key]
+def _limit(area: str, copies: queue.Queue[Copy], console: Console) -> float:
+    """Seconds that the tests of an area may take: thrice what they take on the code as it is."""
+    copy = copies.get()
+    seconds = copy.baseline(AREAS[area].tests_of(Path())).seconds
+    copies.put(copy)
+    console.print(f"{area}: the tests take {seconds:.0f} s and pass", highlight=False)
+    return 60.0 + 3.0 * seconds
 
 
 if __name__ == "__main__":

@@ -37,7 +37,8 @@ SIM, CONTROL, MSGS = "space_robot_sim", "space_robot_control", "space_robot_msgs
 AREAS = {
     "laws": Area(
         (f"{CONTROL}/laws/*.py",),
-        ("tests/control/test_laws.py", "tests/control/test_controller.py",
+        ("tests/control/test_laws.py", "tests/control/test_compiled_loop.py",
+         "tests/control/test_controller.py",
          "tests/control/test_takeover.py", "tests/control/test_closed_loop.py"),
     ),
     "controller": Area(
@@ -47,6 +48,7 @@ AREAS = {
         ("tests/control/test_controller.py", "tests/control/test_time_delay_estimation.py",
          "tests/control/test_tracking.py", "tests/control/test_takeover.py",
          "tests/control/test_swaps.py", "tests/control/test_reference.py",
+         "tests/control/test_compiled_loop.py",
          "tests/control/test_closed_loop.py"),
     ),
     "dynamics": Area(
@@ -67,7 +69,8 @@ AREAS = {
          f"{CONTROL}/analysis/settling.py", f"{CONTROL}/analysis/pointing.py",
          f"{CONTROL}/analysis/estimate_error.py", f"{CONTROL}/analysis/waypoints.py"),
         ("tests/control/test_metrics.py", "tests/control/test_actuation.py",
-         "tests/control/test_settling.py", "tests/control/test_pointing.py",
+         "tests/control/test_settling.py", "tests/control/test_waypoints.py",
+         "tests/control/test_pointing.py",
          "tests/control/test_estimate_error.py"),
     ),
     "bag": Area(
