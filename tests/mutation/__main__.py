@@ -9,16 +9,18 @@ from __future__ import annotations
 
 import difflib
 import queue
+import signal
 import sys
 import tempfile
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from random import Random
+from typing import NoReturn
 
 import click
-from areas import AREAS, ROOT
-from mutants import Mutant, sample
+from areas import AREAS
+from mutants import Mutant, sample, text_of
 from rich.console import Console
 from rich.table import Table
 from trial import Copy, Outcome
@@ -28,7 +30,7 @@ Result = tuple[str, Mutant, Outcome]
 
 def change(mutant: Mutant) -> str:
     """What a mutant changes, as a diff without its head."""
-    before = (ROOT / mutant.module).read_text("utf-8").splitlines()
+    before = text_of(mutant.module).splitlines()
     lines = difflib.unified_diff(before, mutant.text().splitlines(), n=0, lineterm="")
     return "\n".join(line for line in lines if not line.startswith(("---", "+++", "@@")))
 
@@ -66,10 +68,13 @@ def main(areas: tuple[str, ...], count: int, seed: int, jobs: int, only_list: bo
             console.print(f"{area}: {mutant.module}:{mutant.line}", change(mutant), markup=False)
         return
     results: list[Result] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupt)  # what was tried until then is shown
     with tempfile.TemporaryDirectory(prefix="mutation-") as folder:
+        everywhere = [Copy(Path(folder) / str(number)) for number in range(jobs)]
         copies: queue.Queue[Copy] = queue.Queue()
-        for number in range(jobs):
-            copies.put(Copy(Path(folder) / str(number)))
+        for copy in everywhere:
+            copies.put(copy)
         limits = {
             area: _limit(area, copies, console) for area in dict.fromkeys(a for a, _ in chosen)
         }
@@ -92,13 +97,25 @@ def main(areas: tuple[str, ...], count: int, seed: int, jobs: int, only_list: bo
                     console.print(change(mutant), markup=False, highlight=False)
 
         with ThreadPoolExecutor(jobs) as pool:
-            for future in [pool.submit(work, area, mutant) for area, mutant in chosen]:
-                future.result()
+            trials = [pool.submit(work, area, mutant) for area, mutant in chosen]
+            try:
+                for trial in trials:
+                    trial.result()
+            except KeyboardInterrupt:
+                pool.shutdown(wait=False, cancel_futures=True)
+                for copy in everywhere:
+                    copy.stop()
+    if not results:
+        return
     console.print(table(results))
     for area, mutant, outcome in results:
         if outcome.verdict == "survived":
             console.print(f"{area}: {mutant.module}:{mutant.line}", markup=False)
             console.print(change(mutant), markup=False, highlight=False)
+
+
+def _interrupt(number: int, frame: object) -> NoReturn:
+    raise KeyboardInterrupt
 
 
 def _limit(area: str, copies: queue.Queue[Copy], console: Console) -> float:

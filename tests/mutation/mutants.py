@@ -27,6 +27,12 @@ NOT_USED = re.compile(
 )
 
 
+@cache
+def text_of(module: Path) -> str:
+    """A module as it was when first asked for: the tree may change while trials go on."""
+    return (ROOT / module).read_text("utf-8")
+
+
 class Mutant(NamedTuple):
     """One change of one module."""
 
@@ -37,7 +43,7 @@ class Mutant(NamedTuple):
 
     def text(self) -> str:
         """The module with the change."""
-        source = (ROOT / self.module).read_text("utf-8")
+        source = text_of(self.module)
         if self.operator == DELETE:
             return _without(source, self.occurrence)
         changed = mutate_code(source, get_operator(self.operator)(), self.occurrence)
@@ -92,7 +98,7 @@ def _unused_ranges(tree: ast.AST) -> Iterator[Place]:
 @cache
 def mutants(module: Path) -> dict[int, list[Mutant]]:
     """All mutants of a module, by the line they change."""
-    source = (ROOT / module).read_text("utf-8")
+    source = text_of(module)
     tree, parsed = get_ast(source), ast.parse(source)
     unused = list(_unused_ranges(parsed))
     found: dict[int, list[Mutant]] = defaultdict(list)

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -31,6 +32,8 @@ class Copy:
 
     def __init__(self, folder: Path) -> None:
         self._tree, self._kernels = folder / "tree", folder / "kernels"
+        self._process: subprocess.Popen[str] | None = None
+        self._stopped = False
         listed = subprocess.run(
             ["git", "ls-files", "-co", "--exclude-standard"],
             cwd=ROOT, check=True, text=True, capture_output=True,
@@ -64,6 +67,13 @@ class Copy:
             for folder in set(self._caches()) - kept:
                 shutil.rmtree(folder)
 
+    def stop(self) -> None:
+        """End the tests that run, and begin no others."""
+        self._stopped = True
+        if self._process is not None:
+            with suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+
     def _caches(self) -> Iterable[Path]:
         return self._kernels.iterdir() if self._kernels.exists() else ()
 
@@ -81,12 +91,18 @@ class Copy:
             cwd=self._tree, env=environment, text=True, start_new_session=True,
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         )  # fmt: skip
+        self._process = process
         try:
             output, _ = process.communicate(timeout=limit_s)
         except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.communicate()
             return Outcome("timeout", "", time.monotonic() - begun)
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+            self._process = None
+        if self._stopped:
+            raise RuntimeError("stopped")
         seconds = time.monotonic() - begun
         if process.returncode == 0:
             return Outcome("survived", "", seconds)
