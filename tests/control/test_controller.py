@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from closed_loop import GAINS, PERIOD, Loop, law_of
 from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 from oracles import attitude_jacobian_base, attitude_jacobian_inertial, rotation_of, skew
 from random_robots import Case, cases, random_quaternion
 
 from space_robot_control.controller import TRANSFER_S, Controller
 from space_robot_control.controller_kernels import LARGEST
 from space_robot_control.laws import find_law
+from space_robot_control.time_delay_estimation import LONGEST_GAP
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_sim import Robot, forward_dynamics
@@ -160,7 +162,56 @@ def test_numbers_of_opposite_sign_do_not_hide_one_another(paper_robot: Robot) ->
             controller.update(state, np.zeros((3, 6)), np.eye(10)[0])
 
 
+# Force and torque
+
+
+@settings(max_examples=30)
+@given(cases(joints=[6]), st.integers(0, 2**32 - 1))
+def test_on_a_turning_base_torque_becomes_force_with_the_attitude_it_began_at(
+    case: Case, seed: int
+) -> None:
+    """Applied from the last tick on, so F_S = J0^-T tau with that tick's J0, whoever asks; after a
+    gap that is not known and the present J0 is nearest."""
+    rng = np.random.default_rng(seed)
+    later = random_quaternion(rng)
+    if later @ case.state.quaternion < 0.0:
+        later = -later
+    assume(min(abs(case.state.quaternion[0]), abs(later[0])) > 0.05)
+    torque = rng.normal(size=9)
+    reference = np.zeros((3, 6)), np.eye(10)[0]
+    for ticks, began_at in ((1, case.state.quaternion), (LONGEST_GAP, case.state.quaternion),
+                            (LONGEST_GAP + 1, later)):  # fmt: skip
+        controller = Controller(case.robot, law_of("tde_stc"), PERIOD)
+        state = measured(case)
+        controller.update(state, *reference)
+        sign = np.sign(controller.block[0].quaternion @ state.quaternion)
+        state.tick, state.quaternion[:], state.applied_torque[:] = ticks, later, torque
+        controller.update(state, *reference)
+        # either quaternion of an attitude will do, but the same one throughout
+        j0 = attitude_jacobian_base(sign * began_at)
+        force = controller.block[0].applied_force
+        np.testing.assert_allclose(j0.T @ force[:3], torque[:3], rtol=1e-9, atol=1e-9)
+        np.testing.assert_array_equal(force[3:], torque[3:])
+        np.testing.assert_array_equal(controller.block[0].pair.applied_force, force)
+
+
 # Taking over
+
+
+@pytest.mark.parametrize(("period", "ticks"), [(5e-4, 40), (1e-3, 20), (2e-3, 10), (0.1, 1)])
+def test_a_transfer_lasts_20_ms(paper_robot: Robot, period: float, ticks: int) -> None:
+    """At any period; at least a tick. What is applied is not what the law would do."""
+    controller = Controller(paper_robot, find_law("ctc")(GAINS["ctc"], period), period)
+    state = RobotState.allocate(6)
+    state.joint_positions[:], state.applied_torque[:] = 0.1, 1.0
+    shares = []
+    for tick in range(1, ticks + 4):
+        state.tick = tick
+        controller.update(state, np.zeros((3, 6)), np.eye(10)[0])
+        own = controller.law.force(controller.signals)
+        shares.append(np.abs(controller.block[0].force - own).max())
+    assert all(share > 0.0 for share in shares[:ticks])
+    assert shares[ticks:] == [0.0] * 3
 
 
 def test_a_law_takes_over_within_the_transfer_and_then_is_alone(paper_robot: Robot) -> None:

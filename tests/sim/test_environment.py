@@ -48,6 +48,15 @@ def test_disturbance_is_equation_61(n: int, scale: float, time: float) -> None:
     )
 
 
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+def test_disturbance_writes_nothing_behind_a_short_robots_array(n: int) -> None:
+    memory = np.full(n + 3 + 9, -7.0)
+    environment = Environment.build(n, FrictionSettings(), DisturbanceSettings(scale=1.0))
+    disturbance_torque(environment, 0.5, memory[: n + 3])
+    np.testing.assert_allclose(memory[: n + 3], equation_61(n, 1.0, 0.5), rtol=1e-12)
+    np.testing.assert_array_equal(memory[n + 3 :], -7.0)
+
+
 def test_disturbance_at_given_times() -> None:
     """Half a second into case 2, and two seconds into it, by hand."""
     root = np.sqrt(0.5)
@@ -72,6 +81,17 @@ def test_friction_opposes_the_motion(rate: float, joint: int) -> None:
     assert torque == pytest.approx(expected, rel=1e-14)
     assert torque * rate >= 0.0
     assert friction_torque(environment, joint, -rate) == -torque
+
+
+@given(st.lists(st.floats(0.0, 9.0), min_size=8, max_size=8), st.sampled_from([-0.5, 0.0, 0.25]))
+def test_each_joint_has_its_own_friction(coefficients: list[float], rate: float) -> None:
+    """As a stuck joint has."""
+    environment = Environment.build(4, FrictionSettings(), DisturbanceSettings())
+    environment.coulomb[:], environment.viscous[:] = coefficients[:4], coefficients[4:]
+    for joint in range(4):
+        coulomb, viscous = coefficients[joint], coefficients[4 + joint]
+        expected = coulomb * np.sign(rate) + viscous * rate
+        assert friction_torque(environment, joint, rate) == expected
 
 
 def test_friction_at_rest_is_zero() -> None:

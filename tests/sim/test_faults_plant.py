@@ -90,6 +90,20 @@ def test_actuators_fail_in_time_and_are_restored_exactly(paper_robot: Robot) -> 
         assert np.abs(plant.state.applied_torque[3:]).max() <= joints
 
 
+def test_a_fault_never_makes_an_actuator_stronger_nor_a_joint_freer(paper_robot: Robot) -> None:
+    """Limits and friction that are worse than the fault's stay; 0 is the lowest limit of all."""
+    plant = plant_of(paper_robot, base_torque_limit=0.5, joint_torque_limit=7.0)
+    plant.block[0].limit[4] = 0.0
+    plant.block[0].environment.coulomb[1] = 3.0
+    worst = memory_of(plant)
+    texts = ["saturate_base@0:2", "saturate_joints@0:9", "stuck_joint@0:2=1"]
+    faults = ActuatorFaults(Schedule(parse_faults(texts, KINDS), 0, PERIOD))
+    for tick in range(3):
+        faults.apply(plant)
+        assert memory_of(plant) == worst
+        plant.step(Command(tick, TORQUE))
+
+
 def test_after_the_last_fault_the_plant_is_as_it_was(paper_robot: Robot) -> None:
     plant = plant_of(paper_robot)
     sound = memory_of(plant)
