@@ -28,7 +28,7 @@ def log_of(robot: Robot, rng: np.random.Generator, size: float, ticks: int = 4) 
     log.reference_base[:, :4] = desired
     for k in range(ticks):
         log.quaternion[k] = quaternion_of(off[k] * rotation_of(desired[k]))
-    log.reference_joints[:] = rng.uniform(-np.pi, np.pi, (ticks, 1, robot.n))
+    log.reference_joints[:] = rng.uniform(-np.pi, np.pi, (ticks, 3, robot.n))
     log.joint_positions[:] = log.reference_joints[:, 0]
     log.joint_positions += size * rng.uniform(-1.0, 1.0, (ticks, robot.n))
     log.base_position[:] = rng.normal(size=(ticks, 3))

@@ -203,6 +203,7 @@ def test_points_not_one_tick_apart_are_an_error(codec_saw_the_layout: bool) -> N
         codec.decode_joints(joints)
     with pytest.raises(MessageError, match="/reference/base: point 1 is not 1 ticks after"):
         codec.decode_base(base)
+    assert codec.encode(chunk) == good, "with its own times again"
     assert_decodes_to(codec, good, chunk)
 
 
