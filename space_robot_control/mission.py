@@ -51,8 +51,8 @@ class Mission:
         if times[0] != 0.0 or np.any(np.diff(times) <= 0.0):
             raise InputError(f"waypoint_times must rise from 0, got {settings.waypoint_times}")
         norm = float(np.linalg.norm(settings.base_quaternion))
-        if norm < 1e-3:
-            raise InputError(f"base_quaternion must not be zero, got norm {norm:g}")
+        if not 1e-3 <= norm <= 1e3:
+            raise InputError(f"base_quaternion must have a norm near 1, got {norm:g}")
         self._times = times
         self._waypoints = np.radians(settings.waypoints_deg).reshape(len(times), n)
         self._quaternion = np.array(settings.base_quaternion) / norm

@@ -31,7 +31,9 @@ LONGEST_NAME = 250
 MOST_REPEATED = 100_000
 """Values that aliases may add to those written out."""
 
-_FLOAT, _TIMESTAMP = "tag:yaml.org,2002:float", "tag:yaml.org,2002:timestamp"
+_FLOAT, _TIMESTAMP, _MERGE = (
+    f"tag:yaml.org,2002:{kind}" for kind in ("float", "timestamp", "merge")
+)
 _EXPONENT = re.compile(r"^[-+]?(?:[0-9][0-9_]*(?:\.[0-9_]*)?|\.[0-9][0-9_]*)[eE][-+]?[0-9]+$")
 
 
@@ -173,6 +175,8 @@ class _Loader(SafeLoader):
             )
         seen = set()
         for key_node, _ in node.value:
+            if key_node.tag == _MERGE:
+                continue
             key = self.construct_object(key_node, deep=True)
             if not isinstance(key, Hashable):
                 raise yaml.constructor.ConstructorError(

@@ -100,8 +100,8 @@ class Plant:
                 f"robot {robot.name!r} has {n} joints"
             )
         norm = float(np.linalg.norm(settings.initial_quaternion))
-        if norm < 1e-3:
-            raise InputError(f"initial_quaternion must not be zero, got norm {norm:g}")
+        if not 1e-3 <= norm <= 1e3:
+            raise InputError(f"initial_quaternion must have a norm near 1, got {norm:g}")
         self.robot = with_payload(robot, settings.payload)
         self.period = period
         self.block = PlantMemory.block(n)

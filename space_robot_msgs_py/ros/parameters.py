@@ -47,6 +47,11 @@ def declare_settings(node: Node, schema: type[Schema], changeable: tuple[str, ..
     """
     fields = dict(leaves(schema))
     settings = schema.resolve(overrides(node, fields))
+    usual = schema.model_fields["period"].default
+    if settings.period != usual:
+        node.get_logger().info(
+            f"a tick lasts {settings.period:g} s; the gains shipped are for {usual:g} s"
+        )
     for name, value in flatten(settings.model_dump()):
         node.declare_parameter(
             name, value, descriptor(fields[name], name not in changeable), ignore_override=True

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pydantic import Field
 
 from space_robot_msgs_py.errors import InputError
@@ -52,6 +54,71 @@ def test_file_that_is_no_mapping(tmp_path: Path, content: str) -> None:
 
 def test_numbers_may_stand_for_names() -> None:
     assert check(Inner, {"mass": 1, "name": 4}, "file.yaml").name == "4"
+
+
+class Typed(Strict):
+    mass: float = 0.0
+    ticks: int = 0
+    on: bool = False
+    names: list[str] = Field(default_factory=list)
+    values: list[float] = Field(default_factory=list)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ({"mass": True}, "mass: Input should be a valid number, got True"),
+        ({"mass": "750"}, "mass: Input should be a valid number, got '750'"),
+        ({"mass": float("inf")}, "mass: Input should be a finite number, got inf"),
+        ({"mass": float("nan")}, "mass: Input should be a finite number, got nan"),
+        ({"mass": None}, "mass: Input should be a valid number, got None"),
+        ({"mass": 10**400}, "mass: Input should be a valid number, got 1000"),
+        ({"mass": 2**20_000}, "mass: Input should be a valid number, got a number of type int"),
+        ({"ticks": 1.5}, "ticks: Input should be a valid integer, got 1.5"),
+        ({"ticks": True}, "ticks: Input should be a valid integer, got True"),
+        ({"ticks": "1"}, "ticks: Input should be a valid integer, got '1'"),
+        ({"on": 1}, "on: Input should be a valid boolean, got 1"),
+        ({"on": "yes"}, "on: Input should be a valid boolean, got 'yes'"),
+        ({"names": "abc"}, "names: Input should be a valid list, got 'abc'"),
+        ({"values": [1.0, True]}, "values.1: Input should be a valid number, got True"),
+        ({"values": {1.0}}, "values: Input should be a valid list"),
+        ({5: 1}, "Keys should be strings"),
+    ],
+)
+def test_values_of_another_type_are_refused(content: dict[str, object], said: str) -> None:
+    with pytest.raises(InputError) as caught:
+        check(Typed, content, "file.yaml")
+    assert said in str(caught.value)
+    assert str(caught.value).isprintable()
+
+
+def test_whole_numbers_are_numbers_and_tuples_lists() -> None:
+    read = check(Typed, {"mass": 750, "names": ("a", "b"), "values": (1, 2.5)}, "file.yaml")
+    assert type(read.mass) is float
+    assert read.names == ["a", "b"]
+    assert [type(value) for value in read.values] == [float, float]
+
+
+_ANY = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=4) | st.binary(),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(st.text("abmns", max_size=3) | st.integers(), inner, max_size=3)
+    ),
+    max_leaves=8,
+)
+
+
+@given(st.dictionaries(st.sampled_from([*Typed.model_fields, "x", 5, None]), _ANY))
+def test_any_content_fits_or_is_refused_in_one_line(content: dict[object, object]) -> None:
+    try:
+        read = check(Typed, content, "file.yaml")
+    except InputError as error:
+        assert len(str(error).splitlines()) == 1  # noqa: PT017
+    else:
+        for name, value in content.items():
+            assert getattr(read, str(name)) == value
+            assert type(value) is not bool or name == "on"
 
 
 def test_one_of() -> None:
