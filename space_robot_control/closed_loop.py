@@ -116,8 +116,8 @@ def fly_ticks(
     """
     plant, memory = plant_block[0], controller_block[0]
     fastest = 0.0
-    for k in range(start, stop):
-        row = k - first_tick
+    for row in range(start - first_tick, stop - first_tick):
+        k = first_tick + row
         rows.base_position[row] = plant.base_position
         rows.quaternion[row] = plant.quaternion
         rows.base_velocity[row] = plant.base_velocity
