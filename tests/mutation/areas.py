@@ -67,11 +67,15 @@ AREAS = {
     "metrics": Area(
         (f"{CONTROL}/analysis/metrics.py", f"{CONTROL}/analysis/actuation.py",
          f"{CONTROL}/analysis/settling.py", f"{CONTROL}/analysis/pointing.py",
-         f"{CONTROL}/analysis/estimate_error.py", f"{CONTROL}/analysis/waypoints.py"),
+         f"{CONTROL}/analysis/estimate_error.py", f"{CONTROL}/analysis/waypoints.py",
+         f"{CONTROL}/analysis/spectrum.py", f"{CONTROL}/analysis/blocks.py",
+         f"{CONTROL}/analysis/report.py", f"{CONTROL}/analysis/generalised_motion.py",
+         f"{CONTROL}/analysis/excerpt.py", f"{CONTROL}/analysis/table.py"),
         ("tests/control/test_metrics.py", "tests/control/test_actuation.py",
          "tests/control/test_settling.py", "tests/control/test_waypoints.py",
          "tests/control/test_pointing.py",
-         "tests/control/test_estimate_error.py"),
+         "tests/control/test_estimate_error.py", "tests/control/test_blocks.py",
+         "tests/control/test_excerpt.py", "tests/control/test_table.py"),
     ),
     "bag": Area(
         (f"{MSGS}/bag/*.py",),
