@@ -25,24 +25,28 @@ def open_bag(path: Path) -> Bag:
     """
     if path.name == METADATA:
         path = path.parent
-    if path.is_file():
-        return _open_files([path], None, [], closed=True)
     if not path.exists():
         raise InputError(f"{path}: no such bag")
+    if not path.is_dir():
+        return _open_files([path], None, [], closed=True)
     information, damage = None, []
     if closed := (path / METADATA).exists():
         try:
             information = read_information(path)
         except InputError as error:
             damage = [str(error)]
+        else:
+            damage = information.doubts
     if information and information.compressed:
+        for name in information.relative_file_paths:
+            _check_regular(path / Path(name).name)
         return StoredBag([path], information, [], closed)
     there = [file for suffix in _STORAGES for file in path.glob(f"*{suffix}")]
     there.sort(key=lambda file: (len(file.name), file.name))
     if information:
         there = _listed(path, information, there, damage)
     if not there:
-        hint = damage[0] if damage else f"not a bag folder (no {METADATA}, no .mcap)"
+        hint = damage[-1] if damage else f"not a bag folder (no {METADATA}, no .mcap)"
         raise InputError(hint if damage else f"{path}: {hint}")
     return _open_files(there, information, damage, closed)
 
@@ -75,6 +79,8 @@ def _listed(
 def _open_files(
     files: list[Path], information: BagInformation | None, damage: list[str], closed: bool
 ) -> Bag:
+    for file in files:
+        _check_regular(file)
     kinds = {file: _kind(file) for file in files}
     if all(kind == ".db3" for kind in kinds.values()):
         return StoredBag(files, information, damage, closed)
@@ -87,6 +93,16 @@ def _open_files(
                 raise
             damage.append(f"{file.name}: cannot be read ({error.strerror})")
     return McapBag(opened, information, damage, closed)
+
+
+def _check_regular(file: Path) -> None:
+    """See that reading comes to an end: a pipe waits for its other end, a device may give for ever.
+
+    Raises:
+        InputError: it is neither a file, nor a folder, nor absent.
+    """
+    if file.exists() and not (file.is_file() or file.is_dir()):
+        raise InputError(f"{file}: cannot be read (a pipe, socket or device, not a file)")
 
 
 def _kind(file: Path) -> str:

@@ -12,6 +12,8 @@ from ..validation import check, read_yaml
 from ..yaml_text import parse_yaml
 
 METADATA = "metadata.yaml"
+NEWEST = 9
+"""Version of the format that is known, that of ROS 2 Jazzy; older ones have fewer keys."""
 
 
 class _Nanoseconds(BaseModel):
@@ -44,6 +46,15 @@ class BagInformation(BaseModel):
     topics_with_message_count: list[_Count]
     compression_mode: str = ""
     custom_data: dict[str, Any] | None = None
+
+    @property
+    def doubts(self) -> list[str]:
+        """What may be misunderstood in it, a sentence each."""
+        if 1 <= self.version <= NEWEST:
+            return []
+        return [
+            f"{METADATA}: version {self.version}, known are 1 to {NEWEST}: read as one of those"
+        ]
 
     @property
     def noted(self) -> dict[str, str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import socket
 import sqlite3
 from pathlib import Path
 
@@ -30,6 +31,7 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.plain_codecs import ClockCodec
 
 METADATA = "metadata.yaml"
 
@@ -335,3 +337,104 @@ def test_a_topic_not_needed_is_left_out_if_it_is_of_another_type(
     assert log.damage == ()
     for name in COLUMNS:
         np.testing.assert_array_equal(getattr(log, name), getattr(recorded.log, name))
+
+
+# What does not end, and what is too much
+
+
+@pytest.mark.parametrize("name", ["bag_0.mcap", "metadata.yaml", "x.mcap", "x.db3"])
+@pytest.mark.parametrize("kind", ["pipe", "device", "socket"])
+def test_only_files_are_read(bag: Path, tmp_path: Path, name: str, kind: str) -> None:
+    """A pipe without a writer, or /dev/zero, was waited for or read for ever."""
+    (path := bag / name).unlink(missing_ok=True)
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    else:
+        with socket.socket(socket.AF_UNIX) as server:
+            directory = os.open(bag, os.O_RDONLY)  # the path itself may be too long for a socket
+            server.bind(f"/proc/self/fd/{directory}/{name}")
+            os.close(directory)
+    if name == METADATA:
+        assert "metadata.yaml: " in read_flight(bag).damage[0]
+    elif name == "bag_0.mcap":
+        assert "not a file" in _error(bag)
+    else:  # beside the bag's own file
+        assert f"does not name {name}: left out" in read_flight(bag).damage[0]
+    if name != METADATA:
+        assert "not a file" in _error(path)
+
+
+def test_an_unknown_version_is_told(bag: Path) -> None:
+    _edit(bag, version=99)
+    (told,) = read_flight(bag).damage
+    assert told == "metadata.yaml: version 99, known are 1 to 9: read as one of those"
+
+
+def test_aliases_that_unfold_without_measure_are_refused_at_once(bag: Path) -> None:
+    """Once nine seconds, and more with each level."""
+    content = yaml.safe_load((bag / METADATA).read_text())
+    del content["rosbag2_bagfile_information"]["custom_data"]
+    lines = ["  custom_data:", "    a0: &a0 [lol]"]
+    for level in range(1, 9):
+        lines.append(f"    a{level}: &a{level} [{', '.join([f'*a{level - 1}'] * 9)}]")
+    (bag / METADATA).write_text(yaml.safe_dump(content) + "\n".join(lines) + "\n")
+    log = read_flight(bag)
+    assert METADATA in log.damage[0]
+    assert len(log.damage[0]) < 300
+    assert log.ticks == 400
+
+
+def _with_topics(path: Path, count: int) -> Path:
+    with path.open("wb") as file:
+        writer = McapWriter(file)
+        writer.start("ros2")
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"")
+        for k in range(count):
+            channel = writer.register_channel(f"/topic_{k:05}", "cdr", schema)
+            writer.add_message(channel, k, b"\0\1\0\0\1\0\0\0\0", k)
+        writer.finish()
+    return path
+
+
+def test_of_ten_thousand_topics_a_few_are_named(tmp_path: Path) -> None:
+    line = _error(_with_topics(tmp_path / "x.mcap", 10_000))
+    assert "/topic_00000, /topic_00001, " in line
+    assert line.endswith(", and 9,988 more)")
+    assert len(line) < 400
+    line = _error(tmp_path / "x.mcap", remap={"/a": "/command"})
+    assert "no topic /a to remap" in line
+    assert len(line) < 400
+
+
+def test_counts_of_ten_thousand_topics_are_told_in_a_few_sentences(bag: Path) -> None:
+    entries = yaml.safe_load((bag / METADATA).read_text())["rosbag2_bagfile_information"]
+    counts = entries["topics_with_message_count"]
+    topic = {"type": "std_msgs/msg/String", "serialization_format": "cdr"}
+    for k in range(1000):
+        counts.append({"topic_metadata": {"name": f"/t{k}", **topic}, "message_count": 1})
+    _edit(bag, topics_with_message_count=counts)
+    damage = read_flight(bag).damage
+    assert len(damage) < 20
+    assert any("so it is with 988 more topics" in text for text in damage)
+
+
+def test_the_topic_that_is_there_but_empty_is_not_said_to_be_missing(tmp_path: Path) -> None:
+    """Once "no messages on /joint_states (it has ..., /joint_states, ...)"."""
+    recorder = BagRecorder(tmp_path / "bag", FLIGHT, TIMEBASE)
+    recorder.record(topics.CLOCK, ClockCodec().encode(0))
+    recorder.close()
+    line = _error(tmp_path / "bag")
+    assert "no messages on /joint_states (it has /clock)" in line
+
+
+def test_a_topic_of_the_type_that_is_missing_is_named_first(
+    recorded: Recorded, tmp_path: Path
+) -> None:
+    entries = [
+        (t.name.replace("/joint_states", "/zz/arm"), t.type, "cdr", data)
+        for t, data in messages_of(recorded.folder)
+    ]
+    _write(tmp_path / "x.mcap", entries)
+    assert "no messages on /joint_states (it has /command, /zz/arm, " in _error(tmp_path / "x.mcap")
