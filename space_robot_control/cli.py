@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Sequence
@@ -14,6 +13,7 @@ import click
 
 from space_robot_msgs_py.errors import SpaceRobotError
 from space_robot_msgs_py.lifeline import hold_to_standard_input
+from space_robot_msgs_py.text import printable
 
 from .commands.analyze import analyze
 from .commands.bench import bench
@@ -23,6 +23,7 @@ from .commands.reproduce import reproduce
 from .commands.soak import soak
 from .commands.stability import stability
 from .interruption import Interrupted, raising_signals
+from .streams import is_of_output, standard_streams
 
 NODE_MODULES = {
     "plant_node": "space_robot_sim.plant_node",
@@ -68,11 +69,12 @@ def _faults(context: click.Context, given: Sequence[str]) -> Sequence[str]:
 
 
 def _report(report: dict[str, Any], as_json: bool) -> None:
+    from .terminal import echo_json, terminal
+
     if as_json:
-        click.echo(json.dumps(report, indent=2))
+        echo_json(report)
         return
     from .flight.display import print_report
-    from .terminal import terminal
 
     print_report(report, terminal())
 
@@ -110,10 +112,13 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
       space-robot fly --fault kill_controller@3 --restart-controller
       space-robot fly --fault drop_state@2-4:0.1 --fault noise_rate@0:1e-5 --seed 7
     """
+    from .commands.failure import told_as_json
     from .flight.orchestrator import fly as fly_graph
 
     flight = _plan(**options)
-    report = fly_graph(flight, bag or flight.default_bag())
+    bag = bag or flight.default_bag()
+    with told_as_json(flight, bag, as_json):
+        report = fly_graph(flight, bag)
     _report(report, as_json)
     if failures := report["graph"]["failures"]:
         from space_robot_msgs_py.errors import FlightError
@@ -137,6 +142,7 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
     from space_robot_msgs_py.errors import FlightError
 
     from .analysis import Analysis
+    from .commands.failure import failed_report
     from .flight.compilation import compile_kernels
     from .flight.display import flight_progress
     from .flight.plan import check_bag_path
@@ -164,9 +170,11 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
                     analysis.add(block)
             except FlightError as error:
                 failure = error
-    if analysis.ticks:
-        report = analysis.report()
-        _report({**report, "failure": str(failure)} if failure else report, as_json)
+    report = analysis.report() if analysis.ticks else {}
+    if failure and as_json:
+        report = failed_report(flight, bag, failure, report)
+    if report:
+        _report(report, as_json)
     if failure:
         raise failure
 
@@ -189,14 +197,16 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         del sys.argv[1]  # rclpy and the node read the rest
         import_module(module).main()
     hold_to_standard_input()  # if another command of this project has started this one
-    with raising_signals():
-        sys.exit(_run(arguments))
+    with raising_signals(), standard_streams():
+        code = _run(arguments)
+    sys.exit(code)
 
 
 def _run(arguments: Sequence[str] | None) -> int:
     """The exit code of a command."""
     try:
         cli.main(args=arguments, prog_name="space-robot", standalone_mode=False)
+        sys.stdout.flush()
     except click.exceptions.Exit as exit_:
         return exit_.exit_code
     except click.Abort as abort:  # click's word for KeyboardInterrupt, and for the input's end
@@ -207,9 +217,25 @@ def _run(arguments: Sequence[str] | None) -> int:
         error.show()
         return 2
     except SpaceRobotError as error:
-        click.echo(f"space-robot: error: {error}", err=True)
+        _complain(str(error))
         return error.exit_code
+    except OSError as error:
+        return _lost(error)
     return 0
+
+
+def _lost(error: OSError) -> int:
+    """The exit code when something could not be written or read; says what, unless nobody reads."""
+    if not is_of_output(error):
+        _complain(f"{error.filename or 'the system'}: {error.strerror or error}")
+    elif not isinstance(error, BrokenPipeError):
+        _complain(f"standard output cannot be written ({error.strerror or error})")
+    return 1
+
+
+def _complain(text: str) -> None:
+    lines = (printable(line) for line in text.split("\n"))
+    click.echo("space-robot: error: " + "\n".join(lines), err=True)
 
 
 if __name__ == "__main__":

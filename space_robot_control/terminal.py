@@ -6,13 +6,16 @@ printed reaches the terminal. A table whose numbers do not fit becomes lines.
 
 from __future__ import annotations
 
+import json
+import math
 from typing import Any
 
+import click
 from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
 
-from space_robot_msgs_py.bag.findings import printable
+from space_robot_msgs_py.text import printable
 
 _START = 8
 """Letters of a label's word that tell it from others."""
@@ -27,6 +30,19 @@ class _Console(Console):
 def terminal(**options: Any) -> Console:
     """A console that takes every text as it is; ``options``: of `rich.console.Console`."""
     return _Console(markup=False, emoji=False, highlight=False, **options)
+
+
+def echo_json(report: Any) -> None:
+    """Print a report as JSON, which has no NaN and no infinity: they become null."""
+    click.echo(json.dumps(_finite(report), indent=2, allow_nan=False))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def say(console: Console, text: str) -> None:

@@ -21,12 +21,21 @@ def check_free(path: Path) -> None:
     """
     if path.exists():
         raise InputError(f"{path}: exists already; it is not overwritten")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{path.parent}: no folder can be made there ({error.strerror})") from None
+    make_folder(path.parent)
     if not os.access(path.parent, os.W_OK | os.X_OK):
         raise InputError(f"{path}: cannot be written (no permission for its folder)")
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder, and those above it, where they are not there yet.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path}: no folder can be made there ({error.strerror})") from None
 
 
 def write_csv(log: FlightLog, path: Path) -> None:
@@ -75,24 +84,42 @@ def write_text(text: str, path: Path) -> None:
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[IO[Any]]:
-    """A file to write that takes its name only when all is in it, and no name that is taken.
+def whole_file(path: Path, replace: bool = False) -> Iterator[IO[Any]]:
+    """A file to write that takes its name only when all is in it.
+
+    Args:
+        path: its name, which must not be taken yet; a pipe or device is written as it is.
+        replace: whether an older file of that name is replaced.
 
     Raises:
         InputError: the file exists, or it cannot be written.
     """
-    check_free(path)
-    try:
+    if path.exists() and not path.is_file() and not path.is_dir():
+        with _told(path), path.open("wb") as file:
+            yield file
+        return
+    if not replace:
+        check_free(path)
+    with _told(path):
         descriptor, name = mkstemp(dir=path.parent, prefix=f".{path.name}.")
         unnamed = Path(name)
         try:
             with os.fdopen(descriptor, "wb") as file:
                 yield file
             unnamed.chmod(0o666 & ~_umask())
-            os.link(unnamed, path)  # a rename would overwrite
+            if replace:
+                unnamed.replace(path)
+            else:
+                os.link(unnamed, path)  # a rename would overwrite
         finally:
             with suppress(OSError):
                 unnamed.unlink()
+
+
+@contextmanager
+def _told(path: Path) -> Iterator[None]:
+    try:
+        yield
     except FileExistsError:
         raise InputError(f"{path}: exists already; it is not overwritten") from None
     except OSError as error:

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
-from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.flight_log import FlightLog
 
 from .course import Course
@@ -64,10 +63,7 @@ class Album:
         """
         saved = []
         for stem, caption, draw in self._pictures():
-            try:
-                png, svg = save_figure(draw(), folder / stem)
-            except OSError as error:
-                raise InputError(f"{folder}: cannot be written ({error.strerror})") from None
+            png, svg = save_figure(draw(), folder / stem)
             saved.append(Picture(caption, png, svg))
         return saved
 

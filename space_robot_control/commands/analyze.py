@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -10,6 +9,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import click
+
+from space_robot_msgs_py.text import printable
 
 from .options import REMAP, TRUST
 
@@ -120,12 +121,13 @@ def analyze(
 
 
 def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
+    from ..terminal import echo_json, terminal
+
     if as_json:
         found = list(reports.values())
-        click.echo(json.dumps(found[0] if len(found) == 1 else found, indent=2))
+        echo_json(found[0] if len(found) == 1 else found)
         return
     from ..flight.display import print_comparison, print_figures, print_report
-    from ..terminal import terminal
 
     console = terminal()
     if len(reports) > 1:
@@ -138,7 +140,7 @@ def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
 
 def _names(bags: Sequence[Path]) -> list[str]:
     """What the bags are called: their folders' names, with as much before them as tells apart."""
-    paths = [bag.absolute() for bag in bags]
+    paths = [Path(printable(str(bag.absolute()))) for bag in bags]
     if len(set(paths)) < len(paths):
         raise click.BadParameter("the same bag was given twice", param_hint="BAG...")
     for length in range(1, max(len(path.parts) for path in paths)):

@@ -204,10 +204,15 @@ def check_writable(path: Path) -> None:
     Raises:
         InputError: it cannot.
     """
+    from tempfile import TemporaryFile
+
     from space_robot_msgs_py.errors import InputError
 
     try:
-        path.open("a", encoding="utf-8").close()
+        if path.exists():
+            path.open("r+b", buffering=0).close()  # a folder, or one of others
+        with TemporaryFile(dir=path.parent):  # nothing is left if the work fails
+            pass
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror})") from None
 
@@ -222,6 +227,9 @@ def put_json(report: Any, as_json: bool, output: Path | None) -> None:
     """Write a report to ``output``, if given, and print it if JSON was asked for."""
     text = json.dumps(report, indent=1, allow_nan=False)
     if output:
-        output.write_text(text + "\n", "utf-8")
+        from ..analysis.export import whole_file
+
+        with whole_file(output, replace=True) as file:
+            file.write(text.encode() + b"\n")
     if as_json:
         click.echo(text)

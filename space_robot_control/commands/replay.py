@@ -76,13 +76,13 @@ def replay(
       space-robot replay flights/one --controller ctc --plot ctc_instead.png
       space-robot replay flights/one --rate 1 --start 5 --end 10 --json
     """
-    import json
     import math
 
     from space_robot_msgs_py.errors import FlightError, InputError
 
     from ..flight.replay.outcome import Options
     from ..flight.replay.run import replay as run
+    from ..terminal import echo_json, terminal
 
     if other := sorted(set(parameters) - {"controller"}):
         raise InputError(f"--set {other[0]}.…: a replay has no {other[0]}, only the controller")
@@ -107,10 +107,9 @@ def replay(
 
         write_plot(done.comparison, period, title(report), plot)
     if as_json:
-        click.echo(json.dumps(report, indent=2, allow_nan=False))
+        echo_json(report)
     else:
         from ..flight.replay.display import print_replay
-        from ..terminal import terminal
 
         print_replay(report, terminal())
     if done.error:

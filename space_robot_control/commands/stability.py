@@ -42,15 +42,13 @@ def stability(initial_error: float, as_json: bool, plot: Path | None, **options:
       space-robot stability --case 4-2 --json
       space-robot stability --gains tuned --plot figures
     """  # fmt: skip
-    import json
-
     from space_robot_msgs_py.validation import check
 
     from ..analysis.stability import report, study
     from ..analysis.stability.display import print_study
     from ..flight.compilation import compile_kernels
     from ..flight.plan import FlightPlan
-    from ..terminal import terminal
+    from ..terminal import echo_json, terminal
 
     plan = check(FlightPlan, options, "options")
     if plot:
@@ -64,7 +62,7 @@ def stability(initial_error: float, as_json: bool, plot: Path | None, **options:
         names = ", ".join(map(str, written)) or "nothing: the pictures are of K_1 and K_2"
         click.echo(f"wrote {names}", err=True)
     if as_json:
-        click.echo(json.dumps(report(found), indent=2, allow_nan=False))
+        echo_json(report(found))
     else:
         print_study(found, terminal())
 

@@ -14,8 +14,8 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue
 
 from ..errors import InputError
+from ..text import printable
 from ..validation import check
-from .findings import printable
 from .recorder import FLIGHT_KEY
 
 WHERE = "the description of the flight"

@@ -14,11 +14,6 @@ SHOWN = 12
 """Names in a sentence."""
 
 
-def printable(text: str) -> str:
-    """One line, whatever a broken bag had for names."""
-    return "".join(letter if letter.isprintable() else "?" for letter in text)
-
-
 def some_of(names: Iterable[str]) -> str:
     """The first of some names, and how many there are more; a bag may have thousands."""
     there = list(names)

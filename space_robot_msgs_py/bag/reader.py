@@ -15,11 +15,12 @@ from ..definitions import decode
 from ..errors import InputError, MessageError
 from ..flight_log import FlightLog
 from ..samples import Timebase
+from ..text import printable
 from .batch import Batch
 from .contents import Bag
 from .coverage import LONGEST_JUMP, Coverage, excused_topics, lost_messages, unanswered_ticks
 from .description import read_description
-from .findings import missing_ticks, printable, unread_messages
+from .findings import missing_ticks, unread_messages
 from .folder import custom_data, open_bag
 from .gaps import fill_gaps
 from .recorder import COVERAGE_KEY

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from ...analysis.export import whole_file
 from ...analysis.figures.files import save_figure
 from ...analysis.figures.lines import draw_lines
 from ...analysis.figures.quantity import Quantity
@@ -38,7 +40,10 @@ def write_csv(comparison: Comparison, period: float, path: Path) -> None:
     names = [
         f"{axis}_{which}" for which in ("recorded", "replayed") for axis in comparison.axis_names
     ]
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with (
+        whole_file(path, replace=True) as raw,
+        io.TextIOWrapper(raw, encoding="utf-8", newline="") as file,
+    ):
         writer = csv.writer(file)
         writer.writerow(["tick", "time_s", *names])
         for tick, row in zip(ticks.tolist(), np.hstack([recorded, replayed]), strict=True):

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.coverage import excused_topics, message_tick
 from space_robot_msgs_py.bag.description import read_description
-from space_robot_msgs_py.bag.findings import printable
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import REQUIRED, first_states, missing, timebase_of
 from space_robot_msgs_py.bag.selection import Selection
 from space_robot_msgs_py.errors import InputError, MessageError
+from space_robot_msgs_py.text import printable
 from space_robot_msgs_py.topics import Topic
 
 from .commands import CommandList, Commands
