@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from space_robot_control.flight.replay.commands import CommandList, Commands
+from space_robot_control.flight.replay.commands import CommandList, Commands, Form
 from space_robot_control.flight.replay.comparison import Comparison
 from space_robot_msgs_py.codecs import CommandCodec
 from space_robot_msgs_py.definitions import decode, jazzy
@@ -66,6 +66,54 @@ def test_one_bit_is_found_where_it_was_changed(tick: int, axis: int, bit: int) -
     report = compared.report(TIMEBASE.period)
     assert report["first_difference"]["fields"][0]["recorded"] == torque_of(tick)[axis]
     assert report["axes"][AXES[axis]]["recorded_rms"] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (0x0000000000000000, 0x8000000000000000),  # 0.0 and -0.0, which are equal as numbers
+        (0x7FF8000000000000, 0xFFF8000000000000),  # NaN and -NaN, which are not, nor each itself
+        (0x7FF8000000000000, 0x7FF8000000000001),  # NaN of another payload
+        (0x0000000000000001, 0x0000000000000000),  # the smallest number there is
+        (0x7FF0000000000000, 0xFFF0000000000000),
+    ],
+)
+@pytest.mark.parametrize("field", ["effort", "position", "velocity"])
+def test_bits_are_compared_and_not_numbers(one: int, other: int, field: str) -> None:
+    """In the torques and in the fields that a command of others may have."""
+    sent = messages(range(3))
+
+    def with_bits(bits: int) -> dict[int, bytes]:
+        if field == "effort":
+            torque = torque_of(1)
+            torque.view(np.uint64)[2] = bits
+            return {**sent, 1: CommandCodec(AXES, TIMEBASE).encode(Command(1, torque))}
+        values = np.array([0, bits], np.uint64).view(np.float64)
+        return {**sent, 1: foreign(sent[1], **{field: values})}
+
+    for bits in (one, other):  # each is equal to itself, NaN too
+        same = compare(with_bits(bits).values(), with_bits(bits).values(), 3)
+        assert same.is_identical
+        assert same.report(TIMEBASE.period)["equal"] == 3
+    compared = compare(with_bits(one).values(), with_bits(other).values(), 3)
+    assert not compared.is_identical
+    assert compared.equal.tolist() == [True, False, True]
+    found = compared.first_difference()
+    assert found is not None
+    (difference,) = found[1]
+    assert difference.field.startswith(field)
+    assert str(difference.recorded) != str(difference.replayed)  # so that one sees it
+
+
+def test_every_command_may_be_of_another_form() -> None:
+    """More of them than 16 bits can number."""
+    taken = CommandList(AXES, TIMEBASE)
+    taken._forms.update({Form(f"seen {k}", ""): k for k in range(1, 70_000)})
+    sent = messages(range(2))
+    for message in (sent[0], foreign(sent[1], frame_id="new")):
+        taken.add(message)
+    commands = taken.commands()
+    assert [commands.forms[form].frame_id for form in commands.form] == ["base", "new"]
 
 
 @given(recorded=st.sets(st.integers(0, 12)), replayed=st.sets(st.integers(0, 12)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from array import array
 from typing import Any, NamedTuple
 
@@ -64,7 +65,7 @@ class CommandList:
         self._torque = np.zeros(len(axis_names))
         usual = Form(topics.BASE_FRAME, str(list(axis_names)))
         self._forms: dict[Form, int] = {usual: 0}
-        self._ticks, self._torques, self._form = array("q"), array("d"), array("H")
+        self._ticks, self._torques, self._form = array("q"), array("d"), array("I")
         self._unreadable = 0
 
     def add(self, data: bytes) -> int | None:
@@ -102,9 +103,15 @@ class CommandList:
         """What has come; of several commands of one tick the first."""
         ticks, first = np.unique(np.frombuffer(self._ticks, np.int64), return_index=True)
         torques = np.frombuffer(self._torques, np.float64).reshape(-1, len(self._names))
-        form = np.frombuffer(self._form, np.uint16).astype(np.intp)
+        form = np.frombuffer(self._form, np.uint32).astype(np.intp)
         return Commands(ticks, torques[first], form[first], list(self._forms), self._unreadable)
 
 
+def number(value: float) -> float | str:
+    """A number to show: a NaN, of which there are many, by its bits."""
+    (bits,) = struct.unpack("<Q", struct.pack("<d", value))
+    return float(value) if value == value else f"nan 0x{bits:016x}"
+
+
 def _text(values: Any) -> str:
-    return str(np.asarray(values).tolist())
+    return str([number(value) for value in np.asarray(values, np.float64)])

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .commands import Array, Commands, Ticks
+from .commands import Array, Commands, Form, Ticks, number
 
 
 class Difference(NamedTuple):
@@ -56,11 +56,14 @@ class Comparison:
         """(K,) whether every field is the same, to the last bit."""
 
     def _same_form(self) -> NDArray[np.bool_]:
-        ours = [[a == b for b in self._replayed.forms] for a in self._recorded.forms]
-        table = np.array(ours, dtype=bool).reshape(len(ours), -1)
-        same: NDArray[np.bool_] = table[
-            self._recorded.form[self._at], self._replayed.form[self._again]
-        ]
+        numbers: dict[Form, int] = {}
+        recorded, replayed = (
+            np.array([numbers.setdefault(form, len(numbers)) for form in forms], np.intp)
+            for forms in (self._recorded.forms, self._replayed.forms)
+        )
+        same: NDArray[np.bool_] = (
+            recorded[self._recorded.form[self._at]] == replayed[self._replayed.form[self._again]]
+        )
         return same
 
     @property
@@ -94,8 +97,8 @@ class Comparison:
         differences += [
             Difference(
                 f"effort[{self.axis_names[i]}]",
-                float(self.recorded[k, i]),
-                float(self.replayed[k, i]),
+                number(self.recorded[k, i]),
+                number(self.replayed[k, i]),
             )
             for i in np.flatnonzero(~self._same_torque[k])
         ]
