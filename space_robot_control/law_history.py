@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from space_robot_msgs_py.samples import LawInForce
+from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.samples import LawInForce, Timebase
+
+MOST_TOLD = 3
+"""Changes that are told one by one where there is little room."""
 
 
 class LawChange(NamedTuple):
@@ -38,3 +43,53 @@ def same(one: LawInForce, other: LawInForce) -> bool:
             for gain, values in one.gains.items()
         )
     )
+
+
+def within(laws: Iterable[LawInForce], start: int, stop: float) -> tuple[LawInForce, ...]:
+    """The laws, by rising tick, in force at the ticks from ``start`` to before ``stop``."""
+    laws = tuple(laws)
+    begun = [law for law in laws if law.tick <= start]
+    return (*begun[-1:], *(law for law in laws if start < law.tick < stop))
+
+
+def laws_of(log: FlightLog) -> tuple[LawInForce, ...]:
+    """Those in force in the rows of ``log``."""
+    return within(log.laws, log.first_tick, log.first_tick + log.ticks)
+
+
+def as_data(laws: Iterable[LawInForce], timebase: Timebase) -> list[dict[str, Any]]:
+    """The laws for JSON: tick, time, name and gains of each."""
+    return [
+        {
+            "tick": law.tick,
+            "t_s": timebase.stamp_ns(law.tick) / 1e9,
+            "controller": law.name,
+            "gains": {gain: list(values) for gain, values in law.gains.items()},
+        }
+        for law in laws
+    ]
+
+
+def in_words(laws: Sequence[dict[str, Any]]) -> str:
+    """Laws as data in a line, as ``tde_stc -> tde_tsmc at 1.2345 s (other k_1 at 2.0000 s)``."""
+    if not laws:
+        return ""
+    words, flown = str(laws[0]["controller"]), [laws[0]]
+    for law in laws[1 : 1 + MOST_TOLD]:
+        last_of_name = [known for known in flown if known["controller"] == law["controller"]][-1:]
+        others = [
+            k
+            for known in last_of_name
+            for k, v in law["gains"].items()
+            if known["gains"].get(k) != v
+        ]
+        other, when = f"other {', '.join(others)}", f"at {law['t_s']:.4f} s"
+        if law["controller"] != flown[-1]["controller"]:
+            words += f" -> {law['controller']} {when}" + (f" ({other})" if others else "")
+        elif others:
+            words += f" ({other} {when})"
+        else:
+            words += f" (begun again {when})"
+        flown.append(law)
+    left = len(laws) - 1 - MOST_TOLD
+    return words + (f" and {left} more" if left > 0 else "")

@@ -19,7 +19,14 @@ from space_robot_sim.robot import Robot
 from .controller import Controller
 from .law_history import LawChange, same
 from .laws import ControlLaw, find_law
-from .settings import ControllerNodeSettings, available_laws, build_law, check_gains
+from .settings import (
+    ControllerNodeSettings,
+    available_laws,
+    build_law,
+    check_gains,
+    gain_lengths,
+    gain_range,
+)
 from .swaps import Swap, parse_swaps
 
 
@@ -46,6 +53,9 @@ class LawSet:
         self._swaps: list[Swap] = parse_swaps(settings.swaps, settings.period)
         for swap in self._swaps:
             one_of(swap.name, self._laws, "controller", " of swaps")
+        descriptor = shell.node.describe_parameter("controller")
+        descriptor.additional_constraints = f"one of {', '.join(self._laws)}"
+        shell.node.set_descriptor("controller", descriptor)
         shell.node.add_on_set_parameters_callback(self._on_set)
 
     def warm_up(self, robot: Robot) -> None:
@@ -96,7 +106,11 @@ class LawSet:
         for gain, description in law.gain_descriptions.items():
             node.declare_parameter(
                 f"{law.name}.{gain}", law.gains[gain].tolist(),
-                ParameterDescriptor(description=description), ignore_override=True,
+                ParameterDescriptor(
+                    description=description,
+                    additional_constraints=f"{gain_lengths(self._axes)}; {gain_range(gain)}",
+                ),
+                ignore_override=True,
             )  # fmt: skip
         return law
 

@@ -175,17 +175,23 @@ def check_gains(content: Tree, law: type[ControlLaw], axes: int, where: str) -> 
             raise InputError(f"{key}: numbers were expected, got {short(content[name])}")
         if values.shape not in ((axes,), (1,)):
             raise InputError(
-                f"{key}: {axes} values (base x, y, z and the joints) or 1 were expected, "
-                f"got {short(content[name])}"
+                f"{key}: {gain_lengths(axes)} were expected, got {short(content[name])}"
             )
-        low = "above 0" if name in STRICTLY_POSITIVE else "0 or more"
         fits = values > 0.0 if name in STRICTLY_POSITIVE else values >= 0.0
         if not np.all(fits & np.isfinite(values)):
-            raise InputError(
-                f"{key}: finite values {low} were expected, got {short(content[name])}"
-            )
+            raise InputError(f"{key}: {gain_range(name)} were expected, got {short(content[name])}")
         gains[name] = np.ascontiguousarray(np.broadcast_to(values, axes))
     return gains
+
+
+def gain_range(name: str) -> str:
+    """The values a gain may have, in words."""
+    return f"finite values {'above 0' if name in STRICTLY_POSITIVE else '0 or more'}"
+
+
+def gain_lengths(axes: int) -> str:
+    """How many values a gain may have, in words."""
+    return f"{axes} values (base x, y, z and the joints) or 1"
 
 
 def _numbers(value: Any) -> Array | None:

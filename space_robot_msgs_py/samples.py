@@ -6,7 +6,7 @@ float64, allocated once by the owner and overwritten in place.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -115,3 +115,9 @@ class LawInForce(NamedTuple):
     """A value an axis of each gain."""
     is_first: bool = False
     """Whether the controller begins with it: a controller that was started again does so, too."""
+
+
+def in_order(laws: Iterable[LawInForce]) -> tuple[LawInForce, ...]:
+    """Laws by rising tick; of several of one tick the last, under which it was answered."""
+    last_of_tick = {law.tick: law for law in laws}
+    return tuple(law for _, law in sorted(last_of_tick.items()))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.flight_log import FlightLog
 
+from ..law_history import as_data, laws_of
 from .metrics import tracking_error
 
 Array = NDArray[np.float64]
@@ -28,7 +29,9 @@ XYZ, WXYZ = "xyz", "wxyz"
 def schema(log: FlightLog) -> pa.Schema:
     """Names and types of the columns; its metadata is the flight's description."""
     about = {
-        "flight": log.flight, "lost": log.lost, "unanswered_ticks": log.unanswered,
+        "flight": log.flight,
+        "laws": as_data(laws_of(log), log.timebase),
+        "lost": log.lost, "unanswered_ticks": log.unanswered,
         "filled_ticks": log.filled, "unfinished": log.unfinished, "damage": list(log.damage),
     }  # fmt: skip
     fields = [pa.field("tick", pa.int64(), nullable=False)]

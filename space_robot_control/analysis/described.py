@@ -19,10 +19,12 @@ from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_sim.plant_settings import PlantNodeSettings
 from space_robot_sim.robot import Robot
 
+from ..law_history import laws_of
 from ..settings import ControllerNodeSettings, build_law
 from ..time_delay_estimation import low_pass_weight
 from ..trust import check_file, check_law
 from .actuation import TorqueLimits
+from .estimate_error import HBar
 
 Array = NDArray[np.float64]
 
@@ -73,23 +75,51 @@ def torque_limits(log: FlightLog) -> TorqueLimits:
     return TorqueLimits(base or np.inf, joint or np.inf)
 
 
-def estimator(log: FlightLog) -> tuple[Array, float]:
-    """(m,) Mbar of the law's time-delay estimate, and the weight of its low-pass (0: none).
+def estimator(log: FlightLog) -> tuple[HBar, float]:
+    """Hbar of the laws' time-delay estimate, and the weight of its low-pass (0: none).
 
     Raises:
-        InputError: the law has no estimate, was swapped, or is not described.
+        InputError: the law is not recorded, and has no estimate or is not described.
     """
+    if log.laws:
+        h_bar = recorded_h_bar
+    else:
+        described = _described_h_bar(log)
+
+        def h_bar(log: FlightLog) -> Array:
+            return described
+
+    parameters, key = _parameters(log, ControllerNodeSettings.node), "acceleration_filter_hz"
+    settings = ControllerNodeSettings.resolve({key: parameters[key]} if key in parameters else {})
+    return h_bar, low_pass_weight(settings.acceleration_filter_hz, log.timebase.period)
+
+
+def recorded_h_bar(log: FlightLog) -> Array:
+    """Of the laws in force in the rows of ``log``, see `HBar`."""
+    laws, none = laws_of(log), np.full(log.axes, np.nan)
+    rows = [none]
+    for law in laws:
+        values = law.gains.get("h_bar", ())
+        rows.append(np.broadcast_to(values, log.axes) if len(values) in (1, log.axes) else none)
+    if len(laws) == 1 and laws[0].tick <= log.first_tick:
+        return np.asarray(rows[1])
+    ticks = np.arange(log.first_tick, log.first_tick + log.ticks)
+    which = np.searchsorted([law.tick for law in laws], ticks, side="right")
+    return np.array(rows)[which]
+
+
+def _described_h_bar(log: FlightLog) -> Array:
+    """Of a bag without the laws in force, at its description's word."""
     flight = log.flight
     if flight.get("swaps"):
-        raise NotDescribedError("laws were swapped in flight, so no one Mbar holds")
+        raise NotDescribedError("laws were swapped in flight, so no one Hbar holds")
     if not (name := flight.get("controller")):
         raise NotDescribedError("the bag does not say which law was flown")
-    parameters = _parameters(log, ControllerNodeSettings.node)
     if isinstance(gains := flight.get("gains_used"), dict):
         h_bar = np.array(gains.get("h_bar", ()), dtype=np.float64)
     else:
         chosen: dict[str, Any] = {key: flight[key] for key in ("robot", "gains") if key in flight}
-        chosen = {**chosen, **parameters, "controller": name}
+        chosen |= {**_parameters(log, ControllerNodeSettings.node), "controller": name}
         _check_files(log, chosen)
         if not log.trusted:
             check_law(str(name))
@@ -98,10 +128,7 @@ def estimator(log: FlightLog) -> tuple[Array, float]:
         raise NotDescribedError(f"{name} has no time-delay estimate")
     if h_bar.shape not in ((log.axes,), (1,)):
         raise NotDescribedError(f"gains_used of the bag: h_bar: {log.axes} values were expected")
-    key = "acceleration_filter_hz"
-    settings = ControllerNodeSettings.resolve({key: parameters[key]} if key in parameters else {})
-    smoothing = low_pass_weight(settings.acceleration_filter_hz, log.timebase.period)
-    return np.broadcast_to(h_bar, log.axes), smoothing
+    return np.broadcast_to(h_bar, log.axes)
 
 
 def _check_files(log: FlightLog, given: Mapping[str, Any]) -> None:

@@ -8,6 +8,7 @@ the mean acceleration over it. Both are in a bag, so N_hat follows without the t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.flight_log import FlightLog
 
+from ..law_history import laws_of
 from .blocks import Figure, joined, last_rows
 from .generalised_motion import (
     applied_force,
@@ -26,6 +28,8 @@ from .generalised_motion import (
 from .metrics import AxisMaximum, AxisRms, Table, axis_groups
 
 Array = NDArray[np.float64]
+HBar = Callable[[FlightLog], Array]
+"""Hbar in force in the rows of a log: (m,), or (N, m) with NaN under a law without an estimate."""
 
 
 def neglected_force(log: FlightLog, h_bar: Array) -> Array:
@@ -74,20 +78,21 @@ class EstimateErrors:
 
     It is known from the third row on, at the tick before. Ticks whose state was filled in
     (`FlightLog.filled`), and their neighbours, are left out: what stands there was not measured.
+    So are ticks under a law without an estimate.
     """
 
-    def __init__(self, h_bar: Array, smoothing: float = 0.0, rest: bool = True) -> None:
-        """``h_bar``: (m,); the others as in `DelayedEstimate`."""
+    def __init__(self, h_bar: HBar, smoothing: float = 0.0, rest: bool = True) -> None:
+        """``h_bar``: as `described.estimator` has it; the others as in `DelayedEstimate`."""
         self._h_bar = h_bar
-        self._estimates = DelayedEstimate(smoothing, rest)
+        self._forces, self._accelerations = (DelayedEstimate(smoothing, rest) for _ in range(2))
         self._before: FlightLog | None = None
         """The last two rows, or the only one."""
         self._side = 1.0
         """1 if Q continues from Q in these rows, -1 if from -Q."""
         self._measured = np.empty(0, np.bool_)
         """Of these rows."""
-        self._estimate = np.empty((0, len(h_bar)))
-        """At the last row."""
+        self._pair: tuple[Array, ...] | None = None
+        """Force and acceleration of the estimate at the last row, (1, m) each."""
 
     def of(self, log: FlightLog) -> Array:
         """(K, m) those that become known with the rows of ``log``."""
@@ -97,39 +102,55 @@ class EstimateErrors:
         rows = replace(rows, quaternion=self._side * continuous_quaternion(rows))
         measured = np.concatenate([self._measured, measured_rows(log, before)])
         seen = max(0, rows.ticks - log.ticks - 1)  # intervals
+        part = rows.rows(seen, rows.ticks)
         with np.errstate(divide="ignore", invalid="ignore"):  # J0 may be singular
-            neglected = neglected_force(rows.rows(seen, rows.ticks), self._h_bar)
-        estimates = np.concatenate([self._estimate, self._estimates.of(neglected)])
-        error: Array = neglected[len(neglected) - len(estimates) + 1 :] - estimates[:-1]
-        there = measured[:-2] & measured[1:-1] & measured[2:]
+            force, acceleration = applied_force(part), mean_acceleration(part)
+        pair: tuple[Array, ...] = self._forces.of(force), self._accelerations.of(acceleration)
+        if self._pair is not None:
+            pair = tuple(np.concatenate(both) for both in zip(self._pair, pair, strict=True))
+        known = slice(len(force) - len(pair[0]) + 1, len(force))
+        h_bar = self._h_bar(part)
+        if h_bar.ndim == 2:
+            h_bar = h_bar[known]
+        # the pair outlasts a change of law or gains, its Hbar does not
+        estimate = pair[0][:-1] - h_bar * pair[1][:-1]
+        error: Array = force[known] - h_bar * acceleration[known] - estimate
+        there = np.broadcast_to(np.isfinite(h_bar).all(axis=-1), len(error))
+        if log.filled:
+            there = there & measured[:-2] & measured[1:-1] & measured[2:]
         self._before, self._measured = (
             last_rows(replace(rows, quaternion=recorded), 2),
             measured[-2:],
         )
         self._side = 1.0 if np.array_equal(rows.quaternion[-2:][0], recorded[-2:][0]) else -1.0
-        self._estimate = estimates[-1:].copy()
-        if log.filled:
-            error = error[there]
-        return error
+        self._pair = tuple(half[-1:].copy() for half in pair)
+        return error if there.all() else error[there]
 
 
 class EstimateError(Figure):
     """RMS and largest absolute value of `EstimateErrors`, by group of axes."""
 
-    def __init__(self, log: FlightLog, h_bar: Array, smoothing: float) -> None:
+    def __init__(self, log: FlightLog, h_bar: HBar, smoothing: float) -> None:
         """``log``: the first rows; the others as in `EstimateErrors`."""
         self._errors = EstimateErrors(h_bar, smoothing, rest=log.first_tick == 0)
+        self._laws: set[str] = set()
+        self._has_estimate = False
         self._rms, self._maximum = AxisRms(log.axes), AxisMaximum(log.axes)
 
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
         errors = self._errors.of(log)
+        for law in laws_of(log):
+            self._laws.add(law.name)
+            self._has_estimate |= "h_bar" in law.gains
         self._rms.add(errors**2)
         self._maximum.add(errors)
 
     def result(self) -> Table:
         """``rms`` and ``max`` by group."""
         if not self._rms.rows:
+            if self._laws and not self._has_estimate:
+                raise InputError(f"{', '.join(sorted(self._laws))} has no time-delay estimate")
             raise InputError("three measured states in a row are needed")
         each, largest = self._rms.value, self._maximum.value
         if not np.isfinite(each).all():

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .pictures import Picture
-from .table import DEFINITIONS, Report, lines, notes, remarks
+from .table import DEFINITIONS, Report, law_of, lines, notes, remarks
 from .template import template
 
 
@@ -28,6 +28,7 @@ def render(
     groups = {group: [line for line in shown if line.group == group] for group in DEFINITIONS}
     return template("space_robot_control.analysis", "flights.html.j2").render(
         reports=reports,
+        laws={name: law_of(report) for name, report in reports.items()},
         groups={group: found for group, found in groups.items() if found},
         definitions=DEFINITIONS,
         notes={name: [*remarks(r), *notes(r)] for name, r in reports.items()},

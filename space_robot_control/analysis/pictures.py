@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from space_robot_msgs_py.flight_log import FlightLog
 
+from ..law_history import as_data, laws_of
 from .course import Course
 from .figures import (
     BaseTorque,
@@ -98,4 +99,5 @@ def _drawn(figure: Figure) -> Callable[[], Figure]:
 
 def title(name: str, log: FlightLog) -> str:
     """What was flown, in a line."""
-    return f"{name}: {flown(log.flight)}"
+    laws = as_data(laws_of(log), log.timebase)
+    return f"{name}: {flown({**log.flight, 'laws': laws})}"

@@ -10,6 +10,7 @@ import numpy as np
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.flight_log import FlightLog
 
+from ..law_history import as_data, within
 from .actuation import Latency, Misses, Saturation, TorqueLimits
 from .blocks import Figure, blocks_of
 from .described import estimator, robot_of, torque_limits
@@ -56,6 +57,7 @@ class Analysis:
         for figure in self._figures.values():
             figure.add(block, error)
         self.ticks += block.ticks
+        self._laws, self._timebase = block.laws, block.timebase
         self._tail = {
             "lost": block.lost,
             "unanswered_ticks": block.unanswered,
@@ -78,8 +80,11 @@ class Analysis:
             except InputError as error:
                 unavailable[name] = str(error)
         stop, period_ns = self._first_tick + self.ticks, self._period_ns
+        laws = within(self._laws, self._first_tick, stop)
         return {
             **self._head,
+            **({"controller": laws[0].name} if laws else {}),
+            "laws": as_data(laws, self._timebase),
             "ticks": self.ticks,
             "duration_s": self.ticks * period_ns / 1e9,
             "from_s": self._first_tick * period_ns / 1e9,

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
+from ..law_history import in_words
 from .pointing import ARCSEC
 from .settling import BAND
 
@@ -52,9 +53,14 @@ class Line(NamedTuple):
 
 def flown(described: Mapping[str, Any]) -> str:
     """What was flown, in a few words; ``described``: a report, or the description in a bag."""
-    law = described.get("controller")
+    law = law_of(described)
     known = [f"{key} {described[key]}" for key in ("case", "gains") if described.get(key)]
     return ", ".join([str(law or "unknown law"), *known])
+
+
+def law_of(described: Mapping[str, Any]) -> str | None:
+    """The law, or all the laws and when they changed, in words; None: nobody says."""
+    return in_words(described.get("laws", ())) or described.get("controller")
 
 
 def unit_of(column: str) -> str:

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from ..analysis.table import Line, flown, lines, notes, remarks, unit_of
+from ..analysis.table import Line, flown, law_of, lines, notes, remarks, unit_of
 from ..terminal import say, show, terminal
 
 LABELS = 44
@@ -64,7 +64,8 @@ def print_comparison(reports: dict[str, dict[str, Any]], console: Console) -> No
             table.add_column("", no_wrap=True)
         for name in shown:
             table.add_column(name, justify="right", overflow="fold")
-        for key in ("controller", "case", "gains", "robot"):
+        table.add_row("controller", "", *(law_of(reports[name]) or "-" for name in shown))
+        for key in ("case", "gains", "robot"):
             table.add_row(key, "", *(str(reports[name][key] or "-") for name in shown))
         span = [f"{reports[name]['from_s']:g} to {reports[name]['to_s']:g}" for name in shown]
         table.add_row("time (s)", "", *span, end_section=True)

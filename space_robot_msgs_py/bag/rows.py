@@ -12,7 +12,7 @@ from .. import topics
 from ..errors import MessageError
 from ..flight_log import REFERENCE, STATE, FlightLog
 from ..plain_codecs import LawCodec
-from ..samples import LawInForce, Timebase
+from ..samples import LawInForce, Timebase, in_order
 from .batch import Batch
 from .coverage import LONGEST_JUMP, Coverage
 from .kernels import NO_STAMP, read_stamps
@@ -124,8 +124,7 @@ class Rows:
     def finish(self, ticks: int) -> FlightLog:
         """The log, cut to ``ticks`` rows."""
         log = self.log
-        last_of_tick = {law.tick: law for law in self._laws if law.tick < ticks}
-        log.laws = tuple(law for _, law in sorted(last_of_tick.items()))
+        log.laws = in_order(law for law in self._laws if law.tick < ticks)
         for column in self._columns():
             column.resize((ticks, *column.shape[1:]), refcheck=False)
         if topics.COMMAND.name not in self.coverages:

@@ -94,6 +94,7 @@ def test_analyze_imports_none_and_says_so(
     tmp_path: Path, ran: Callable[[], bool], bag: Path
 ) -> None:
     log = read_flight(bag)
+    log.laws = ()  # else their numbers are taken
     log.flight = described(controller=LAW)
     log.flight.pop("gains_used")
     report = analyse(log)
@@ -116,6 +117,7 @@ def test_analyze_reads_no_file_that_a_bag_names(
     secret.write_text("password: 1234")
     names = {"robot": "paper", "case": "1", "mission": "paper", "gains": "default"}
     log = read_flight(bag)
+    log.laws = ()
     log.flight = {"controller": "tde_stc", **names, key: str(secret)}
     why = analyse(log)["unavailable"][figure]
     assert "read only with --trust" in why

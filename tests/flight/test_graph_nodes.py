@@ -59,7 +59,7 @@ def test_controller_can_be_replaced_in_flight(start: Start, tmp_path: Path) -> N
 
 
 def test_law_and_gains_change_in_flight(start: Start, domain: int) -> None:
-    from rcl_interfaces.srv import SetParameters
+    from rcl_interfaces.srv import DescribeParameters, SetParameters
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.parameter import Parameter
 
@@ -71,7 +71,9 @@ def test_law_and_gains_change_in_flight(start: Start, domain: int) -> None:
     executor.add_node(node)
     try:
         client = node.create_client(SetParameters, "/controller_node/set_parameters")
+        describe = node.create_client(DescribeParameters, "/controller_node/describe_parameters")
         assert client.wait_for_service(30.0)
+        assert describe.wait_for_service(30.0)
 
         def change(name: str, value: object) -> tuple[bool, str]:
             request = SetParameters.Request()
@@ -81,6 +83,14 @@ def test_law_and_gains_change_in_flight(start: Start, domain: int) -> None:
             result = future.result().results[0]
             return result.successful, result.reason
 
+        names = ["controller", "tde_stc.h_bar", "tde_stc.k_1"]
+        asked = describe.call_async(DescribeParameters.Request(names=names))
+        executor.spin_until_future_complete(asked, 30.0)
+        assert [d.additional_constraints for d in asked.result().descriptors] == [
+            "one of tde_stc, ctc, ctc_smc, tde_smc, tde_tsmc",
+            "9 values (base x, y, z and the joints) or 1; finite values above 0",
+            "9 values (base x, y, z and the joints) or 1; finite values 0 or more",
+        ]
         assert change("controller", "tde_tsmc") == (True, "")
         assert change("tde_tsmc.k_1", [0.5]) == (True, "")
         refused, reason = change("controller", "pid")

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from flights import space_robot
 
+from space_robot_control.flight.replay.outcome import Options
+from space_robot_control.flight.replay.run import replay
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.flight_log import FlightLog
 
 pytest.importorskip("rclpy")
 
@@ -26,7 +27,7 @@ class Story:
         assert self.result.stdout, self.result.stderr
         assert "Traceback" not in self.result.stderr
         self.report: dict[str, Any] = json.loads(self.result.stdout)
-        self.log: FlightLog = read_flight(bag)
+        self.bag, self.log = bag, read_flight(bag)
 
     def time_of(self, node: str, what: str, after: float = 0.0) -> float:
         """Simulated time of the first event of a node that begins so."""
@@ -79,6 +80,16 @@ def test_restarted_controller_flies_the_mission_on(deaths: Story) -> None:
     back = deaths.time_of("plant", "nominal", after=0.3)
     assert back < 9.0
     assert deaths.error(9.4) < 0.5 * max(deaths.error(back), 1e-3)
+
+
+def test_the_restart_is_recorded_and_replayed(deaths: Story, domain: int) -> None:
+    """The replayed controller, too, begins again: to the last bit like the one that did."""
+    first, again = deaths.log.laws
+    assert (first.tick, first.is_first, again.is_first) == (0, True, True)
+    assert again.tick > 0.3 / PERIOD
+    done = replay(Options(deaths.bag, domain=domain, end_s=again.tick * PERIOD + 0.2))
+    assert done.comparison.is_identical, done.report()["first_difference"]
+    assert done.comparison.ticks[-1] > again.tick
 
 
 def test_without_mission_the_last_point_is_held(deaths: Story) -> None:

@@ -12,6 +12,7 @@ import yaml
 
 from space_robot_msgs_py.configuration import named_file
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import LawInForce
 from space_robot_msgs_py.validation import one_of
 from space_robot_sim.robot import Robot
 
@@ -102,6 +103,14 @@ class ControllerChoice:
             not gains or gains == flown.get("gains") or _same(now.gains, recorded_gains)
         )
         """Whether law and gains are those that flew; what was ``given`` is not looked at."""
+        self.follows_flight = is_same_law and "swaps" not in given
+        """Whether laws and gains change as they did in flight."""
+
+    def law_parameters(self, law: LawInForce) -> dict[str, str | list[float]]:
+        """What to set to have a law of the flight in force; what the user gave stays."""
+        gains = {f"{law.name}.{gain}": list(values) for gain, values in law.gains.items()}
+        kept = {name: gains[name] for name in gains if name not in self._said}
+        return {"controller": law.name, **(kept if self.is_as_flown else {})}
 
     def _check_laws(self, named: str, flown: Mapping[str, Any]) -> None:
         """See that no law but those shipped, or given by the user, is imported."""

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ...analysis.table import flown as words_of
+from ...law_history import in_words
 from ...terminal import say, show
 
 COUNTS = {
@@ -46,9 +47,13 @@ def title(report: dict[str, Any]) -> str:
     """What was replayed, by whom."""
     now = report["replayed"]
     pace = "in lockstep" if report["lockstep"] else f"at {report['rate']:g} times real time"
-    swaps = f", swaps {' '.join(now['swaps'])}" if now["swaps"] else ""
+    law, swaps = now["controller"], ""
+    if now["as_in_flight"]:
+        law = in_words(report["recorded"]["laws"])
+    elif now["swaps"]:
+        swaps = f", swaps {' '.join(now['swaps'])}"
     changed = "".join(f", {name}={value}" for name, value in now["set"].items())
-    law = f"{now['controller']}, gains {now['gains']}{swaps}{changed}"
+    law = f"{law}, gains {now['gains']}{swaps}{changed}"
     return f"replay of {report['bag']}: {law}, {pace}"
 
 

@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from space_robot_msgs_py.errors import FlightError
+from space_robot_msgs_py.samples import LawInForce
 
+from ...law_history import as_data
 from .choice import ControllerChoice
 from .comparison import Comparison
 from .reasons import reasons
@@ -48,6 +50,8 @@ class Replay:
     choice: ControllerChoice
     recording: Recording
     comparison: Comparison
+    laws: tuple[LawInForce, ...]
+    """In force in flight in the part that was replayed."""
     skipped: int
     """States that the controller did not answer in flight, and was not sent now."""
     elapsed_s: float
@@ -70,11 +74,15 @@ class Replay:
         numbers = self.comparison.report(self.recording.timebase.period)
         return {
             "bag": str(options.bag),
-            "recorded": {key: flight.get(key) for key in ("controller", "gains", "swaps")},
+            "recorded": {
+                **{key: flight.get(key) for key in ("controller", "gains", "swaps")},
+                "laws": as_data(self.laws, self.recording.timebase),
+            },
             "replayed": {
                 "controller": self.choice.law_name,
                 "gains": self.choice.gains_name,
                 "swaps": self.choice.swaps,
+                "as_in_flight": bool(self.choice.follows_flight and self.laws),
                 "set": dict(options.parameters),
             },
             "lockstep": options.rate is None,
@@ -88,6 +96,7 @@ class Replay:
             "reasons": [
                 *reasons(
                     flight,
+                    has_laws=bool(self.laws),
                     begins_late=options.start_s > 0.0,
                     by_the_clock=options.rate is not None,
                     is_finished=self.recording.is_finished,

@@ -110,14 +110,15 @@ class Player:
 
     def lockstep(
         self, states: Iterable[State], references: Iterable[Iterator[Reference]],
-        show: Callable[[int], None],
+        before: Callable[[int], None], show: Callable[[int], None],
     ) -> None:  # fmt: skip
         """Send state after state, each when the one before has its answer.
 
         Args:
             states: in their order; those that were not answered in flight left out.
             references: those of each topic in their order.
-            show: called now and then with the tick.
+            before: called with each tick before its state is sent.
+            show: called with each tick whose state was sent.
 
         Raises:
             FlightError: the controller has fallen silent, or `check` says so.
@@ -128,6 +129,7 @@ class Player:
         state = next(coming, None)
         while state is not None:
             self._send_references(state.tick)
+            before(state.tick)
             self._send(state)
             following = next(coming, None)  # read while the controller computes
             unanswered = 0 if self._is_answered(state) else unanswered + 1
@@ -141,16 +143,20 @@ class Player:
 
     def by_the_clock(
         self, states: Iterable[State], references: Iterable[Iterator[Reference]],
-        show: Callable[[int], None], period_s: float,
+        before: Callable[[int], None], show: Callable[[int], None], period_s: float,
     ) -> None:  # fmt: skip
         """Send a tick's state every ``period_s`` of the wall clock, answered or not.
 
-        Time begins when the first one is answered. Arguments and errors: see `lockstep`.
+        Time begins when the first one is answered, and stands still in ``before``. Arguments and
+        errors: see `lockstep`.
         """
         self._references = [_Stream(messages, deque()) for messages in references]
         began, first = 0.0, -1
         for state in states:
             self._send_references(state.tick)
+            paused = time.perf_counter()
+            before(state.tick)
+            began += time.perf_counter() - paused
             if first < 0:
                 self._send(state)
                 self._is_answered(state)

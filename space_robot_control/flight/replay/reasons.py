@@ -7,7 +7,12 @@ from typing import Any
 
 
 def reasons(
-    flight: Mapping[str, Any], *, begins_late: bool, by_the_clock: bool, is_finished: bool
+    flight: Mapping[str, Any],
+    *,
+    has_laws: bool,
+    begins_late: bool,
+    by_the_clock: bool,
+    is_finished: bool,
 ) -> Iterator[str]:
     """A sentence each, for a replay of a recorded ``flight``."""
     if begins_late:
@@ -18,8 +23,10 @@ def reasons(
     if by_the_clock:
         yield "by the wall clock the controller may miss states, and a law's memory with them"
     faults = " ".join(flight.get("faults", []))
-    if flight.get("restart_controller") or "_controller" in faults:
+    if not has_laws and (flight.get("restart_controller") or "_controller" in faults):
         yield "the controller was stopped or started again in flight, the replayed one is not"
+    if not has_laws:
+        yield "the bag has no record of laws and gains changed in flight with `ros2 param set`"
     if "_mission" in faults:
         yield "the mission was killed or stopped: references may have come late in flight"
     if not flight:

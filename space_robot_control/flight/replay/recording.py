@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,6 +16,8 @@ from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import REQUIRED, first_states, missing, timebase_of
 from space_robot_msgs_py.bag.selection import Selection
 from space_robot_msgs_py.errors import InputError, MessageError
+from space_robot_msgs_py.plain_codecs import LawCodec
+from space_robot_msgs_py.samples import LawInForce, in_order
 from space_robot_msgs_py.text import printable
 from space_robot_msgs_py.topics import Topic
 
@@ -80,6 +82,14 @@ class Recording:
         for _, data in self._messages(topics.COMMAND) if self.has_commands else ():
             found.add(data)
         return found.commands()
+
+    def laws(self) -> tuple[LawInForce, ...]:
+        """The laws in force, with their gains, by rising tick; empty: not recorded."""
+        found = []
+        for topic, data in self._messages(topics.LAW):
+            with suppress(MessageError):
+                found.append(LawCodec.decode(data, message_tick(topic, data, self.timebase)))
+        return in_order(found)
 
     def states(self, start: int = 0, stop: float = math.inf) -> Iterator[State]:
         """States of the ticks from ``start`` to before ``stop``, as they were sent.

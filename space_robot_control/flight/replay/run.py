@@ -12,16 +12,19 @@ from pathlib import Path
 
 from space_robot_msgs_py.errors import FlightError, InputError
 
+from ...law_history import within
 from ..compilation import compile_kernels
 from ..display import FlightProgress, flight_progress
 from ..domain import ros_domain
 from ..following import InterruptedFlightError
 from ..lifecycle import LifecycleDriver
 from ..orchestrator import require_ros, stop_signals
+from ..parameters import ParameterClient
 from ..processes import Graph, NodeProcess, node_command, node_environment
 from .choice import ControllerChoice
 from .commands import CommandList, Commands, Ticks
 from .comparison import Comparison
+from .laws import RecordedLaws
 from .outcome import Options, Replay
 from .player import CONTROLLER, REFERENCES, Player
 from .recording import Recording, State
@@ -57,6 +60,7 @@ class _Run:
         self._recorded = self._read_commands()
         if next(recording.states(self._start, self._stop), None) is None:
             raise InputError(f"{options.bag}: no states in the part to be replayed")
+        self._laws = within(recording.laws(), self._start, self._stop)
         self._skipped = 0
         self._progress: FlightProgress | None = None
         self._shown_at = 0.0
@@ -102,7 +106,9 @@ class _Run:
         comparison = Comparison(
             axes, played, self._recorded_until(played, error), answers.commands()
         )
-        return Replay(options, choice, recording, comparison, self._skipped, elapsed, error)
+        return Replay(
+            options, choice, recording, comparison, self._laws, self._skipped, elapsed, error
+        )  # fmt: skip
 
     def _recorded_until(self, played: Ticks, error: FlightError | None) -> Commands:
         """Of a replay that ended early, or a bag that did, only what came until then."""
@@ -113,11 +119,17 @@ class _Run:
     def _play(self, player: Player, show: Callable[[int], None]) -> None:
         states = self._states()
         references = [self._recording.references(topic, self._start) for topic in REFERENCES]
-        if self._options.rate is None:
-            player.lockstep(states, references, show)
-        else:
-            period = self._recording.timebase.period / self._options.rate
-            player.by_the_clock(states, references, show, period)
+        with closing(ParameterClient(player.node, CONTROLLER, player.check)) as client:
+            laws = RecordedLaws(
+                self._laws if self._choice.follows_flight else (),
+                lambda law: client.set(self._choice.law_parameters(law)),
+                lambda: _start_again(player),
+            )
+            if self._options.rate is None:
+                player.lockstep(states, references, laws.before, show)
+            else:
+                period = self._recording.timebase.period / self._options.rate
+                player.by_the_clock(states, references, laws.before, show, period)
 
     def _states(self) -> Iterator[State]:
         """The states that the controller took; where it did not answer all, those answered."""
@@ -150,13 +162,25 @@ class _Run:
 
 
 def _bring_up(controller: NodeProcess, player: Player) -> None:
-    with closing(LifecycleDriver(player.node)) as driver:
-        for transition in ("configure", "activate"):
-            if driver.change([CONTROLLER], transition, player.check):
-                raise FlightError(
-                    f"{CONTROLLER} refused to {transition}:\n{controller.last_words()}"
-                )
+    if refused := _change_state(player, "configure", "activate"):
+        raise FlightError(f"{CONTROLLER} refused to {refused}:\n{controller.last_words()}")
     player.wait_for_controller()
+
+
+def _start_again(player: Player) -> None:
+    """Let the controller forget everything, as the one that was started again in flight."""
+    if refused := _change_state(player, "deactivate", "cleanup", "configure", "activate"):
+        raise FlightError(f"{CONTROLLER} refused to {refused}")
+    player.wait_for_controller()
+
+
+def _change_state(player: Player, *transitions: str) -> str:
+    """Put the controller through these transitions; the one it refuses, if any."""
+    with closing(LifecycleDriver(player.node)) as driver:
+        for transition in transitions:
+            if driver.change([CONTROLLER], transition, player.check):
+                return transition
+    return ""
 
 
 def _check(controller: NodeProcess, stopped: list[int]) -> None:
