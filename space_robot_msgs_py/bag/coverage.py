@@ -62,6 +62,7 @@ class Coverage:
             return True
         elif self.received == 0:
             self.first = self.last = tick
+            self._expect_before(tick)
         else:
             step = tick - self.last
             self.unit = min(self.unit, step) if self.unit else step
@@ -79,6 +80,7 @@ class Coverage:
         self._guard.passes(int(ticks[0]))
         if not self.received:
             self.first = int(ticks[0])
+            self._expect_before(self.first)
         if len(steps):
             shortest = int(steps.min())
             self.unit = min(self.unit, shortest) if self.unit else shortest
@@ -89,6 +91,11 @@ class Coverage:
         self.last = self._guard.last = int(ticks[-1])
         self.received += len(ticks)
         return np.ones(len(ticks), np.bool_)
+
+    def _expect_before(self, tick: int) -> None:
+        """Ticks before the first message may still come, late."""
+        if self.topic.per_tick and tick <= LONGEST_JUMP:
+            self._holes.update(range(tick))
 
     @property
     def kept(self) -> int:

@@ -238,6 +238,28 @@ def test_flight_by_the_clock_of_the_wall_begins_with_its_first_state(
     assert_same_flight(read_flight(mcap_of(tmp_path / "x.mcap", later)), recorded.log)
 
 
+@pytest.mark.parametrize("by_ns", [0, 1_795_220_105_128_297_452])
+def test_a_reference_that_begins_before_the_first_state_stays_in_its_place(
+    recorded: Recorded, entries: list[Entry], tmp_path: Path, by_ns: int
+) -> None:
+    """By a recorder that came late, to a flight in simulated time or by the clock of the wall."""
+    first, late = 130, {"/joint_states", "/base/state", "/command"}
+    first_ns = first * TIMEBASE.period_ns
+    kept = [
+        entry
+        for entry in entries
+        if entry[0] not in late or np.frombuffer(entry[3], np.uint32, 1, 8)[0] >= first_ns
+    ]
+    log = read_flight(mcap_of(tmp_path / "x.mcap", shifted(kept, by_ns)))
+    start = 0 if by_ns else first
+    rows = slice(start, start + 200 - first)
+    assert log.whole[rows].all()
+    for name in COLUMNS:
+        np.testing.assert_array_equal(
+            getattr(log, name)[rows], getattr(recorded.log, name)[first:], name
+        )
+
+
 def test_period_of_a_bag_of_others_is_that_of_its_stamps(
     recorded: Recorded, tmp_path: Path
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import fields
 
 import numpy as np
@@ -39,3 +40,48 @@ def test_events_may_come_whenever_they_like() -> None:
         assert coverage.take(tick)
     assert (coverage.received, coverage.repeated, coverage.strange) == (5, 0, 0)
     assert coverage.missing(4 * LONGEST_JUMP) == 0
+
+
+@pytest.mark.parametrize("topic", [topics.JOINT_STATES, topics.COMMAND], ids=lambda t: t.name)
+@given(st.lists(st.integers(0, 60), max_size=80), st.integers(0, 5))
+def test_ticks_are_counted_as_a_set_has_them(
+    topic: topics.Topic, ticks: list[int], more: int
+) -> None:
+    """Late, twice, late and twice, in any order: against sets, which know nothing of holes."""
+    coverage, came = Coverage(topic), set[int]()
+    for tick in ticks:
+        assert coverage.take(tick) == (tick not in came)
+        came.add(tick)
+    last = max(came, default=-1)
+    assert coverage.received == len(came)
+    assert coverage.repeated == len(ticks) - len(came)
+    assert coverage.strange == 0
+    assert coverage.last == last
+    assert coverage.missing(last + more) == len(set(range(last + more + 1)) - came)
+
+
+@given(st.integers(1, 30), st.sets(st.integers(0, 40), min_size=1))
+def test_messages_at_a_period_are_counted_as_a_set_has_them(period: int, places: set[int]) -> None:
+    """Of a topic with a message every few ticks, the smallest step seen is its period."""
+    coverage, sent = Coverage(topics.CLOCK), sorted(places)
+    for place in sent:
+        coverage.take(period * place)
+    smallest = min((b - a for a, b in itertools.pairwise(sent)), default=1)
+    expected = set(range(sent[0], sent[-1] + 1, smallest))
+    assert coverage.missing(period * 41) == max(0, len(expected) - len(sent))
+    assert coverage.received == len(sent)
+
+
+@given(st.lists(st.integers(0, 500), unique=True, min_size=1).map(sorted), st.data())
+def test_bad_stamps_between_good_ones_are_counted_apart(
+    ticks: list[int], data: st.DataObject
+) -> None:
+    """They are strange, and the good ones are neither lost nor taken for repeated."""
+    coverage, bad = Coverage(topics.COMMAND), 0
+    for i, tick in enumerate(ticks):
+        for jump in data.draw(st.lists(st.sampled_from([10**6, 10**9]), max_size=3)) if i else ():
+            assert coverage.take(tick + jump)
+            bad += 1
+        assert coverage.take(tick)
+    assert (coverage.received, coverage.strange) == (len(ticks), bad)
+    assert coverage.missing(500) == len(set(range(501)) - set(ticks))
