@@ -23,10 +23,10 @@ class InputError(SpaceRobotError, ValueError):
 class MessageError(SpaceRobotError, ValueError):
     """A message came that does not fit: other names, lengths or stamps than this graph's."""
 
-    def __init__(self, text: str, reason: str = "malformed", tick: int | None = None) -> None:
-        """``reason``: the kind of misfit in a word; ``tick``: of the message, where it is known."""
+    def __init__(self, text: str, reason: str = "malformed") -> None:
+        """``reason``: the kind of misfit in a word."""
         super().__init__(text)
-        self.reason, self.tick = reason, tick
+        self.reason = reason
 
 
 class FlightError(SpaceRobotError):

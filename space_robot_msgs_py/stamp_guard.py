@@ -9,8 +9,8 @@ AGREEING = 5
 class StampGuard:
     """Lets stamps pass that rise by no more than a jump. Knows no ROS.
 
-    A single stamp that goes back or jumps is wrong. Several that agree mean that the plant has
-    started anew, or that this controller has slept.
+    A single stamp that goes back or jumps is wrong. Several that agree mean a new time: the plant
+    has started anew, or this node has slept.
     """
 
     def __init__(self, longest_jump: int) -> None:
@@ -18,16 +18,19 @@ class StampGuard:
         self._longest_jump = longest_jump
         self.last = -1
         """The last tick believed; -1 before the first."""
+        self.is_new_time = False
+        """Whether the last tick believed did not follow the one before."""
         self._strange = -1
         self._agreeing = 0
 
     def passes(self, tick: int) -> bool:
         """Whether to believe a state of ``tick``, which is then the last one."""
-        if self.last >= 0 and not 0 < tick - self.last <= self._longest_jump:
+        follows = 0 < tick - self.last <= self._longest_jump
+        if not follows and self.last >= 0:
             agrees = self._agreeing and 0 <= tick - self._strange <= self._longest_jump
             self._agreeing = self._agreeing + 1 if agrees else 1
             self._strange = tick
             if self._agreeing < AGREEING:
                 return False
-        self.last, self._agreeing = tick, 0
+        self.last, self._agreeing, self.is_new_time = tick, 0, not follows
         return True

@@ -40,14 +40,15 @@ BASE_STATE = Topic(
     per_tick=True,
 )  # fmt: skip
 COMMAND = Topic("/command", "sensor_msgs/msg/JointState", 10_000, TO_PLANT, per_tick=True)
+# Reference and clock are not transient local: a late joiner would be told the past, and that a
+# message was lost if one is pushed out meanwhile; at depth 1 a slow one would lose some. The
+# mission says again what is still needed when somebody joins, a plant that waits its time.
 REFERENCE_JOINTS = Topic(
-    "/reference/joints", "trajectory_msgs/msg/JointTrajectory", 200, TO_CONTROLLER,
-    transient_local=True,
-)  # fmt: skip
+    "/reference/joints", "trajectory_msgs/msg/JointTrajectory", 200, TO_CONTROLLER
+)
 REFERENCE_BASE = Topic(
-    "/reference/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 200,
-    TO_CONTROLLER, transient_local=True,
-)  # fmt: skip
+    "/reference/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 200, TO_CONTROLLER
+)
 TELEMETRY = Topic(
     "/controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, ("recorder_node",)
 )
@@ -55,13 +56,7 @@ LAW = Topic(
     "/controller/law", "rcl_interfaces/msg/ParameterEvent", 100, ("recorder_node",),
     transient_local=True, is_event=True,
 )  # fmt: skip
-CLOCK = Topic(
-    "/clock",
-    "rosgraph_msgs/msg/Clock",
-    1_000,
-    TO_MISSION,
-    transient_local=True,
-)
+CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock", 1_000, TO_MISSION)
 
 ALL = (
     JOINT_STATES, BASE_STATE, COMMAND, REFERENCE_JOINTS, REFERENCE_BASE, TELEMETRY, LAW, CLOCK,

@@ -16,7 +16,7 @@ from space_robot_msgs_py.health import Health, Level
 from space_robot_msgs_py.plain_codecs import ClockCodec
 from space_robot_msgs_py.ros.endpoints import (
     SPIN_S,
-    In,
+    FollowedIn,
     Out,
     TakenByLoop,
     Waiter,
@@ -32,12 +32,15 @@ from .plant_settings import PlantNodeSettings
 from .robot import Robot
 from .wall_clock import WallClock
 
-ASK_AGAIN_S = 0.5
-"""Without an answer for this long the state is sent again (lockstep)."""
+ASK_AGAIN_S = 0.2
+"""Without an answer for this long the state is sent again (lockstep): well before a listener takes
+this plant for silent, and soon enough for one that believes a new time only after some states."""
 SPIN_BEFORE_DEADLINE_S = 100e-6
 GIVE_WAY_S = 100e-6
 FLUSH_S = 5.0
 """How long a flight's end waits for its listeners: one may be stopped, or dead."""
+MOST_AT_ONCE = 100
+"""Commands taken before the clock is looked at again: somebody may flood the topic."""
 HOLDING_TICKS = 20
 """A command held for longer is worth a word in the diagnostics."""
 
@@ -67,7 +70,7 @@ class PlantLoop:
         self._joint_states = Out(node, topics.JOINT_STATES)
         self._base_state = Out(node, topics.BASE_STATE)
         self._clock_out = Out(node, topics.CLOCK)
-        self._command_in = In(node, topics.COMMAND, TakenByLoop())
+        self._command_in = FollowedIn(node, topics.COMMAND, TakenByLoop())
         spin_s = 0.0 if settings.fifo_priority else SPIN_S
         self._waiter = Waiter(node, self._command_in, spin_s=spin_s)
         self.outputs = (self._joint_states, self._base_state, self._clock_out)
@@ -76,7 +79,7 @@ class PlantLoop:
         self._controller_silent = False
         self._heard = -1
         """The newest tick that a command has come for."""
-        self._sent = (b"", b"")
+        self._sent, self._clock_sent = (b"", b""), b""
         self._sent_at = 0.0
         self._answers, self._latency_s, self._latency_max_s = 0, 0.0, 0.0
         self.late_ticks = 0
@@ -93,8 +96,8 @@ class PlantLoop:
                 break
             if plant.tick == 0:
                 clock.start(0)  # time begins when the loop is closed
-            elif self._by_the_clock and (behind := clock.slip(plant.tick)):
-                shell.log(f"{behind:.3f} s behind the wall clock: time goes on from here")
+            elif self._by_the_clock and clock.slip(plant.tick) and (remark := clock.remark()):
+                shell.log(remark)
             self._step()
             shell.serve()
         elapsed = time.monotonic() - began
@@ -119,6 +122,7 @@ class PlantLoop:
             "held_ticks": guard.held_ticks(tick),
             "saturated_ticks": self._plant.saturated_ticks,
             **{f"refused: {reason}": count for reason, count in guard.refused.items()},
+            **self._command_in.counts("refused"),
         }
         if self._answers:
             values["latency_mean_ms"] = 1e3 * self._latency_s / self._answers
@@ -151,7 +155,8 @@ class PlantLoop:
     def _publish_clock(self) -> None:
         tick = self._plant.tick
         if tick % self._settings.clock_decimation == 0:
-            self._clock_out.publish(self._clock.encode(self._timebase.stamp_ns(tick)))
+            self._clock_sent = self._clock.encode(self._timebase.stamp_ns(tick))
+            self._clock_out.publish(self._clock_sent)
 
     def _step(self) -> None:
         plant, guard = self._plant, self._guard
@@ -171,11 +176,9 @@ class PlantLoop:
         give_up = time.monotonic() + self._silence_s
         while True:
             data = take_or_wait(self._command_in, self._waiter, 0.02)
-            if data is not None:
-                if self._receive(data) == stamp:
-                    self._time_answer()
-                    return True
-                continue
+            if data is not None and self._receive(data) == stamp:
+                self._time_answer()
+                return True
             if self._shell.stopping:
                 return False
             now = time.monotonic()
@@ -187,6 +190,7 @@ class PlantLoop:
             if now > ask_again:
                 ask_again = now + ASK_AGAIN_S
                 self._publish(*self._sent)
+                self._clock_out.publish(self._clock_sent)
             self._shell.serve()
 
     def _wait_by_the_clock(self, stamp: int) -> None:
@@ -206,20 +210,28 @@ class PlantLoop:
             self._controller_silent = False
 
     def _take_all(self, stamp: int) -> None:
-        while (data := self._command_in.take()) is not None:
+        for _ in range(MOST_AT_ONCE):
+            data = self._command_in.take()
+            if data is None:
+                return
             if self._receive(data) == stamp:
                 self._time_answer()
 
     def _receive(self, data: bytes) -> int | None:
-        """Take a command that has come, if it is good; the tick it answers, if it tells one."""
-        guard = self._guard
+        """Take a command that has come, if it is good; the tick it answers, if it can be read."""
+        guard, source = self._guard, self._command_in.source
         try:
             self._commands.decode(data, guard.offered)
+            if not (source.is_sure or np.isfinite(guard.offered.torque).all()):
+                raise MessageError("a number is not finite", "not finite")
         except MessageError as error:
             guard.refuse(error.reason)
-            return error.tick
+            source.doubt()
+            return None
         tick = guard.offered.tick
-        self._heard = max(self._heard, tick)
+        if self._heard < tick <= self._plant.tick:
+            self._heard = tick
+            source.follow()
         self._deliver()
         return tick
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import time
 
 SLIP_S = 0.25
 """Further behind the wall clock than this, nobody catches up."""
+REMARK_S = 5.0
+"""Between two remarks on time lost lies at least this."""
 
 
 class WallClock:
@@ -16,6 +19,7 @@ class WallClock:
         self._begin = 0.0
         self.slipped_s = 0.0
         """How far the wall clock has run ahead for good."""
+        self._remarked_s, self._remarked_at = 0.0, -math.inf
 
     def start(self, tick: int) -> None:
         """``tick`` begins now."""
@@ -33,3 +37,13 @@ class WallClock:
         self._begin += behind
         self.slipped_s += behind
         return behind
+
+    def remark(self) -> str:
+        """What to say of the time lost since the last remark; empty if that was just now."""
+        now = time.monotonic()
+        lost, since = self.slipped_s - self._remarked_s, now - self._remarked_at
+        if since < REMARK_S or not lost:
+            return ""
+        within = f" in {since:.1f} s, {self.slipped_s:.3f} s in all" if self._remarked_s else ""
+        self._remarked_s, self._remarked_at = self.slipped_s, now
+        return f"{lost:.3f} s behind the wall clock{within}: time goes on from here"

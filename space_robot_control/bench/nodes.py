@@ -121,10 +121,11 @@ class TimedControllerLoop(ControllerLoop):
         """See `ControllerLoop`."""
         super().__init__(shell, settings)
         self._watch = watch = Stopwatch()
-        watch.attach(self._joints_in, "take", "take joints")
-        watch.attach(self._states, "decode_joints", "decode joints")
-        watch.attach(self._base_in, "take", "take base")
-        watch.attach(self._states, "decode_base", "decode base")
+        joints, base = self._states.inputs
+        watch.attach(joints, "take", "take joints")
+        watch.attach(self._states.codec, "decode_joints", "decode joints")
+        watch.attach(base, "take", "take base")
+        watch.attach(self._states.codec, "decode_base", "decode base")
         watch.attach(self._controller, "update", "update controller")
         watch.attach(self._commands, "encode", "encode command")
         watch.attach(self._command_out, "publish", "publish command")

@@ -10,6 +10,7 @@ from typing import Any
 from space_robot_msgs_py.errors import FlightError
 
 from ..interruption import exit_code
+from .degraded import degradation
 from .display import FlightProgress, flight_progress
 from .foreign import ForeignNodes
 from .injection import Injector
@@ -73,6 +74,8 @@ class _Follower:
         self._last_clock_s = self.total_s - flight.plant_settings.clock_decimation * flight.period
         self._graph, self._monitor, self._stopped = graph, monitor, stopped
         self._foreign = ForeignNodes(monitor.node, NODE_NAMES)
+        self._fault_kinds = frozenset(fault.kind for fault in flight.orchestrator_faults)
+        self._realtime = flight.plant_settings.realtime
         self._injector = Injector(flight.orchestrator_faults, graph)
         again = {**parameters["controller"], "wait_for": ["plant_node"]}
         self._watch = Watch(
@@ -129,11 +132,13 @@ class _Follower:
         if self._stopped:
             raise InterruptedFlightError("stopped when the flight had landed", self._stopped[0])
         self._monitor.poll()  # the nodes' last reports
+        found = degradation(self._monitor.values, self._fault_kinds, self._realtime)
         return {
             "events": [event._asdict() for event in self._events],
             "nodes": self._monitor.values,
             "restarts": self._watch.restarts,
-            "failures": self._watch.failures,
+            "failures": [*self._watch.failures, *found.failures],
+            "warnings": found.warnings,
         }
 
     def _check_start(self) -> None:
@@ -149,8 +154,9 @@ class _Follower:
             show(self._last_s, _remark(monitor.errors, self._last_s, now - self._begun_at))
         elif now - self._moved_at > STALL_TIMEOUT_S:
             words = "\n".join(f"{n}:\n{p.last_words()}" for n, p in self._graph.nodes.items())
+            why = "".join(f"{node}: {mode}\n" for node, mode in monitor.complaints.items())
             raise FlightError(
-                f"no progress for {STALL_TIMEOUT_S:.0f} s at {self._last_s:.2f} s:\n{words}"
+                f"no progress for {STALL_TIMEOUT_S:.0f} s at {self._last_s:.2f} s:\n{why}{words}"
             )
 
 

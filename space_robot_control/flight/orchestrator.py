@@ -60,6 +60,8 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
         _say(f"flown and recorded in {time.monotonic() - begin:.1f} s, start-up included")
     report = analyse(read_flight(bag, trust=True))
     report["graph"] = what_happened
+    for warning in what_happened["warnings"]:
+        _say(f"warning: {warning}")
     _check(report, flight)
     return report
 

@@ -17,11 +17,15 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
+from ..source_guard import SourceGuard
 from ..topics import Topic
 
 SPIN_S = 300e-6
 """How long a wait takes and yields before it sleeps in the wait set. Not under SCHED_FIFO, where
 yielding gives way to nobody and sleeping threads wake at once."""
+
+MOST_REFUSED = 1_000
+"""So many messages of others are passed over before the loop may look after other things."""
 
 
 class TakenByLoop(CallbackGroup):
@@ -66,12 +70,17 @@ class Out:
         self.publish = self._publisher.publish
         """Send serialized bytes."""
 
+    @property
+    def listener_count(self) -> int:
+        """How many subscriptions are connected."""
+        return int(self._publisher.get_subscription_count())
+
     def missing_listeners(self, names: Sequence[str]) -> list[str]:
         """Which of the named nodes that listen to this topic are not connected yet."""
         wanted = [name for name in names if name in self.topic.listeners]
         infos = self._node.get_subscriptions_info_by_topic(self.topic.name)
         missing = [name for name in wanted if name not in {info.node_name for info in infos}]
-        if not missing and self._publisher.get_subscription_count() < len(wanted):
+        if not missing and self.listener_count < len(wanted):
             return wanted  # discovered, but not all matched with this publisher yet
         return missing
 
@@ -114,6 +123,31 @@ class In:
         with self.handle:
             taken = self.handle.take_message(self._type, True)
         return None if taken is None else (taken[0], taken[1]["source_timestamp"])
+
+
+class FollowedIn(In):
+    """Follows one publisher: what others send at the same time is not taken."""
+
+    def __init__(self, node: Node, topic: Topic, group: TakenByLoop, depth: int = 0) -> None:
+        super().__init__(node, topic, group, depth)
+        self.source = SourceGuard()
+
+    def take(self) -> bytes | None:
+        """The next message of the publisher followed, if there is one."""
+        for _ in range(MOST_REFUSED):
+            with self.handle:
+                taken = self.handle.take_message(self._type, True)
+            if taken is None:
+                return None
+            data, info = taken
+            if self.source.passes(info["publication_sequence_number"], info["received_timestamp"]):
+                return data  # type: ignore[no-any-return]
+        return None
+
+    def counts(self, word: str) -> dict[str, int]:
+        """For a node's health: how many messages of others were ``word``, if any."""
+        count = self.source.others_messages
+        return {f"{word}: another publisher's on {self.topic.name}": count} if count else {}
 
 
 class Waiter:

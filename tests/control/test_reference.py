@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from space_robot_control.reference import ReferenceBuffer
+from space_robot_control.reference import MOST_PUT_ASIDE, PAST_SHARE, ReferenceBuffer
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import ReferenceChunk
 
@@ -134,6 +134,80 @@ def test_what_is_covered_is_always_right_and_the_newest_always_covered(
         assert buffer.covers(tick) == (newest.get(tick % CAPACITY) == tick)
         if buffer.covers(tick):
             assert_holds(buffer, tick)
+
+
+# Once it is known what is now
+
+
+@given(
+    st.integers(0, 10**6),
+    st.lists(st.tuples(st.integers(-3 * CAPACITY, 3 * CAPACITY), st.integers(1, 8)), max_size=12),
+)
+def test_rows_around_now_are_kept_whatever_comes_from_elsewhere_in_time(
+    now: int, others: list[tuple[int, int]]
+) -> None:
+    """Far ahead or long past, they take no place that is needed."""
+    buffer = ReferenceBuffer(2, CAPACITY)
+    buffer.begin(now)
+    first = now - CAPACITY // PAST_SHARE
+    buffer.add(chunk(now, 8))
+    for offset, length in others:
+        buffer.add(chunk(now + offset, length))
+    for tick in range(now, now + 8):
+        assert_holds(buffer, tick)
+    for tick in range(now - 4 * CAPACITY, now + 4 * CAPACITY):
+        if buffer.covers(tick):
+            assert first <= tick < first + CAPACITY
+            assert_holds(buffer, tick)
+
+
+@given(st.integers(4 * CAPACITY, 10**6), st.integers(0, 2 * CAPACITY))
+def test_a_new_time_finds_the_rows_that_came_before_it_was_known(old: int, new: int) -> None:
+    """A mission that follows a new plant is faster than the states."""
+    buffer = ReferenceBuffer(2, CAPACITY)
+    buffer.begin(old)
+    buffer.add(chunk(old, 4))
+    buffer.add(chunk(new, 4))
+    assert not buffer.covers(new)
+    buffer.begin(new)
+    for tick in range(new, new + 4):
+        assert_holds(buffer, tick)
+    buffer.add(chunk(new + 4, 4))
+    assert_holds(buffer, new + 5)
+
+
+def test_what_is_put_aside_is_bounded() -> None:
+    buffer = ReferenceBuffer(2, CAPACITY)
+    buffer.begin(10 * CAPACITY)
+    for start in range(MOST_PUT_ASIDE):  # two halves each: the first ones are forgotten
+        buffer.add(chunk(start % 5, 1))
+    buffer.add(chunk(20, 1))
+    buffer.begin(0)
+    assert_holds(buffer, 20)
+    assert_holds(buffer, 4)
+
+
+def test_gaps_can_be_filled_without_overwriting() -> None:
+    """With what another than the mission has sent."""
+    buffer = ReferenceBuffer(2, CAPACITY)
+    buffer.begin(0)
+    buffer.add(chunk(2, 2))
+    stranger = chunk(0, 6, version=100.0)
+    buffer.add_joints(0, stranger.joints, only_missing=True)
+    buffer.add_base(0, stranger.base, only_missing=True)
+    assert_holds(buffer, 2)
+    assert_holds(buffer, 3)
+    assert buffer.at(1)[1][0] == 101.5
+    buffer.add(chunk(0, 6))
+    assert_holds(buffer, 1)
+
+
+def test_the_longest_lead_and_chunk_of_a_mission_find_place() -> None:
+    buffer, length = ReferenceBuffer(1), 10_000
+    buffer.begin(70_000)
+    for start in range(70_000, 90_000, length):
+        buffer.add(chunk(start, length, n=1))
+    assert all(buffer.covers(tick) for tick in range(70_000, 90_000))
 
 
 # Where the mission stays away

@@ -52,7 +52,6 @@ MEANT = {
     r"footer/summary_.*": OTHER_RECORDING,
     r".*/custom_data": "what was flown, and the count of what was lost",
     r".*/history|.*/depth": "our recorder knows them; DDS does not tell rosbag2",
-    r".*/reference/joints/.*/durability": "the sample's stand-in mission offered it as volatile",
     r"header/library": "who wrote it",
     r"own metadata records": "they stand before rosbag2's: what is flown, what was lost",
     r"chunk/compression|chunk index/compression": "LZ4 unless told otherwise: half the size",

@@ -86,3 +86,31 @@ def test_a_plant_that_asks_again_from_tick_0_is_believed() -> None:
     passing(guard, list(range(100, 120)))
     assert passing(guard, [0] * AGREEING) == [False] * (AGREEING - 1) + [True]
     assert guard.passes(1)
+
+
+@given(st.integers(100, 10**6), st.integers(0, 10**9), st.integers(1, 30))
+def test_strange_stamps_among_good_ones_are_never_believed(
+    begin: int, strange: int, many: int
+) -> None:
+    """However many agree with one another: every good one between them starts the count anew."""
+    guard = StampGuard(JUMP)
+    guard.passes(begin)
+    for k in range(1, many + 1):
+        there = strange + k
+        if not 0 < there - guard.last <= JUMP:
+            assert not guard.passes(there)
+        assert guard.passes(begin + k)
+        assert not guard.is_new_time
+
+
+@given(st.integers(0, 10**6), st.integers(0, 10**9))
+def test_a_new_time_is_told_as_one_and_only_once(begin: int, new: int) -> None:
+    guard = StampGuard(JUMP)
+    guard.passes(begin)
+    if 0 < new - begin <= JUMP:
+        new = begin
+    passing(guard, [new] * AGREEING)
+    assert guard.last == new
+    assert guard.is_new_time
+    assert guard.passes(new + 1)
+    assert not guard.is_new_time

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from itertools import pairwise
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from space_robot_sim.wall_clock import SLIP_S, WallClock
+from space_robot_sim.wall_clock import REMARK_S, SLIP_S, WallClock
 
 ROUNDING_S = 1e-6
 periods = st.floats(1e-4, 1e-2)
@@ -66,3 +68,25 @@ def test_only_hopelessly_missed_deadlines_slip(
         assert before + slip - watch.elapsed - ROUNDING_S <= left <= before + slip + ROUNDING_S
         slipped += slip
     assert clock.slipped_s == slipped
+
+
+def test_lost_time_is_remarked_at_most_every_few_seconds_with_its_sum(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A machine that is too slow loses time three times a second."""
+    now, remarks = 1000.0, []
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    clock = WallClock(1e-3)
+    clock.start(0)
+    while now < 1020.0:
+        now += 0.3  # a tick takes 300 ms
+        if clock.slip(0) and (remark := clock.remark()):
+            remarks.append((now, remark))
+        clock.start(0)
+    moments = [moment for moment, _ in remarks]
+    assert 3 <= len(remarks) <= 20.0 / REMARK_S + 1
+    assert all(later - earlier >= REMARK_S for earlier, later in pairwise(moments))
+    assert remarks[0][1] == "0.299 s behind the wall clock: time goes on from here"
+    in_all = float(remarks[-1][1].split(", ")[1].split(" s in all")[0])
+    assert in_all == pytest.approx(0.299 * round((moments[-1] - 1000.0) / 0.3), abs=1e-3)
+    assert clock.remark() == ""
