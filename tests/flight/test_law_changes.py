@@ -82,16 +82,17 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
     """Swapped, refused, two gains in two calls, there and back between two looks, and a plan."""
     bag = tmp_path_factory.mktemp("changed") / "bag"
     with ros_domain() as domain:
-        process = subprocess.Popen(
-            [*COMMAND, "fly", "--duration", str(SECONDS), "--swap", f"{SWAP_S}:tde_smc",
-             "--bag", str(bag), "--domain", str(domain)],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
-        )  # fmt: skip
-        try:
-            swapped_to = change_laws(domain)
-            table, errors = process.communicate(timeout=150)
-        finally:
-            process.kill()
+        pass  # a free one, for the flight to take
+    process = subprocess.Popen(
+        [*COMMAND, "fly", "--duration", str(SECONDS), "--swap", f"{SWAP_S}:tde_smc",
+         "--bag", str(bag), "--domain", str(domain)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
+    )  # fmt: skip
+    try:
+        swapped_to = change_laws(domain)
+        table, errors = process.communicate(timeout=150)
+    finally:
+        process.kill()
     assert process.returncode == 0, errors
     return Flown(bag, errors, table, swapped_to)
 

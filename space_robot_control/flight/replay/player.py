@@ -38,8 +38,8 @@ class _Stream(NamedTuple):
     """One topic's messages of the reference."""
 
     messages: Iterator[Reference]
-    ahead: deque[int]
-    """Ticks of those sent that are not needed yet."""
+    needed: deque[Reference]
+    """Those sent that are needed from now on: the last one that has begun, and what is ahead."""
 
 
 class Player:
@@ -108,6 +108,13 @@ class Player:
                 f"{topic} is also published by {', '.join(names)}: take another domain"
             )
 
+    def greet(self) -> None:
+        """Send again what is still needed of the reference, as a mission does for who joins."""
+        self.wait_for_controller()
+        for stream in self._references:
+            for reference in stream.needed:
+                self._outs[reference.topic.name].publish(reference.data)
+
     def lockstep(
         self, states: Iterable[State], references: Iterable[Iterator[Reference]],
         before: Callable[[int], None], show: Callable[[int], None],
@@ -174,13 +181,14 @@ class Player:
 
     def _send_references(self, tick: int) -> None:
         """Keep both streams ahead of ``tick``."""
-        for messages, ahead in self._references:
-            while ahead and ahead[0] <= tick:
-                ahead.popleft()
-            while len(ahead) < AHEAD and (reference := next(messages, None)):
+        for messages, needed in self._references:
+            while len(needed) > 1 and needed[1].tick <= tick:
+                needed.popleft()
+            while len(needed) <= AHEAD and (reference := next(messages, None)):
                 self._outs[reference.topic.name].publish(reference.data)
-                if reference.tick > tick:
-                    ahead.append(reference.tick)
+                if needed and max(needed[-1].tick, reference.tick) <= tick:
+                    needed.pop()
+                needed.append(reference)
 
     def _is_answered(self, state: State) -> bool:
         """Wait for the answer to the state just sent; whether it has come."""

@@ -171,7 +171,7 @@ def _start_again(player: Player) -> None:
     """Let the controller forget everything, as the one that was started again in flight."""
     if refused := _change_state(player, "deactivate", "cleanup", "configure", "activate"):
         raise FlightError(f"{CONTROLLER} refused to {refused}")
-    player.wait_for_controller()
+    player.greet()
 
 
 def _change_state(player: Player, *transitions: str) -> str:
