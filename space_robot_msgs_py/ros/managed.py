@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
@@ -23,6 +22,7 @@ from .diagnostics import Diagnostics
 from .endpoints import Out
 from .exclusive import Claim, claim_name, foreign_publishers
 from .parameters import declare_settings, refuse_unknown
+from .service_calls import ServiceCalls
 
 Schema = TypeVar("Schema", bound=NodeSettings)
 AUTOSTART = "autostart"
@@ -83,22 +83,25 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         self.autostart = bool(self.declare_parameter(AUTOSTART, True, description).value)
         self._diagnostics = Diagnostics(self)
         self._own = self._entities()
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self)
+        self.calls = ServiceCalls(self)
         self._guard_change_state()
 
-    def spin_services(self, timeout_s: float = 0.0) -> None:
-        """Let services run, and report the health."""
-        self._executor.spin_once(timeout_sec=timeout_s)
-        if self.loop is not None:
-            health = self.loop.health()
-            if not self.is_active:
-                health = Health("inactive", values=health.values)
-            elif health.level is Level.OK and (strangers := self._strangers()):
-                health = Health(strangers, Level.WARN, health.values)
-        else:
-            health = Health("unconfigured")
-        self._diagnostics.report(health)
+    def report(self) -> None:
+        """Report the health, if it is time again or the mode has changed."""
+        self._diagnostics.report(self._health())
+
+    def _health(self) -> Health:
+        if self.loop is None:
+            return Health("unconfigured")
+        health = self.loop.health()
+        values = {**health.values, "service_calls": self.calls.count}
+        if not self.is_active:
+            return Health("inactive", values=values)
+        if health.level is Level.OK and (strangers := self._strangers()):
+            return Health(strangers, Level.WARN, values)
+        if health.level is Level.OK and self.calls.is_overloaded:
+            return Health("more service calls than can be answered in flight", Level.WARN, values)
+        return Health(health.mode, health.level, values)
 
     def claim_name(self) -> None:
         """Be the only node of this name in the domain; before anything is served.
@@ -110,7 +113,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
 
     def destroy_node(self) -> None:
         """Let go of everything, what serves the node before the node."""
-        self._executor.shutdown()
+        self.calls.shutdown()
         super().destroy_node()
         if self._name:
             self._name.release()
@@ -148,7 +151,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             self._try(self._release)
         else:
             if self.loop is not None and self.is_active:
-                self._diagnostics.report(self.loop.health(), now_or_never=True)
+                self._diagnostics.report(self._health(), now_or_never=True)
             self.trigger_shutdown()
         if self.error:
             raise self.error

@@ -29,6 +29,9 @@ Schema = TypeVar("Schema", bound=NodeSettings)
 
 SERVICE_PERIOD_S = 0.1
 """A look for service calls takes a millisecond, a whole tick's time: not too often."""
+SERVICE_SHARE = 0.1
+"""Of a loop's time, for service calls that wait one behind another."""
+LONGEST_PAUSE_S = 1.0
 LISTENER_PERIOD_S = 0.02
 REMIND_S = 5.0
 
@@ -40,7 +43,7 @@ class Shell:
         self.node = node
         self.signalled = False
         """Whether the process has been told to end."""
-        self._next_service = 0.0
+        self._next_service = self._next_report = 0.0
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._stop)
         hold_to_standard_input()
@@ -66,12 +69,19 @@ class Shell:
             return
         now = time.monotonic()
         if now >= self._next_service:
-            self._next_service = now + SERVICE_PERIOD_S
-            self.node.spin_services()
+            has_run = self.node.calls.run_one()
+            begin, now = now, time.monotonic()
+            # after one call look for another soon, but let them take no more than their share;
+            # the answer to a client that has gone takes the middleware 0.1 s
+            pause = min((now - begin) / SERVICE_SHARE, LONGEST_PAUSE_S)
+            self._next_service = now + (pause if has_run else SERVICE_PERIOD_S)
+        if now >= self._next_report:
+            self._next_report = now + SERVICE_PERIOD_S
+            self.node.report()
 
     def report_soon(self) -> None:
         """Report the health at the next `serve`: the mode has changed."""
-        self._next_service = 0.0
+        self._next_service = self._next_report = 0.0
 
     def wait_for_listeners(self, outputs: Sequence[Out], names: Sequence[str]) -> None:
         """Return when the named nodes listen to all of ``outputs``, or when stopping."""
@@ -131,7 +141,8 @@ def _live(node: ManagedNode[Schema], shell: Shell) -> None:
     """Run the loop whenever the node is active, until it has come to its end."""
     while not shell.signalled and not node.is_shut_down:
         if not node.is_active or node.loop is None:
-            node.spin_services(SERVICE_PERIOD_S)
+            node.calls.run_one(SERVICE_PERIOD_S)
+            node.report()
             continue
         gc.collect()
         gc.freeze()  # what lives until the end need not be looked through in the loop

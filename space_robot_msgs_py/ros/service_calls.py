@@ -1,0 +1,49 @@
+"""A node's service calls, run one by one between the ticks of its loop."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from rclpy.executors import ShutdownException, SingleThreadedExecutor, TimeoutException
+from rclpy.node import Node
+
+OVERLOADED_S = 1.0
+"""Calls that have been waiting without a break for this long are a storm."""
+
+
+class ServiceCalls(SingleThreadedExecutor):
+    """Runs the callbacks of one node; counts them, and knows when they are too many."""
+
+    def __init__(self, node: Node) -> None:
+        super().__init__()
+        self.add_node(node)
+        self.count = 0
+        """Calls run so far."""
+        self._busy_since: float | None = None
+
+    def run_one(self, timeout_s: float = 0.0) -> bool:
+        """Run a call that waits, or comes within ``timeout_s``; whether there was one."""
+        # the end of a call wakes the executor, whose next look then ends at once and finds nothing
+        callback = self._next(timeout_s) or (self._next(0.0) if self._busy_since else None)
+        if callback is None:
+            self._busy_since = None
+            return False
+        self._busy_since = self._busy_since or time.monotonic()
+        callback()
+        if error := callback.exception():
+            raise error
+        self.count += 1
+        return True
+
+    def _next(self, timeout_s: float) -> Any:
+        try:
+            return self.wait_for_ready_callbacks(timeout_sec=timeout_s)[0]
+        except (TimeoutException, ShutdownException):
+            return None
+
+    @property
+    def is_overloaded(self) -> bool:
+        """Whether calls come faster than they are run; beyond 1000 of a kind they are lost."""
+        since = self._busy_since
+        return since is not None and time.monotonic() - since > OVERLOADED_S
