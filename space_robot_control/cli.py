@@ -23,14 +23,8 @@ from .commands.reproduce import reproduce
 from .commands.soak import soak
 from .commands.stability import stability
 from .interruption import Interrupted, raising_signals
+from .node_modules import MODULES, SUFFIX
 from .streams import is_of_output, standard_streams
-
-NODE_MODULES = {
-    "plant_node": "space_robot_sim.plant_node",
-    "controller_node": "space_robot_control.controller_node",
-    "mission_node": "space_robot_control.mission_node",
-    "recorder_node": "space_robot_msgs_py.recorder_node",
-}
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -193,13 +187,18 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     ``space-robot plant_node`` and the like, which ``ros2 run`` starts, are the nodes themselves.
     Exit code 2 on bad input, 1 on a failed flight, 128 and its number on a signal.
     """
-    if arguments is None and sys.argv[1:] and (module := NODE_MODULES.get(sys.argv[1])):
+    if arguments is None and sys.argv[1:] and (module := _node_module(sys.argv[1])):
         del sys.argv[1]  # rclpy and the node read the rest
         import_module(module).main()
     hold_to_standard_input()  # if another command of this project has started this one
     with raising_signals(), standard_streams():
         code = _run(arguments)
     sys.exit(code)
+
+
+def _node_module(word: str) -> str | None:
+    """The module of the node that is called so, if there is one."""
+    return MODULES.get(word.removesuffix(SUFFIX)) if word.endswith(SUFFIX) else None
 
 
 def _run(arguments: Sequence[str] | None) -> int:

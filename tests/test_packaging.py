@@ -13,8 +13,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from space_robot_control.cli import NODE_MODULES, cli
-from space_robot_control.flight.processes import MODULES
+from space_robot_control.cli import cli
+from space_robot_control.node_modules import MODULES
 from space_robot_msgs_py import topics
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -82,10 +82,12 @@ def test_the_recipe_for_apt_takes_its_packages_from_setup_py() -> None:
 
 
 def test_there_is_one_executable_for_each_command_and_node() -> None:
-    assert {path.name for path in EXECUTABLES} == {*cli.commands, *NODE_MODULES}
+    assert {path.name for path in EXECUTABLES} == {
+        *cli.commands,
+        *(f"{node}_node" for node in MODULES),
+    }
     assert len({path.read_text("utf-8") for path in EXECUTABLES}) == 1
     assert all(os.access(path, os.X_OK) for path in EXECUTABLES)
-    assert {f"{node}_node": module for node, module in MODULES.items()} == NODE_MODULES
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,8 @@ from space_robot_msgs_py.run_module import module_command
 from ..flight.domain import ros_domain
 from ..flight.orchestrator import flight_parameters, require_ros
 from ..flight.plan import Flight
-from ..flight.processes import MODULES, Graph, node_environment, ros_arguments
+from ..flight.processes import Graph, node_environment, ros_arguments
+from ..node_modules import MODULES
 
 WATCH_S = 0.2
 WARM_UP_TICKS = 500

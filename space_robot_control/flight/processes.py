@@ -19,13 +19,9 @@ from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.ros.process_environment import DEFAULTS
 from space_robot_msgs_py.run_module import clean_environment, module_command
 
+from ..node_modules import MODULES
+
 PACKAGE = "space_robot"
-MODULES = {
-    "plant": "space_robot_sim.plant_node",
-    "controller": "space_robot_control.controller_node",
-    "mission": "space_robot_control.mission_node",
-    "recorder": "space_robot_msgs_py.recorder_node",
-}
 LAST_WORDS = 5
 
 

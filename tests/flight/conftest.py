@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import pytest
 from flights import Flown, Start, ros_environment, space_robot
 
-from space_robot_control.flight.processes import MODULES
+from space_robot_control.flight.domain import ros_domain
+from space_robot_control.node_modules import MODULES
 
 if TYPE_CHECKING:
     from ground import Ground
@@ -32,6 +33,13 @@ def fly(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Flown]:
         return flown[options]
 
     return run
+
+
+@pytest.fixture
+def free_domain() -> int:
+    """Of nobody: a flight will take it."""
+    with ros_domain() as domain:
+        return domain
 
 
 @pytest.fixture

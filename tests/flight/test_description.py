@@ -12,8 +12,8 @@ import numpy as np
 from space_robot_control import software
 from space_robot_control.flight.node_settings import NODES
 from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_control.flight.processes import MODULES
 from space_robot_control.flight.simulate import simulate
+from space_robot_control.node_modules import MODULES
 from space_robot_control.settings import ControllerNodeSettings, build_law
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_sim.plant_settings import PlantNodeSettings

@@ -10,7 +10,7 @@ from threading import Event, Thread
 
 import psutil
 
-from ..processes import MODULES
+from ...node_modules import MODULES
 
 SAMPLE_S = 0.25
 GRACE_S = 2.0

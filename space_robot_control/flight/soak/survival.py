@@ -19,8 +19,8 @@ from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_msgs_py.samples import Command, RobotState
 
 from ...analysis.metrics import tracking_error
+from ...node_modules import MODULES
 from ..plan import Flight
-from ..processes import MODULES
 
 
 @dataclass
