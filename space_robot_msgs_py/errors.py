@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .flight_log import FlightLog
@@ -12,6 +12,14 @@ class SpaceRobotError(Exception):
     """Base of this project's errors; the message says what was given, what is allowed, where."""
 
     exit_code = 1
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For another process: by what it holds; its constructor may want other arguments."""
+        return _remade, (type(self), self.args), self.__dict__
+
+
+def _remade(kind: type[SpaceRobotError], args: tuple[Any, ...]) -> SpaceRobotError:
+    return kind.__new__(kind, *args)  # an exception's `__new__` keeps them as `args`
 
 
 class InputError(SpaceRobotError, ValueError):
