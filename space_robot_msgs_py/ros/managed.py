@@ -161,6 +161,8 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
 
         def configure() -> None:
             self.settings = declare_settings(self, self._schema, self._changeable)
+            if not self._changeable:  # else the loop declares more
+                refuse_unknown(self)
             self.loop = self._make_loop(self, self.settings)
             refuse_unknown(self)
             self._topics = [output.topic.name for output in self.loop.outputs]

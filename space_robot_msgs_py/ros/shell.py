@@ -6,6 +6,7 @@ import faulthandler
 import gc
 import signal
 import sys
+import textwrap
 import time
 from collections.abc import Callable, Sequence
 from typing import NoReturn, TypeVar
@@ -18,11 +19,12 @@ import rclpy  # noqa: E402  (the environment must be set before)
 import rclpy.utilities  # noqa: E402
 from rclpy.signals import SignalHandlerOptions  # noqa: E402
 
-from ..configuration import NodeSettings  # noqa: E402
+from ..configuration import NodeSettings, leaves  # noqa: E402
 from ..errors import InputError, SpaceRobotError  # noqa: E402
 from ..lifeline import hold_to_standard_input  # noqa: E402
+from ..validation import short  # noqa: E402
 from .endpoints import Out  # noqa: E402
-from .managed import Loop, ManagedNode  # noqa: E402
+from .managed import AUTOSTART, Loop, ManagedNode  # noqa: E402
 from .scheduling import ask_for_fifo  # noqa: E402
 
 Schema = TypeVar("Schema", bound=NodeSettings)
@@ -111,10 +113,14 @@ def run_node(
     """
     faulthandler.enable()  # a crash of the middleware leaves a word on where it was
     try:
+        _, *others = rclpy.utilities.remove_ros_args(sys.argv if arguments is None else arguments)
+        if others:
+            _answer(schema, others)
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    except InputError as error:
+        sys.exit(_say(schema, error))
     except Exception as error:  # RCLError is private; whatever it is, the arguments are at fault
-        print(f"{schema.ros_name()}: error: {str(error).splitlines()[0]}", file=sys.stderr)
-        sys.exit(InputError.exit_code)
+        sys.exit(_say(schema, InputError(str(error).splitlines()[0])))
     node: ManagedNode[Schema] = ManagedNode(
         schema, lambda node, settings: make_loop(shell, settings), changeable
     )
@@ -135,6 +141,24 @@ def run_node(
         node.destroy_node()
         rclpy.utilities.try_shutdown()
     sys.exit(code)
+
+
+def _answer(schema: type[NodeSettings], others: Sequence[str]) -> None:
+    """Print the usage and end, if that is what the arguments that are not for ROS ask for.
+
+    Raises:
+        InputError: they ask for something else.
+    """
+    if not {"-h", "--help"} & set(others):
+        raise InputError(
+            f"unknown argument {short(others[0])}: a node takes only those of ROS, after "
+            "--ros-args (--help tells more)"
+        )
+    name = schema.ros_name()
+    parameters = ", ".join([AUTOSTART, *(key for key, _ in leaves(schema))])
+    print(f"usage: {name} [--ros-args [-p NAME:=VALUE]... [--params-file FILE] [-r FROM:=TO]...]")
+    print(textwrap.fill(f"parameters: {parameters}", 96, subsequent_indent="  "))
+    sys.exit(0)
 
 
 def _live(node: ManagedNode[Schema], shell: Shell) -> None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 
 import pytest
-from flights import Start
+from flights import COMMAND, Start, ros_environment
 
+from space_robot_control.node_modules import MODULES
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.ros.process_environment import set_defaults
 
@@ -122,6 +124,7 @@ def test_law_and_gains_change_in_flight(start: Start, domain: int) -> None:
         ("controller", {"tde_stc__k_1": "[1.0, 2.0]"}, "9 values (base x, y, z and the joints)"),
         ("mission", {"waypoint_times": "[0.0]"}, "waypoints_deg has 18 values"),
         ("recorder", {"bag": "/proc/no/bag"}, "no bag can be written there"),
+        ("recorder", {"bagg": "b"}, "unknown parameter 'bagg'"),
     ],
 )
 def test_node_refuses_bad_parameters(
@@ -131,4 +134,32 @@ def test_node_refuses_bad_parameters(
     output, _ = process.communicate(timeout=60)
     assert process.returncode == 2
     assert said in output
+    assert "recording to" not in output
     assert "Traceback" not in output
+
+
+@pytest.mark.parametrize("node", MODULES)
+def test_help_is_a_few_lines(node: str) -> None:
+    pytest.importorskip("rclpy")
+    command = [sys.executable, "-m", MODULES[node], "--help"]
+    result = subprocess.run(
+        command, capture_output=True, text=True, timeout=60, check=False, env=ros_environment()
+    )
+    assert (result.returncode, result.stderr) == (0, "")
+    usage, *parameters = result.stdout.splitlines()
+    assert usage.startswith(f"usage: {node}_node [--ros-args")
+    assert "autostart, robot, period" in parameters[0]
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--case", "3"], ["--case", "3", "--ros-args", "-p", "x:=1"]]
+)
+def test_arguments_that_are_not_of_ros_are_refused(arguments: list[str]) -> None:
+    pytest.importorskip("rclpy")
+    result = subprocess.run(
+        [*COMMAND, "plant_node", *arguments],
+        capture_output=True, text=True, timeout=60, check=False, env=ros_environment(),
+    )  # fmt: skip
+    assert result.returncode == 2
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("plant_node: error: unknown argument '--case'")
