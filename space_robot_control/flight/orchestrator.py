@@ -41,9 +41,10 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
     require_ros()
     compile_kernels()
     with ros_domain(flight.plan.domain) as domain, stop_signals() as stopped:
-        _say(f"flying on ROS_DOMAIN_ID={domain}, recording to {bag}")
+        _claim(bag)
         begin = time.monotonic()
         try:
+            _say(f"flying on ROS_DOMAIN_ID={domain}, recording to {bag}")
             parameters = flight_parameters(flight, bag)
             commands = {
                 node: node_command(node, {**values, "autostart": False})
@@ -51,11 +52,11 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
             }
             with Graph(commands, node_environment(domain)) as graph:
                 what_happened = follow(graph, flight, parameters, domain, stopped)
-        except SpaceRobotError as error:
-            if _has_states(bag):
-                error.args = (f"{error}; what was flown is in {bag}",)
-            else:
+        except BaseException as error:
+            if not _has_states(bag):
                 shutil.rmtree(bag, ignore_errors=True)
+            elif isinstance(error, SpaceRobotError):
+                error.args = (f"{error}; what was flown is in {bag}",)
             raise
         _say(f"flown and recorded in {time.monotonic() - begin:.1f} s, start-up included")
     report = analyse(read_flight(bag, trust=True))
@@ -64,6 +65,19 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
         _say(f"warning: {warning}")
     _check(report, flight)
     return report
+
+
+def _claim(bag: Path) -> None:
+    """Make the bag's folder, so that what is in it is of this flight alone.
+
+    Raises:
+        InputError: it is there: another flight was quicker.
+    """
+    try:
+        bag.mkdir(parents=True)
+    except OSError:
+        check_bag_path(bag)  # in words
+        raise
 
 
 def _has_states(bag: Path) -> bool:

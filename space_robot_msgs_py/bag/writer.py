@@ -30,7 +30,7 @@ class BagWriter:
         compression: Compression = "lz4",
         split_size: int = 0,
     ) -> None:
-        """Create the bag's folder, and its first file.
+        """Create the bag's folder, unless it is there and empty, and its first file.
 
         Args:
             path: the folder.
@@ -52,7 +52,9 @@ class BagWriter:
         self._chunk = OpenChunk(self._first_records)
         self._files: list[McapFile] = []
         try:
-            path.mkdir(parents=True)
+            path.mkdir(parents=True, exist_ok=True)
+            if any(path.iterdir()):
+                raise FileExistsError
             self._begin_file()
         except FileExistsError:
             raise InputError(f"{path}: exists already; a bag is never overwritten") from None

@@ -122,7 +122,16 @@ def test_nothing_flown_is_nothing_lost() -> None:
 
 def test_bag_is_never_overwritten(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="exists already"):
+        BagRecorder(tmp_path.parent, {}, TIMEBASE)
+
+
+def test_of_two_recorders_for_one_bag_the_first_has_it(tmp_path: Path) -> None:
+    """In a folder that was empty, too, as a flight leaves it to its recorder."""
+    first = BagRecorder(tmp_path, {}, TIMEBASE)
+    with pytest.raises(InputError, match="exists already"):
         BagRecorder(tmp_path, {}, TIMEBASE)
+    first.close()
+    assert (tmp_path / "metadata.yaml").exists()
 
 
 def test_unreadable_bag_is_an_input_error(tmp_path: Path) -> None:
