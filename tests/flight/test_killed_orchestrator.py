@@ -12,7 +12,6 @@ import psutil
 import pytest
 from flights import COMMAND, ros_environment, space_robot
 
-from space_robot_control.flight.domain import ros_domain
 from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")
@@ -20,9 +19,9 @@ pytest.importorskip("rclpy")
 PATIENCE_S = 90.0
 
 
-def _start(bag: Path, domain: int) -> subprocess.Popen[bytes]:
+def _start(bag: Path, domain: int, *options: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
-        [*COMMAND, "fly", "--bag", str(bag), "--domain", str(domain)],
+        [*COMMAND, "fly", "--bag", str(bag), "--domain", str(domain), *options],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=ros_environment(),
     )  # fmt: skip
 
@@ -34,19 +33,19 @@ def _nodes(flight: subprocess.Popen[bytes]) -> list[psutil.Process]:
     ]  # fmt: skip
 
 
+def _has_ended(process: psutil.Process) -> bool:
+    try:
+        return process.status() == psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return True
+
+
 def _wait_until(condition: Callable[[], bool], flight: subprocess.Popen[bytes]) -> None:
     until = time.monotonic() + PATIENCE_S
     while not condition():
         assert flight.poll() is None
         assert time.monotonic() < until
         time.sleep(0.01)
-
-
-@pytest.fixture
-def free_domain() -> int:
-    """Of nobody: the flight will take it."""
-    with ros_domain() as domain:
-        return domain
 
 
 def test_nodes_close_the_bag_and_the_next_flight_has_the_domain(
@@ -78,7 +77,7 @@ def test_nodes_that_do_not_fly_yet_end_too(moment: str, tmp_path: Path, free_dom
     bag = tmp_path / "bag"
     flight = _start(bag, free_domain)
     if moment == "configuring":
-        _wait_until(bag.exists, flight)
+        _wait_until((bag / "bag_0.mcap").exists, flight)
     _wait_until(lambda: len(_nodes(flight)) == 4, flight)
     nodes = _nodes(flight)
     flight.kill()
@@ -99,3 +98,19 @@ def test_stopped_node_ends_when_it_goes_on(tmp_path: Path, free_domain: int) -> 
     assert stopped.is_running()
     stopped.send_signal(signal.SIGCONT)
     stopped.wait(timeout=PATIENCE_S)
+
+
+def test_killed_while_landing(tmp_path: Path, free_domain: int) -> None:
+    """The plant has ended, the recorder still takes what is left."""
+    bag = tmp_path / "bag"
+    flight = _start(bag, free_domain, "--duration", "0.3")
+    _wait_until(lambda: len(_nodes(flight)) == 4, flight)
+    nodes = _nodes(flight)
+    (plant,) = (n for n in nodes if any(word.endswith("plant_node") for word in n.cmdline()))
+    _wait_until(lambda: _has_ended(plant), flight)
+    flight.kill()
+    flight.wait()
+    assert not psutil.wait_procs(nodes, timeout=PATIENCE_S)[1]
+    log = read_flight(bag)
+    assert (log.unfinished, log.damage, log.ticks) == ("", (), 600)
+    assert not any(log.lost.values())
