@@ -7,6 +7,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 
+from restarts import restarted
 from stranger import KINDS
 from trial import NODES, Trial, Verdict
 
@@ -48,11 +49,18 @@ def pairs() -> Iterator[tuple[str, Attack]]:
     yield "a second flight later", lambda domain: _two(domain, 4.0)
 
 
+def restarts() -> Iterator[tuple[str, Attack]]:
+    """Each node of a graph started by hand dies and comes back."""
+    for victim in NODES:
+        yield f"{victim} restarted", restarted(victim)
+
+
 GROUPS: dict[str, Callable[[], Iterator[tuple[str, Attack]]]] = {
     "strangers": strangers,
     "early": early_strangers,
     "deaths": deaths,
     "pairs": pairs,
+    "restarts": restarts,
 }
 
 
@@ -62,7 +70,7 @@ def _flies(trial: Trial) -> bool:
 
 def _intrusion(topic: str, kind: str, rate_hz: float) -> Attack:
     def attack(domain: int) -> list[Verdict]:
-        trial = Trial(f"{kind} on {topic} at {rate_hz:g} Hz", domain, duration=2.0).start()
+        trial = Trial(f"{kind} on {topic} at {rate_hz:g} Hz", domain, duration=6.0).start()
         if trial.wait(lambda: _flies(trial)):
             trial.stranger(topic, kind, rate_hz)
         return [trial.end(must_fly=rate_hz < FLOOD_HZ)]
