@@ -45,9 +45,10 @@ def hostile(groups: tuple[str, ...], only: str, every: int, as_list: bool) -> No
     harmed = 0
     for _, attack in chosen:
         with ros_domain() as domain:
-            for verdict in attack(domain):
-                harmed += bool(verdict.wrong)
-                _show(verdict)
+            pass  # a free one, for the flight to take
+        for verdict in attack(domain):
+            harmed += bool(verdict.wrong)
+            _show(verdict)
     click.echo(f"{len(chosen)} attacks, {harmed} flights harmed")
     sys.exit(harmed > 0)
 

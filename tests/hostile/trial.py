@@ -136,7 +136,7 @@ class Trial:
             return []
         wrong = [f"did not fly: exit code {code}"] if must_fly else []
         reasons = said.partition("space-robot: error:")[2].strip()
-        if code not in (1, 2, 130) or not reasons or "(it said nothing)" in reasons:
+        if code not in (1, 2, 130, 143) or not reasons or "(it said nothing)" in reasons:
             wrong.append(f"exit code {code} without a reason: {said.strip()[-300:]!r}")
         return wrong
 
