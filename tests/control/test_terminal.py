@@ -86,7 +86,8 @@ def test_markup_is_text(text: str) -> None:
 def test_a_bag_that_does_not_say_what_flew_has_a_title_without_none(
     report: dict[str, Any],
 ) -> None:
-    foreign = {**report, "controller": None, "case": None, "gains": None, "robot": None}
+    unknown = dict.fromkeys(("controller", "case", "gains", "robot"))
+    foreign = {**report, **unknown, "laws": []}
     text = shown(100, lambda console: print_report(foreign, console))
     assert text.startswith("unknown law: 100 ticks, 0.05 s")
     assert "None" not in text

@@ -191,7 +191,7 @@ def test_error_says_where_a_file_is_no_yaml_mapping(
 
 def test_error_names_a_missing_file_and_an_unreadable_one(tmp_path: Path) -> None:
     assert "no such file" in error_of(tmp_path / "none.yaml")
-    assert "cannot be read" in error_of(tmp_path)
+    assert "not a file" in error_of(tmp_path)
     binary = tmp_path / "binary.yaml"
     binary.write_bytes(b"\xff\xfe\xfa")
     assert "cannot be read" in error_of(binary)
