@@ -58,6 +58,8 @@ class FlightLog:
     """What is known of a bag that nobody finished; empty for a whole one."""
     damage: tuple[str, ...] = ()
     """What was found wrong with the bag, a sentence each."""
+    foreign: tuple[str, ...] = ()
+    """Whose messages the recorder left out, since they are not of the flight, a sentence each."""
     commanded_torque: Array | None = None
     """(N, n+3) N m, the controller's answer to the tick (NaN: none); None: not recorded."""
     latency_s: Array | None = None

@@ -10,6 +10,7 @@ import fcntl
 import os
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -60,8 +61,8 @@ def _path(name: str) -> Path:
 class FileLock:
     """A lock, until its process ends or lets go."""
 
-    def __init__(self, path: Path, name: str) -> None:
-        """Take it as ``name``.
+    def __init__(self, path: Path, name: str, notes: Sequence[str] = ()) -> None:
+        """Take it as ``name``, and leave ``notes`` there, a word each, for those who `look`.
 
         Raises:
             HeldError: somebody else has it.
@@ -77,7 +78,8 @@ class FileLock:
             self.release()
             raise HeldError(path, holder)
         os.ftruncate(self._descriptor, 0)
-        os.pwrite(self._descriptor, f"{name} (pid {os.getpid()})\n{starter()}".encode(), 0)
+        lines = (f"{name} (pid {os.getpid()})", str(starter()), " ".join(notes))
+        os.pwrite(self._descriptor, "\n".join(lines).encode(), 0)
 
     def release(self) -> None:
         """Let others have it."""
@@ -98,6 +100,19 @@ def nodes_in(domain: int) -> list[Holder]:
     return found
 
 
+def look(path: Path) -> tuple[bool, list[str]]:
+    """Whether somebody holds a lock, and the notes of who has taken it last."""
+    try:
+        descriptor = _open(path)
+    except InputError:
+        return False, []
+    try:
+        is_held = not _try(descriptor, fcntl.LOCK_SH)
+        return is_held, _lines(descriptor)[2].split()
+    finally:
+        os.close(descriptor)
+
+
 def _try(descriptor: int, kind: int) -> bool:
     try:
         fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
@@ -107,8 +122,14 @@ def _try(descriptor: int, kind: int) -> bool:
 
 
 def _holder(descriptor: int) -> Holder:
-    name, _, started_by = os.pread(descriptor, 300, 0).decode(errors="replace").partition("\n")
+    name, started_by, _ = _lines(descriptor)
     return Holder(name or "another process", int(started_by) if started_by.isdecimal() else 0)
+
+
+def _lines(descriptor: int) -> list[str]:
+    """Holder, starter, notes; empty where nobody has written any."""
+    lines = os.pread(descriptor, 1000, 0).decode(errors="replace").split("\n")
+    return [*lines, "", "", ""][:3]
 
 
 def _open(path: Path) -> int:

@@ -5,15 +5,19 @@ from __future__ import annotations
 import json
 import os
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
 from . import topics
 from .bag.recorder import BagRecorder
-from .errors import InputError
-from .health import Health, Level
+from .definitions import decode
+from .errors import InputError, MessageError
+from .health import SENT, Health, Level
 from .recorder_settings import RecorderNodeSettings
 from .ros.endpoints import In, Out, TakenByLoop
+from .ros.exclusive import GraphPublishers
+from .ros.serialized_take import serialized_take, take_by_rclpy
 from .ros.shell import Shell, run_node
 
 SILENCE_S = 0.3
@@ -23,6 +27,8 @@ DRAIN_S = 5.0
 QUEUE_DEPTH = 20_000
 TURN = 100
 """Messages taken of one topic before the next has its turn."""
+REPORTS = 5
+"""Reports of nodes looked at in a round: to read one takes a tenth of a millisecond."""
 AHEAD_OF_NEED = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
 """What was said of them while nothing was recorded is of the time after it, too."""
 NEVER_NS = 1 << 63
@@ -42,17 +48,20 @@ class RecorderLoop:
         path = Path(settings.bag or time.strftime("bag_%Y%m%d-%H%M%S"))
         self._recorder = BagRecorder(
             path, {"period": settings.period, **flight}, settings.timebase,
-            settings.compression, settings.split_size,
+            settings.compression, settings.split_size, GraphPublishers(shell.node),
         )  # fmt: skip
         self.outputs: tuple[Out, ...] = ()
         group = TakenByLoop()
         self._inputs = [In(shell.node, topic, group, QUEUE_DEPTH) for topic in topics.ALL]
+        self._diagnostics = In(shell.node, topics.DIAGNOSTICS, group)
         self._told = False
         self._from_ns = 0
         """When recording was taken up again, by the senders' clock; 0: it never paused."""
         self._until_ns: int | None = None
         """When this recorder was told to stop; None while it records."""
         shell.log(f"recording to {path}")
+        if serialized_take() is take_by_rclpy:
+            shell.log("this rclpy does not tell publishers: they are told apart by their numbers")
 
     @property
     def failure(self) -> str:
@@ -64,6 +73,7 @@ class RecorderLoop:
         os.nice(max(0, NICENESS - os.nice(0)))
         if self._until_ns is not None:  # active again
             self._from_ns, self._until_ns = time.time_ns(), None
+            self._recorder.pause()
         while not self._shell.stopping:
             _, busy = self._take_round()
             self._shell.serve()
@@ -79,7 +89,7 @@ class RecorderLoop:
         told = last_arrival = time.monotonic()
         while (now := time.monotonic()) < min(last_arrival + SILENCE_S, told + DRAIN_S):
             recorded, busy = self._take_round()
-            if recorded:
+            if recorded or self._recorder.is_behind:
                 last_arrival = now
             if not busy:
                 time.sleep(self._settings.drain_period)
@@ -87,9 +97,14 @@ class RecorderLoop:
 
     def health(self) -> Health:
         """What has come, and whether it is kept."""
-        values = {"received": self._recorder.received}
+        recorder = self._recorder
+        foreign = {f"foreign {name}": count for name, count in recorder.foreign.items()}
+        values = {"received": recorder.received, **foreign}
         if self.failure:
             return Health(f"not recording: {self.failure}", Level.ERROR, values)
+        if foreign:
+            names = ", ".join(recorder.foreign_names())
+            return Health(f"messages of {names} are left out", Level.WARN, values)
         return Health("nominal", values=values)
 
     def close(self) -> None:
@@ -100,6 +115,9 @@ class RecorderLoop:
         """
         lost = {name: count for name, count in self._recorder.lost.items() if count}
         self._shell.log(f"{self._recorder.received} messages received, missing: {lost or 0}")
+        if foreign := self._recorder.foreign:
+            names = ", ".join(self._recorder.foreign_names())
+            self._shell.log(f"messages of {names} were left out: {foreign}")
         self._recorder.close()
 
     def _take_round(self) -> tuple[bool, bool]:
@@ -111,6 +129,7 @@ class RecorderLoop:
         for entry in self._inputs:
             taken, kept = self._take_some(entry)
             recorded, waiting = recorded or kept > 0, waiting or taken == TURN
+        self._take_counts()
         self._recorder.flush_if_due()
         self._tell_failure()
         return recorded, waiting
@@ -119,15 +138,33 @@ class RecorderLoop:
         """How many messages were taken, and how many of them are to be recorded."""
         kept = 0
         begin_ns = 0 if entry.topic in AHEAD_OF_NEED else self._from_ns
-        until_ns = NEVER_NS if self._until_ns is None else self._until_ns
+        until_ns = self._end_ns
         for count in range(TURN):
-            if (taken := entry.take_with_time()) is None:
+            if (taken := entry.take_with_source()) is None:
                 return count, kept
-            if begin_ns <= taken[1] <= until_ns:
-                self._recorder.record(entry.topic, *taken)
-                kept += 1
+            if begin_ns <= taken.sent_ns <= until_ns:
+                kept += self._recorder.record(entry.topic, *taken)
             os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
         return TURN, kept
+
+    def _take_counts(self) -> None:
+        """Hear from the nodes how much they have sent."""
+        for _ in range(REPORTS):
+            if (taken := self._diagnostics.take_with_source()) is None:
+                return
+            if not self._from_ns <= taken.sent_ns <= self._end_ns:
+                continue
+            with suppress(MessageError, ValueError):
+                for status in decode(taken.data, topics.DIAGNOSTICS.type).status:
+                    for item in status.values:
+                        if item.key.startswith(SENT):
+                            name = item.key.removeprefix(SENT)
+                            self._recorder.note_sent(name, taken.publisher, int(item.value))
+
+    @property
+    def _end_ns(self) -> int:
+        """What is sent later is not recorded."""
+        return NEVER_NS if self._until_ns is None else self._until_ns
 
     def _tell_failure(self) -> None:
         if self.failure and not self._told:

@@ -61,4 +61,6 @@ CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock", 1_000, TO_MISSION)
 ALL = (
     JOINT_STATES, BASE_STATE, COMMAND, REFERENCE_JOINTS, REFERENCE_BASE, TELEMETRY, LAW, CLOCK,
 )  # fmt: skip
+"""All that are recorded."""
 BY_NAME = {topic.name: topic for topic in ALL}
+DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100, ())

@@ -33,6 +33,7 @@ def schema(log: FlightLog) -> pa.Schema:
         "laws": as_data(laws_of(log), log.timebase),
         "lost": log.lost, "unanswered_ticks": log.unanswered,
         "filled_ticks": log.filled, "unfinished": log.unfinished, "damage": list(log.damage),
+        "foreign": list(log.foreign),
     }  # fmt: skip
     fields = [pa.field("tick", pa.int64(), nullable=False)]
     fields += [pa.field(name, pa.float64()) for name in _names(log)]

@@ -64,6 +64,7 @@ class Analysis:
             "filled_ticks": block.filled,
             "unfinished": block.unfinished,
             "damage": list(block.damage),
+            "foreign": list(block.foreign),
         }
 
     def report(self) -> dict[str, Any]:

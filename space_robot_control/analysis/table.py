@@ -109,7 +109,9 @@ def remarks(report: Report) -> list[str]:
     """What the figures of a report do not say: damage, what is missing and why, in sentences."""
     lost = {topic: count for topic, count in report["lost"].items() if count}
     found = [f"messages lost: {lost or 'none'}"]
-    found += [text for text in (report["unfinished"], *report["damage"]) if text]
+    found += [
+        text for text in (report["unfinished"], *report["damage"], *report["foreign"]) if text
+    ]
     if report["unanswered_ticks"]:
         found.append(f"ticks the controller did not answer in time: {report['unanswered_ticks']}")
     if report["filled_ticks"]:

@@ -17,7 +17,6 @@ CLOCK_DEPTH = 1_000
 """All of a plant's messages are needed to tell them from another's."""
 MOST_AT_ONCE = 1_000
 """Messages of a topic looked at in one poll: somebody may flood it."""
-DIAGNOSTICS = topics.Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100, ())
 
 
 class Event(NamedTuple):
@@ -42,7 +41,7 @@ class Monitor:
         group = TakenByLoop()
         self._clock = FollowedIn(self.node, topics.CLOCK, group, depth=CLOCK_DEPTH)
         self._telemetry = In(self.node, topics.TELEMETRY, group, depth=1)
-        self._diagnostics = In(self.node, DIAGNOSTICS, group)
+        self._diagnostics = In(self.node, topics.DIAGNOSTICS, group)
         self.simulated_s = 0.0
         self.has_begun = False
         """Whether the plant has sent a tick."""
@@ -87,7 +86,7 @@ class Monitor:
         return []
 
     def _read_diagnostics(self, data: bytes) -> list[Event]:
-        statuses = decode(data, DIAGNOSTICS.type).status
+        statuses = decode(data, topics.DIAGNOSTICS.type).status
         return [event for status in statuses for event in self._take_status(status)]
 
     def _take_status(self, status: Any) -> list[Event]:

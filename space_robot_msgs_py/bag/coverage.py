@@ -98,6 +98,17 @@ class Coverage:
             self._holes.update(range(tick))
 
     @property
+    def gaps(self) -> int:
+        """Places up to its own last message that none is of, for a topic that begins at tick 0."""
+        return max(
+            0, self.last // (1 if self.topic.per_tick else self.unit or 1) + 1 - self.received
+        )
+
+    def pause(self) -> None:
+        """The next message may be of any later tick."""
+        self._guard = StampGuard(LONGEST_JUMP)
+
+    @property
     def kept(self) -> int:
         """Messages that belong into a bag."""
         return self.received + self.strange

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -16,6 +15,7 @@ from ..errors import InputError, MessageError
 from ..flight_log import FlightLog
 from ..samples import Timebase
 from ..text import printable
+from .accounts import Account, foreign, noted_accounts, paused
 from .batch import Batch
 from .contents import Bag
 from .coverage import LONGEST_JUMP, Coverage, excused_topics, lost_messages, unanswered_ticks
@@ -23,7 +23,6 @@ from .description import read_description
 from .findings import missing_ticks, unread_messages
 from .folder import custom_data, open_bag
 from .gaps import fill_gaps
-from .recorder import COVERAGE_KEY
 from .rows import Rows, stamps_of
 from .selection import Selection
 
@@ -64,30 +63,15 @@ def read_flight(
     return log
 
 
-def read_coverage(path: Path) -> dict[str, dict[str, int]]:
-    """How many messages of each topic the recorder counted: received, missing, repeated.
+def read_coverage(path: Path) -> dict[str, dict[str, Any]]:
+    """How many messages of each topic the recorder counted: received, missing, repeated, ...
 
     Empty for a bag of another recorder.
 
     Raises:
         InputError: there is no finished bag.
     """
-    return _coverage(custom_data(path))
-
-
-def _coverage(noted: Mapping[str, str]) -> dict[str, dict[str, int]]:
-    """What the recorder counted, by topic."""
-    try:
-        counts = json.loads(noted.get(COVERAGE_KEY, "{}"))
-    except (ValueError, RecursionError):
-        return {}
-    if not isinstance(counts, dict):
-        return {}
-    return {
-        name: each
-        for name, each in counts.items()
-        if isinstance(each, dict) and all(type(count) is int for count in each.values())
-    }
+    return {name: a.model_dump() for name, a in noted_accounts(custom_data(path)).items()}
 
 
 def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
@@ -102,19 +86,21 @@ def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
     log, excused = rows.log, excused_topics(flight)
     log.flight = flight
     gone = _gone(selection, rows)
-    _count_lost(bag, selection, rows, gone)
-    if excused and not (gone or bag.incomplete):
+    accounts = noted_accounts(bag.custom_data())
+    _count_lost(bag, selection, rows, gone, accounts)
+    if excused and not (bag.incomplete or any(log.lost[topic.name] for topic in REQUIRED)):
         fill_gaps(log)
     whole = log.whole
     ticks = len(whole) - int(np.argmax(whole[::-1])) if whole.any() else 0
     damage += [*bag.damage, *unread_messages(selection.recorded() or {}, gone)]
     damage += [f"{name} is left out: {wrong}" for name, wrong in selection.wrong.items()]
-    damage += rows.oddities(bool(excused))
+    damage += rows.oddities(bool(excused)) + paused(accounts)
     if not ticks:
         context = "; ".join(_not_finished(bag) + damage)
         raise InputError(f"not one tick with its state and reference ({context})")
     damage += missing_ticks(whole[:ticks], log.timebase)
     log.damage = tuple(printable(text) for text in damage)
+    log.foreign = tuple(printable(text) for text in foreign(accounts))
     if not bag.finished:
         last_s = log.timebase.stamp_ns(ticks - 1) / 1e9
         log.unfinished = f"the bag was not finished: read up to t = {last_s:.4f} s"
@@ -209,7 +195,10 @@ def _gone(selection: Selection, rows: Rows) -> dict[str, int]:
     return {name: count for name, count in counts if count > 0}
 
 
-def _count_lost(bag: Bag, selection: Selection, rows: Rows, gone: Mapping[str, int]) -> None:
+def _count_lost(
+    bag: Bag, selection: Selection, rows: Rows, gone: Mapping[str, int],
+    accounts: Mapping[str, Account],
+) -> None:  # fmt: skip
     """`FlightLog.lost` and `FlightLog.unanswered`: what never came and what is gone since."""
     log = rows.log
     there = selection.topics()
@@ -219,10 +208,11 @@ def _count_lost(bag: Bag, selection: Selection, rows: Rows, gone: Mapping[str, i
         if topic.name in rows.coverages or (bag.finished and topic in there)
     }
     log.lost = lost_messages(coverages, excused_topics(log.flight), bag.finished)
-    if bag.finished and gone:
-        noted = _coverage(bag.custom_data())
-        for name, count in gone.items():
-            missed = noted.get(name, {}).get("missing", 0)
-            log.lost[name] = max(log.lost.get(name, 0), count + missed)
+    for name in log.lost if bag.finished else ():
+        account, unread = accounts.get(name), gone.get(name, 0)
+        if account and rows.counts[name] + unread == account.received + account.strange:
+            log.lost[name] = account.missing + unread  # the bag is the one that was counted
+        else:
+            log.lost[name] = max(log.lost[name], unread)
     if topics.COMMAND.name in coverages:
         log.unanswered = unanswered_ticks(coverages, bag.finished)

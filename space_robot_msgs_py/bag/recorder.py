@@ -11,12 +11,13 @@ from typing import Any
 from .. import topics
 from ..errors import FlightError, MessageError
 from ..samples import Timebase
+from .accounts import COVERAGE_KEY
 from .coverage import Coverage, excused_topics, lost_messages, message_tick
 from .mcap_file import Compression
+from .sources import PARTICIPANT_BYTES, Publishers, Sources, Unknown
 from .writer import BagWriter
 
 FLIGHT_KEY = "space_robot.flight"
-COVERAGE_KEY = "space_robot.coverage"
 CHUNK_BYTES = 1 << 20
 CHUNK_AGE_S = 0.25
 """A killed recorder loses the open chunk, so none stays open for longer."""
@@ -40,10 +41,12 @@ class BagRecorder:
         timebase: Timebase,
         compression: Compression = "lz4",
         split_size: int = 0,
+        publishers: Publishers | None = None,
     ) -> None:
         """Open the bag; ``flight`` says what was flown and is stored with it.
 
         A file of the bag that has ``split_size`` bytes is followed by another (0: never).
+        ``publishers`` tells the graph's own from foreign ones; None: all are the graph's.
 
         Raises:
             InputError: the bag exists already, or cannot be written.
@@ -55,6 +58,9 @@ class BagRecorder:
         self._chunk_bytes = min(CHUNK_BYTES, split_size or CHUNK_BYTES)
         self._timebase = timebase
         self.coverages = {topic.name: Coverage(topic) for topic in topics.ALL}
+        self.sources = {
+            topic.name: Sources(topic.name, publishers or Unknown()) for topic in topics.ALL
+        }
         self.failure = ""
         """Why nothing is written any more (empty: all is well)."""
         self.kept_tick = -1
@@ -63,23 +69,82 @@ class BagRecorder:
         self._flush_at = time.monotonic() + CHUNK_AGE_S
         self._closed = False
 
-    def record(self, topic: topics.Topic, data: bytes, sent_ns: int = 0) -> None:
-        """Add one serialized message, sent at ``sent_ns`` by the sender's clock (0: not known).
+    def record(
+        self, topic: topics.Topic, data: bytes, sent_ns: int = 0, publisher: bytes = b"",
+        sequence: int = 0,
+    ) -> bool:  # fmt: skip
+        """Add one serialized message, if it is from the graph's own publisher; whether it is.
 
         One whose stamp cannot be right is kept at the time of the last good one.
+
+        Args:
+            topic: it came on.
+            data: the message.
+            sent_ns: when, by the sender's clock (0: not known).
+            publisher: by whom: a GID (empty: not known).
+            sequence: its place among all of its publisher, from 1 on (0: not known).
         """
+        sources = self.sources[topic.name]
+        is_unnamed = sequence > 0 and not publisher
+        if is_unnamed and not sources.take_unnamed(sequence, sent_ns):
+            return False
+        if publisher:
+            if not sources.take(publisher, sequence):
+                return False
+            if sources.begins_anew:
+                sources.begins_anew = False
+                self.coverages[topic.name] = Coverage(topic)
         coverage = self.coverages[topic.name]
+        strange = coverage.strange
         try:
             tick = message_tick(topic, data, self._timebase)
             is_new = coverage.take(tick)
         except MessageError:
             tick, is_new = coverage.last, True
             coverage.strange += 1
+        if is_unnamed:
+            sources.judge(coverage.strange == strange)
         if not is_new or self.failure:
-            return
+            return True
         log_ns = self._timebase.stamp_ns(max(0, min(tick, coverage.last)))
         if self._writer.write(topic, log_ns, sent_ns or log_ns, tick, data) > self._chunk_bytes:
             self.flush()
+        return True
+
+    def note_sent(self, topic_name: str, publisher: bytes, count: int) -> None:
+        """A node says how many messages it has sent on a topic.
+
+        Args:
+            topic_name: the topic; others than those recorded are ignored.
+            publisher: GID of the publisher it says so with, of the same participant.
+            count: messages.
+        """
+        if sources := self.sources.get(topic_name):
+            sources.note_sent(publisher[:PARTICIPANT_BYTES], count)
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether a node has sent more than has come."""
+        return any(sources.is_behind for sources in self.sources.values())
+
+    @property
+    def foreign(self) -> dict[str, int]:
+        """Messages a topic of foreign publishers, which are left out; topics without: no entry."""
+        return {name: count for name, s in self.sources.items() if (count := s.foreign)}
+
+    def foreign_names(self) -> list[str]:
+        """Nodes whose messages are left out."""
+        found = set()
+        for topic in self.foreign:
+            self.sources[topic].find_names()
+            found |= set(self.sources[topic].foreign_names)
+        return sorted(found)
+
+    def pause(self) -> None:
+        """What is sent until the next message recorded is left out on purpose."""
+        for name, sources in self.sources.items():
+            sources.pause()
+            self.coverages[name].pause()
 
     def flush(self) -> None:
         """End the open chunk: what was recorded is with the kernel and survives this process."""
@@ -113,8 +178,19 @@ class BagRecorder:
 
     @property
     def lost(self) -> dict[str, int]:
-        """Messages a topic that never came, so far."""
-        return lost_messages(self.coverages, self._excused)
+        """Messages a topic that were sent and never came, so far.
+
+        By their publishers' own counts; by the ticks, if no publisher counts. What was sent again
+        and has come then is not lost.
+        """
+        if not any(sources.is_counted for sources in self.sources.values()):
+            return lost_messages(self.coverages, self._excused)
+        return {name: self._lost(name) for name in self.sources}
+
+    def _lost(self, name: str) -> int:
+        sources, coverage = self.sources[name], self.coverages[name]
+        holes = sources.holes
+        return sources.tail + (holes if coverage.topic.is_event else min(holes, coverage.gaps))
 
     def close(self) -> None:
         """Make the bag whole, with the flight's description and the counts in its metadata.
@@ -149,10 +225,21 @@ class BagRecorder:
                 "missing": lost,
                 "repeated": c.repeated,
                 "strange": c.strange,
+                **self._left_out(name),
             }
             for (name, c), lost in zip(self.coverages.items(), self.lost.values(), strict=True)
         }
         self._writer.close({COVERAGE_KEY: json.dumps(counts)})
+
+    def _left_out(self, name: str) -> dict[str, Any]:
+        sources = self.sources[name]
+        left_out: dict[str, Any] = {}
+        if sources.foreign:
+            sources.find_names()
+            left_out = {"foreign": sources.foreign, "foreign_publishers": sources.foreign_names}
+        if sources.passed_over:
+            left_out["while_inactive"] = sources.passed_over
+        return left_out
 
     def _fail(self, error: OSError) -> None:
         self.failure = error.strerror or str(error)

@@ -8,9 +8,9 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.duration import Duration
 from rclpy.node import Node
 
+from .. import topics
 from ..health import Health, Level
 
-TOPIC = "/diagnostics"
 PERIOD_S = 1.0
 FLUSH_S = 0.5
 
@@ -20,7 +20,7 @@ class Diagnostics:
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._publisher = node.create_publisher(DiagnosticArray, TOPIC, 10)
+        self._publisher = node.create_publisher(DiagnosticArray, topics.DIAGNOSTICS.name, 10)
         self._last: Health | None = None
         self._last_s = -PERIOD_S
         self._last_tick: tuple[float, float] | None = None

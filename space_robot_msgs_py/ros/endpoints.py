@@ -19,6 +19,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from ..source_guard import SourceGuard
 from ..topics import Topic
+from .serialized_take import Received, serialized_take
 
 SPIN_S = 300e-6
 """How long a wait takes and yields before it sleeps in the wait set. Not under SCHED_FIFO, where
@@ -67,8 +68,13 @@ class Out:
         self.topic = topic
         self._node = node
         self._publisher = node.create_publisher(message_type(topic.type), topic.name, qos(topic))
-        self.publish = self._publisher.publish
+        self.sent = 0
+        """Messages sent."""
+
+    def publish(self, data: bytes) -> None:
         """Send serialized bytes."""
+        self.sent += 1
+        self._publisher.publish(data)
 
     @property
     def listener_count(self) -> int:
@@ -111,6 +117,7 @@ class In:
         )  # fmt: skip
         self.handle = self._subscription.handle
         self._type = self._subscription.msg_type
+        self._take_serialized = serialized_take()
 
     def take(self) -> bytes | None:
         """The next message, if there is one."""
@@ -118,11 +125,9 @@ class In:
             taken = self.handle.take_message(self._type, True)
         return None if taken is None else taken[0]
 
-    def take_with_time(self) -> tuple[bytes, int] | None:
-        """`take`, with when it was sent by its sender's clock, ns since 1970."""
-        with self.handle:
-            taken = self.handle.take_message(self._type, True)
-        return None if taken is None else (taken[0], taken[1]["source_timestamp"])
+    def take_with_source(self) -> Received | None:
+        """`take`, with when and by whom it was sent."""
+        return self._take_serialized(self.handle, self._type)
 
 
 class FollowedIn(In):

@@ -12,8 +12,9 @@ from contextlib import ExitStack
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from ..bag.sources import Claimed
 from ..errors import InputError
-from ..locks import FileLock, HeldError, node_lock, topic_lock
+from ..locks import FileLock, HeldError, look, node_lock, topic_lock
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
 """What discovery calls the node of a publisher until its participant has said, if it ever does."""
@@ -30,16 +31,19 @@ class Claim:
         """
         self._held = ExitStack()
         domain = node.context.get_domain_id()
+        own = node.get_fully_qualified_name()
         try:
             for name in topic_names:
-                self._take(domain, node.resolve_topic_name(name), node.get_name())
+                listed = node.get_publishers_info_by_topic(name)
+                gids = [gid_of(info).hex() for info in listed if _full_name(info) == own]
+                self._take(domain, node.resolve_topic_name(name), node.get_name(), gids)
         except BaseException:
             self.release()
             raise
 
-    def _take(self, domain: int, topic: str, holder: str) -> None:
+    def _take(self, domain: int, topic: str, holder: str, gids: Sequence[str]) -> None:
         try:
-            lock = FileLock(topic_lock(domain, topic), holder)
+            lock = FileLock(topic_lock(domain, topic), holder, gids)
         except HeldError as error:
             raise InputError(
                 f"{topic} of ROS domain {domain} is already published by {error.holder.name}"
@@ -65,6 +69,38 @@ def claim_name(node: Node) -> FileLock:
             f"ROS domain {domain} has a {name} already: {error.holder.name}; end that one, "
             "or take another domain (ROS_DOMAIN_ID) or name (--ros-args -r __node:=...)"
         ) from None
+
+
+class GraphPublishers:
+    """Who publishes the topics of a node's domain: by the claims on them, and by discovery."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+
+    def claimed(self, topic: str) -> Claimed:
+        """Who has claimed a topic, on this machine."""
+        domain = self._node.context.get_domain_id()
+        is_held, notes = look(topic_lock(domain, self._node.resolve_topic_name(topic)))
+        return Claimed(frozenset(gid for text in notes if (gid := _gid(text))), is_held)
+
+    def names(self, topic: str) -> dict[bytes, str]:
+        """Full node name by GID of all that are listed now; empty of one without a name."""
+        infos = self._node.get_publishers_info_by_topic(topic)
+        return {
+            gid_of(info): "" if info.node_name == UNNAMED else _full_name(info) for info in infos
+        }
+
+
+def gid_of(info: TopicEndpointInfo) -> bytes:
+    """The identity that a publisher's messages carry."""
+    return bytes(info.endpoint_gid)
+
+
+def _gid(text: str) -> bytes:
+    try:
+        return bytes.fromhex(text)
+    except ValueError:
+        return b""
 
 
 def foreign_publishers(

@@ -16,7 +16,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 
 from ..configuration import NodeSettings
 from ..errors import InputError, SpaceRobotError
-from ..health import Health, Level
+from ..health import SENT, Health, Level
 from ..locks import FileLock
 from .diagnostics import Diagnostics
 from .endpoints import Out
@@ -91,10 +91,12 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         self._diagnostics.report(self._health())
 
     def _health(self) -> Health:
+        """The loop's, with the messages it has sent: the recorder looks whether all have come."""
         if self.loop is None:
             return Health("unconfigured")
         health = self.loop.health()
-        values = {**health.values, "service_calls": self.calls.count}
+        sent = {f"{SENT}{output.topic.name}": output.sent for output in self.loop.outputs}
+        values = {**health.values, **sent, "service_calls": self.calls.count}
         if not self.is_active:
             return Health("inactive", values=values)
         if health.level is Level.OK and (strangers := self._strangers()):

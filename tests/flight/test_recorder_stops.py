@@ -32,7 +32,8 @@ def flying(start: Start, ground: Ground, bag: Path) -> Nodes:
     ground.until(lambda: "recorder_node" in ground.monitor.modes, "the recorder")
     nodes = {"recorder": recorder, "mission": start("mission")}
     nodes["controller"] = start("controller", wait_for="[plant_node, recorder_node]")
-    nodes["plant"] = start("plant", wait_for="[controller_node, mission_node, recorder_node]")
+    others = "[controller_node, mission_node, recorder_node]"
+    nodes["plant"] = start("plant", wait_for=others, silence_timeout=0.2)
     go_on(ground)
     return nodes
 
@@ -57,7 +58,9 @@ def test_a_signal_ends_it_in_flight(
     output, _ = recorder.communicate(timeout=30)
     assert recorder.returncode == 0, output
     assert flying["plant"].poll() is None
-    assert read_coverage(bag)["/joint_states"]["received"] > 100  # of a finished bag only
+    counts = read_coverage(bag)  # of a finished bag only
+    assert counts["/joint_states"]["received"] > 100
+    assert not any(count["missing"] for count in counts.values())
 
 
 def test_inactive_it_writes_nothing_and_then_goes_on(
@@ -75,6 +78,8 @@ def test_inactive_it_writes_nothing_and_then_goes_on(
     assert all(node.poll() is None for node in flying.values())
     log = read_flight(bag)
     assert not log.unfinished
+    assert not any(log.lost.values())
+    assert any("sent while the recorder was inactive" in text for text in log.damage)
     assert any("lack state or reference" in text for text in log.damage)
     flying["recorder"].send_signal(signal.SIGINT)
     assert flying["recorder"].wait(30) == 0
@@ -90,3 +95,18 @@ def test_cleaned_up_in_flight(flying: Nodes, ground: Ground, node: str) -> None:
     output, _ = flying[node].communicate(timeout=30)
     assert flying[node].returncode == 0, output
     assert "Invalid" not in output
+
+
+def test_what_was_never_sent_is_not_lost(flying: Nodes, ground: Ground, bag: Path) -> None:
+    """A controller that stood still, a plant that was ended before its last answer."""
+    flying["controller"].send_signal(signal.SIGSTOP)
+    go_on(ground, 0.3)
+    flying["controller"].send_signal(signal.SIGCONT)
+    go_on(ground, 0.1)
+    for name in ("plant", "controller", "mission", "recorder"):
+        flying[name].send_signal(signal.SIGTERM)
+        assert flying[name].wait(30) == 0
+    log, counts = read_flight(bag), read_coverage(bag)
+    assert log.unanswered > 200
+    assert not any(log.lost.values())
+    assert not any(count["missing"] for count in counts.values())

@@ -97,6 +97,28 @@ def test_nothing_is_filled_where_messages_are_gone(
     assert (log.lost["/joint_states"], log.lost["/base/state"]) == (gone, gone)
 
 
+def test_nothing_is_filled_where_the_recorder_lost_states(
+    recorded: Recorded, tmp_path: Path
+) -> None:
+    """By the publisher's count: one that was sent, and none of those that were kept back."""
+    recorder, sent = BagRecorder(tmp_path / "bag", FAULTY, TIMEBASE), dict.fromkeys(topics.ALL, 0)
+    for topic, data in messages_of(recorded.folder):
+        tick = header_stamp_ns(data) // TIMEBASE.period_ns
+        is_state = topic in (topics.JOINT_STATES, topics.BASE_STATE)
+        if is_state and tick in KEPT_BACK:
+            continue
+        sent[topic] += 1
+        if not (is_state and tick == 200):
+            recorder.record(topic, data, 0, topic.name.encode(), sent[topic])
+    recorder.close()
+    log = read_flight(tmp_path / "bag")
+    assert log.lost == {
+        topic.name: int(topic in (topics.JOINT_STATES, topics.BASE_STATE)) for topic in topics.ALL
+    }
+    assert log.filled == 0
+    assert np.flatnonzero(~log.whole).tolist() == sorted((*KEPT_BACK, 200))
+
+
 def test_a_filled_reference_is_at_rest() -> None:
     log = FlightLog.allocate(6, ("a", "b"), TIMEBASE)
     for name in (*STATE, *REFERENCE):

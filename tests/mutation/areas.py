@@ -80,7 +80,7 @@ AREAS = {
     "bag": Area(
         (f"{MSGS}/bag/*.py",),
         ("tests/msgs/test_bag*.py", "tests/msgs/test_coverage.py", "tests/msgs/test_mcap*.py",
-         "tests/msgs/test_faulty_flights.py",
+         "tests/msgs/test_sources.py", "tests/msgs/test_faulty_flights.py",
          "tests/msgs/test_rosbag2_yaml.py", "tests/msgs/test_unfinished_bag.py",
          "tests/msgs/test_broken_bags.py", "tests/sim/test_load_bag.py"),
     ),

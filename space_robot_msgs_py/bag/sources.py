@@ -1,0 +1,217 @@
+"""Which publisher a recorded message is from: the graph's own, or a foreign one.
+
+A topic of the graph has one publisher. Its node has claimed the topic and noted its publisher's
+identity there, so it is told from others without asking anybody's name, from its first message on;
+one that was started again has claimed the topic anew. Each publisher counts what it sends, so
+what it sent and did not come here is known whatever the stamps say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+from ..source_guard import SourceGuard
+
+PARTICIPANT_BYTES = 12
+"""The first bytes of a publisher's GID, which name the participant, so the process."""
+FOLLOWED, OTHERS = b"followed", b"others"
+"""Stand for GIDs where messages tell none."""
+
+
+class Claimed(NamedTuple):
+    """Who has claimed a topic."""
+
+    publishers: frozenset[bytes] = frozenset()
+    """The GIDs noted last, of a node that may have ended since."""
+    is_held: bool = False
+    """Whether that node still lives."""
+
+
+class Publishers(Protocol):
+    """What can be found out about the publishers of a topic, without their messages."""
+
+    def claimed(self, topic: str) -> Claimed:
+        """Who has claimed it."""
+
+    def names(self, topic: str) -> Mapping[bytes, str]:
+        """Full node name by GID of all that are listed now; empty of one without a name."""
+
+
+class Unknown:
+    """Nothing can be found out: every publisher of a topic is taken for its own."""
+
+    def claimed(self, topic: str) -> Claimed:
+        """Nobody has."""
+        return Claimed()
+
+    def names(self, topic: str) -> Mapping[bytes, str]:
+        """None is listed."""
+        return {}
+
+
+@dataclass(slots=True)
+class Source:
+    """One publisher's messages, counted."""
+
+    is_ours: bool
+    is_claimed: bool
+    received: int = 0
+    last: int = 0
+    """The highest sequence number."""
+    passed_over: int = 0
+    """Messages sent while nothing was to be recorded."""
+    told: int = 0
+    """Messages that were sent, by their sender's own account."""
+    is_resuming: bool = False
+    name: str = ""
+
+    def take(self, sequence: int) -> None:
+        """Count a message."""
+        if self.is_resuming:
+            self.is_resuming = False
+            self.passed_over += max(0, sequence - self.last - 1)
+        self.received += 1
+        self.last = max(self.last, sequence)
+
+    @property
+    def holes(self) -> int:
+        """Messages that were sent before the last one here and are not here."""
+        return max(0, self.last - self.received - self.passed_over)
+
+    @property
+    def tail(self) -> int:
+        """Messages that were sent after the last one here."""
+        return 0 if self.is_resuming else max(0, self.told - self.last)
+
+
+class Sources:
+    """The publishers of one topic. Knows no ROS."""
+
+    def __init__(self, topic: str, publishers: Publishers) -> None:
+        self._topic, self._publishers = topic, publishers
+        self._sources: dict[bytes, Source] = {}
+        self._guard = SourceGuard()
+        self._was_claimed = self._has_paused = False
+        self.is_counted = False
+        """Whether our publisher tells how many messages it sent."""
+        self.begins_anew = False
+        """Whether what was recorded so far turned out to be a foreign publisher's."""
+
+    def take(self, publisher: bytes, sequence: int) -> bool:
+        """Count a message; whether it is ours.
+
+        Args:
+            publisher: GID.
+            sequence: the message's place among all of its publisher, from 1 on; 0: not told.
+        """
+        source = self._sources.get(publisher) or self._meet(publisher)
+        source.take(sequence)
+        if source.is_ours and sequence:
+            self.is_counted = True
+        return source.is_ours
+
+    def take_unnamed(self, sequence: int, sent_ns: int) -> bool:
+        """`take` where messages tell no publisher: ours is the one whose numbers are followed.
+
+        What is lost cannot be known from such numbers.
+        """
+        is_ours = self._guard.passes(sequence, sent_ns)
+        publisher = FOLLOWED if is_ours else OTHERS
+        if publisher not in self._sources:
+            self._sources[publisher] = Source(is_ours, False, is_resuming=self._has_paused)
+        self._sources[publisher].take(sequence)
+        return is_ours
+
+    def judge(self, was_good: bool) -> None:
+        """Whether the message that `take_unnamed` took for ours made sense."""
+        if was_good:
+            self._guard.follow()
+        else:
+            self._guard.doubt()
+
+    def note_sent(self, participant: bytes, count: int) -> None:
+        """Our publisher of this participant says that it has sent ``count`` messages.
+
+        Of no use where messages tell no publisher (empty).
+        """
+        if not participant:
+            return
+        ours = [p for p, s in self._sources.items() if s.is_ours]
+        same = [p for p in ours if p[:PARTICIPANT_BYTES] == participant]
+        if not same and count:
+            claimed = self._publishers.claimed(self._topic).publishers
+            same = [p for p in claimed if p[:PARTICIPANT_BYTES] == participant]
+        if same:  # of several the newest: a node that was configured again counts anew
+            source = self._sources.get(same[-1]) or self._meet(same[-1])
+            source.told = max(source.told, count)
+            self.is_counted = True
+
+    def pause(self) -> None:
+        """What each publisher sends until its next message here is not to be recorded."""
+        self._has_paused = True
+        for source in self._sources.values():
+            source.is_resuming = True
+
+    def find_names(self) -> None:
+        """Look for names of foreign publishers that have none yet."""
+        nameless = {p: s for p, s in self._sources.items() if not (s.is_ours or s.name)}
+        names = self._publishers.names(self._topic) if nameless else {}
+        for publisher, source in nameless.items():
+            source.name = names.get(publisher, "")
+
+    @property
+    def holes(self) -> int:
+        """Messages that our publishers sent before the last one here and that are not here."""
+        return sum(source.holes for source in self._sources.values() if source.is_ours)
+
+    @property
+    def tail(self) -> int:
+        """Messages that our publishers sent after the last one here."""
+        return sum(source.tail for source in self._sources.values() if source.is_ours)
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether our publishers say that they have sent more than has come."""
+        return self.tail > 0
+
+    @property
+    def passed_over(self) -> int:
+        """Messages of our publishers that were sent while nothing was to be recorded."""
+        return sum(source.passed_over for source in self._sources.values() if source.is_ours)
+
+    @property
+    def foreign(self) -> int:
+        """Messages of foreign publishers."""
+        return sum(source.received for source in self._sources.values() if not source.is_ours)
+
+    @property
+    def foreign_names(self) -> list[str]:
+        """Their nodes, or how many have no name."""
+        foreign = [source.name for source in self._sources.values() if not source.is_ours]
+        names = sorted({name for name in foreign if name})
+        if nameless := foreign.count(""):
+            names.append(f"{nameless} publisher{'s' if nameless > 1 else ''} without a name")
+        return names
+
+    def _meet(self, publisher: bytes) -> Source:
+        claim = self._publishers.claimed(self._topic)
+        self._was_claimed = self._was_claimed or claim.is_held or publisher in claim.publishers
+        if is_claimed := publisher in claim.publishers:
+            for other in self._sources.values():
+                if other.is_ours and not other.is_claimed:  # it was there first, but is foreign
+                    other.is_ours, self.begins_anew = False, True
+        is_ours = is_claimed or (not self._was_claimed and self._follows(publisher))
+        source = Source(is_ours, is_claimed, is_resuming=self._has_paused)
+        self._sources[publisher] = source
+        return source
+
+    def _follows(self, publisher: bytes) -> bool:
+        """Whether one of a topic that nobody claims is the first, or the first started again."""
+        ours = [p for p, source in self._sources.items() if source.is_ours]
+        if not ours:
+            return True
+        names = self._publishers.names(self._topic)
+        known = {names[p] for p in ours if p in names}
+        return not known or names.get(publisher, "") in known - {""}
