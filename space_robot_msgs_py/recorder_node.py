@@ -88,8 +88,8 @@ class RecorderLoop:
         self._until_ns = time.time_ns()
         told = last_arrival = time.monotonic()
         while (now := time.monotonic()) < min(last_arrival + SILENCE_S, told + DRAIN_S):
-            recorded, busy = self._take_round()
-            if recorded or self._recorder.is_behind:
+            is_timely, busy = self._take_round()
+            if is_timely or self._recorder.is_behind:
                 last_arrival = now
             if not busy:
                 time.sleep(self._settings.drain_period)
@@ -121,31 +121,36 @@ class RecorderLoop:
         self._recorder.close()
 
     def _take_round(self) -> tuple[bool, bool]:
-        """Give each topic its turn; whether something was recorded, whether more is waiting.
+        """Give each topic its turn; whether something was sent in time, whether more waits.
 
         In turns: a backlog of one topic must not hold up the others.
         """
-        recorded = waiting = False
+        is_timely = waiting = False
         for entry in self._inputs:
-            taken, kept = self._take_some(entry)
-            recorded, waiting = recorded or kept > 0, waiting or taken == TURN
+            taken, timely = self._take_some(entry)
+            is_timely, waiting = is_timely or timely > 0, waiting or taken == TURN
         self._take_counts()
         self._recorder.flush_if_due()
         self._tell_failure()
-        return recorded, waiting
+        return is_timely, waiting
 
     def _take_some(self, entry: In) -> tuple[int, int]:
-        """How many messages were taken, and how many of them are to be recorded."""
-        kept = 0
+        """How many messages were taken, and how many of them were sent before the end.
+
+        Those of a pause count, too: behind them in the queue are some to be recorded.
+        """
+        timely = 0
         begin_ns = 0 if entry.topic in AHEAD_OF_NEED else self._from_ns
         until_ns = self._end_ns
         for count in range(TURN):
             if (taken := entry.take_with_source()) is None:
-                return count, kept
-            if begin_ns <= taken.sent_ns <= until_ns:
-                kept += self._recorder.record(entry.topic, *taken)
+                return count, timely
+            if taken.sent_ns <= until_ns:
+                timely += 1
+                if taken.sent_ns >= begin_ns:
+                    self._recorder.record(entry.topic, *taken)
             os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
-        return TURN, kept
+        return TURN, timely
 
     def _take_counts(self) -> None:
         """Hear from the nodes how much they have sent."""
