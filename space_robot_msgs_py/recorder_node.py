@@ -22,7 +22,7 @@ from .ros.shell import Shell, run_node
 
 SILENCE_S = 0.3
 """Told to stop, the recorder leaves when nothing sent before has come for this long."""
-DRAIN_S = 5.0
+DRAIN_S = 8.0
 """But it leaves after this long in any case, whatever still comes."""
 QUEUE_DEPTH = 20_000
 TURN = 100
@@ -87,10 +87,10 @@ class RecorderLoop:
             return
         self._until_ns = time.time_ns()
         told = last_arrival = time.monotonic()
-        while (now := time.monotonic()) < min(last_arrival + SILENCE_S, told + DRAIN_S):
+        while time.monotonic() < min(last_arrival + SILENCE_S, told + DRAIN_S):
             is_timely, busy = self._take_round()
             if is_timely or self._recorder.is_behind:
-                last_arrival = now
+                last_arrival = time.monotonic()  # a round may last longer than the silence
             if not busy:
                 time.sleep(self._settings.drain_period)
         self._recorder.flush()
@@ -149,7 +149,8 @@ class RecorderLoop:
                 timely += 1
                 if taken.sent_ns >= begin_ns:
                     self._recorder.record(entry.topic, *taken)
-            os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
+            if self._until_ns is None:  # once told to stop, it is in a hurry
+                os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
         return TURN, timely
 
     def _take_counts(self) -> None:

@@ -13,7 +13,7 @@ from space_robot_msgs_py.fault import PLANT_KINDS, Fault, parse_faults
 
 from .plant import PlantSettings
 
-MOST_TICKS = 10**9
+MOST_TICKS = 10**10
 """Of a flight."""
 
 

@@ -143,8 +143,10 @@ def test_simulate_refuses_what_needs_the_graph(parameters: Parameters, said: str
 
 
 def test_longer_than_a_flight_may_last() -> None:
-    with pytest.raises(InputError, match="duration must be at most 500000 s"):
-        Flight(FlightPlan(duration=1e6))
+    assert Flight(FlightPlan(duration=1e6)).ticks == 2 * 10**9
+    fine = {node: {"period": 1e-5} for node in NODES}
+    with pytest.raises(InputError, match="duration must be at most 100000 s"):
+        Flight(FlightPlan(duration=1e6, parameters=fine))
 
 
 def test_a_heavy_plant_under_a_nominal_controller(tmp_path: Path) -> None:

@@ -44,7 +44,8 @@ def program(tmp_path: Path) -> Path:
 
 
 def test_current_folder_is_not_searched(shadows: Path, program: Path) -> None:
-    path = os.pathsep.join([str(program), os.environ.get("PYTHONPATH", "")])
+    ours = [entry for entry in os.environ.get("PYTHONPATH", "").split(os.pathsep) if entry]
+    path = os.pathsep.join([str(program), *ours])
     found = _run(module_command("show", "-p", "a:=[1, 2]"), shadows, PYTHONPATH=path)
     assert found["argv"] == ["-p", "a:=[1, 2]"]
     assert str(shadows) not in found["path"]
