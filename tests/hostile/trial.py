@@ -86,7 +86,7 @@ class Trial:
     def node(self, name: str) -> int | None:
         """The process of a node, if there is one."""
         for pid in self._left():
-            if f"{name}_node" in _read(pid, "cmdline"):
+            if f"{name}_node --ros-args" in _read(pid, "cmdline"):
                 return pid
         return None
 
@@ -136,7 +136,7 @@ class Trial:
             return []
         wrong = [f"did not fly: exit code {code}"] if must_fly else []
         reasons = said.partition("space-robot: error:")[2].strip()
-        if code not in (1, 2, 130, 143) or not reasons or "(it said nothing)" in reasons:
+        if code not in (1, 2, 130, 143) or not reasons:
             wrong.append(f"exit code {code} without a reason: {said.strip()[-300:]!r}")
         return wrong
 
