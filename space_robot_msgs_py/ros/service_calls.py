@@ -20,17 +20,23 @@ class ServiceCalls(SingleThreadedExecutor):
         self.add_node(node)
         self.count = 0
         """Calls run so far."""
+        self.is_overloaded = False
+        """Whether calls come faster than they are run; beyond 1000 of a kind they are lost."""
         self._busy_since: float | None = None
+        """When the first of the calls ended after each of which another one waited."""
 
     def run_one(self, timeout_s: float = 0.0) -> bool:
         """Run a call that waits, or comes within ``timeout_s``; whether there was one."""
         # the end of a call wakes the executor, whose next look then ends at once and finds nothing
         callback = self._next(timeout_s) or (self._next(0.0) if self._busy_since else None)
         if callback is None:
-            self._busy_since = None
+            self._busy_since, self.is_overloaded = None, False
             return False
-        self._busy_since = self._busy_since or time.monotonic()
+        # judged here, not later: one slow call, as a transition, or a loop that starts is no storm
+        since = self._busy_since
+        self.is_overloaded = since is not None and time.monotonic() - since > OVERLOADED_S
         callback()
+        self._busy_since = self._busy_since or time.monotonic()
         if error := callback.exception():
             raise error
         self.count += 1
@@ -41,9 +47,3 @@ class ServiceCalls(SingleThreadedExecutor):
             return self.wait_for_ready_callbacks(timeout_sec=timeout_s)[0]
         except (TimeoutException, ShutdownException):
             return None
-
-    @property
-    def is_overloaded(self) -> bool:
-        """Whether calls come faster than they are run; beyond 1000 of a kind they are lost."""
-        since = self._busy_since
-        return since is not None and time.monotonic() - since > OVERLOADED_S

@@ -90,6 +90,21 @@ def test_a_storm_is_known_while_it_lasts(
     calls.shutdown()
 
 
+def test_what_comes_after_a_call_is_no_storm(
+    node: Any, ask: Callable[..., list[Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The loop that a call has started takes a while until it looks for calls again."""
+    monkeypatch.setattr(service_calls, "OVERLOADED_S", 0.05)
+    calls = ServiceCalls(node)
+    ask(2)
+    time.sleep(0.3)
+    assert calls.run_one()
+    assert calls.run_one()
+    time.sleep(0.06)
+    assert not calls.is_overloaded
+    calls.shutdown()
+
+
 class _Asked:
     """What `Shell.serve` needs of a node."""
 
