@@ -1,6 +1,6 @@
 """A process that does not belong to the flight, publishing on one of its topics.
 
-It hears what is sent there and sends it again, spoiled: ``stranger.py TOPIC KIND RATE_HZ``.
+It hears what others send there and sends it again, spoiled: ``stranger.py TOPIC KIND RATE_HZ``.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import struct
 import sys
 import time
+from collections import deque
 
 import numpy as np
 
@@ -23,6 +24,8 @@ KINDS = ("echo", "future", "past", "nan", "malformed")
 STAMP = slice(4, 12)
 """Where the stamp is: all messages with one begin with it, after CDR's four bytes."""
 LATER_S = 100
+MOST_OWN = 1_000
+"""Of its own messages so many are known again; to spoil them once more would wear them down."""
 
 
 def spoil(data: bytes, kind: str, count: int) -> bytes:
@@ -48,12 +51,14 @@ def main() -> None:
     topic = topics.BY_NAME[name]
     out, heard = Out(node, topic), In(node, topic, TakenByLoop(), depth=10)
     print("ready", flush=True)
-    data, count = bytes(400), 0
+    data, count, own = bytes(400), 0, deque[bytes](maxlen=MOST_OWN)
     begin = time.monotonic()
     while True:
         while (taken := heard.take()) is not None:
-            data = taken
-        out.publish(spoil(data, kind, count))
+            if taken not in own and len(taken) >= STAMP.stop:
+                data = taken
+        own.append(spoil(data, kind, count))
+        out.publish(own[-1])
         count += 1
         time.sleep(max(0.0, begin + count / rate - time.monotonic()))
 

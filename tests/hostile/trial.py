@@ -109,6 +109,8 @@ class Trial:
             output, said = self.process.communicate()
         seconds, code = time.monotonic() - self._began, self.process.returncode
         for other in self._others:
+            if other.poll() is not None:
+                wrong.append("the attack itself has ended before the flight")
             other.kill()
             other.communicate()
         until = time.monotonic() + LEAVING_S
