@@ -24,7 +24,7 @@ setup(
     packages=find_packages(include=[f"{NAME}_*"]),
     package_data={
         "space_robot_control.analysis": ["templates/*.j2"],
-        "space_robot_control.reproduction": ["templates/*.j2"],
+        "space_robot_control.paper.reproduction": ["templates/*.j2"],
         "space_robot_msgs_py.ros": ["*.xml"],
     },
     python_requires=">=3.10,<3.14",
@@ -75,7 +75,7 @@ setup(
             "types-psutil",
         ],
     },
-    entry_points={"console_scripts": ["space-robot = space_robot_control.cli:main"]},
+    entry_points={"console_scripts": ["space-robot = space_robot_control.cli.main:main"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .flight_log import FlightLog
+    from .bag.flight_log import FlightLog
 
 
 class SpaceRobotError(Exception):

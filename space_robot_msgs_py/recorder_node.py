@@ -11,14 +11,14 @@ from typing import NoReturn
 
 from . import topics
 from .bag.recorder import BagRecorder
-from .definitions import decode
+from .bag.recorder_settings import RecorderNodeSettings
 from .errors import InputError, MessageError
-from .health import SENT, Health, Level
-from .recorder_settings import RecorderNodeSettings
 from .ros.endpoints import In, Out, TakenByLoop
 from .ros.exclusive import GraphPublishers
+from .ros.health import SENT, Health, Level
+from .ros.node_host import Shell, run_node
 from .ros.serialized_take import serialized_take, take_by_rclpy
-from .ros.shell import Shell, run_node
+from .wire.definitions import decode
 
 SILENCE_S = 0.3
 """Told to stop, the recorder leaves when nothing sent before has come for this long."""

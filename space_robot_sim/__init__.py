@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .dynamics import bias_force, forward_dynamics, mass_matrix
+from .dynamics import aba as forward_dynamics
 from .robot import Robot
+from .robot.dynamics import bias_force, mass_matrix
 
 if TYPE_CHECKING:
-    from space_robot_msgs_py.flight_log import FlightLog
+    from space_robot_msgs_py.bag.flight_log import FlightLog
 
 __all__ = ["Robot", "bias_force", "forward_dynamics", "load_bag", "mass_matrix"]
 
@@ -43,6 +44,6 @@ def load_bag(path: str | Path, remap: Mapping[str, str] | None = None) -> Flight
     Raises:
         InputError: no bag is there, or no flight in it; one line says why.
     """
-    from space_robot_msgs_py.bag.reader import read_flight  # the nodes start without it
+    from space_robot_msgs_py.bag.reader import read_flight
 
     return read_flight(Path(path), remap)

@@ -18,7 +18,7 @@ else:
     )
     settings.load_profile("ci")
 
-from space_robot_control.flight.domain import ros_domain
+from space_robot_control.flight.graph.domain import ros_domain
 from space_robot_sim.robot import Robot
 
 ROBOTS = Path(__file__).resolve().parent.parent / "config" / "robots"

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import click
 import pytest
 
-from space_robot_control.cli import cli
+from space_robot_control.cli.main import cli
 from space_robot_msgs_py import topics
 
 ROOT = Path(__file__).resolve().parents[1]

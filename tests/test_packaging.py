@@ -13,8 +13,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from space_robot_control.cli import cli
-from space_robot_control.node_modules import MODULES
+from space_robot_control.cli.main import cli
+from space_robot_control.flight.node_modules import MODULES
 from space_robot_msgs_py import topics
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from shown import ROOT, block, check, differences, run
 
-from space_robot_control.settings import ControllerNodeSettings, MissionNodeSettings
-from space_robot_msgs_py.configuration import NodeSettings, leaves
-from space_robot_msgs_py.recorder_settings import RecorderNodeSettings
+from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.mission.settings import MissionNodeSettings
+from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.config.settings import NodeSettings, leaves
 from space_robot_sim import load_bag
-from space_robot_sim.plant_settings import PlantNodeSettings
+from space_robot_sim.plant.settings import PlantNodeSettings
 
 
 @pytest.fixture(scope="module")

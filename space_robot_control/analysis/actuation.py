@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.bag.blocks import Figure, last_rows
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
 
-from .blocks import Figure, last_rows
 from .generalised_motion import measured_rows
 
 Array = NDArray[np.float64]

@@ -12,9 +12,9 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.law_history import as_data, laws_of
 
-from ..law_history import as_data, laws_of
 from .metrics import tracking_error
 
 Array = NDArray[np.float64]

@@ -13,16 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.configuration import named_file
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.law_history import laws_of
+from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
-from space_robot_sim.plant_settings import PlantNodeSettings
+from space_robot_sim.plant.settings import PlantNodeSettings
 from space_robot_sim.robot import Robot
 
-from ..law_history import laws_of
-from ..settings import ControllerNodeSettings, build_law
-from ..time_delay_estimation import low_pass_weight
-from ..trust import check_file, check_law
+from ..controller.gains import build_law
+from ..controller.settings import ControllerNodeSettings
+from ..controller.time_delay_estimation import low_pass_weight
+from ..laws.trust import check_file, check_law
 from .actuation import TorqueLimits
 from .estimate_error import HBar
 

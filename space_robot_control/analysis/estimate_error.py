@@ -2,7 +2,7 @@
 
 ``N = F_S - Mbar rhodd`` (33) is all that the constant diagonal inertia Mbar (the gain ``h_bar``)
 leaves out; ``N_hat(t) = N(t - delta)`` (35), (36). The controller forms N_hat from the pair that
-`space_robot_control.time_delay_estimation` keeps: the torque *applied* over the last interval and
+`space_robot_control.controller.time_delay_estimation` keeps: the torque *applied* over the last interval and
 the mean acceleration over it. Both are in a bag, so N_hat follows without the telemetry.
 """
 
@@ -14,11 +14,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.bag.blocks import Figure, joined, last_rows
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.law_history import laws_of
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
 
-from ..law_history import laws_of
-from .blocks import Figure, joined, last_rows
 from .generalised_motion import (
     applied_force,
     continuous_quaternion,

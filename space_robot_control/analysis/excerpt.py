@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
 
 ROUNDING = 1e-6
 """Ticks by which a time may miss the tick it means."""

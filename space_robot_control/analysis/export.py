@@ -9,8 +9,8 @@ from pathlib import Path
 from tempfile import mkstemp
 from typing import IO, Any
 
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
 
 
 def check_free(path: Path) -> None:

@@ -11,9 +11,9 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.blocks import Figure, blocks_of
+from space_robot_msgs_py.bag.flight_log import FlightLog
 
-from .blocks import Figure, blocks_of
 from .spectrum import PowerAbove
 
 Array = NDArray[np.float64]

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.law_history import as_data, laws_of
 
-from ..law_history import as_data, laws_of
 from .course import Course
 from .figures import (
     BaseTorque,

@@ -1,6 +1,6 @@
 """Where the end effector points in the inertial frame: what the mission is flown for.
 
-The tool's pose follows from base attitude and joint angles (`space_robot_sim.tool.tool_pose`), once
+The tool's pose follows from base attitude and joint angles (`space_robot_sim.robot.tool.tool_pose`), once
 with the measured ones and once with the desired ones. The base's position is free in this mission
 ("semi-floating"), so both poses share it and its drift is given separately.
 """
@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.blocks import Figure
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.robot import Robot
-from space_robot_sim.tool import tool_pose
+from space_robot_sim.robot.tool import tool_pose
 
-from .blocks import Figure
 from .metrics import AxisMaximum, AxisRms, Table
 
 Array = NDArray[np.float64]

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from space_robot_msgs_py.bag.blocks import Figure, blocks_of
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.law_history import as_data, within
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
 
-from ..law_history import as_data, within
 from .actuation import Latency, Misses, Saturation, TorqueLimits
-from .blocks import Figure, blocks_of
 from .described import estimator, robot_of, torque_limits
 from .estimate_error import EstimateError
 from .metrics import Chatter, Maxima, Rms, tracking_error

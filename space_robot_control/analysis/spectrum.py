@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .blocks import BLOCK_TICKS
+from space_robot_msgs_py.bag.blocks import BLOCK_TICKS
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
-from ..law_history import in_words
+from space_robot_msgs_py.bag.law_history import in_words
+
 from .pointing import ARCSEC
 from .settling import BAND
 

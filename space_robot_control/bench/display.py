@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ..terminal import say, show
+from ..flight.terminal import say, show
 from .result import Result
 
 

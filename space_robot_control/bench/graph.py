@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.reader import read_coverage
 from space_robot_msgs_py.errors import FlightError
-from space_robot_msgs_py.run_module import module_command
+from space_robot_msgs_py.ros.run_module import module_command
 
-from ..flight.domain import ros_domain
-from ..flight.orchestrator import flight_parameters, require_ros
+from ..flight.graph.domain import ros_domain
+from ..flight.graph.orchestrator import flight_parameters, require_ros
+from ..flight.graph.processes import Graph, node_environment, ros_arguments
+from ..flight.node_modules import MODULES
 from ..flight.plan import Flight
-from ..flight.processes import Graph, node_environment, ros_arguments
-from ..node_modules import MODULES
 
 WATCH_S = 0.2
 WARM_UP_TICKS = 500

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled import kernel
-from space_robot_sim.dynamics import forward_dynamics_into
-from space_robot_sim.integrator import state_derivative
-from space_robot_sim.plant import advance
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_sim.dynamics.aba import forward_dynamics_into
+from space_robot_sim.plant.integrator import state_derivative
+from space_robot_sim.plant.plant import advance
 
-from ..closed_loop import Rows
-from ..controller_kernels import answer
+from ..controller.kernels import answer
+from ..flight.closed_loop import Rows
 
 Array = NDArray[np.float64]
 Block = NDArray[Any]

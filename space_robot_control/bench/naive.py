@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.lifeline import hold_to_standard_input
 from space_robot_msgs_py.ros.endpoints import message_type, qos
+from space_robot_msgs_py.ros.lifeline import hold_to_standard_input
 from space_robot_msgs_py.ros.process_environment import set_defaults
 
 set_defaults()

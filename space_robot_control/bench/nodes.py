@@ -17,15 +17,15 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.ros.shell import Shell, run_node
+from space_robot_msgs_py.ros.node_host import Shell, run_node
 from space_robot_msgs_py.samples import Command, RobotState
-from space_robot_sim.plant import Plant
-from space_robot_sim.plant_node import PlantLoop
-from space_robot_sim.plant_settings import PlantNodeSettings
+from space_robot_sim.plant.loop import PlantLoop
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import PlantNodeSettings
 
-from ..controller import Controller
-from ..controller_node import ControllerLoop
-from ..settings import ControllerNodeSettings
+from ..controller.controller import Controller
+from ..controller.loop import ControllerLoop
+from ..controller.settings import ControllerNodeSettings
 
 Array = NDArray[np.float64]
 

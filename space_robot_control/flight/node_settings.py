@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from space_robot_msgs_py.configuration import NodeSettings, Tree, flatten, nest
+from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.config.settings import NodeSettings
+from space_robot_msgs_py.config.trees import Tree, flatten, nest
+from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.recorder_settings import RecorderNodeSettings
-from space_robot_msgs_py.validation import one_of
-from space_robot_sim.plant_settings import PlantNodeSettings
+from space_robot_sim.plant.settings import PlantNodeSettings
 
+from ..controller.gains import gains_as_path, split_gains
+from ..controller.settings import ControllerNodeSettings
 from ..laws import ControlLaw
-from ..settings import ControllerNodeSettings, MissionNodeSettings, gains_as_path, split_gains
+from ..mission.settings import MissionNodeSettings
 
 SCHEMAS: tuple[type[NodeSettings], ...] = (
     PlantNodeSettings, ControllerNodeSettings, MissionNodeSettings, RecorderNodeSettings,

@@ -11,20 +11,20 @@ from typing import Annotated, Any
 from pydantic import ByteSize, Field
 
 from space_robot_msgs_py.bag.mcap_file import Compression
+from space_robot_msgs_py.config.validation import Strict, one_of, short
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.fault import KINDS, parse_faults
-from space_robot_msgs_py.validation import Strict, one_of, short
-from space_robot_sim.faults import PlantFaults
-from space_robot_sim.plant import Plant
-from space_robot_sim.plant_settings import MOST_TICKS
+from space_robot_sim.faults.catalogue import KINDS, parse_faults
+from space_robot_sim.plant.faults import PlantFaults
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import MOST_TICKS
 
-from ..controller import Controller
-from ..mission import Mission
-from ..settings import build_laws
-from ..software import commit, versions
-from ..swaps import parse_swaps
+from ..controller.controller import Controller
+from ..controller.gains import build_laws
+from ..controller.swaps import parse_swaps
+from ..mission.mission import Mission
 from .node_settings import FlightSettings
 from .robots import Robots
+from .software import commit, versions
 
 NO_FRICTION = {"friction.coulomb": 0.0, "friction.viscous": 0.0}
 
@@ -43,7 +43,7 @@ class FlightPlan(Strict):
     realtime: bool = False
     fifo_priority: int = 0
     faults: list[str] = Field(default_factory=list)
-    """What fails, each as ``KIND@T[-END][:ARGUMENT]``, see `space_robot_msgs_py.fault`."""
+    """What fails, each as ``KIND@T[-END][:ARGUMENT]``, see `space_robot_sim.faults.catalogue`."""
     seed: Annotated[int, Field(ge=0)] = 0
     """Of the faults' random numbers."""
     swaps: list[str] = Field(default_factory=list)

@@ -15,17 +15,17 @@ from pathlib import Path
 import numpy as np
 
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.blocks import block_bounds
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.law_history import same
 from space_robot_msgs_py.bag.recorder import BagRecorder
-from space_robot_msgs_py.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.flight_log import FlightLog
-from space_robot_msgs_py.plain_codecs import ClockCodec, LawCodec, TelemetryCodec
-from space_robot_msgs_py.reference_codec import ReferenceCodec
 from space_robot_msgs_py.samples import Command, LawInForce
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.plain_codecs import ClockCodec, LawCodec, TelemetryCodec
+from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 
-from ..analysis.blocks import block_bounds
-from ..closed_loop import close_loop, measured_ticks
-from ..law_history import same
+from .closed_loop import close_loop, measured_ticks
 from .plan import Flight
 
 STRETCH_TICKS = 2000

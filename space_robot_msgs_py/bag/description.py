@@ -13,9 +13,9 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue
 
+from ..config.text import printable
+from ..config.validation import check
 from ..errors import InputError
-from ..text import printable
-from ..validation import check
 from .recorder import FLIGHT_KEY
 
 WHERE = "the description of the flight"

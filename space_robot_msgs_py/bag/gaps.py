@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..flight_log import REFERENCE, STATE, FlightLog
+from .flight_log import REFERENCE, STATE, FlightLog
 
 
 def fill_gaps(log: FlightLog) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import kernel, subroutine
+from ..compiled.kernels import kernel, subroutine
 
 Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int64]

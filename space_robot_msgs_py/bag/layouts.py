@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import topics
-from ..cdr import CdrBuilder, FixedMessage, Slot
-from ..decoded import name_order
-from ..definitions import decode
 from ..errors import MessageError
 from ..samples import Timebase
+from ..wire.cdr import CdrBuilder, FixedMessage, Slot
+from ..wire.decoded import name_order
+from ..wire.definitions import decode
 from .batch import Batch
 from .kernels import Bytes, Integers, gather
 

@@ -20,16 +20,7 @@ from mcap.records import Channel, Footer, Metadata, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
 
 from .batch import Batch
-from .kernels import (
-    CHANNEL,
-    LENGTH,
-    LOG_NS,
-    PUBLISH_NS,
-    START,
-    Bytes,
-    Integers,
-    walk_messages,
-)
+from .kernels import CHANNEL, LENGTH, LOG_NS, PUBLISH_NS, START, Bytes, Integers, walk_messages
 from .mcap_records import (
     BROKEN,
     DESCRIPTIONS,

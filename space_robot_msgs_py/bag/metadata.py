@@ -7,9 +7,9 @@ from typing import Any
 
 from pydantic import BaseModel, Field, ValidationError
 
+from ..config.validation import check, read_yaml
+from ..config.yaml_text import parse_yaml
 from ..errors import InputError
-from ..validation import check, read_yaml
-from ..yaml_text import parse_yaml
 
 METADATA = "metadata.yaml"
 NEWEST = 9

@@ -10,19 +10,25 @@ from typing import Any
 import numpy as np
 
 from .. import topics
-from ..definitions import decode
+from ..config.text import printable
 from ..errors import InputError, MessageError
-from ..flight_log import FlightLog
 from ..samples import Timebase
-from ..text import printable
+from ..wire.definitions import decode
 from .accounts import Account, foreign, noted_accounts, paused
 from .batch import Batch
 from .contents import Bag
-from .coverage import LONGEST_JUMP, Coverage, excused_topics, lost_messages, unanswered_ticks
 from .description import read_description
 from .findings import missing_ticks, unread_messages
+from .flight_log import FlightLog
 from .folder import custom_data, open_bag
 from .gaps import fill_gaps
+from .message_accounting import (
+    LONGEST_JUMP,
+    Coverage,
+    excused_topics,
+    lost_messages,
+    unanswered_ticks,
+)
 from .rows import Rows, stamps_of
 from .selection import Selection
 

@@ -12,8 +12,8 @@ from .. import topics
 from ..errors import FlightError, MessageError
 from ..samples import Timebase
 from .accounts import COVERAGE_KEY
-from .coverage import Coverage, excused_topics, lost_messages, message_tick
 from .mcap_file import Compression
+from .message_accounting import Coverage, excused_topics, lost_messages, message_tick
 from .sources import PARTICIPANT_BYTES, Publishers, Sources, Unknown
 from .writer import BagWriter
 

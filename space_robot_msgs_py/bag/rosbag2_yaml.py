@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from ..definitions import jazzy
 from ..topics import Topic
+from ..wire.definitions import jazzy
 
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 _NEVER_NS = 2**63 - 1

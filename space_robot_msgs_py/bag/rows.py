@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from .. import topics
 from ..errors import MessageError
-from ..flight_log import REFERENCE, STATE, FlightLog
-from ..plain_codecs import LawCodec
 from ..samples import LawInForce, Timebase, in_order
+from ..wire.plain_codecs import LawCodec
 from .batch import Batch
-from .coverage import LONGEST_JUMP, Coverage
+from .flight_log import REFERENCE, STATE, FlightLog
 from .kernels import NO_STAMP, read_stamps
 from .layouts import (
     Describe,
@@ -25,6 +24,7 @@ from .layouts import (
     joint_states,
     joint_trajectory,
 )
+from .message_accounting import LONGEST_JUMP, Coverage
 
 Array = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from .. import topics as graph
+from ..config.validation import one_of
 from ..errors import InputError
-from ..validation import one_of
 from .batch import Batch
 from .contents import Bag
 from .findings import some_of

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-from ..source_guard import SourceGuard
+from ..wire.source_guard import SourceGuard
 
 PARTICIPANT_BYTES = 12
 """The first bytes of a publisher's GID, which name the participant, so the process."""

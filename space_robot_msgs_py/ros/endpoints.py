@@ -17,8 +17,8 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from ..source_guard import SourceGuard
 from ..topics import Topic
+from ..wire.source_guard import SourceGuard
 from .serialized_take import Received, serialized_take
 
 SPIN_S = 300e-6

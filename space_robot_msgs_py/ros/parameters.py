@@ -8,7 +8,8 @@ from typing import Any, TypeVar
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
-from ..configuration import NodeSettings, flatten, leaves
+from ..config.settings import NodeSettings, leaves
+from ..config.trees import flatten
 from ..errors import InputError
 
 Schema = TypeVar("Schema", bound=NodeSettings)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled import subroutine
+from space_robot_msgs_py.compiled.kernels import subroutine
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled import kernel
+from space_robot_msgs_py.compiled.kernels import kernel
 
-from ..attitude import rotation_matrix
 from .algebra import (
     Matrix,
     Symmetric,
@@ -23,6 +22,7 @@ from .algebra import (
     transform_symmetric,
     vector,
 )
+from .attitude import rotation_matrix
 from .model import Data, Model
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..records import Record, shaped
+from space_robot_msgs_py.compiled.records import Record, shaped
 
 Array = NDArray[np.float64]
 

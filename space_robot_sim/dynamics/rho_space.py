@@ -11,13 +11,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled import kernel
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, nested, shaped
 
-from ..attitude import attitude_jacobian_inverse, rotate, rotate_back, rotation_matrix
-from ..records import Record, nested, shaped
-from .equations_of_motion import composite_bodies, newton_euler
+from .attitude import attitude_jacobian_inverse, rotate, rotate_back, rotation_matrix
+from .crba import composite_bodies
 from .kinematics import forward_kinematics, spatial_velocities
 from .model import Data, Model
+from .rnea import newton_euler
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.fault import Fault
+
+from .catalogue import Fault
 
 Array = NDArray[np.float64]
 

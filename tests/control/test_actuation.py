@@ -16,8 +16,8 @@ from space_robot_control.analysis import analyse
 from space_robot_control.analysis.actuation import Latency, Misses, Saturation, TorqueLimits
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
 
 NONE = TorqueLimits(np.inf, np.inf)
 SOME = TorqueLimits(2.0, 1.5)

@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from space_robot_control.analysis import analyse, excerpt
-from space_robot_control.cli import main
+from space_robot_control.cli.main import main
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight

@@ -20,7 +20,7 @@ from space_robot_control.bench import Options, Result, Target, interleave, repea
 from space_robot_control.bench.display import print_section
 from space_robot_control.bench.sections import SECTIONS
 from space_robot_control.bench.sections.laws import Recorded
-from space_robot_control.cli import cli
+from space_robot_control.cli.main import cli
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 
@@ -184,7 +184,7 @@ def test_help_names_every_section() -> None:
 
 
 def test_output_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "space_robot_control.cli", "bench", "--output"]
+    command = [sys.executable, "-m", "space_robot_control.cli.main", "bench", "--output"]
     path = tmp_path / "missing" / "bench.json"
     result = subprocess.run([*command, str(path)], capture_output=True, text=True, check=False)
     assert result.returncode == 2

@@ -14,7 +14,11 @@ from numpy.typing import NDArray
 from space_robot_control.laws import ControlLaw, Signals, find_law
 from space_robot_msgs_py.errors import FlightError
 from space_robot_sim import Robot
-from space_robot_sim.environment import DisturbanceSettings, FrictionSettings, PayloadSettings
+from space_robot_sim.environment.environment import (
+    DisturbanceSettings,
+    FrictionSettings,
+    PayloadSettings,
+)
 
 Array = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from closed_loop import PERIOD, Loop, law_of
 
-from space_robot_control.closed_loop import close_loop
+from space_robot_control.flight.closed_loop import close_loop
 from space_robot_control.laws import ControlLaw, Signals
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import DivergedError, SingularAttitudeError
-from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 from space_robot_sim import Robot
 

@@ -12,14 +12,14 @@ from hypothesis import strategies as st
 from oracles import attitude_jacobian_base, attitude_jacobian_inertial, rotation_of, skew
 from random_robots import Case, cases, random_quaternion
 
-from space_robot_control.controller import TRANSFER_S, Controller
-from space_robot_control.controller_kernels import LARGEST
+from space_robot_control.controller.controller import TRANSFER_S, Controller
+from space_robot_control.controller.kernels import LARGEST
+from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
 from space_robot_control.laws import find_law
-from space_robot_control.time_delay_estimation import LONGEST_GAP
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_sim import Robot, forward_dynamics
-from space_robot_sim.environment import FrictionSettings
+from space_robot_sim.environment.environment import FrictionSettings
 
 NO_FRICTION = FrictionSettings(coulomb=0.0, viscous=0.0)
 

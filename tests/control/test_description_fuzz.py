@@ -21,12 +21,12 @@ from hypothesis import strategies as st
 
 from space_robot_control.analysis import analyse
 from space_robot_control.analysis.pictures import Album
-from space_robot_control.flight.display import print_comparison, print_figures, print_report
+from space_robot_control.cli.report_display import print_comparison, print_figures, print_report
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.replay.choice import ControllerChoice
 from space_robot_control.flight.replay.recording import Recording
 from space_robot_control.flight.simulate import simulate
-from space_robot_control.terminal import terminal
+from space_robot_control.flight.terminal import terminal
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import InputError
 

@@ -19,7 +19,7 @@ from space_robot_control.analysis.estimate_error import (
 )
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog
 
 
 def flown(**options: Any) -> FlightLog:

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from space_robot_control.analysis import analyse, excerpt
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,8 @@ from space_robot_control.analysis.columns import BATCH, METADATA_KEY, batches, s
 from space_robot_control.analysis.export import whole_file, write_csv, write_parquet
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 
 

@@ -41,8 +41,8 @@ from space_robot_control.analysis.figures.style import Look, house_style
 from space_robot_control.analysis.waypoints import junction_ticks, waypoint_ticks
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
-from space_robot_control.mission import Mission, MissionSettings
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_control.mission.mission import Mission, MissionSettings
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 
 PERIOD = 0.0005
@@ -435,7 +435,7 @@ class TestPrint:
     def test_pyplot_stays_out_and_matplotlib_is_lazy(self) -> None:
         program = (
             "import sys\n"
-            "import space_robot_control.analysis, space_robot_control.cli\n"
+            "import space_robot_control.analysis, space_robot_control.cli.main\n"
             "assert 'matplotlib' not in sys.modules\n"
             "import space_robot_control.analysis.figures\n"
             "assert 'matplotlib.pyplot' not in sys.modules\n"

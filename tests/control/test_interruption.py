@@ -14,9 +14,9 @@ from pathlib import Path
 import psutil
 import pytest
 
-from space_robot_control.interruption import Interrupted, handled_signals, raising_signals
+from space_robot_control.flight.interruption import Interrupted, handled_signals, raising_signals
 
-COMMAND = [sys.executable, "-m", "space_robot_control.cli"]
+COMMAND = [sys.executable, "-m", "space_robot_control.cli.main"]
 LONG = ["--duration", "60", "--jobs", "2"]
 
 

@@ -14,8 +14,8 @@ from space_robot_control.analysis.excerpt import excerpt
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.replay.laws import RecordedLaws
 from space_robot_control.flight.simulate import simulate
-from space_robot_control.law_history import LawChange, as_data, in_words, same, within
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.law_history import LawChange, as_data, in_words, same, within
 from space_robot_msgs_py.samples import LawInForce, Timebase, in_order
 
 TIMEBASE = Timebase(500_000)

@@ -26,7 +26,7 @@ from space_robot_control.analysis.metrics import (
 from space_robot_control.analysis.spectrum import PowerAbove
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 
 PERIOD = 0.0005

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from space_robot_control.mission import Mission, MissionSettings
+from space_robot_control.mission.mission import Mission, MissionSettings
 from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]

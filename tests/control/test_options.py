@@ -11,10 +11,10 @@ from click.testing import CliRunner, Result
 from hypothesis import given
 from hypothesis import strategies as st
 
-from space_robot_control import cli
+from space_robot_control.cli import main as cli
 from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_msgs_py.config.validation import check
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.validation import check
 
 
 @pytest.fixture
@@ -154,7 +154,7 @@ _TEXTS = st.sampled_from(
 @given(st.lists(st.tuples(_NAMES, _TEXTS), min_size=1, max_size=3))
 def test_any_parameters_fly_or_are_refused_in_one_line(pairs: list[tuple[str, str]]) -> None:
     """Of the options' parser and of the plan; nothing is flown."""
-    from space_robot_control.commands.options import _set
+    from space_robot_control.cli.options import _set
 
     tree: dict[str, dict[str, Any]] = {}
     try:

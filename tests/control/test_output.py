@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 
 from space_robot_control.analysis.export import whole_file
-from space_robot_control.cli import main
+from space_robot_control.cli.main import main
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py.errors import InputError
 
-COMMAND = [sys.executable, "-m", "space_robot_control.cli"]
+COMMAND = [sys.executable, "-m", "space_robot_control.cli.main"]
 
 
 @pytest.fixture(scope="module")

@@ -11,10 +11,10 @@ from random_robots import random_quaternion, random_robot
 from scipy.spatial.transform import Rotation
 
 from space_robot_control.analysis.pointing import angle_between, pointing_error, rotation_angle
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 from space_robot_sim.robot import Robot
-from space_robot_sim.tool import tool_pose
+from space_robot_sim.robot.tool import tool_pose
 
 SEEDS = st.integers(0, 2**32 - 1)
 

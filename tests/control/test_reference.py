@@ -7,7 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from space_robot_control.reference import MOST_PUT_ASIDE, PAST_SHARE, ReferenceBuffer
+from space_robot_control.controller.reference_buffer import (
+    MOST_PUT_ASIDE,
+    PAST_SHARE,
+    ReferenceBuffer,
+)
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import ReferenceChunk
 

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from space_robot_control.flight.replay.commands import CommandList, Commands, Form
 from space_robot_control.flight.replay.comparison import Comparison
-from space_robot_msgs_py.codecs import CommandCodec
-from space_robot_msgs_py.definitions import decode, jazzy
 from space_robot_msgs_py.samples import Command, Timebase
+from space_robot_msgs_py.wire.codecs import CommandCodec
+from space_robot_msgs_py.wire.definitions import decode, jazzy
 
 AXES = ("base_x", "base_y", "base_z", "joint1", "joint2")
 TIMEBASE = Timebase(500_000)

@@ -11,18 +11,19 @@ import pytest
 import yaml
 from rosbags.rosbag2 import StoragePlugin, Writer
 
+from space_robot_control.controller.gains import build_law
+from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.replay.choice import ControllerChoice
 from space_robot_control.flight.replay.recording import Recording
 from space_robot_control.flight.simulate import simulate
-from space_robot_control.settings import ControllerNodeSettings, build_law
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.recorder import BagRecorder
-from space_robot_msgs_py.configuration import named_file
-from space_robot_msgs_py.definitions import jazzy
+from space_robot_msgs_py.config.files import named_file
+from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.validation import read_yaml
+from space_robot_msgs_py.wire.definitions import jazzy
 
 
 @pytest.fixture(scope="module")

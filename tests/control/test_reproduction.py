@@ -11,8 +11,8 @@ from urllib.parse import urlparse
 
 import pytest
 
-from space_robot_control.reproduction.claims import claims
-from space_robot_control.reproduction.flights import (
+from space_robot_control.paper.reproduction.claims import claims
+from space_robot_control.paper.reproduction.flights import (
     ROWS,
     VARIANTS,
     Planned,
@@ -22,9 +22,9 @@ from space_robot_control.reproduction.flights import (
     fly,
     plan,
 )
-from space_robot_control.reproduction.reproduce import check_folder, reproduce
-from space_robot_control.reproduction.table import cells
-from space_robot_control.reproduction.table_v import COLUMNS, printed
+from space_robot_control.paper.reproduction.reproduce import check_folder, reproduce
+from space_robot_control.paper.reproduction.table import cells
+from space_robot_control.paper.reproduction.table_v import COLUMNS, printed
 from space_robot_msgs_py.errors import InputError
 
 PAPER = Path(__file__).parent

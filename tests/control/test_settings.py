@@ -8,27 +8,17 @@ import numpy as np
 import pytest
 import yaml
 
+from space_robot_control.controller.gains import build_law, gain_files, read_gains
+from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.laws import laws
-from space_robot_control.settings import (
-    ControllerNodeSettings,
-    MissionNodeSettings,
-    build_law,
-    gain_files,
-    read_gains,
-)
-from space_robot_msgs_py.configuration import (
-    config_directory,
-    flatten,
-    leaves,
-    merge,
-    named_file,
-    nest,
-    node_parameters,
-)
+from space_robot_control.mission.settings import MissionNodeSettings
+from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.config.files import config_directory, named_file, node_parameters
+from space_robot_msgs_py.config.settings import leaves
+from space_robot_msgs_py.config.trees import flatten, merge, nest
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.recorder_settings import RecorderNodeSettings
-from space_robot_sim.plant_settings import PlantNodeSettings
+from space_robot_sim.plant.settings import PlantNodeSettings
 
 SCHEMAS = (PlantNodeSettings, ControllerNodeSettings, MissionNodeSettings, RecorderNodeSettings)
 

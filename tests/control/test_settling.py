@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from space_robot_control.analysis import excerpt
-from space_robot_control.analysis.blocks import blocks_of
 from space_robot_control.analysis.settling import BAND, Settling
 from space_robot_control.analysis.waypoints import Waypoints
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import unflown
+from space_robot_msgs_py.bag.blocks import blocks_of
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 
 PERIOD = 0.0005

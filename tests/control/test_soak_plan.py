@@ -8,10 +8,8 @@ import click
 from hypothesis import given
 from hypothesis import strategies as st
 
-from space_robot_control.cli import cli
-from space_robot_control.flight.plan import Flight
-from space_robot_control.flight.soak.census import node_of
-from space_robot_control.flight.soak.draw import (
+from space_robot_control.campaign.soak.census import node_of
+from space_robot_control.campaign.soak.draw import (
     BREAKING,
     CASES,
     LONGEST_S,
@@ -23,9 +21,11 @@ from space_robot_control.flight.soak.draw import (
     command_line,
     draw_flight,
 )
-from space_robot_control.flight.soak.survival import unplanned_deaths
+from space_robot_control.campaign.soak.survival import unplanned_deaths
+from space_robot_control.cli.main import cli
+from space_robot_control.flight.plan import Flight
 from space_robot_control.laws import laws
-from space_robot_msgs_py.fault import KINDS, Fault, parse_faults
+from space_robot_sim.faults.catalogue import KINDS, Fault, parse_faults
 
 SEEDS = st.integers(0, 2**63)
 NUMBERS = st.integers(0, 10**9)

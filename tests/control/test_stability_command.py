@@ -12,12 +12,12 @@ import yaml
 from click.testing import CliRunner
 from closed_loop import GAINS
 
-from space_robot_control.analysis.figures.stability import draw
-from space_robot_control.analysis.stability import Study, report, study
-from space_robot_control.analysis.stability.check import Check
-from space_robot_control.cli import cli
+from space_robot_control.cli.main import cli
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
+from space_robot_control.paper.stability import Study, report, study
+from space_robot_control.paper.stability.check import Check
+from space_robot_control.paper.stability.figures import draw
 from space_robot_msgs_py.errors import InputError
 
 

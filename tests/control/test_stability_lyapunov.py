@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from space_robot_control.analysis.stability.circle_criterion import (
+from space_robot_control.paper.stability.circle_criterion import (
     largest_tolerated_beta,
     peak_gain,
     transfer_function,
 )
-from space_robot_control.analysis.stability.lyapunov import (
+from space_robot_control.paper.stability.lyapunov import (
     B,
     C,
     Certificate,

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from space_robot_control.analysis.stability.reaching import (
+from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.flight.simulate import simulate
+from space_robot_control.paper.stability.reaching import (
     arrival,
     lyapunov_state,
     off_mission_plan,
     ripple,
 )
-from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_control.flight.simulate import simulate
 
 PERIOD = 0.01
 

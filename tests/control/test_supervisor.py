@@ -11,9 +11,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from space_robot_control.controller import Controller
-from space_robot_control.supervisor import REGULAR_ETA, SINGULAR_ETA, Mode, Supervisor
-from space_robot_control.time_delay_estimation import LONGEST_GAP
+from space_robot_control.controller.controller import Controller
+from space_robot_control.controller.supervisor import REGULAR_ETA, SINGULAR_ETA, Mode, Supervisor
+from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
 from space_robot_msgs_py.samples import RobotState
 from space_robot_sim import Robot
 

@@ -7,13 +7,13 @@ import pytest
 from numpy.typing import NDArray
 
 from space_robot_control.analysis.metrics import tracking_error
-from space_robot_control.closed_loop import close_loop
-from space_robot_control.controller import Controller
+from space_robot_control.controller.controller import Controller
+from space_robot_control.controller.gains import build_law
+from space_robot_control.flight.closed_loop import close_loop
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import unflown
 from space_robot_control.laws import ControlLaw, laws
-from space_robot_control.settings import build_law
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from rich.table import Table
 
 from space_robot_control.analysis import analyse
-from space_robot_control.flight.display import print_comparison, print_figures, print_report
+from space_robot_control.cli.report_display import print_comparison, print_figures, print_report
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
-from space_robot_control.terminal import say, show, terminal
+from space_robot_control.flight.terminal import say, show, terminal
 
 WIDTHS = (1, 10, 20, 33, 40, 60, 80, 100, 200)
 

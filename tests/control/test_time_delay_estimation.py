@@ -10,14 +10,14 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 from random_robots import JOINTS
 
-from space_robot_control.time_delay_estimation import (
+from space_robot_control.controller.time_delay_estimation import (
     LONGEST_GAP,
     TimeDelayPair,
     low_pass_weight,
     observe,
     time_delay_estimate,
 )
-from space_robot_sim.records import assign
+from space_robot_msgs_py.compiled.records import assign
 
 Array = NDArray[np.float64]
 

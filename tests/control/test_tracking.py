@@ -13,13 +13,13 @@ from oracles import attitude_jacobian_base, quaternion_of, rotation_of
 from random_robots import JOINTS, random_quaternion
 from scipy.spatial.transform import Rotation
 
-from space_robot_control.tracking import (
+from space_robot_control.controller.tracking import (
     force_from_torque,
     measured_rate,
     torque_from_force,
     tracking_errors,
 )
-from space_robot_sim.attitude import attitude_jacobian_inverse
+from space_robot_sim.dynamics.attitude import attitude_jacobian_inverse
 
 Array = NDArray[np.float64]
 

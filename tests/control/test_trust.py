@@ -12,12 +12,12 @@ import pytest
 from bags import redescribed
 
 from space_robot_control.analysis import analyse
-from space_robot_control.cli import main
+from space_robot_control.cli.main import main
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.replay.choice import ControllerChoice
 from space_robot_control.flight.simulate import simulate
 from space_robot_control.laws import find_law
-from space_robot_control.trust import NotTrustedError, is_plain
+from space_robot_control.laws.trust import NotTrustedError, is_plain
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import InputError
 

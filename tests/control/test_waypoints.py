@@ -8,7 +8,7 @@ import pytest
 from space_robot_control.analysis.waypoints import junction_ticks, waypoint_ticks
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import unflown
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog
 
 
 def log_with_speed(speed: np.ndarray) -> FlightLog:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import pytest
 from flights import Flown, Start, ros_environment, space_robot
 
-from space_robot_control.flight.domain import ros_domain
-from space_robot_control.node_modules import MODULES
+from space_robot_control.flight.graph.domain import ros_domain
+from space_robot_control.flight.node_modules import MODULES
 
 if TYPE_CHECKING:
     from ground import Ground

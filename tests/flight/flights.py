@@ -14,7 +14,7 @@ from space_robot_msgs_py.ros.process_environment import DEFAULTS
 
 Start = Callable[..., "subprocess.Popen[str]"]
 """Starts a node with parameters."""
-COMMAND = [sys.executable, "-m", "space_robot_control.cli"]
+COMMAND = [sys.executable, "-m", "space_robot_control.cli.main"]
 
 
 def ros_environment() -> dict[str, str]:

@@ -9,14 +9,15 @@ from pathlib import Path
 
 import numpy as np
 
-from space_robot_control import software
+from space_robot_control.controller.gains import build_law
+from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.flight import software
+from space_robot_control.flight.node_modules import MODULES
 from space_robot_control.flight.node_settings import NODES
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
-from space_robot_control.node_modules import MODULES
-from space_robot_control.settings import ControllerNodeSettings, build_law
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_sim.plant_settings import PlantNodeSettings
+from space_robot_sim.plant.settings import PlantNodeSettings
 from space_robot_sim.robot import Robot
 
 PLAN = FlightPlan(

@@ -16,10 +16,10 @@ from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import fly_blocks, simulate
 from space_robot_control.laws import ControlLaw, Signals
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import DivergedError, FlightError, SingularAttitudeError
-from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_msgs_py.samples import Command
 
 AXES = 9

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from flights import Flown
 
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.fault import KINDS, PLANT_KINDS, parse_faults
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_sim.faults.catalogue import KINDS, PLANT_KINDS, parse_faults
 from space_robot_sim.faults.schedule import Schedule, ScheduledFault
 
 pytest.importorskip("rclpy")

@@ -12,11 +12,11 @@ import pytest
 from flights import Start
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.codecs import CommandCodec, StateCodec
-from space_robot_msgs_py.plain_codecs import ClockCodec
-from space_robot_msgs_py.reference_codec import ReferenceCodec
 from space_robot_msgs_py.ros.process_environment import set_defaults
 from space_robot_msgs_py.samples import Command, ReferenceChunk, RobotState, Timebase
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.plain_codecs import ClockCodec
+from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 from space_robot_sim.robot import Robot
 
 set_defaults()
@@ -24,7 +24,7 @@ rclpy = pytest.importorskip("rclpy")
 
 from rclpy.event_handler import SubscriptionEventCallbacks  # noqa: E402
 
-from space_robot_control.flight.monitor import Monitor  # noqa: E402
+from space_robot_control.flight.graph.monitor import Monitor  # noqa: E402
 from space_robot_msgs_py.ros.endpoints import Out, message_type, qos  # noqa: E402
 
 PATIENCE_S = 60.0

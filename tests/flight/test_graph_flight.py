@@ -17,12 +17,12 @@ from space_robot_control.analysis import analyse
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.definitions import jazzy
-from space_robot_msgs_py.flight_log import FlightLog
-from space_robot_sim.attitude import rotation_matrix
-from space_robot_sim.conservation import kinetic_energy, momentum
+from space_robot_msgs_py.wire.definitions import jazzy
+from space_robot_sim.dynamics.attitude import rotation_matrix
+from space_robot_sim.plant.conservation import kinetic_energy, momentum
 
 SHORT = ("--duration", "0.5")
 LONG = ("--duration", "3")

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from flights import COMMAND, Start, ros_environment
 
-from space_robot_control.node_modules import MODULES
+from space_robot_control.flight.node_modules import MODULES
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.ros.process_environment import set_defaults
 

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 from flights import COMMAND, ros_environment, space_robot
 
-from space_robot_control.flight.domain import ros_domain
+from space_robot_control.flight.graph.domain import ros_domain
+from space_robot_control.flight.graph.visitor import Visitor
 from space_robot_control.flight.replay.outcome import Options
 from space_robot_control.flight.replay.run import replay
-from space_robot_control.flight.visitor import Visitor
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.flight_log import FlightLog
 
 pytest.importorskip("rclpy")
 SECONDS = 4

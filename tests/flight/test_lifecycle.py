@@ -13,9 +13,9 @@ import pytest
 from flights import Start
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.ros.process_environment import set_defaults
 from space_robot_msgs_py.samples import Command, RobotState, Timebase
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 
 set_defaults()
 pytest.importorskip("rclpy")

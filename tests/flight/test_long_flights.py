@@ -12,7 +12,7 @@ import psutil
 import pytest
 from flights import COMMAND, ros_environment, space_robot
 
-from space_robot_control.flight import room
+from space_robot_control.flight import disk_space as room
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight

@@ -15,24 +15,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot_control.analysis import analyse
-from space_robot_control.controller import Controller
+from space_robot_control.controller.controller import Controller
+from space_robot_control.controller.gains import build_laws, split_gains
+from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.flight.graph.orchestrator import flight_parameters
 from space_robot_control.flight.node_settings import NODES, NOT_TO_BE_SET, SCHEMAS
-from space_robot_control.flight.orchestrator import flight_parameters
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate, unflown
 from space_robot_control.laws import laws
-from space_robot_control.mission import Mission
-from space_robot_control.settings import (
-    ControllerNodeSettings,
-    MissionNodeSettings,
-    build_laws,
-    split_gains,
-)
-from space_robot_msgs_py.bag.coverage import excused_topics
-from space_robot_msgs_py.configuration import config_directory, leaves, named_file
+from space_robot_control.mission.mission import Mission
+from space_robot_control.mission.settings import MissionNodeSettings
+from space_robot_msgs_py.bag.message_accounting import excused_topics
+from space_robot_msgs_py.config.files import config_directory, named_file
+from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.plant import Plant
-from space_robot_sim.plant_settings import PlantNodeSettings
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import PlantNodeSettings
 from space_robot_sim.robot import Robot
 
 Parameters = dict[str, dict[str, Any]]

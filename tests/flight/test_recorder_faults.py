@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 from flights import Start, space_robot
 
-from space_robot_control.flight.monitor import Monitor
+from space_robot_control.flight.graph.monitor import Monitor
 from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")

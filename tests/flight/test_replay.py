@@ -15,7 +15,7 @@ import psutil
 import pytest
 from flights import COMMAND, Flown, ros_environment, space_robot
 
-from space_robot_control.cli import main
+from space_robot_control.cli.main import main
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.replay.outcome import Options, Replay
 from space_robot_control.flight.replay.run import replay
@@ -24,8 +24,8 @@ from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.recorder import BagRecorder
-from space_robot_msgs_py.codecs import CommandCodec
 from space_robot_msgs_py.samples import Command
+from space_robot_msgs_py.wire.codecs import CommandCodec
 
 pytest.importorskip("rclpy")
 TICKS = 300

@@ -14,7 +14,7 @@ import psutil
 import pytest
 from flights import COMMAND, ros_environment, space_robot
 
-from space_robot_control.flight.soak import draw_flight
+from space_robot_control.campaign.soak import draw_flight
 from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")

@@ -13,15 +13,15 @@ from rosbags.typesys import get_types_from_msg
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.coverage import Coverage, lost_messages
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.message_accounting import Coverage, lost_messages
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
-from space_robot_msgs_py.codecs import CommandCodec, StateCodec
-from space_robot_msgs_py.definitions import definition, jazzy
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
-from space_robot_msgs_py.plain_codecs import ClockCodec
 from space_robot_msgs_py.samples import Command, RobotState, Timebase
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.definitions import definition, jazzy
+from space_robot_msgs_py.wire.plain_codecs import ClockCodec
 
 SAMPLE = Path(__file__).parent.parent / "data" / "rosbag2_sample"
 TIMEBASE = Timebase(500_000)

@@ -26,13 +26,13 @@ from mcap.writer import Writer as McapWriter
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, Writer
 
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import FLIGHT_KEY
-from space_robot_msgs_py.definitions import decode
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.wire.definitions import decode
 
 SAMPLE = Path(__file__).parent.parent / "data" / "rosbag2_sample"
 

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_typestore
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.coverage import message_tick
-from space_robot_msgs_py.cdr import CdrBuilder, FixedMessage, Slot, header_stamp_ns
+from space_robot_msgs_py.bag.message_accounting import message_tick
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.wire.cdr import CdrBuilder, FixedMessage, Slot, header_stamp_ns
 
 ENCAPSULATION = b"\x00\x01\x00\x00"
 STORE = get_typestore(Stores.ROS2_JAZZY)

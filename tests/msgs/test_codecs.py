@@ -22,11 +22,11 @@ from random_samples import (
 from rosbags.typesys import Stores, get_typestore
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.cdr import header_stamp_ns
-from space_robot_msgs_py.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.plain_codecs import ClockCodec, LawCodec, TelemetryCodec
 from space_robot_msgs_py.samples import Command, LawInForce, RobotState, Timebase
+from space_robot_msgs_py.wire.cdr import header_stamp_ns
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.plain_codecs import ClockCodec, LawCodec, TelemetryCodec
 
 Array = NDArray[np.float64]
 

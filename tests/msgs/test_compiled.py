@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from space_robot_msgs_py.compiled import _temporary_cache
+from space_robot_msgs_py.compiled.cache import _temporary_cache
 
 PROGRAM = """
 import numpy as np

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.coverage import LONGEST_JUMP, Coverage
+from space_robot_msgs_py.bag.message_accounting import LONGEST_JUMP, Coverage
 
 steps = st.sampled_from([1, 1, 1, 1, 2, 5, 0, -1, -3, 19_999, 20_001, 10**12])
 batches = st.lists(st.lists(steps, max_size=12), max_size=6)

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from space_robot_control.flight.following import InterruptedFlightError
+from space_robot_control.flight.graph.following import InterruptedFlightError
 from space_robot_msgs_py.errors import (
     DivergedError,
     MessageError,
@@ -18,7 +18,7 @@ from space_robot_msgs_py.errors import (
     SpaceRobotError,
     UnusableStateError,
 )
-from space_robot_msgs_py.locks import HeldError, Holder
+from space_robot_msgs_py.ros.locks import HeldError, Holder
 
 MADE: dict[type[SpaceRobotError], SpaceRobotError] = {
     DivergedError: DivergedError(11, 0.0005, "why"),

@@ -18,11 +18,7 @@ from space_robot_msgs_py.ros.process_environment import DEFAULTS, set_defaults
 set_defaults()
 rclpy = pytest.importorskip("rclpy")
 
-from space_robot_msgs_py.ros.exclusive import (  # noqa: E402
-    Claim,
-    claim_name,
-    foreign_publishers,
-)
+from space_robot_msgs_py.ros.exclusive import Claim, claim_name, foreign_publishers  # noqa: E402
 
 PUBLISHER = """
 import sys, time

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.fault import (
+from space_robot_sim.faults.catalogue import (
     KINDS,
     ORCHESTRATOR_KINDS,
     PLANT_KINDS,

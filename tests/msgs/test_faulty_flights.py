@@ -20,14 +20,14 @@ from bags import (
 )
 
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.flight_log import REFERENCE, STATE, FlightLog
 from space_robot_msgs_py.bag.gaps import fill_gaps
 from space_robot_msgs_py.bag.mcap_storage import McapStorage
 from space_robot_msgs_py.bag.reader import read_flight, timebase_of
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.bag.rows import stamps_of
-from space_robot_msgs_py.cdr import header_stamp_ns
-from space_robot_msgs_py.flight_log import REFERENCE, STATE, FlightLog
-from space_robot_msgs_py.plain_codecs import ClockCodec
+from space_robot_msgs_py.wire.cdr import header_stamp_ns
+from space_robot_msgs_py.wire.plain_codecs import ClockCodec
 
 KEPT_BACK = (30, 31, 150, 250, 251, 252)
 """Ticks whose state a fault keeps back."""

@@ -18,9 +18,9 @@ from random_samples import (
     serialization,
 )
 
-from space_robot_msgs_py.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Command, RobotState
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 
 
 def foreign_joint_state(order: list[str], frame: str = "", **arrays: Any) -> bytes:

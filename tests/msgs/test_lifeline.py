@@ -12,7 +12,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from space_robot_msgs_py import lifeline
+from space_robot_msgs_py.ros import lifeline
 
 HOLDING = """
 import signal, sys, time

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from space_robot_msgs_py import lifeline
-from space_robot_msgs_py.locks import (
+from space_robot_msgs_py.ros import lifeline
+from space_robot_msgs_py.ros.locks import (
     FileLock,
     HeldError,
     Holder,

@@ -14,8 +14,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.reference_codec import ReferenceCodec
 from space_robot_msgs_py.samples import ReferenceChunk, Timebase
+from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 
 Array = NDArray[np.float64]
 

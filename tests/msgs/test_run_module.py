@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from space_robot_msgs_py.run_module import HERE, clean_environment, module_command
+from space_robot_msgs_py.ros.run_module import HERE, clean_environment, module_command
 
 SHOW = 'import json, sys; print(json.dumps({"argv": sys.argv[1:], "path": sys.path}))'
 
@@ -65,5 +65,5 @@ def test_empty_entry_of_the_python_path_is_no_current_folder(
 
 
 def test_same_tree_is_found_where_it_is_not_installed(tmp_path: Path) -> None:
-    module = module_command("space_robot_msgs_py.lifeline")
+    module = module_command("space_robot_msgs_py.ros.lifeline")
     subprocess.run([sys.executable, "-I", "-S", *module[1:]], cwd=tmp_path, check=True)

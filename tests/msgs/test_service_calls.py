@@ -17,8 +17,8 @@ from rcl_interfaces.srv import GetParameters  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 
 from space_robot_msgs_py.ros import service_calls  # noqa: E402
+from space_robot_msgs_py.ros.node_host import SERVICE_PERIOD_S, Shell  # noqa: E402
 from space_robot_msgs_py.ros.service_calls import ServiceCalls  # noqa: E402
-from space_robot_msgs_py.ros.shell import SERVICE_PERIOD_S, Shell  # noqa: E402
 
 REQUESTS = 8  # a client keeps ten answers
 

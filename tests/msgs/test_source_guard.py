@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from space_robot_msgs_py.source_guard import DOUBTS, SILENCE_NS, UNSUPPORTED, SourceGuard
+from space_robot_msgs_py.wire.source_guard import DOUBTS, SILENCE_NS, UNSUPPORTED, SourceGuard
 
 MS = 1_000_000
 

@@ -18,8 +18,8 @@ from space_robot_msgs_py.bag.reader import read_coverage
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.bag.rows import stamps_of
 from space_robot_msgs_py.bag.sources import PARTICIPANT_BYTES, Claimed, Sources
-from space_robot_msgs_py.codecs import CommandCodec
 from space_robot_msgs_py.samples import Command, Timebase
+from space_robot_msgs_py.wire.codecs import CommandCodec
 
 TIMEBASE = Timebase(500_000)
 TOPIC = topics.COMMAND.name

@@ -7,7 +7,7 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from space_robot_msgs_py.stamp_guard import AGREEING, StampGuard
+from space_robot_msgs_py.wire.stamp_guard import AGREEING, StampGuard
 
 JUMP = 8
 

@@ -20,15 +20,15 @@ from mcap.reader import make_reader
 from rich.console import Console
 
 from space_robot_control.analysis import analyse
-from space_robot_control.flight.display import print_report
+from space_robot_control.cli.report_display import print_report
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import CHUNK_AGE_S, FLIGHT_KEY, BagRecorder
 from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 
 TIMEBASE = Timebase(500_000)

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import Field
 
+from space_robot_msgs_py.config.validation import Strict, check, one_of, read_yaml
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.validation import Strict, check, one_of, read_yaml
 
 
 class Inner(Strict):

@@ -17,11 +17,12 @@ from random_samples import BASE_AXES, TIMEBASE, joint_names, random_sample
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
-from space_robot_msgs_py import codecs, reference_codec, topics
-from space_robot_msgs_py.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.reference_codec import ReferenceCodec
 from space_robot_msgs_py.samples import Command, ReferenceChunk, RobotState
+from space_robot_msgs_py.wire import codecs, reference_codec
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 
 Array = NDArray[np.float64]
 Read = tuple[int, bytes] | None

@@ -11,9 +11,8 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.validation import read_yaml
-from space_robot_msgs_py.yaml_text import (
+from space_robot_msgs_py.config.validation import read_yaml
+from space_robot_msgs_py.config.yaml_text import (
     DEEPEST,
     LARGEST_FILE,
     YamlTextError,
@@ -21,6 +20,7 @@ from space_robot_msgs_py.yaml_text import (
     parse_yaml,
     read_file,
 )
+from space_robot_msgs_py.errors import InputError
 
 BOMB = "a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
     f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]\n"

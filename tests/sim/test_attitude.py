@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from oracles import attitude_jacobian_base, attitude_jacobian_inertial, rotation_of, turned
 from random_robots import random_quaternion
 
-from space_robot_sim.attitude import (
+from space_robot_sim.dynamics.attitude import (
     attitude_jacobian,
     attitude_jacobian_inverse,
     quaternion_rate,

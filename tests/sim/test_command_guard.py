@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from space_robot_sim.command_guard import CommandGuard
+from space_robot_sim.plant.command_guard import CommandGuard
 
 AXES, HOLD = 3, 10
 

@@ -10,7 +10,7 @@ from oracles import pinocchio_model, pinocchio_state, rotation_of
 from random_robots import Case, State, cases
 
 from space_robot_msgs_py.samples import RobotState
-from space_robot_sim.conservation import generalised_velocity, kinetic_energy, momentum
+from space_robot_sim.plant.conservation import generalised_velocity, kinetic_energy, momentum
 
 FEW = settings(max_examples=40)
 

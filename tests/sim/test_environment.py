@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 from random_robots import random_robot
 
-from space_robot_sim.environment import (
+from space_robot_sim.environment.environment import (
     DisturbanceSettings,
     Environment,
     FrictionSettings,

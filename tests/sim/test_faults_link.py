@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from space_robot_msgs_py.fault import KINDS, parse_faults
+from space_robot_sim.faults.catalogue import KINDS, parse_faults
 from space_robot_sim.faults.link import Link, Parcel, awaited_stamp
 from space_robot_sim.faults.schedule import Schedule
 

@@ -10,15 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.fault import KINDS, parse_fault, parse_faults
 from space_robot_msgs_py.samples import Command
-from space_robot_sim.faults import PlantFaults, awaited_stamp
-from space_robot_sim.faults.actuators import ActuatorFaults
+from space_robot_sim.actuators.faults import ActuatorFaults
+from space_robot_sim.faults.catalogue import KINDS, parse_fault, parse_faults
+from space_robot_sim.faults.link import awaited_stamp
 from space_robot_sim.faults.schedule import Schedule, ScheduledFault
-from space_robot_sim.faults.sensors import ARRAYS
-from space_robot_sim.plant import Plant, PlantSettings
-from space_robot_sim.plant_settings import PlantNodeSettings
+from space_robot_sim.plant.faults import PlantFaults
+from space_robot_sim.plant.plant import Plant, PlantSettings
+from space_robot_sim.plant.settings import PlantNodeSettings
 from space_robot_sim.robot import Robot
+from space_robot_sim.sensors.faults import ARRAYS
 
 PERIOD = 5e-4
 TORQUE = np.array([5.0, -4.0, 3.0, 20.0, -30.0, 15.0, 4.0, -3.0, 2.0])

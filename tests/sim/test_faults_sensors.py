@@ -13,11 +13,11 @@ from oracles import rotation_of
 from random_robots import random_quaternion
 from random_samples import assert_same, random_sample
 
-from space_robot_msgs_py.fault import KINDS, parse_faults
 from space_robot_msgs_py.samples import Command, RobotState
-from space_robot_sim.faults.corruption import STAMP_BACK_TICKS, STAMP_JUMP_TICKS, Corruption
+from space_robot_sim.faults.catalogue import KINDS, parse_faults
 from space_robot_sim.faults.schedule import Schedule
-from space_robot_sim.faults.sensors import SensorFaults, rotation_vector, turned
+from space_robot_sim.sensors.corruption import STAMP_BACK_TICKS, STAMP_JUMP_TICKS, Corruption
+from space_robot_sim.sensors.faults import SensorFaults, rotation_vector, turned
 
 Array = NDArray[np.float64]
 

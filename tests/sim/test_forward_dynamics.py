@@ -10,7 +10,7 @@ from oracles import mujoco_forward_dynamics, pinocchio_forward_dynamics
 from random_robots import JOINTS, Case, State, cases, random_robot, random_state
 
 from space_robot_sim import Robot, bias_force, forward_dynamics, mass_matrix
-from space_robot_sim.dynamics.forward_dynamics import solve_spatial
+from space_robot_sim.dynamics.aba import solve_spatial
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import pytest
 
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim import load_bag
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "bags.md"

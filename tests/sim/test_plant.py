@@ -15,9 +15,13 @@ from scipy.integrate import solve_ivp
 
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import Command, RobotState
-from space_robot_sim.conservation import kinetic_energy, momentum
-from space_robot_sim.environment import DisturbanceSettings, FrictionSettings, PayloadSettings
-from space_robot_sim.plant import Plant, PlantSettings
+from space_robot_sim.environment.environment import (
+    DisturbanceSettings,
+    FrictionSettings,
+    PayloadSettings,
+)
+from space_robot_sim.plant.conservation import kinetic_energy, momentum
+from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]

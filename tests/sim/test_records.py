@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled import kernel
-from space_robot_sim.records import Record, assign, nested, shaped
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 
 Array = NDArray[np.float64]
 

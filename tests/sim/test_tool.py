@@ -12,7 +12,7 @@ from random_robots import random_quaternion, random_robot
 from scipy.spatial.transform import Rotation
 
 from space_robot_sim.robot import Robot
-from space_robot_sim.tool import tool_pose
+from space_robot_sim.robot.tool import tool_pose
 
 
 def pinocchio_tool(robot: Robot, quaternion: np.ndarray, theta: np.ndarray) -> pin.SE3:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from space_robot_sim.wall_clock import REMARK_S, SLIP_S, WallClock
+from space_robot_sim.plant.wall_clock import REMARK_S, SLIP_S, WallClock
 
 ROUNDING_S = 1e-6
 periods = st.floats(1e-4, 1e-2)

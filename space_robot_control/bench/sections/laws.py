@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...closed_loop import Rows, law_pointer
-from ...controller import Controller
+from ...controller.controller import Controller
+from ...flight.closed_loop import Rows, law_pointer
 from ...flight.plan import Flight, FlightPlan
 from ...flight.simulate import simulate
 from ...laws import CompiledLaw

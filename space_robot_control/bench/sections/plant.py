@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from space_robot_msgs_py.samples import Command
-from space_robot_sim.plant import Plant
+from space_robot_sim.plant.plant import Plant
 
 from ...flight.plan import Flight, FlightPlan
 from ..kernels import forward_dynamics_calls, plant_steps, state_derivatives

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from ...reproduction.flights import ROWS
-from ...reproduction.processes import cores
-from ...reproduction.reproduce import reproduce as run
+from ...paper.reproduction.flights import ROWS
+from ...paper.reproduction.processes import cores
+from ...paper.reproduction.reproduce import reproduce as run
 from ..measure import Options, interleave
 from ..result import Result, Target
 

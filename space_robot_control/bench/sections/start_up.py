@@ -9,18 +9,18 @@ import time
 from pathlib import Path
 
 from space_robot_msgs_py.errors import FlightError
-from space_robot_msgs_py.run_module import module_command
+from space_robot_msgs_py.ros.run_module import module_command
 
-from ...flight.domain import ros_domain
-from ...flight.monitor import Monitor
-from ...flight.orchestrator import require_ros
-from ...flight.processes import child_process
+from ...flight.graph.domain import ros_domain
+from ...flight.graph.monitor import Monitor
+from ...flight.graph.orchestrator import require_ros
+from ...flight.graph.processes import child_process
 from ..measure import Options, interleave, repeated
 from ..result import Result, Target
 
 HELP_ASKED = Target(0.3)
 FIRST_TICK_ASKED = Target(5.0)
-COMMAND = module_command("space_robot_control.cli")
+COMMAND = module_command("space_robot_control.cli.main")
 
 
 def start_up(options: Options) -> list[Result]:

@@ -10,23 +10,17 @@ from typing import Any
 
 import yaml
 
-from space_robot_msgs_py.configuration import named_file
+from space_robot_msgs_py.config.files import named_file
+from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import LawInForce
-from space_robot_msgs_py.validation import one_of
 from space_robot_sim.robot import Robot
 
+from ...controller.gains import available_laws, build_law, check_gains, gain_files, gains_as_path
+from ...controller.settings import ControllerNodeSettings
+from ...controller.swaps import parse_swaps
 from ...laws import ControlLaw, find_law
-from ...settings import (
-    ControllerNodeSettings,
-    available_laws,
-    build_law,
-    check_gains,
-    gain_files,
-    gains_as_path,
-)
-from ...swaps import parse_swaps
-from ...trust import check_file, check_law, is_plain
+from ...laws.trust import check_file, check_law, is_plain
 
 NODE = ControllerNodeSettings.node
 OF_THE_GRAPH = ("wait_for", "fifo_priority", "autostart")

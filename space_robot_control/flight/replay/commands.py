@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.codecs import JointStateMessage
-from space_robot_msgs_py.compiled_cdr import FOREIGN, read_effort
-from space_robot_msgs_py.decoded import name_order, stamp_of
-from space_robot_msgs_py.definitions import decode
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.wire.codecs import JointStateMessage
+from space_robot_msgs_py.wire.compiled_cdr import FOREIGN, read_effort
+from space_robot_msgs_py.wire.decoded import name_order, stamp_of
+from space_robot_msgs_py.wire.definitions import decode
 
 Array = NDArray[np.float64]
 Ticks = NDArray[np.int64]

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from space_robot_msgs_py.bag.law_history import as_data
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import LawInForce
 
-from ...law_history import as_data
 from .choice import ControllerChoice
 from .comparison import Comparison
 from .reasons import reasons

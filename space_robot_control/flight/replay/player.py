@@ -14,7 +14,7 @@ import numpy as np
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import FlightError, InputError
 
-from ..visitor import Visitor
+from ..graph.visitor import Visitor
 from .commands import CommandList, Ticks
 from .recording import Reference, State
 

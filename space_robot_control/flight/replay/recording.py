@@ -10,16 +10,16 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.coverage import excused_topics, message_tick
 from space_robot_msgs_py.bag.description import read_description
 from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.message_accounting import excused_topics, message_tick
 from space_robot_msgs_py.bag.reader import REQUIRED, first_states, missing, timebase_of
 from space_robot_msgs_py.bag.selection import Selection
+from space_robot_msgs_py.config.text import printable
 from space_robot_msgs_py.errors import InputError, MessageError
-from space_robot_msgs_py.plain_codecs import LawCodec
 from space_robot_msgs_py.samples import LawInForce, in_order
-from space_robot_msgs_py.text import printable
 from space_robot_msgs_py.topics import Topic
+from space_robot_msgs_py.wire.plain_codecs import LawCodec
 
 from .commands import CommandList, Commands
 

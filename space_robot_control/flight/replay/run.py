@@ -10,17 +10,17 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
+from space_robot_msgs_py.bag.law_history import within
 from space_robot_msgs_py.errors import FlightError, InputError
 
-from ...law_history import within
 from ..compilation import compile_kernels
-from ..display import FlightProgress, flight_progress
-from ..domain import ros_domain
-from ..following import InterruptedFlightError
-from ..lifecycle import LifecycleDriver
-from ..orchestrator import require_ros, stop_signals
-from ..parameters import ParameterClient
-from ..processes import Graph, NodeProcess, node_command, node_environment
+from ..graph.domain import ros_domain
+from ..graph.following import InterruptedFlightError
+from ..graph.lifecycle import LifecycleDriver
+from ..graph.orchestrator import require_ros, stop_signals
+from ..graph.parameters import ParameterClient
+from ..graph.processes import Graph, NodeProcess, node_command, node_environment
+from ..progress import FlightProgress, flight_progress
 from .choice import ControllerChoice
 from .commands import CommandList, Commands, Ticks
 from .comparison import Comparison

@@ -1,0 +1,70 @@
+"""What a person sees of a soak: a table, and the flights that failed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from ...flight.terminal import say, show
+
+
+def print_soak(report: dict[str, Any], console: Console) -> None:
+    """Print the report of `run.Soak`."""
+    ended = ", interrupted" if report["interrupted"] else ""
+    table = Table(
+        title=f"soak, seed {report['seed']}{ended}", title_justify="left", show_header=False
+    )
+    table.add_column()
+    table.add_column(justify="right", no_wrap=True)
+    table.add_column()
+    for row in rows(report):
+        table.add_row(*row)
+    show(table, console)
+    for flown in report["each"]:
+        if flown["survived"]:
+            continue
+        lines = [f"flight {flown['number']} did not survive:", *flown["wrong"]]
+        lines.append(f"again: {flown['command']}")
+        if flown["bag"]:
+            lines.append(f"bag: {flown['bag']}")
+        for line in lines:
+            say(console, line if line is lines[0] else f"  {line}")
+
+
+def rows(report: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Name, figure and remark of each line of the table."""
+    growth, files = report["memory_growth_mb"], report["shared_memory_files"]
+    return [
+        ("flights", str(report["flights"]), ""),
+        ("survived", str(report["survived"]), ""),
+        ("faults", str(report["faults"]), f"{len(report['faults_by_kind'])} kinds"),
+        ("controllers restarted", str(report["restarts"]), ""),
+        ("messages lost", str(report["messages_lost"]), ""),
+        *_errors(
+            report["largest_error"]["tracking"], "largest {} error", ", torque and reference whole"
+        ),
+        *_errors(
+            report["largest_error"]["disturbed"],
+            "largest {} error",
+            ", torque or reference taken away",
+        ),
+        ("memory growth, this process", _mb(growth["soak"]), "since the third flight"),
+        ("memory growth, largest node", _mb(growth["largest_node"]), "first to last quarter"),
+        ("shared memory files", f"{files['start']} to {files['end']}", "of Fast DDS"),
+    ]
+
+
+def _errors(errors: dict[str, Any], name: str, remark: str) -> list[tuple[str, str, str]]:
+    found = []
+    for what, unit in (("attitude", ""), ("joint", " rad")):
+        largest = errors[what]
+        figure = f"{largest['value']:.2e}{unit}" if largest else "-"
+        where = f"flight {largest['flight']}{remark}" if largest else ""
+        found.append((name.format(what), figure, where))
+    return found
+
+
+def _mb(value: float | None) -> str:
+    return "-" if value is None else f"{value:+.1f} MB"

@@ -1,0 +1,129 @@
+"""The laws a controller node can fly, with their gains as parameters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.parameter import Parameter
+
+from space_robot_msgs_py.bag.law_history import LawChange, same
+from space_robot_msgs_py.config.trees import nest
+from space_robot_msgs_py.config.validation import one_of
+from space_robot_msgs_py.errors import SpaceRobotError
+from space_robot_msgs_py.ros.node_host import Shell
+from space_robot_msgs_py.ros.parameters import overrides
+from space_robot_msgs_py.samples import LawInForce, RobotState
+from space_robot_sim.robot import Robot
+
+from ..laws import ControlLaw, find_law
+from .controller import Controller
+from .gains import available_laws, build_law, check_gains, gain_lengths, gain_range
+from .settings import ControllerNodeSettings
+from .swaps import Swap, parse_swaps
+
+
+class LawSet:
+    """The laws of the gain set as parameters: ``controller``, and ``<law>.<gain>`` for each."""
+
+    def __init__(self, shell: Shell, settings: ControllerNodeSettings, axes: int) -> None:
+        """Build all laws and declare their gains.
+
+        Raises:
+            InputError: a law, a gain or a swap that cannot be.
+        """
+        self._shell, self._settings, self._axes = shell, settings, axes
+        self._laws: dict[str, ControlLaw] = {}
+        first = find_law(settings.controller).name
+        for name in dict.fromkeys([first, *available_laws(settings)]):
+            self._laws[name] = self._declared(settings.controller if name == first else name)
+        self.chosen = self._laws[first]
+        self._may_differ = True
+        """Whether law or gains may be others than at the last tick answered."""
+        self._before: LawInForce | None = None
+        """What was in force at that tick."""
+        self._was_swapped = False
+        self._swaps: list[Swap] = parse_swaps(settings.swaps, settings.period)
+        for swap in self._swaps:
+            one_of(swap.name, self._laws, "controller", " of swaps")
+        descriptor = shell.node.describe_parameter("controller")
+        descriptor.additional_constraints = f"one of {', '.join(self._laws)}"
+        shell.node.set_descriptor("controller", descriptor)
+        shell.node.add_on_set_parameters_callback(self._on_set)
+
+    def warm_up(self, robot: Robot) -> None:
+        """Load every law's compiled code, so that no first tick and no swap comes late."""
+        rest = RobotState.allocate(robot.n)
+        for law in self._laws.values():
+            controller = Controller(robot, law, self._settings.period)
+            controller.update(rest, np.zeros((3, robot.n)), np.eye(10)[0])
+
+    def change_at(self, tick: int) -> LawChange | None:
+        """Choose the law of the swaps that are due; what is in force, if not as before.
+
+        Called once for each tick that is answered.
+        """
+        while self._swaps and self._swaps[0].tick <= tick:
+            self.chosen = self._laws[self._swaps.pop(0).name]
+            self._may_differ = self._was_swapped = True
+        if not self._may_differ:
+            return None
+        self._may_differ = False
+        before, law = self._before, self.chosen.in_force(tick, is_first=self._before is None)
+        if before and same(before, law):
+            return None
+        self._before = law
+        return LawChange(before, law)
+
+    def tell(self, change: LawChange) -> None:
+        """Log a change, and let the parameter ``controller`` follow a planned swap."""
+        when = (
+            f"from tick {change.law.tick} on (t = {change.law.tick * self._settings.period:.4f} s)"
+        )
+        self._shell.log(f"controller: {change}, {when}")
+        if self._was_swapped:
+            self._was_swapped = False
+            name = Parameter("controller", value=change.law.name)  # type: ignore[no-untyped-call]
+            self._shell.node.set_parameters([name])
+
+    def close(self) -> None:
+        """Take no more changes."""
+        self._shell.node.remove_on_set_parameters_callback(self._on_set)
+
+    def _declared(self, wanted: str) -> ControlLaw:
+        law = build_law(wanted, self._settings, self._axes)
+        node = self._shell.node
+        given = overrides(node, [f"{law.name}.{gain}" for gain in law.gain_descriptions])
+        tree = {**law.gains, **nest(given).get(law.name, {})}
+        law.gains = check_gains(tree, type(law), self._axes, "controller parameters")
+        for gain, description in law.gain_descriptions.items():
+            node.declare_parameter(
+                f"{law.name}.{gain}", law.gains[gain].tolist(),
+                ParameterDescriptor(
+                    description=description,
+                    additional_constraints=f"{gain_lengths(self._axes)}; {gain_range(gain)}",
+                ),
+                ignore_override=True,
+            )  # fmt: skip
+        return law
+
+    def _on_set(self, parameters: list[Any]) -> SetParametersResult:
+        """Check all changes first, then make them; the loop sees them at its next tick."""
+        gains = {name: dict(law.gains) for name, law in self._laws.items()}
+        chosen = self.chosen
+        try:
+            for parameter in parameters:
+                law_name, _, gain = parameter.name.partition(".")
+                if parameter.name == "controller":
+                    chosen = self._laws[one_of(parameter.value, self._laws, "controller")]
+                elif law_name in gains and gain:
+                    law = self._laws[law_name]
+                    changed = {**gains[law_name], gain: list(parameter.value)}
+                    gains[law_name] = check_gains(changed, type(law), self._axes, "parameter")
+        except SpaceRobotError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        for name, law in self._laws.items():
+            law.gains = gains[name]
+        self.chosen, self._may_differ = chosen, True
+        return SetParametersResult(successful=True)

@@ -1,0 +1,144 @@
+"""The flights behind Table V: which rows fly in which variants, and what is kept of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from space_robot_msgs_py.config.files import config_directory
+from space_robot_msgs_py.config.validation import read_yaml
+from space_robot_msgs_py.errors import DivergedError, InputError
+
+from ...analysis import metrics
+from ...analysis.figures import BaseTorque, control_results
+from ...flight.plan import Flight, FlightPlan
+from ...flight.simulate import simulate
+from .gallery import Gallery
+from .provenance import parameters
+from .table_v import PRINTED
+
+ROBOT = "paper"
+DEFINITIONS = {"mean_axis": "mean of the axes' RMS", "eq64": "RMS by (64)"}
+COMPARED_CASE = "1"
+"""The case in which the laws are set beside one another."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """What Table V leaves open: the gain set, and whether the joints rub."""
+
+    gains: str
+    friction: bool
+
+    @property
+    def title(self) -> str:
+        """For a person."""
+        return f"{self.gains} gains, {'printed friction' if self.friction else 'friction-free'}"
+
+
+VARIANTS = tuple(Variant(g, f) for g in ("printed", "tuned") for f in (True, False))
+AS_PRINTED = VARIANTS[0]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of Table V."""
+
+    controller: str
+    case: str
+
+    @classmethod
+    def parse(cls, text: str) -> Row:
+        """From ``CONTROLLER/CASE``.
+
+        Raises:
+            InputError: Table V has no such row.
+        """
+        row = cls(*text.partition("/")[::2])
+        if (row.controller, row.case) not in PRINTED:
+            names = ", ".join(f"{controller}/{case}" for controller, case in PRINTED)
+            raise InputError(f"Table V has no row {text!r}: choose from {names}")
+        return row
+
+    @property
+    def stem(self) -> str:
+        """Of the name of its picture."""
+        return f"case{self.case}_{self.controller}"
+
+    @property
+    def shown(self) -> Variant:
+        """The variant that is drawn: the default gains, the printed friction."""
+        sets = read_yaml(config_directory() / "gains" / ROBOT / "default_sets.yaml")
+        return Variant(sets[self.controller], True)
+
+
+ROWS = tuple(Row(controller, case) for controller, case in PRINTED)
+
+
+class Planned(NamedTuple):
+    """A row in one variant."""
+
+    row: Row
+    variant: Variant
+    shown: bool
+    """Whether it is drawn: the default gains, the printed friction."""
+
+    @property
+    def compared(self) -> bool:
+        """Whether it stands for its law in the pictures of all laws."""
+        return self.shown and self.row.case == COMPARED_CASE
+
+
+def plan(rows: Iterable[Row], brief: bool = False) -> Iterator[Planned]:
+    """The flights of ``rows``: all four variants of each, or (``brief``) what Table V asks for.
+
+    That is the default gains with friction and without and, where the default ones are others,
+    the printed gains with the printed friction: what the paper says was flown.
+    """
+    for row in rows:
+        shown = row.shown
+        for variant in VARIANTS:
+            if not brief or variant.gains == shown.gains or variant == AS_PRINTED:
+                yield Planned(row, variant, variant == shown)
+
+
+@dataclass(frozen=True)
+class Result:
+    """A finished flight."""
+
+    row: Row
+    variant: Variant
+    parameters: dict[str, Any]
+    """All that plant, controller and mission were told."""
+    diverged_tick: int | None = None
+    rms: dict[str, dict[str, float]] | None = None
+    """By definition and column; None if the flight diverged."""
+    chatter: dict[str, dict[str, float]] | None = None
+    """By measure and column, of the compared case with friction."""
+    base_torque: BaseTorque | None = None
+    """Of the flights that are compared."""
+
+
+def fly(planned: Planned, duration: float | None, gallery: Gallery | None) -> Result:
+    """Fly one row in one variant; if it is shown it is also drawn for the ``gallery``."""
+    row, variant, _ = planned
+    flight = Flight(
+        FlightPlan(
+            controller=row.controller, case=row.case, gains=variant.gains, robot=ROBOT,
+            friction=variant.friction, duration=duration,
+        )
+    )  # fmt: skip
+    told = parameters(flight)
+    try:
+        log = simulate(flight)
+    except DivergedError as error:
+        return Result(row, variant, told, error.tick)
+    if planned.shown and gallery is not None:
+        title = f"{row.controller}, case {row.case}: {variant.title}"
+        gallery.hang(control_results(log, title), row.stem)
+    return Result(
+        row, variant, told, None, metrics.rms(log),
+        metrics.chatter(log) if row.case == COMPARED_CASE and variant.friction else None,
+        BaseTorque.of(log) if planned.compared else None,
+    )  # fmt: skip

@@ -1,0 +1,169 @@
+"""A flight as arrays, one row a tick: what the analysis reads, from a bag or from memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..samples import LawInForce, RobotState, Timebase
+
+Array = NDArray[np.float64]
+
+STATE = (
+    "base_position", "quaternion", "base_velocity", "omega_base", "joint_positions",
+    "joint_velocities", "applied_torque",
+)  # fmt: skip
+"""The columns a state fills."""
+REFERENCE = ("reference_joints", "reference_base")
+"""The columns the desired motion fills."""
+
+
+@dataclass(slots=True)
+class FlightLog:
+    """Measured and desired motion and the applied torque, tick by tick from 0."""
+
+    timebase: Timebase
+    joint_names: tuple[str, ...]
+    base_position: Array
+    """(N, 3) m, inertial frame."""
+    quaternion: Array
+    """(N, 4) ``[w, x, y, z]``."""
+    base_velocity: Array
+    """(N, 3) m/s, inertial frame."""
+    omega_base: Array
+    """(N, 3) rad/s, base frame."""
+    joint_positions: Array
+    """(N, n) rad."""
+    joint_velocities: Array
+    """(N, n) rad/s."""
+    applied_torque: Array
+    """(N, n+3) N m over the interval that ended at the tick; base frame, then joints."""
+    reference_joints: Array
+    """(N, 3, n) desired position, velocity, acceleration."""
+    reference_base: Array
+    """(N, 10) desired quaternion, angular velocity, acceleration (base frame)."""
+    flight: dict[str, Any] = field(default_factory=dict)
+    """What was flown: controller, case, ..., as recorded."""
+    lost: dict[str, int] = field(default_factory=dict)
+    """Missing messages a topic."""
+    unanswered: int = 0
+    """Ticks without a command of their own (by the wall clock, or where something failed)."""
+    filled: int = 0
+    """Ticks without a usable state, which have the one before."""
+    unfinished: str = ""
+    """What is known of a bag that nobody finished; empty for a whole one."""
+    damage: tuple[str, ...] = ()
+    """What was found wrong with the bag, a sentence each."""
+    foreign: tuple[str, ...] = ()
+    """Whose messages the recorder left out, since they are not of the flight, a sentence each."""
+    commanded_torque: Array | None = None
+    """(N, n+3) N m, the controller's answer to the tick (NaN: none); None: not recorded."""
+    latency_s: Array | None = None
+    """(N,) s from the state's sending to its answer's, by the clock of the wall (NaN: none)."""
+    telemetry: Array | None = None
+    """(N, 4, n+3) s, u, N_hat, e of the controller; of flights in this process only."""
+    laws: tuple[LawInForce, ...] = ()
+    """Every change of law or gains in flight, the first law first; empty: not recorded."""
+    first_tick: int = 0
+    """Tick of row 0; not 0 in a part of a flight."""
+    trusted: bool = True
+    """Whether ``flight`` is the user's own word, so that files and modules it names may be opened.
+
+    A bag may be anybody's: of one it is so only if the user says so.
+    """
+
+    @classmethod
+    def allocate(cls, ticks: int, joint_names: tuple[str, ...], timebase: Timebase) -> FlightLog:
+        """A log of ``ticks`` rows of NaN."""
+        n = len(joint_names)
+        shapes = [(3,), (4,), (3,), (3,), (n,), (n,), (n + 3,), (3, n), (10,)]
+        columns: list[Any] = [np.full((ticks, *shape), np.nan) for shape in shapes]
+        return cls(timebase, joint_names, *columns)
+
+    @property
+    def ticks(self) -> int:
+        """Number of rows."""
+        return len(self.quaternion)
+
+    @property
+    def time(self) -> Array:
+        """(N,) s, simulated time of the rows."""
+        ticks = np.arange(self.first_tick, self.first_tick + self.ticks, dtype=np.float64)
+        return np.asarray(ticks * self.timebase.period)
+
+    @property
+    def angular_velocity(self) -> Array:
+        """(N, 3) rad/s, base frame; the same as ``omega_base``."""
+        return self.omega_base
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """What was flown, as recorded; the same as ``flight``. Empty for a bag of others."""
+        return self.flight
+
+    @property
+    def whole(self) -> NDArray[np.bool_]:
+        """(N,) whether state and reference of a row are there and finite."""
+        return self.finite(STATE) & self.finite(REFERENCE)
+
+    def finite(self, columns: Iterable[str]) -> NDArray[np.bool_]:
+        """(N,) whether a row has no NaN in some of the columns."""
+        found = np.ones(self.ticks, np.bool_)
+        for name in columns:
+            found &= np.isfinite(getattr(self, name).reshape(self.ticks, -1)).all(axis=1)
+        return found
+
+    def longest_stretch(self) -> FlightLog:
+        """The longest stretch of `whole` rows, for what cannot bear a gap; views, not copies."""
+        edges = np.diff(np.concatenate(([False], self.whole, [False])).astype(np.int8))
+        starts, stops = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+        if not len(starts):
+            return self.truncated(0)
+        longest = int(np.argmax(stops - starts))
+        return self.rows(int(starts[longest]), int(stops[longest]))
+
+    @property
+    def axes(self) -> int:
+        """Controlled coordinates, n+3."""
+        return int(self.applied_torque.shape[1])
+
+    def put(self, state: RobotState) -> None:
+        """Copy a state into its tick's row."""
+        k = state.tick - self.first_tick
+        self.base_position[k] = state.base_position
+        self.quaternion[k] = state.quaternion
+        self.base_velocity[k] = state.base_velocity
+        self.omega_base[k] = state.omega_base
+        self.joint_positions[k] = state.joint_positions
+        self.joint_velocities[k] = state.joint_velocities
+        self.applied_torque[k] = state.applied_torque
+
+    def state(self, tick: int) -> RobotState:
+        """The state of a tick, as the plant measured it."""
+        k = tick - self.first_tick
+        return RobotState(
+            tick, self.base_position[k], self.quaternion[k], self.base_velocity[k],
+            self.omega_base[k], self.joint_positions[k], self.joint_velocities[k],
+            self.applied_torque[k],
+        )  # fmt: skip
+
+    def reference(self, tick: int) -> tuple[Array, Array]:
+        """The joints' (3, n) and the base's (10,) row of a tick."""
+        k = tick - self.first_tick
+        return self.reference_joints[k], self.reference_base[k]
+
+    def truncated(self, ticks: int) -> FlightLog:
+        """The first ``ticks`` rows."""
+        return self.rows(0, ticks)
+
+    def rows(self, start: int, stop: int) -> FlightLog:
+        """The rows ``start`` to ``stop``: views, not copies. Counts stay those of the whole log."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        rows: dict[str, Any] = {
+            k: v[start:stop] for k, v in values.items() if isinstance(v, np.ndarray)
+        }
+        return replace(self, **rows, first_tick=self.first_tick + start)

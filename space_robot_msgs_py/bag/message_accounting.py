@@ -1,0 +1,165 @@
+"""Counting what arrived and what is missing, from the ticks in the messages themselves.
+
+Nothing else in a bag tells a lost message: header stamps are ticks, so gaps are losses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import topics
+from ..samples import Timebase
+from ..wire.cdr import header_stamp_ns
+from ..wire.plain_codecs import TelemetryCodec
+from ..wire.stamp_guard import StampGuard
+
+
+def message_tick(topic: topics.Topic, data: bytes, timebase: Timebase) -> int:
+    """The tick a serialized message is stamped with (of a chunk: its first)."""
+    if topic is topics.TELEMETRY:
+        return TelemetryCodec.decode(data)[0]
+    return timebase.tick(header_stamp_ns(data))
+
+
+LONGEST_JUMP = 20_000
+"""Ticks from one message to the next that are still believed: 10 s at 2 kHz."""
+
+
+@dataclass(slots=True)
+class Coverage:
+    """Ticks of one topic's messages."""
+
+    topic: topics.Topic
+    received: int = 0
+    repeated: int = 0
+    """Messages of a tick that had come already."""
+    strange: int = 0
+    """Messages whose stamp cannot be right, or cannot be read."""
+    first: int = 0
+    last: int = -1
+    unit: int = 0
+    """Ticks from one message to the next: the smallest step seen."""
+    _guard: StampGuard = field(default_factory=lambda: StampGuard(LONGEST_JUMP))
+    _holes: set[int] = field(default_factory=set)
+    """Ticks passed over, which may still come late."""
+
+    def take(self, tick: int) -> bool:
+        """Count a message; False if one of this tick has come already (events: never)."""
+        if self.topic.is_event:
+            self.last = max(self.last, tick)
+        elif self.received and tick <= self.last:
+            if tick not in self._holes:
+                self.repeated += 1
+                return False
+            self._holes.remove(tick)
+        elif not self._guard.passes(tick):
+            self.strange += 1
+            return True
+        elif self.received == 0:
+            self.first = self.last = tick
+            self._expect_before(tick)
+        else:
+            step = tick - self.last
+            self.unit = min(self.unit, step) if self.unit else step
+            if step != 1 and self.topic.per_tick and step <= LONGEST_JUMP:
+                self._holes.update(range(self.last + 1, tick))
+            self.last = tick
+        self.received += 1
+        return True
+
+    def take_all(self, ticks: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """`take` of many, in their order; those that only go forward are counted at once."""
+        steps = np.diff(ticks, prepend=[self.last] if self.received else [])
+        if self.topic.is_event or not len(ticks) or np.any((steps < 1) | (steps > LONGEST_JUMP)):
+            return np.fromiter((self.take(int(tick)) for tick in ticks), np.bool_, len(ticks))
+        self._guard.passes(int(ticks[0]))
+        if not self.received:
+            self.first = int(ticks[0])
+            self._expect_before(self.first)
+        if len(steps):
+            shortest = int(steps.min())
+            self.unit = min(self.unit, shortest) if self.unit else shortest
+        if self.topic.per_tick:
+            after = ticks[len(ticks) - len(steps) :]
+            for i in np.flatnonzero(steps != 1):
+                self._holes.update(range(int(after[i] - steps[i]) + 1, int(after[i])))
+        self.last = self._guard.last = int(ticks[-1])
+        self.received += len(ticks)
+        return np.ones(len(ticks), np.bool_)
+
+    def _expect_before(self, tick: int) -> None:
+        """Ticks before the first message may still come, late."""
+        if self.topic.per_tick and tick <= LONGEST_JUMP:
+            self._holes.update(range(tick))
+
+    @property
+    def gaps(self) -> int:
+        """Places up to its own last message that none is of, for a topic that begins at tick 0."""
+        return max(
+            0, self.last // (1 if self.topic.per_tick else self.unit or 1) + 1 - self.received
+        )
+
+    def pause(self) -> None:
+        """The next message may be of any later tick."""
+        self._guard = StampGuard(LONGEST_JUMP)
+
+    @property
+    def kept(self) -> int:
+        """Messages that belong into a bag."""
+        return self.received + self.strange
+
+    def missing(self, last_tick: int) -> int:
+        """Messages that were sent but are not here, for a flight from tick 0 to ``last_tick``."""
+        if self.topic.is_event:
+            return 0
+        if self.topic.per_tick:
+            return last_tick + 1 - self.received
+        if self.received == 0:
+            return 1 if last_tick >= 0 else 0
+        return (self.last - self.first) // (self.unit or 1) + 1 - self.received
+
+
+def lost_messages(
+    coverages: Mapping[str, Coverage],
+    excused: frozenset[str] = frozenset(),
+    finished: bool = True,
+) -> dict[str, int]:
+    """Missing messages a topic; the flight's length is that of the longest per-tick topic.
+
+    Gaps in the ``excused`` topics are not lost messages. Of a bag that was not
+    ``finished`` each topic counts up to its own last message: nobody knows what came after.
+    """
+    lost = {
+        name: coverage.missing(_last_tick(coverages) if finished else coverage.last)
+        for name, coverage in coverages.items()
+    }
+    return lost | dict.fromkeys(excused & lost.keys(), 0)
+
+
+def excused_topics(flight: Mapping[str, Any]) -> frozenset[str]:
+    """Topics that may have ticks without a message in a flight of this description.
+
+    By the wall clock, or where something fails, the controller does not answer every tick
+    (`unanswered_ticks`); states may be kept back by a fault.
+    """
+    excused: tuple[topics.Topic, ...] = ()
+    if any(flight.get(key) for key in ("realtime", "faults", "restart_controller")):
+        excused += (topics.COMMAND, topics.TELEMETRY)
+    if flight.get("faults"):
+        excused += (topics.JOINT_STATES, topics.BASE_STATE)
+    return frozenset(topic.name for topic in excused)
+
+
+def unanswered_ticks(coverages: Mapping[str, Coverage], finished: bool = True) -> int:
+    """Ticks without a command."""
+    command = coverages[topics.COMMAND.name]
+    return command.missing(_last_tick(coverages) if finished else command.last)
+
+
+def _last_tick(coverages: Mapping[str, Coverage]) -> int:
+    return max((c.last for c in coverages.values() if c.topic.per_tick), default=-1)
