@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from .bag.flight_log import FlightLog
+from typing import Any
 
 
 class SpaceRobotError(Exception):
@@ -40,8 +37,8 @@ class MessageError(SpaceRobotError, ValueError):
 class FlightError(SpaceRobotError):
     """A flight ended before its time."""
 
-    log: FlightLog | None = None
-    """What was flown until then, where somebody kept it."""
+    log: Any = None
+    """The `FlightLog` of what was flown until then, where somebody kept it."""
 
 
 class DivergedError(FlightError):

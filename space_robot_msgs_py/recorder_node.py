@@ -13,10 +13,10 @@ from . import topics
 from .bag.recorder import BagRecorder
 from .bag.recorder_settings import RecorderNodeSettings
 from .errors import InputError, MessageError
-from .ros.endpoints import In, Out, TakenByLoop
+from .ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription
 from .ros.exclusive import GraphPublishers
 from .ros.health import SENT, Health, Level
-from .ros.node_host import Shell, run_node
+from .ros.node_host import NodeHost, run_node
 from .ros.serialized_take import serialized_take, take_by_rclpy
 from .wire.definitions import decode
 
@@ -39,8 +39,8 @@ NICENESS = 5
 class RecorderLoop:
     """Empties the queues of all topics in turn; deep queues bridge the time between rounds."""
 
-    def __init__(self, shell: Shell, settings: RecorderNodeSettings) -> None:
-        self._shell, self._settings = shell, settings
+    def __init__(self, host: NodeHost, settings: RecorderNodeSettings) -> None:
+        self._host, self._settings = host, settings
         try:
             flight = json.loads(settings.flight)
         except json.JSONDecodeError as error:
@@ -48,20 +48,22 @@ class RecorderLoop:
         path = Path(settings.bag or time.strftime("bag_%Y%m%d-%H%M%S"))
         self._recorder = BagRecorder(
             path, {"period": settings.period, **flight}, settings.timebase,
-            settings.compression, settings.split_size, GraphPublishers(shell.node),
+            settings.compression, settings.split_size, GraphPublishers(host.node),
         )  # fmt: skip
-        self.outputs: tuple[Out, ...] = ()
-        group = TakenByLoop()
-        self._inputs = [In(shell.node, topic, group, QUEUE_DEPTH) for topic in topics.ALL]
-        self._diagnostics = In(shell.node, topics.DIAGNOSTICS, group)
+        self.outputs: tuple[RawPublisher, ...] = ()
+        group = PolledCallbackGroup()
+        self._inputs = [
+            RawSubscription(host.node, topic, group, QUEUE_DEPTH) for topic in topics.ALL
+        ]
+        self._diagnostics = RawSubscription(host.node, topics.DIAGNOSTICS, group)
         self._told = False
         self._from_ns = 0
         """When recording was taken up again, by the senders' clock; 0: it never paused."""
         self._until_ns: int | None = None
         """When this recorder was told to stop; None while it records."""
-        shell.log(f"recording to {path}")
+        host.log(f"recording to {path}")
         if serialized_take() is take_by_rclpy:
-            shell.log("this rclpy does not tell publishers: they are told apart by their numbers")
+            host.log("this rclpy does not tell publishers: they are told apart by their numbers")
 
     @property
     def failure(self) -> str:
@@ -74,9 +76,9 @@ class RecorderLoop:
         if self._until_ns is not None:  # active again
             self._from_ns, self._until_ns = time.time_ns(), None
             self._recorder.pause()
-        while not self._shell.stopping:
+        while not self._host.stopping:
             _, busy = self._take_round()
-            self._shell.serve()
+            self._host.serve()
             if not busy:
                 time.sleep(self._settings.drain_period)
         self.stand_down()
@@ -114,10 +116,10 @@ class RecorderLoop:
             FlightError: the bag could not be written to its end.
         """
         lost = {name: count for name, count in self._recorder.lost.items() if count}
-        self._shell.log(f"{self._recorder.received} messages received, missing: {lost or 0}")
+        self._host.log(f"{self._recorder.received} messages received, missing: {lost or 0}")
         if foreign := self._recorder.foreign:
             names = ", ".join(self._recorder.foreign_names())
-            self._shell.log(f"messages of {names} were left out: {foreign}")
+            self._host.log(f"messages of {names} were left out: {foreign}")
         self._recorder.close()
 
     def _take_round(self) -> tuple[bool, bool]:
@@ -134,7 +136,7 @@ class RecorderLoop:
         self._tell_failure()
         return is_timely, waiting
 
-    def _take_some(self, entry: In) -> tuple[int, int]:
+    def _take_some(self, entry: RawSubscription) -> tuple[int, int]:
         """How many messages were taken, and how many of them were sent before the end.
 
         Those of a pause count, too: behind them in the queue are some to be recorded.
@@ -175,7 +177,7 @@ class RecorderLoop:
     def _tell_failure(self) -> None:
         if self.failure and not self._told:
             self._told = True
-            self._shell.log(f"the bag is no longer written: {self.failure}; the flight goes on")
+            self._host.log(f"the bag is no longer written: {self.failure}; the flight goes on")
 
 
 def main() -> NoReturn:

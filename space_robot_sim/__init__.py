@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .dynamics import aba as forward_dynamics
 from .robot import Robot
-from .robot.dynamics import bias_force, mass_matrix
+from .robot.dynamics import bias_force, forward_dynamics, mass_matrix
 
 if TYPE_CHECKING:
     from space_robot_msgs_py.bag.flight_log import FlightLog

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-from space_robot_msgs_py.ros.node_host import Shell, run_node
+from space_robot_msgs_py.ros.node_host import NodeHost, run_node
 
 from .plant.loop import PlantLoop
 from .plant.settings import PlantNodeSettings
 
 
-def make_loop(shell: Shell, settings: PlantNodeSettings) -> PlantLoop:
+def make_loop(host: NodeHost, settings: PlantNodeSettings) -> PlantLoop:
     """The loop that the settings ask for."""
     if any(settings.faults):
         from .plant.faulty_loop import FaultyPlantLoop
 
-        return FaultyPlantLoop(shell, settings)
-    return PlantLoop(shell, settings)
+        return FaultyPlantLoop(host, settings)
+    return PlantLoop(host, settings)
 
 
 def main() -> NoReturn:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
 import sys
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -18,10 +20,17 @@ else:
     )
     settings.load_profile("ci")
 
+from flights import Flown, Start, ros_environment, space_robot
+from paths import CONFIG
+
 from space_robot_control.flight.graph.domain import ros_domain
+from space_robot_control.flight.node_modules import MODULES
 from space_robot_sim.robot import Robot
 
-ROBOTS = Path(__file__).resolve().parent.parent / "config" / "robots"
+if TYPE_CHECKING:
+    from ground import Ground
+
+ROBOTS = CONFIG / "robots"
 
 TOOLS = ("cvxpy", "hypothesis", "mujoco", "pinocchio")
 """Of the tests only. Where `colcon test` finds one missing, the modules that use it are skipped,
@@ -58,3 +67,63 @@ def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
     with ros_domain() as number:
         yield number
+
+
+@pytest.fixture(scope="session")
+def fly(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Flown]:
+    """Fly a graph with the given options; each set of options flies once a session."""
+    pytest.importorskip("rclpy")
+    flown: dict[tuple[str, ...], Flown] = {}
+
+    def run(*options: str) -> Flown:
+        if options not in flown:
+            bag = tmp_path_factory.mktemp("flights") / "bag"
+            result = space_robot("fly", *options, "--bag", str(bag), "--json")
+            assert result.returncode == 0, result.stderr
+            flown[options] = Flown(json.loads(result.stdout), bag, result.stderr)
+        return flown[options]
+
+    return run
+
+
+@pytest.fixture
+def free_domain() -> int:
+    """Of nobody: a flight will take it."""
+    with ros_domain() as domain:
+        return domain
+
+
+@pytest.fixture
+def start(domain: int) -> Iterator[Start]:
+    """Start nodes in a domain of their own; what still runs at the end is stopped."""
+    running: list[subprocess.Popen[str]] = []
+
+    def run(node: str, **parameters: object) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", MODULES[node]]
+        if parameters:
+            command.append("--ros-args")
+        for name, value in parameters.items():
+            command += ["-p", f"{name.replace('__', '.')}:={value}"]
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            env={**ros_environment(), "ROS_DOMAIN_ID": str(domain)},
+        )  # fmt: skip
+        running.append(process)
+        return process
+
+    yield run
+    for process in running:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+@pytest.fixture
+def ground(domain: int) -> Iterator[Ground]:
+    """A node of the test in the same domain."""
+    pytest.importorskip("rclpy")
+    from ground import Ground
+
+    it = Ground(domain)
+    yield it
+    it.close()

@@ -15,6 +15,6 @@ All are summed up over blocks of a flight (`blocks`), so that it may be longer t
 
 from .excerpt import excerpt
 from .metrics import tracking_error
-from .report import Analysis, analyse
+from .report import Analysis, analyze
 
-__all__ = ["Analysis", "analyse", "excerpt", "tracking_error"]
+__all__ = ["Analysis", "analyze", "excerpt", "tracking_error"]

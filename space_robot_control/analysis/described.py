@@ -1,4 +1,4 @@
-"""What a flight's description says beyond names: its robot, its actuators' limits, its Mbar.
+"""What a flight's description says beyond names: its robot, its actuators' limits, its h_bar.
 
 A bag carries the numbers. One that does not (an older one, or of another recorder) is taken at its
 names' word: the robot, case and gains of that name here and now. Files and modules that it names
@@ -77,7 +77,7 @@ def torque_limits(log: FlightLog) -> TorqueLimits:
 
 
 def estimator(log: FlightLog) -> tuple[HBar, float]:
-    """Hbar of the laws' time-delay estimate, and the weight of its low-pass (0: none).
+    """h_bar of the laws' time-delay estimate, and the weight of its low-pass (0: none).
 
     Raises:
         InputError: the law is not recorded, and has no estimate or is not described.
@@ -113,7 +113,7 @@ def _described_h_bar(log: FlightLog) -> Array:
     """Of a bag without the laws in force, at its description's word."""
     flight = log.flight
     if flight.get("swaps"):
-        raise NotDescribedError("laws were swapped in flight, so no one Hbar holds")
+        raise NotDescribedError("laws were swapped in flight, so no one h_bar holds")
     if not (name := flight.get("controller")):
         raise NotDescribedError("the bag does not say which law was flown")
     if isinstance(gains := flight.get("gains_used"), dict):

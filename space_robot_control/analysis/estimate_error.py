@@ -1,9 +1,10 @@
 """How far the time-delay estimate N_hat was from N, from recorded motion and torque alone.
 
-``N = F_S - Mbar rhodd`` (33) is all that the constant diagonal inertia Mbar (the gain ``h_bar``)
-leaves out; ``N_hat(t) = N(t - delta)`` (35), (36). The controller forms N_hat from the pair that
-`space_robot_control.controller.time_delay_estimation` keeps: the torque *applied* over the last interval and
-the mean acceleration over it. Both are in a bag, so N_hat follows without the telemetry.
+``N = F_S - h_bar rhodd`` (33) is all that the constant diagonal inertia h_bar (the gain ``h_bar``)
+leaves out; ``N_hat(t) = N(t - delta)`` (35), (36). The controller forms N_hat from the pair of
+`space_robot_control.controller.time_delay_estimation`: the torque *applied* over the last
+interval and the mean acceleration over it. Both are in a bag, so N_hat follows without the
+telemetry.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from .metrics import AxisMaximum, AxisRms, Table, axis_groups
 
 Array = NDArray[np.float64]
 HBar = Callable[[FlightLog], Array]
-"""Hbar in force in the rows of a log: (m,), or (N, m) with NaN under a law without an estimate."""
+"""h_bar in force in the rows of a log: (m,), or (N, m) with NaN under a law without an estimate."""
 
 
 def neglected_force(log: FlightLog, h_bar: Array) -> Array:
@@ -112,7 +113,7 @@ class EstimateErrors:
         h_bar = self._h_bar(part)
         if h_bar.ndim == 2:
             h_bar = h_bar[known]
-        # the pair outlasts a change of law or gains, its Hbar does not
+        # the pair outlasts a change of law or gains, its h_bar does not
         estimate = pair[0][:-1] - h_bar * pair[1][:-1]
         error: Array = force[known] - h_bar * acceleration[known] - estimate
         there = np.broadcast_to(np.isfinite(h_bar).all(axis=-1), len(error))

@@ -20,7 +20,7 @@ def render(
     """The page, without references to anything outside itself.
 
     Args:
-        reports: of `analyse`, by name of the bag.
+        reports: of `analyze`, by name of the bag.
         descriptions: what was flown, as the bags have it.
         pictures: of all of them.
     """

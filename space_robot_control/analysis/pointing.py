@@ -1,6 +1,6 @@
 """Where the end effector points in the inertial frame: what the mission is flown for.
 
-The tool's pose follows from base attitude and joint angles (`space_robot_sim.robot.tool.tool_pose`), once
+The tool's pose follows from base attitude and joint angles (`space_robot_sim.robot.tool`), once
 with the measured ones and once with the desired ones. The base's position is free in this mission
 ("semi-floating"), so both poses share it and its drift is given separately.
 """

@@ -23,11 +23,11 @@ DESCRIBED = ("controller", "case", "gains", "robot")
 """What a report repeats of a flight's description."""
 
 
-def analyse(log: FlightLog) -> dict[str, Any]:
+def analyze(log: FlightLog) -> dict[str, Any]:
     """The flight's report, the same from a graph flight, an in-process one, or a bag.
 
     A figure that this flight does not have is None; ``unavailable`` says why, by its key. Of a
-    flight with gaps (a broken bag) the longest stretch without one is analysed; ``damage`` says so.
+    flight with gaps (a broken bag) the longest stretch without one is analyzed; ``damage`` says so.
 
     Raises:
         InputError: no tick has both a state and a reference.
@@ -39,7 +39,7 @@ def analyse(log: FlightLog) -> dict[str, Any]:
 
 
 class Analysis:
-    """`analyse` of a flight that comes block by block, as `blocks_of` cuts it and without gaps."""
+    """`analyze` of a flight that comes block by block, as `blocks_of` cuts it and without gaps."""
 
     def __init__(self) -> None:
         self.ticks = 0
@@ -111,7 +111,7 @@ def _without_gaps(log: FlightLog) -> FlightLog:
         raise InputError("no tick has both a state and a reference")
     if found.ticks < log.ticks:
         start, stop = found.time[0], found.time[-1]
-        said = f"analysed from t = {start:.4f} to {stop:.4f} s, the longest stretch without a gap"
+        said = f"analyzed from t = {start:.4f} to {stop:.4f} s, the longest stretch without a gap"
         found.damage += (said,)
     return found
 

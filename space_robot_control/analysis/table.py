@@ -73,7 +73,7 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
     """All figures of the reports, a line each.
 
     Args:
-        reports: of `analyse`.
+        reports: of `analyze`.
         brief: without RMS and chatter, which a table of their own shows.
     """
     found = [] if brief else list(_rms_and_chatter(reports))

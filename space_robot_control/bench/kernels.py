@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_sim.dynamics.aba import forward_dynamics_into
+from space_robot_sim.dynamics.aba import aba
 from space_robot_sim.plant.integrator import state_derivative
 from space_robot_sim.plant.plant import advance
 
@@ -22,12 +22,12 @@ Block = NDArray[Any]
 
 @kernel
 def plant_steps(
-    block: Block, late: Array, torque: Array, tick: int, steps: int, period: float
+    block: Block, command_delay_buffer: Array, torque: Array, tick: int, steps: int, period: float
 ) -> float:
     """Steps of a `Plant` from ``tick`` on under one torque; returns the fastest rate at the end."""
     memory, fastest = block[0], 0.0
     for k in range(tick, tick + steps):
-        fastest = advance(memory, late, torque, k, period)
+        fastest = advance(memory, command_delay_buffer, torque, k, period)
     return fastest
 
 
@@ -38,7 +38,7 @@ def forward_dynamics_calls(block: Block, force: Array, calls: int) -> None:
     x, stages, n = memory.x, memory.stages, memory.joint_positions.size
     out = stages.slope[0, 7 + n :]
     for _ in range(calls):
-        forward_dynamics_into(
+        aba(
             memory.model, x[3:7], x[7 : 7 + n], x[10 + n : 13 + n], x[13 + n :], force,
             stages.data, out,
         )  # fmt: skip

@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.ros.node_host import Shell, run_node
+from space_robot_msgs_py.ros.node_host import NodeHost, run_node
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.plant.loop import PlantLoop
 from space_robot_sim.plant.plant import Plant
@@ -87,9 +87,9 @@ class TimedPlantLoop(PlantLoop):
 
     file = ""
 
-    def __init__(self, shell: Shell, settings: PlantNodeSettings) -> None:
+    def __init__(self, host: NodeHost, settings: PlantNodeSettings) -> None:
         """See `PlantLoop`."""
-        super().__init__(shell, settings)
+        super().__init__(host, settings)
         self._watch = watch = Stopwatch()
         watch.attach(self._states, "encode", "encode state")
         watch.attach(self._joint_states, "publish", "publish joints")
@@ -117,9 +117,9 @@ class TimedControllerLoop(ControllerLoop):
 
     file = ""
 
-    def __init__(self, shell: Shell, settings: ControllerNodeSettings) -> None:
+    def __init__(self, host: NodeHost, settings: ControllerNodeSettings) -> None:
         """See `ControllerLoop`."""
-        super().__init__(shell, settings)
+        super().__init__(host, settings)
         self._watch = watch = Stopwatch()
         joints, base = self._states.inputs
         watch.attach(joints, "take", "take joints")

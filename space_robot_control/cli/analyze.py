@@ -76,7 +76,7 @@ def analyze(
     """  # fmt: skip
     from space_robot_msgs_py.bag.reader import read_flight
 
-    from ..analysis import analyse, excerpt
+    from ..analysis import analyze, excerpt
     from ..analysis.export import check_free, write_csv, write_parquet, write_text
 
     names = _names(bags)
@@ -99,7 +99,7 @@ def analyze(
     descriptions: dict[str, dict[str, Any]] = {}
     for name, bag in zip(names, bags, strict=True):
         log = excerpt(read_flight(bag, remap, trust), from_s, to_s)
-        reports[name], descriptions[name] = analyse(log), log.flight
+        reports[name], descriptions[name] = analyze(log), log.flight
         for write, paths in exports:
             write(log, paths[name])
             click.echo(f"wrote {paths[name]}", err=True)

@@ -49,12 +49,12 @@ def failed_report(
 def _figures(bag: Path | None) -> dict[str, Any]:
     from space_robot_msgs_py.bag.reader import read_flight
 
-    from ..analysis import analyse
+    from ..analysis import analyze
 
     if bag is None or not bag.exists():
         return {}
     try:
-        return analyse(read_flight(bag, trust=True))
+        return analyze(read_flight(bag, trust=True))
     except InputError:  # it has not one whole tick
         return {}
 

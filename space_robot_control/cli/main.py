@@ -46,11 +46,11 @@ def cli() -> None:
 
 
 def _plan(**options: Any) -> Any:
-    from space_robot_msgs_py.config.validation import check
+    from space_robot_msgs_py.config.validation import validate
 
     from ..flight.plan import Flight, FlightPlan
 
-    return Flight(check(FlightPlan, options, "options"))
+    return Flight(validate(FlightPlan, options, "options"))
 
 
 def _faults(context: click.Context, given: Sequence[str]) -> Sequence[str]:
@@ -104,15 +104,16 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
       space-robot fly --command-latency-ticks 2
       space-robot fly --swap 5:tde_smc --swap 10:tde_stc
       space-robot fly --fault kill_controller@3 --restart-controller
-      space-robot fly --fault drop_state@2-4:0.1 --fault noise_rate@0:1e-5 --seed 7
+      space-robot fly --fault drop_state@2-4:0.1 --fault noise_gyro@0:1e-5 --seed 7
     """
+    from ..analysis import analyze
     from ..flight.graph.orchestrator import fly as fly_graph
     from .failure import told_as_json
 
     flight = _plan(**options)
     bag = bag or flight.default_bag()
     with told_as_json(flight, bag, as_json):
-        report = fly_graph(flight, bag)
+        report = fly_graph(flight, bag, analyze)
     _report(report, as_json)
     if failures := report["graph"]["failures"]:
         from space_robot_msgs_py.errors import FlightError

@@ -42,7 +42,7 @@ def stability(initial_error: float, as_json: bool, plot: Path | None, **options:
       space-robot stability --case 4-2 --json
       space-robot stability --gains tuned --plot figures
     """  # fmt: skip
-    from space_robot_msgs_py.config.validation import check
+    from space_robot_msgs_py.config.validation import validate
 
     from ..flight.compilation import compile_kernels
     from ..flight.plan import FlightPlan
@@ -50,7 +50,7 @@ def stability(initial_error: float, as_json: bool, plot: Path | None, **options:
     from ..paper.stability import report, study
     from ..paper.stability.display import print_study
 
-    plan = check(FlightPlan, options, "options")
+    plan = validate(FlightPlan, options, "options")
     if plot:
         _make_folder(plot)
     compile_kernels()

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.files import named_file
-from space_robot_msgs_py.ros.endpoints import SPIN_S, Out, flush
+from space_robot_msgs_py.ros.endpoints import SPIN_S, RawPublisher, flush
 from space_robot_msgs_py.ros.health import Health, Level
-from space_robot_msgs_py.ros.node_host import Shell
+from space_robot_msgs_py.ros.node_host import NodeHost
 from space_robot_msgs_py.wire.codecs import CommandCodec
 from space_robot_msgs_py.wire.plain_codecs import LawCodec, TelemetryCodec
 from space_robot_msgs_py.wire.stamp_guard import StampGuard
@@ -35,10 +35,10 @@ class ControllerLoop:
 
     controller_class: ClassVar[type[Controller]] = Controller
 
-    def __init__(self, shell: Shell, settings: ControllerNodeSettings) -> None:
-        self._shell, self._settings = shell, settings
+    def __init__(self, host: NodeHost, settings: ControllerNodeSettings) -> None:
+        self._host, self._settings = host, settings
         robot = Robot.from_yaml(named_file("robots", settings.robot))
-        self._laws = LawSet(shell, settings, robot.n + 3)
+        self._laws = LawSet(host, settings, robot.n + 3)
         self._laws.warm_up(robot)
         self._controller = self.controller_class(
             robot, self._laws.chosen, settings.period, settings.acceleration_filter_hz
@@ -47,25 +47,25 @@ class ControllerLoop:
         self._stamps = StampGuard(settings.longest_jump)
         timebase = settings.timebase
         spin_s = 0.0 if settings.fifo_priority else SPIN_S
-        self._states = StateInput(shell.node, robot, timebase, spin_s)
-        self._references = ReferenceInput(shell, robot, timebase, settings.reference_timeout)
+        self._states = StateInput(host.node, robot, timebase, spin_s)
+        self._references = ReferenceInput(host, robot, timebase, settings.reference_timeout)
         self._commands = CommandCodec(robot.axis_names, timebase)
         self._telemetry = TelemetryCodec(robot.axis_names)
         self._law = LawCodec(timebase)
-        node = shell.node
-        self._command_out = Out(node, topics.COMMAND)
-        self._telemetry_out = Out(node, topics.TELEMETRY)
-        self._law_out = Out(node, topics.LAW)
+        node = host.node
+        self._command_out = RawPublisher(node, topics.COMMAND)
+        self._telemetry_out = RawPublisher(node, topics.TELEMETRY)
+        self._law_out = RawPublisher(node, topics.LAW)
         self.outputs = (self._command_out, self._telemetry_out, self._law_out)
         self._answered, self._answer = -1, b""
         self._state_at = time.monotonic()
 
     def run(self) -> None:
         """Answer states until told to stop."""
-        shell = self._shell
-        shell.wait_for_listeners(self.outputs, self._settings.wait_for)
+        host = self._host
+        host.wait_for_listeners(self.outputs, self._settings.wait_for)
         look_ahead = 0.0
-        while not shell.stopping:
+        while not host.stopping:
             tick = self._states.take()
             if tick is None:
                 self._references.take()  # ahead of need
@@ -74,12 +74,12 @@ class ControllerLoop:
                 if self._state_at > look_ahead:
                     self._references.take()
                     look_ahead = self._state_at + LOOK_AHEAD_S
-            shell.serve()
+            host.serve()
         flush(self.outputs, FLUSH_S)
 
     def stand_down(self) -> None:
         """Answer one more state, with no torque: the plant holds that."""
-        if self._answered < 0 or not self._shell.node.count_publishers(topics.JOINT_STATES.name):
+        if self._answered < 0 or not self._host.node.count_publishers(topics.JOINT_STATES.name):
             return
         until = time.monotonic() + STAND_DOWN_S
         while time.monotonic() < until:
@@ -139,7 +139,7 @@ class ControllerLoop:
         mode = self._supervisor.mode
         command = self._supervisor.answer(state, *reference)
         if self._supervisor.mode is not mode:
-            self._shell.report_soon()
+            self._host.report_soon()
         self._answer = self._commands.encode(command)
         self._command_out.publish(self._answer)
         self._answered = tick
@@ -159,7 +159,7 @@ class ControllerLoop:
         if stamps.is_new_time:
             references.begin(tick)
             if last >= 0:
-                self._shell.log(f"a new time begins at tick {tick}, after {last}")
+                self._host.log(f"a new time begins at tick {tick}, after {last}")
         references.now = tick
         self._state_at = time.monotonic()
         return True

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.ros.endpoints import FollowedIn, TakenByLoop, Waiter
-from space_robot_msgs_py.ros.node_host import Shell
+from space_robot_msgs_py.ros.endpoints import FollowedSubscription, PolledCallbackGroup, Waiter
+from space_robot_msgs_py.ros.node_host import NodeHost
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 from space_robot_sim.robot import Robot
@@ -34,9 +34,9 @@ WAIT_TOLD_S = 0.5
 class ReferenceInput:
     """Takes both halves of the reference into a `ReferenceBuffer`."""
 
-    def __init__(self, shell: Shell, robot: Robot, timebase: Timebase, timeout_s: float) -> None:
+    def __init__(self, host: NodeHost, robot: Robot, timebase: Timebase, timeout_s: float) -> None:
         """``timeout_s``: how long `at` waits for the mission."""
-        self._shell, self._timeout_s = shell, timeout_s
+        self._host, self._timeout_s = host, timeout_s
         self.buffer = ReferenceBuffer(robot.n)
         self.rejected: Counter[str] = Counter()
         """Messages not used, by reason."""
@@ -47,14 +47,14 @@ class ReferenceInput:
         self._waits_since = 0.0
         """When the wait began that has not ended well yet; 0: none."""
         codec, buffer = ReferenceCodec(robot.joint_names, timebase), self.buffer
-        node, group = shell.node, TakenByLoop()
+        node, group = host.node, PolledCallbackGroup()
         self._halves = (
             _Half(
-                FollowedIn(node, topics.REFERENCE_JOINTS, group, QUEUE_DEPTH),
+                FollowedSubscription(node, topics.REFERENCE_JOINTS, group, QUEUE_DEPTH),
                 codec.decode_joints, buffer.add_joints,
             ),
             _Half(
-                FollowedIn(node, topics.REFERENCE_BASE, group, QUEUE_DEPTH),
+                FollowedSubscription(node, topics.REFERENCE_BASE, group, QUEUE_DEPTH),
                 codec.decode_base, buffer.add_base,
             ),
         )  # fmt: skip
@@ -73,7 +73,7 @@ class ReferenceInput:
         """
         buffer = self.buffer
         if not buffer.covers(tick) and not self._wait(tick):
-            held = None if self._shell.stopping else buffer.hold(tick)
+            held = None if self._host.stopping else buffer.hold(tick)
             if held:
                 self.is_missing, self._waits_since = True, 0.0
                 self.held += 1
@@ -91,14 +91,14 @@ class ReferenceInput:
         self._waits_since = self._waits_since or begin
         until = begin + (0.0 if self.is_missing else self._timeout_s)
         while not self.buffer.covers(tick):
-            if self._shell.stopping:
+            if self._host.stopping:
                 return False
             has_come, now = self.take(), time.monotonic()
             if now >= until + (DRAIN_S if has_come else 0.0):
                 return self.buffer.covers(tick)
             if not has_come:
                 self._waiter.wait(PATIENCE_S)
-            self._shell.serve()
+            self._host.serve()
         return True
 
 
@@ -106,7 +106,7 @@ class _Half:
     """One of the two topics; what another than the mission sends only fills gaps."""
 
     def __init__(
-        self, source: FollowedIn, decode: Callable[[bytes], tuple[int, Array]],
+        self, source: FollowedSubscription, decode: Callable[[bytes], tuple[int, Array]],
         add: Callable[[int, Array, bool], bool],
     ) -> None:  # fmt: skip
         self.input, self._decode, self._add = source, decode, add

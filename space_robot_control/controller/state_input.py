@@ -8,7 +8,12 @@ from rclpy.node import Node
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.ros.endpoints import FollowedIn, TakenByLoop, Waiter, take_or_wait
+from space_robot_msgs_py.ros.endpoints import (
+    FollowedSubscription,
+    PolledCallbackGroup,
+    Waiter,
+    take_or_wait,
+)
 from space_robot_msgs_py.samples import RobotState, Timebase
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.codecs import StateCodec
@@ -33,9 +38,9 @@ class StateInput:
         """Messages not used, by reason."""
         self._timebase = timebase
         self.codec = StateCodec(robot.joint_names, timebase)
-        group = TakenByLoop()
-        self._joints = FollowedIn(node, topics.JOINT_STATES, group)
-        self._base = FollowedIn(node, topics.BASE_STATE, group)
+        group = PolledCallbackGroup()
+        self._joints = FollowedSubscription(node, topics.JOINT_STATES, group)
+        self._base = FollowedSubscription(node, topics.BASE_STATE, group)
         self.inputs = self._joints, self._base
         self._joints_waiter = Waiter(node, self._joints, spin_s=spin_s)
         self._base_waiter = Waiter(node, self._base, spin_s=spin_s)
@@ -71,7 +76,7 @@ class StateInput:
         """The state last taken was not good."""
         self._reject(reason, self._joints, self._base)
 
-    def _reject(self, reason: str, *inputs: FollowedIn) -> None:
+    def _reject(self, reason: str, *inputs: FollowedSubscription) -> None:
         self.rejected[reason] += 1
         for entry in inputs:
             entry.source.doubt()

@@ -1,6 +1,6 @@
 """The time-delay estimate (35), (36), shared by every law that uses one.
 
-``N_hat(t) = F_S(t - delta) - Hbar rhodd(t - delta)`` holds only if the force is the one that was
+``N_hat(t) = F_S(t - delta) - h_bar rhodd(t - delta)`` holds only if the force is the one that was
 *applied* while the acceleration was measured. Under zero-order hold the backward difference of
 rhodot is the mean acceleration over the last interval, so it pairs with the force that the plant
 reports as applied over that interval: not with the controller's own last output, which may

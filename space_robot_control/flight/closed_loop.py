@@ -59,8 +59,8 @@ def close_loop(plant: Plant, controller: Controller, log: FlightLog, start: int,
         return
     tick, fastest, found = fly_ticks(
         law_pointer(type(law).kernel), law.gain_matrix, law.memory, law.h_bar, law.uses_model,
-        plant.block, plant.late, controller.block, Rows.of(log), log.first_tick, start, stop,
-        plant.period,
+        plant.block, plant.command_delay_buffer, controller.block, Rows.of(log), log.first_tick,
+        start, stop, plant.period,
     )  # fmt: skip
     plant.state.tick = tick
     if found != USABLE:
@@ -104,8 +104,8 @@ def law_pointer(law: Callable[..., None]) -> Any:
 @kernel
 def fly_ticks(
     law: Callable[..., None], gains: Array, law_memory: Array, h_bar: Array, uses_model: bool,
-    plant_block: Block, late: Array, controller_block: Block, rows: Rows, first_tick: int,
-    start: int, stop: int, period: float,
+    plant_block: Block, command_delay_buffer: Array, controller_block: Block, rows: Rows,
+    first_tick: int, start: int, stop: int, period: float,
 ) -> tuple[int, float, int]:  # fmt: skip
     """The loop of `close_loop` for a law given as a function pointer.
 
@@ -137,7 +137,7 @@ def fly_ticks(
         rows.telemetry[row, 1] = law_memory[1]
         rows.telemetry[row, 2] = memory.n_hat
         rows.telemetry[row, 3] = memory.error
-        fastest = advance(plant, late, torque, k, period)
+        fastest = advance(plant, command_delay_buffer, torque, k, period)
         if not fastest <= RATE_LIMIT:
             return k + 1, fastest, USABLE
     return stop, fastest, USABLE

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from pydantic import ByteSize, Field
 
 from space_robot_msgs_py.bag.mcap_file import Compression
-from space_robot_msgs_py.config.validation import Strict, one_of, short
+from space_robot_msgs_py.config.validation import StrictModel, one_of, short
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.faults.catalogue import KINDS, parse_faults
 from space_robot_sim.plant.faults import PlantFaults
@@ -29,7 +29,7 @@ from .software import commit, versions
 NO_FRICTION = {"friction.coulomb": 0.0, "friction.viscous": 0.0}
 
 
-class FlightPlan(Strict):
+class FlightPlan(StrictModel):
     """The options of ``fly`` and ``simulate``."""
 
     controller: str = "tde_stc"

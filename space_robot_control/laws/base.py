@@ -55,7 +55,7 @@ class ControlLaw(ABC):
         """The gains, a row each in the order of ``gain_descriptions``."""
         has_estimate = self.uses_time_delay_estimate()
         self.h_bar = self.gain_matrix[names.index("h_bar")] if has_estimate else np.zeros(0)
-        """(m,) Hbar of the time-delay estimate; empty if the law has none."""
+        """(m,) h_bar of the time-delay estimate; empty if the law has none."""
         self.gains = gains
         self.sliding_surface = np.zeros(axes)
         """s of the last tick; stays zero for a law without one."""

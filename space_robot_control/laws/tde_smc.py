@@ -29,11 +29,11 @@ def time_delay_sliding_mode(
 
 
 class TimeDelaySlidingMode(CompiledLaw):
-    """``F_S = Hbar (rhodd_d + lambda edot) + N_hat + g sign(s)``, ``s = edot + lambda e``."""
+    """``F_S = h_bar (rhodd_d + lambda edot) + N_hat + g sign(s)``, ``s = edot + lambda e``."""
 
     name = "tde_smc"
     gain_descriptions: ClassVar[dict[str, str]] = {
-        "h_bar": "constant inertia Hbar of (33), kg m2",
+        "h_bar": "constant inertia h_bar of (33), kg m2",
         "lambda": "slope of the sliding surface (38), 1/s",
         "g": "switching gain of (59), N m",
     }

@@ -30,14 +30,14 @@ def time_delay_super_twisting(
 
 
 class TimeDelaySuperTwisting(CompiledLaw):
-    """``F_S = Hbar u_STC + N_hat``, ``s = edot + lambda e``.
+    """``F_S = h_bar u_STC + N_hat``, ``s = edot + lambda e``.
 
     ``u_STC = rhodd_d + lambda edot + K_1 |s|^1/2 sign(s) + psi``, psi the integral of K_2 sign(s).
     """
 
     name = "tde_stc"
     gain_descriptions: ClassVar[dict[str, str]] = {
-        "h_bar": "constant inertia Hbar of (33), kg m2",
+        "h_bar": "constant inertia h_bar of (33), kg m2",
         "lambda": "slope of the sliding surface (38), 1/s",
         "k_1": "K_1 of (40)",
         "k_2": "K_2 of (40), 1/s3",

@@ -32,14 +32,14 @@ def time_delay_terminal_sliding_mode(
 
 
 class TimeDelayTerminalSlidingMode(CompiledLaw):
-    """``F_S = Hbar (u_PD + K_1 |s|^1/2 sign(s)) + N_hat``.
+    """``F_S = h_bar (u_PD + K_1 |s|^1/2 sign(s)) + N_hat``.
 
     ``s = integral of (edd + K_D edot + K_P e)`` from when the law is switched on, so s(0) = 0.
     """
 
     name = "tde_tsmc"
     gain_descriptions: ClassVar[dict[str, str]] = {
-        "h_bar": "constant inertia Hbar of (33), kg m2",
+        "h_bar": "constant inertia h_bar of (33), kg m2",
         "k_p": "K_P of (31), 1/s2",
         "k_d": "K_D of (31), 1/s",
         "k_1": "reaching gain K_1 of (60)",

@@ -5,9 +5,14 @@ from __future__ import annotations
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.ros.endpoints import FollowedIn, Out, TakenByLoop, Waiter
+from space_robot_msgs_py.ros.endpoints import (
+    FollowedSubscription,
+    PolledCallbackGroup,
+    RawPublisher,
+    Waiter,
+)
 from space_robot_msgs_py.ros.health import Health
-from space_robot_msgs_py.ros.node_host import Shell
+from space_robot_msgs_py.ros.node_host import NodeHost
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 from space_robot_msgs_py.wire.stamp_guard import StampGuard
@@ -27,16 +32,18 @@ MOST_OWED_S = 60.0
 class MissionLoop:
     """Follows /clock and keeps the stream a lead ahead of it."""
 
-    def __init__(self, shell: Shell, settings: MissionNodeSettings) -> None:
-        self._shell, self._settings = shell, settings
+    def __init__(self, host: NodeHost, settings: MissionNodeSettings) -> None:
+        self._host, self._settings = host, settings
         robot = Robot.from_yaml(named_file("robots", settings.robot))
         self._mission = Mission(robot.n, settings, settings.period)
         self._codec = ReferenceCodec(robot.joint_names, settings.timebase)
-        self._joints = Out(shell.node, topics.REFERENCE_JOINTS)
-        self._base = Out(shell.node, topics.REFERENCE_BASE)
+        self._joints = RawPublisher(host.node, topics.REFERENCE_JOINTS)
+        self._base = RawPublisher(host.node, topics.REFERENCE_BASE)
         self.outputs = (self._joints, self._base)
-        self._clock = FollowedIn(shell.node, topics.CLOCK, TakenByLoop(), depth=CLOCK_DEPTH)
-        self._waiter = Waiter(shell.node, self._clock)
+        self._clock = FollowedSubscription(
+            host.node, topics.CLOCK, PolledCallbackGroup(), depth=CLOCK_DEPTH
+        )
+        self._waiter = Waiter(host.node, self._clock)
         self._stamps = StampGuard(round(MOST_OWED_S / settings.period))
         self._next = 0
         """The first tick that the stream has not reached."""
@@ -55,15 +62,15 @@ class MissionLoop:
 
     def run(self) -> None:
         """Stream until told to stop."""
-        shell, lead_ticks = self._shell, self._settings.lead_ticks
-        while not shell.stopping:
+        host, lead_ticks = self._host, self._settings.lead_ticks
+        while not host.stopping:
             self._greet()
             if self._next < self._stamps.last + lead_ticks:
                 self._send_chunk()
             else:
                 self._waiter.wait(0.05)
             self._take_clock()
-            shell.serve()
+            host.serve()
 
     def _greet(self) -> None:
         """Say again what is still needed if somebody has joined."""
@@ -108,6 +115,6 @@ class MissionLoop:
         if last < 0:  # in the middle of a flight there is nothing to say of its past
             self._next = max(self._next, start)
         elif stamps.is_new_time:
-            self._shell.log(f"a new time begins at tick {tick}, after {last}: the stream too")
+            self._host.log(f"a new time begins at tick {tick}, after {last}: the stream too")
             self._next = start
         return True

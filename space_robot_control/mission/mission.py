@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from space_robot_msgs_py.config.validation import Strict
+from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ReferenceChunk
 
 Array = NDArray[np.float64]
 
 
-class MissionSettings(Strict):
+class MissionSettings(StrictModel):
     """Waypoints as flat lists, as ROS parameters hold them."""
 
     waypoint_times: list[float] = Field(

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue
 
 from ..config.text import printable
-from ..config.validation import check
+from ..config.validation import validate
 from ..errors import InputError
 from .recorder import FLIGHT_KEY
 
@@ -92,7 +92,7 @@ def read_description(noted: Mapping[str, str]) -> dict[str, Any]:
         raise InputError(f"{WHERE} cannot be read: a mapping was expected")
     if fault := next(_unwritable(content, "", _DEEPEST), ""):
         raise InputError(f"{WHERE} cannot be used: {printable(fault)}")
-    check(_Description, content, f"{WHERE} cannot be used")
+    validate(_Description, content, f"{WHERE} cannot be used")
     return content
 
 

@@ -63,7 +63,7 @@ class FlightLog:
     commanded_torque: Array | None = None
     """(N, n+3) N m, the controller's answer to the tick (NaN: none); None: not recorded."""
     latency_s: Array | None = None
-    """(N,) s from the state's sending to its answer's, by the clock of the wall (NaN: none)."""
+    """(N,) s from the state's sending to its answer's, by the wall clock (NaN: none)."""
     telemetry: Array | None = None
     """(N, 4, n+3) s, u, N_hat, e of the controller; of flights in this process only."""
     laws: tuple[LawInForce, ...] = ()

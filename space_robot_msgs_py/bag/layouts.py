@@ -24,7 +24,7 @@ from .kernels import Bytes, Integers, gather
 Array = NDArray[np.float64]
 
 
-class Layout(NamedTuple):
+class MessageLayout(NamedTuple):
     """Where a message's numbers stand, and which of them to take in which order."""
 
     layout: Bytes
@@ -33,7 +33,9 @@ class Layout(NamedTuple):
     order: NDArray[np.intp]
 
     @classmethod
-    def of(cls, message: FixedMessage, slots: Sequence[Slot], order: Sequence[int]) -> Layout:
+    def of(
+        cls, message: FixedMessage, slots: Sequence[Slot], order: Sequence[int]
+    ) -> MessageLayout:
         """Of the numbers in ``slots``, one slot behind the other, those that ``order`` says."""
         runs = [message.run(slot) for slot in slots if slot.count]
         return cls(
@@ -41,16 +43,16 @@ class Layout(NamedTuple):
         )
 
 
-Describe = Callable[[Any], Layout]
+Describe = Callable[[Any], MessageLayout]
 """The layout of a decoded message; a `MessageError`: it does not fit."""
 
 
-class Numbers:
+class FieldReader:
     """Takes the numbers out of the messages of a topic."""
 
     def __init__(self, type_name: str, describe: Describe) -> None:
         self._type, self._describe = type_name, describe
-        self._layout: Layout | None = None
+        self._layout: MessageLayout | None = None
         self.misfits = 0
         """Messages that could not be read."""
         self.fault = ""
@@ -79,7 +81,7 @@ class Numbers:
                 self._layout, left = before, left[1:]
 
     def _take(
-        self, layout: Layout, batch: Batch, left: NDArray[np.intp]
+        self, layout: MessageLayout, batch: Batch, left: NDArray[np.intp]
     ) -> tuple[NDArray[np.bool_], Array]:
         """Which of the messages ``left`` are laid out so, and a row of numbers for each."""
         found = np.empty((len(left), int(layout.runs[:, 1].sum()) // 8))
@@ -95,7 +97,7 @@ class Numbers:
 def joint_states(topic: topics.Topic, names: Sequence[str], fields: Sequence[str]) -> Describe:
     """The ``fields`` of a sensor_msgs/JointState, one behind the other, each in order of names."""
 
-    def describe(message: Any) -> Layout:
+    def describe(message: Any) -> MessageLayout:
         order = name_order(message.name, names, topic.name)
         builder = CdrBuilder()
         builder.header_slot(message.header.frame_id)
@@ -109,7 +111,7 @@ def joint_states(topic: topics.Topic, names: Sequence[str], fields: Sequence[str
                 )
             slots[field] = builder.float64_sequence_slot(count)
         columns = [i * len(names) + k for i in range(len(fields)) for k in order]
-        return Layout.of(builder.build(), [slots[field] for field in fields], columns)
+        return MessageLayout.of(builder.build(), [slots[field] for field in fields], columns)
 
     return describe
 
@@ -118,7 +120,7 @@ def joint_trajectory(names: Sequence[str], timebase: Timebase) -> Describe:
     """Positions, velocities, accelerations of each point of a trajectory_msgs/JointTrajectory."""
     name = topics.REFERENCE_JOINTS.name
 
-    def describe(message: Any) -> Layout:
+    def describe(message: Any) -> MessageLayout:
         order = name_order(message.joint_names, names, name)
         _check_spacing(message.points, timebase, name)
         builder = _begin(message)
@@ -132,12 +134,12 @@ def joint_trajectory(names: Sequence[str], timebase: Timebase) -> Describe:
             builder.float64_sequence_slot(len(point.effort))
             _time_from_start(builder, point)
         columns = [i * len(names) + k for i in range(len(slots)) for k in order]
-        return Layout.of(builder.build(), slots, columns)
+        return MessageLayout.of(builder.build(), slots, columns)
 
     return describe
 
 
-def base_state(message: Any) -> Layout:
+def base_state(message: Any) -> MessageLayout:
     """A sensor_msgs/MultiDOFJointState of one body, in the order of the columns of a log.
 
     Position, quaternion w x y z, linear and angular velocity, torque.
@@ -148,14 +150,14 @@ def base_state(message: Any) -> Layout:
     builder = _begin(message)
     slots = _one_body(builder)
     columns = [0, 1, 2, 6, 3, 4, 5, *range(7, 13), *range(16, 19)]
-    return Layout.of(builder.build(), slots, columns)
+    return MessageLayout.of(builder.build(), slots, columns)
 
 
 def base_trajectory(timebase: Timebase) -> Describe:
     """Quaternion w x y z, angular velocity, acceleration of each point of the base's reference."""
     name = topics.REFERENCE_BASE.name
 
-    def describe(message: Any) -> Layout:
+    def describe(message: Any) -> MessageLayout:
         name_order(message.joint_names, [topics.BASE_FRAME], name)
         _check_spacing(message.points, timebase, name)
         builder = _begin(message)
@@ -168,7 +170,7 @@ def base_trajectory(timebase: Timebase) -> Describe:
             _time_from_start(builder, point)
         wanted = [6, 3, 4, 5, 10, 11, 12, 16, 17, 18]
         columns = [19 * i + k for i in range(len(message.points)) for k in wanted]
-        return Layout.of(builder.build(), slots, columns)
+        return MessageLayout.of(builder.build(), slots, columns)
 
     return describe
 
@@ -197,7 +199,7 @@ def _check_spacing(points: Sequence[Any], timebase: Timebase, topic: str) -> Non
             raise MessageError(f"{topic}: point {i} is not {i} ticks after its message's stamp")
 
 
-def first_number(message: Any) -> Layout:
+def first_number(message: Any) -> MessageLayout:
     """The first number of a std_msgs/Float64MultiArray: of our telemetry, the tick."""
     builder = CdrBuilder()
     builder.uint32(len(message.layout.dim))
@@ -209,7 +211,7 @@ def first_number(message: Any) -> Layout:
     slot = builder.float64_sequence_slot(len(message.data))
     if not slot.count:
         raise MessageError(f"{topics.TELEMETRY.name}: no tick")
-    return Layout.of(builder.build(), [Slot(slot.offset, 1)], [0])
+    return MessageLayout.of(builder.build(), [Slot(slot.offset, 1)], [0])
 
 
 def _begin(message: Any) -> CdrBuilder:

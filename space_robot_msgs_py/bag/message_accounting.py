@@ -31,7 +31,7 @@ LONGEST_JUMP = 20_000
 
 
 @dataclass(slots=True)
-class Coverage:
+class MessageAccounting:
     """Ticks of one topic's messages."""
 
     topic: topics.Topic
@@ -125,7 +125,7 @@ class Coverage:
 
 
 def lost_messages(
-    coverages: Mapping[str, Coverage],
+    coverages: Mapping[str, MessageAccounting],
     excused: frozenset[str] = frozenset(),
     finished: bool = True,
 ) -> dict[str, int]:
@@ -141,7 +141,7 @@ def lost_messages(
     return lost | dict.fromkeys(excused & lost.keys(), 0)
 
 
-def excused_topics(flight: Mapping[str, Any]) -> frozenset[str]:
+def topics_with_allowed_gaps(flight: Mapping[str, Any]) -> frozenset[str]:
     """Topics that may have ticks without a message in a flight of this description.
 
     By the wall clock, or where something fails, the controller does not answer every tick
@@ -155,11 +155,11 @@ def excused_topics(flight: Mapping[str, Any]) -> frozenset[str]:
     return frozenset(topic.name for topic in excused)
 
 
-def unanswered_ticks(coverages: Mapping[str, Coverage], finished: bool = True) -> int:
+def unanswered_ticks(coverages: Mapping[str, MessageAccounting], finished: bool = True) -> int:
     """Ticks without a command."""
     command = coverages[topics.COMMAND.name]
     return command.missing(_last_tick(coverages) if finished else command.last)
 
 
-def _last_tick(coverages: Mapping[str, Coverage]) -> int:
+def _last_tick(coverages: Mapping[str, MessageAccounting]) -> int:
     return max((c.last for c in coverages.values() if c.topic.per_tick), default=-1)

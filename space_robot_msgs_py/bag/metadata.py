@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import BaseModel, Field, ValidationError
 
-from ..config.validation import check, read_yaml
+from ..config.validation import read_yaml, validate
 from ..config.yaml_text import parse_yaml
 from ..errors import InputError
 
@@ -99,4 +99,4 @@ def parse_information(text: str) -> BagInformation | None:
 def _check(content: Any, where: str) -> BagInformation:
     if not isinstance(content, dict):
         raise InputError(f"{where}: not the metadata of a rosbag2 bag")
-    return check(BagInformation, content, where)
+    return validate(BagInformation, content, where)

@@ -24,9 +24,9 @@ from .folder import custom_data, open_bag
 from .gaps import fill_gaps
 from .message_accounting import (
     LONGEST_JUMP,
-    Coverage,
-    excused_topics,
+    MessageAccounting,
     lost_messages,
+    topics_with_allowed_gaps,
     unanswered_ticks,
 )
 from .rows import Rows, stamps_of
@@ -89,7 +89,7 @@ def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
     for topic in REQUIRED:
         if not rows.counts[topic.name]:
             raise missing(topic, bag, selection)
-    log, excused = rows.log, excused_topics(flight)
+    log, excused = rows.log, topics_with_allowed_gaps(flight)
     log.flight = flight
     gone = _gone(selection, rows)
     accounts = noted_accounts(bag.custom_data())
@@ -173,7 +173,7 @@ def timebase_of(
         described_ns = round(described * 1e9)
         if likely_ns is None or likely_ns == described_ns:
             return Timebase(described_ns), []
-        if likely_ns % described_ns == 0 and excused_topics(flight):
+        if likely_ns % described_ns == 0 and topics_with_allowed_gaps(flight):
             return Timebase(described_ns), []  # states were kept back
     if likely_ns is None:
         return Timebase(round(DEFAULT_PERIOD * 1e9)), []
@@ -209,11 +209,11 @@ def _count_lost(
     log = rows.log
     there = selection.topics()
     coverages = {
-        topic.name: rows.coverages.get(topic.name, Coverage(topic))
+        topic.name: rows.coverages.get(topic.name, MessageAccounting(topic))
         for topic in topics.ALL
         if topic.name in rows.coverages or (bag.finished and topic in there)
     }
-    log.lost = lost_messages(coverages, excused_topics(log.flight), bag.finished)
+    log.lost = lost_messages(coverages, topics_with_allowed_gaps(log.flight), bag.finished)
     for name in log.lost if bag.finished else ():
         account, unread = accounts.get(name), gone.get(name, 0)
         if account and rows.counts[name] + unread == account.received + account.strange:

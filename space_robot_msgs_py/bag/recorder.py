@@ -13,7 +13,12 @@ from ..errors import FlightError, MessageError
 from ..samples import Timebase
 from .accounts import COVERAGE_KEY
 from .mcap_file import Compression
-from .message_accounting import Coverage, excused_topics, lost_messages, message_tick
+from .message_accounting import (
+    MessageAccounting,
+    lost_messages,
+    message_tick,
+    topics_with_allowed_gaps,
+)
 from .sources import PARTICIPANT_BYTES, Publishers, Sources, Unknown
 from .writer import BagWriter
 
@@ -51,13 +56,13 @@ class BagRecorder:
         Raises:
             InputError: the bag exists already, or cannot be written.
         """
-        self._excused = excused_topics(flight)
+        self._excused = topics_with_allowed_gaps(flight)
         self._writer = BagWriter(
             path, topics.ALL, {FLIGHT_KEY: json.dumps(dict(flight))}, compression, split_size
         )
         self._chunk_bytes = min(CHUNK_BYTES, split_size or CHUNK_BYTES)
         self._timebase = timebase
-        self.coverages = {topic.name: Coverage(topic) for topic in topics.ALL}
+        self.coverages = {topic.name: MessageAccounting(topic) for topic in topics.ALL}
         self.sources = {
             topic.name: Sources(topic.name, publishers or Unknown()) for topic in topics.ALL
         }
@@ -93,7 +98,7 @@ class BagRecorder:
                 return False
             if sources.begins_anew:
                 sources.begins_anew = False
-                self.coverages[topic.name] = Coverage(topic)
+                self.coverages[topic.name] = MessageAccounting(topic)
         coverage = self.coverages[topic.name]
         strange = coverage.strange
         try:

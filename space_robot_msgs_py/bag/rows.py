@@ -17,14 +17,14 @@ from .flight_log import REFERENCE, STATE, FlightLog
 from .kernels import NO_STAMP, read_stamps
 from .layouts import (
     Describe,
-    Numbers,
+    FieldReader,
     base_state,
     base_trajectory,
     first_number,
     joint_states,
     joint_trajectory,
 )
-from .message_accounting import LONGEST_JUMP, Coverage
+from .message_accounting import LONGEST_JUMP, MessageAccounting
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ class Rows:
         n = len(joint_names)
         self.log = FlightLog.allocate(0, joint_names, timebase)
         self.log.commanded_torque = np.empty((0, n + 3))
-        self.coverages: dict[str, Coverage] = {}
+        self.coverages: dict[str, MessageAccounting] = {}
         self.counts: Counter[str] = Counter()
         """Messages a topic, of every kind."""
         self._origin_ns = origin_ns
@@ -74,7 +74,7 @@ class Rows:
             topics.REFERENCE_BASE: base_trajectory(timebase),
             topics.TELEMETRY: first_number,
         }
-        self._numbers = {topic: Numbers(topic.type, d) for topic, d in describe.items()}
+        self._numbers = {topic: FieldReader(topic.type, d) for topic, d in describe.items()}
         self._laws: list[LawInForce] = []
         self._law_faults: list[str] = []
 
@@ -97,7 +97,7 @@ class Rows:
 
     def take(self, topic: topics.Topic, batch: Batch) -> None:
         """Count the messages of a topic and put what they say into their ticks' rows."""
-        coverage = self.coverages.setdefault(topic.name, Coverage(topic))
+        coverage = self.coverages.setdefault(topic.name, MessageAccounting(topic))
         self.counts[topic.name] += len(batch)
         ticks, known = self._ticks(topic, batch)
         places = np.flatnonzero(known)

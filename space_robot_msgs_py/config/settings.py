@@ -18,13 +18,13 @@ from typing_extensions import Self
 from ..samples import Timebase
 from .files import GRAPH_FILE, config_directory, node_parameters
 from .trees import Tree, merge, nest
-from .validation import Strict, check
+from .validation import StrictModel, validate
 
 Texts = Annotated[list[str], AfterValidator(lambda texts: texts or [""])]
 """Texts of which empty ones count for nothing: ROS has no empty list of strings."""
 
 
-class NodeSettings(Strict):
+class NodeSettings(StrictModel):
     """What every node of the graph is told; each node's schema derives from it."""
 
     node: ClassVar[str]
@@ -65,13 +65,13 @@ class NodeSettings(Strict):
         where = f"{cls.node} parameters"
         given, tree = nest(overrides), Tree()
         base = node_parameters(config_directory() / GRAPH_FILE, cls.node)
-        chosen = check(cls, merge(base, given), where)
+        chosen = validate(cls, merge(base, given), where)
         selected = {name: str(getattr(chosen, name)) for name in cls.selectors}
         for path in cls.layers(selected):
             layer = node_parameters(path, cls.node)
-            check(cls, merge(tree, layer), str(path))
+            validate(cls, merge(tree, layer), str(path))
             tree = merge(tree, layer)
-        return check(cls, merge(tree, given), where)
+        return validate(cls, merge(tree, given), where)
 
 
 def leaves(schema: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -12,7 +12,7 @@ from ..errors import InputError
 from .yaml_text import YamlTextError, parse_yaml, read_file
 
 
-class Strict(BaseModel):
+class StrictModel(BaseModel):
     """Base of what is read from files, parameters and options: no other keys, no other types.
 
     A whole number may stand for a decimal one, and a number for a name (``case: 1``).
@@ -50,7 +50,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
     return content
 
 
-def check(schema: type[Schema], content: Any, where: str) -> Schema:
+def validate(schema: type[Schema], content: Any, where: str) -> Schema:
     """Validate ``content``; ``where`` names its file (and enclosing key) in errors.
 
     Raises:

@@ -1,7 +1,7 @@
 """Publishers and subscriptions for a loop that takes messages itself.
 
 The executor costs more than the loop's whole work, so the loop's subscriptions are kept out of
-it (`TakenByLoop`) and taken by hand as raw bytes; the executor only serves parameters.
+it (`PolledCallbackGroup`) and taken by hand as raw bytes; the executor only serves parameters.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ MOST_REFUSED = 1_000
 """So many messages of others are passed over before the loop may look after other things."""
 
 
-class TakenByLoop(CallbackGroup):
+class PolledCallbackGroup(CallbackGroup):
     """Keeps its subscriptions out of every executor."""
 
     def can_execute(self, entity: Any) -> bool:
@@ -61,7 +61,7 @@ def qos(topic: Topic) -> QoSProfile:
     )
 
 
-class Out:
+class RawPublisher:
     """A publisher of serialized messages."""
 
     def __init__(self, node: Node, topic: Topic) -> None:
@@ -97,17 +97,19 @@ class Out:
         self._publisher.wait_for_all_acked(Duration(seconds=timeout_s))
 
 
-def flush(outputs: Sequence[Out], timeout_s: float) -> None:
-    """`Out.flush` of all, in ``timeout_s`` together."""
+def flush(outputs: Sequence[RawPublisher], timeout_s: float) -> None:
+    """`RawPublisher.flush` of all, in ``timeout_s`` together."""
     until = time.monotonic() + timeout_s
     for output in outputs:
         output.flush(max(0.0, until - time.monotonic()))
 
 
-class In:
+class RawSubscription:
     """A subscription whose messages the loop takes itself, serialized."""
 
-    def __init__(self, node: Node, topic: Topic, group: TakenByLoop, depth: int = 0) -> None:
+    def __init__(
+        self, node: Node, topic: Topic, group: PolledCallbackGroup, depth: int = 0
+    ) -> None:
         self.topic = topic
         profile = qos(topic)
         profile.depth = depth or topic.depth
@@ -130,10 +132,12 @@ class In:
         return self._take_serialized(self.handle, self._type)
 
 
-class FollowedIn(In):
+class FollowedSubscription(RawSubscription):
     """Follows one publisher: what others send at the same time is not taken."""
 
-    def __init__(self, node: Node, topic: Topic, group: TakenByLoop, depth: int = 0) -> None:
+    def __init__(
+        self, node: Node, topic: Topic, group: PolledCallbackGroup, depth: int = 0
+    ) -> None:
         super().__init__(node, topic, group, depth)
         self.source = SourceGuard()
 
@@ -158,7 +162,7 @@ class FollowedIn(In):
 class Waiter:
     """Waits until a subscription has something to take."""
 
-    def __init__(self, node: Node, *inputs: In, spin_s: float = SPIN_S) -> None:
+    def __init__(self, node: Node, *inputs: RawSubscription, spin_s: float = SPIN_S) -> None:
         self.spin_s = spin_s
         self._handles = [entry.handle for entry in inputs]
         context: Any = node.context.handle
@@ -173,7 +177,7 @@ class Waiter:
         self._set.wait(max(1, int(timeout_s * 1e9)))
 
 
-def take_or_wait(entry: In, waiter: Waiter, timeout_s: float) -> bytes | None:
+def take_or_wait(entry: RawSubscription, waiter: Waiter, timeout_s: float) -> bytes | None:
     """The next message of ``entry``: look and yield for a moment, then sleep, then look again."""
     data = entry.take()
     if data is not None:

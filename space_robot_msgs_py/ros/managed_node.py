@@ -17,7 +17,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from ..config.settings import NodeSettings
 from ..errors import InputError, SpaceRobotError
 from .diagnostics import Diagnostics
-from .endpoints import Out
+from .endpoints import RawPublisher
 from .exclusive import Claim, claim_name, foreign_publishers
 from .health import SENT, Health, Level
 from .locks import FileLock
@@ -34,11 +34,11 @@ class Loop(Protocol):
     """What a node does; made with its settings in configure."""
 
     @property
-    def outputs(self) -> Sequence[Out]:
+    def outputs(self) -> Sequence[RawPublisher]:
         """Topics that nobody else may publish."""
 
     def run(self) -> None:
-        """Work while the node is active; return when the shell is stopping, or at the end."""
+        """Work while the node is active; return when the host is stopping, or at the end."""
 
     def stand_down(self) -> None:
         """Leave the graph safe: called on deactivate, and before the end of an active node."""

@@ -22,7 +22,7 @@ from rclpy.signals import SignalHandlerOptions  # noqa: E402
 from ..config.settings import NodeSettings, leaves  # noqa: E402
 from ..config.validation import short  # noqa: E402
 from ..errors import InputError, SpaceRobotError  # noqa: E402
-from .endpoints import Out  # noqa: E402
+from .endpoints import RawPublisher  # noqa: E402
 from .lifeline import hold_to_standard_input  # noqa: E402
 from .managed_node import AUTOSTART, Loop, ManagedNode  # noqa: E402
 from .scheduling import ask_for_fifo  # noqa: E402
@@ -38,7 +38,7 @@ LISTENER_PERIOD_S = 0.02
 REMIND_S = 5.0
 
 
-class Shell:
+class NodeHost:
     """What a loop needs of its process: whether to stop, and time for services."""
 
     def __init__(self, node: ManagedNode[Schema]) -> None:
@@ -85,7 +85,7 @@ class Shell:
         """Report the health at the next `serve`: the mode has changed."""
         self._next_service = self._next_report = 0.0
 
-    def wait_for_listeners(self, outputs: Sequence[Out], names: Sequence[str]) -> None:
+    def wait_for_listeners(self, outputs: Sequence[RawPublisher], names: Sequence[str]) -> None:
         """Return when the named nodes listen to all of ``outputs``, or when stopping."""
         remind = time.monotonic() + REMIND_S
         while not self.stopping:
@@ -102,7 +102,7 @@ class Shell:
 
 def run_node(
     schema: type[Schema],
-    make_loop: Callable[[Shell, Schema], Loop],
+    make_loop: Callable[[NodeHost, Schema], Loop],
     changeable: tuple[str, ...] = (),
     arguments: list[str] | None = None,
 ) -> NoReturn:
@@ -122,15 +122,15 @@ def run_node(
     except Exception as error:  # RCLError is private; whatever it is, the arguments are at fault
         sys.exit(_say(schema, InputError(str(error).splitlines()[0])))
     node: ManagedNode[Schema] = ManagedNode(
-        schema, lambda node, settings: make_loop(shell, settings), changeable
+        schema, lambda node, settings: make_loop(host, settings), changeable
     )
-    shell = Shell(node)
+    host = NodeHost(node)
     code = 0
     try:
         node.claim_name()
         if node.autostart:
             node.start()
-        _live(node, shell)
+        _live(node, host)
     except SpaceRobotError as error:
         code = _say(schema, error)
     try:
@@ -161,9 +161,9 @@ def _answer(schema: type[NodeSettings], others: Sequence[str]) -> None:
     sys.exit(0)
 
 
-def _live(node: ManagedNode[Schema], shell: Shell) -> None:
+def _live(node: ManagedNode[Schema], host: NodeHost) -> None:
     """Run the loop whenever the node is active, until it has come to its end."""
-    while not shell.signalled and not node.is_shut_down:
+    while not host.signalled and not node.is_shut_down:
         if not node.is_active or node.loop is None:
             node.calls.run_one(SERVICE_PERIOD_S)
             node.report()
@@ -171,7 +171,7 @@ def _live(node: ManagedNode[Schema], shell: Shell) -> None:
         gc.collect()
         gc.freeze()  # what lives until the end need not be looked through in the loop
         if node.settings and node.settings.fifo_priority:
-            shell.log(ask_for_fifo(node.settings.fifo_priority))
+            host.log(ask_for_fifo(node.settings.fifo_priority))
         node.run_loop()
         if node.is_active:
             return

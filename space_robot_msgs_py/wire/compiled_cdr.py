@@ -1,4 +1,4 @@
-"""Numbers into fixed-layout messages and out of them, in compiled code.
+"""FieldReader into fixed-layout messages and out of them, in compiled code.
 
 A message is the (1,) structured array of `FixedMessage.block`. What differs from its layout is
 left alone and told by `FOREIGN`: it is then decoded the general way.

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..faults.schedule import Schedule, ScheduledFault
-from ..plant.plant import Plant, PlantMemory
+
+Array = NDArray[np.float64]
 
 
 class ActuatorFaults:
@@ -15,13 +17,17 @@ class ActuatorFaults:
         self._faults = schedule.of("saturate_base", "saturate_joints", "stuck_joint")
         self._acting: list[ScheduledFault] = []
 
-    def apply(self, plant: Plant) -> None:
-        """Make ``plant`` fail as it should over the tick it is about to step."""
-        acting = [fault for fault in self._faults if fault.acts_at(plant.tick)]
+    def apply(self, tick: int, limit: Array, coulomb: Array) -> None:
+        """Make the actuators fail as they should from ``tick`` to the next.
+
+        Args:
+            tick: the tick that is about to be stepped.
+            limit: (n+3,) largest torque of each axis, N m; changed in place.
+            coulomb: (n,) Coulomb friction of each joint, N m; changed in place.
+        """
+        acting = [fault for fault in self._faults if fault.acts_at(tick)]
         if acting == self._acting:
             return
-        memory: PlantMemory = plant.block[0]
-        limit, coulomb = memory.limit, memory.environment.coulomb
         if not self._acting:
             self._sound = limit.copy(), coulomb.copy()
         limit[:], coulomb[:] = self._sound

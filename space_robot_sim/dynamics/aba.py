@@ -39,78 +39,80 @@ Array = NDArray[np.float64]
 
 
 @kernel
-def forward_dynamics_into(
-    model: Model, quaternion: Array, theta: Array, omega_inertial: Array, theta_rate: Array,
-    force: Array, data: Data, out: Array,
+def aba(
+    model: Model, quaternion: Array, joint_positions: Array, omega_inertial: Array,
+    joint_velocities: Array, force: Array, data: Data, out: Array,
 ) -> None:  # fmt: skip
-    """Write into ``out`` (n+6,) the acceleration ``[v0dot, w0dot, thetadd]``.
+    """Write the acceleration ``[v0dot, w0dot, thetadd]`` (n+6,) into ``out``.
 
-    ``force`` (n+6,) is ``[f0, tau0, tau]``, the base's part on inertial axes.
+    ``force`` (n+6,) is ``[f0, tau0, tau]``, the base's part on inertial axes, N and N m.
     """
-    forward_kinematics(model, quaternion, theta, data)
-    spatial_velocities(model, omega_inertial, theta_rate, data)
-    # inwards: what each link's parent feels of it, free about its joint
+    forward_kinematics(model, quaternion, joint_positions, data)
+    spatial_velocities(model, omega_inertial, joint_velocities, data)
+    # inwards: the articulated-body inertia and bias force of each link, free about its joint
     inertia = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     coupling = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     mass = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    moment, linear = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    bias_moment, bias_force = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for i in range(model.mass.size - 1, -1, -1):
         inertia = add_symmetric(inertia, symmetric(data.inertia[i]))
         coupling = skew_added(coupling, vector(data.first_moment[i], 0))
         m = model.mass[i]
         mass = (mass[0] + m, mass[1] + m, mass[2] + m, mass[3], mass[4], mass[5])
-        moment = add(moment, vector(data.bias[i], 0))
-        linear = add(linear, vector(data.bias[i], 3))
+        bias_moment = add(bias_moment, vector(data.bias[i], 0))
+        bias_force = add(bias_force, vector(data.bias[i], 3))
         if i == 0:
             break
-        axis, arm = vector(data.motion[i], 0), vector(data.motion[i], 3)
-        angular = add(transform_symmetric(inertia, axis), transform(coupling, arm))
-        straight = add(transform_transposed(coupling, axis), transform_symmetric(mass, arm))
-        inverse = 1.0 / (dot(axis, angular) + dot(arm, straight))
-        driving = (force[5 + i] - dot(axis, moment) - dot(arm, linear)) * inverse
-        share_angular, share_straight = scale(angular, inverse), scale(straight, inverse)
-        store(share_angular, data.share[i], 0)
-        store(share_straight, data.share[i], 3)
-        data.driving[i] = driving
-        inertia = outer_subtracted(inertia, share_angular, angular)
-        coupling = outer_subtracted_general(coupling, share_angular, straight)
-        mass = outer_subtracted(mass, share_straight, straight)
-        turning, moving = vector(data.coriolis[i], 0), vector(data.coriolis[i], 3)
-        moment = add(moment, scale(angular, driving))
-        moment = add(moment, transform_symmetric(inertia, turning))
-        moment = add(moment, transform(coupling, moving))
-        linear = add(linear, scale(straight, driving))
-        linear = add(linear, transform_transposed(coupling, turning))
-        linear = add(linear, transform_symmetric(mass, moving))
+        angular, linear = vector(data.motion[i], 0), vector(data.motion[i], 3)
+        # U = I^A S, D = S^T U, u = tau - S^T p^A
+        U_angular = add(transform_symmetric(inertia, angular), transform(coupling, linear))
+        U_linear = add(transform_transposed(coupling, angular), transform_symmetric(mass, linear))
+        inverse = 1.0 / (dot(angular, U_angular) + dot(linear, U_linear))
+        u_over_d = (force[5 + i] - dot(angular, bias_moment) - dot(linear, bias_force)) * inverse
+        U_over_D_angular, U_over_D_linear = scale(U_angular, inverse), scale(U_linear, inverse)
+        store(U_over_D_angular, data.U_over_D[i], 0)
+        store(U_over_D_linear, data.U_over_D[i], 3)
+        data.u_over_d[i] = u_over_d
+        # I^a = I^A - U U^T / D,  p^a = p^A + I^a c + U u / D
+        inertia = outer_subtracted(inertia, U_over_D_angular, U_angular)
+        coupling = outer_subtracted_general(coupling, U_over_D_angular, U_linear)
+        mass = outer_subtracted(mass, U_over_D_linear, U_linear)
+        angular, linear = vector(data.coriolis[i], 0), vector(data.coriolis[i], 3)
+        bias_moment = add(bias_moment, scale(U_angular, u_over_d))
+        bias_moment = add(bias_moment, transform_symmetric(inertia, angular))
+        bias_moment = add(bias_moment, transform(coupling, linear))
+        bias_force = add(bias_force, scale(U_linear, u_over_d))
+        bias_force = add(bias_force, transform_transposed(coupling, angular))
+        bias_force = add(bias_force, transform_symmetric(mass, linear))
     # the base floats: no joint to the ground
-    turning, moving = solve_spatial(
+    angular, linear = solve_spatial(
         inertia, coupling, mass,
-        subtract(vector(force, 3), moment), subtract(vector(force, 0), linear),
+        subtract(vector(force, 3), bias_moment), subtract(vector(force, 0), bias_force),
     )  # fmt: skip
-    store(moving, out, 0)
-    store(turning, out, 3)
-    # outwards
+    store(linear, out, 0)
+    store(angular, out, 3)
+    # outwards: the accelerations
     for i in range(1, model.mass.size):
-        turning = add(turning, vector(data.coriolis[i], 0))
-        moving = add(moving, vector(data.coriolis[i], 3))
-        rate = data.driving[i] - dot(vector(data.share[i], 0), turning)
-        rate -= dot(vector(data.share[i], 3), moving)
-        out[5 + i] = rate
-        turning = add(turning, scale(vector(data.motion[i], 0), rate))
-        moving = add(moving, scale(vector(data.motion[i], 3), rate))
+        angular = add(angular, vector(data.coriolis[i], 0))
+        linear = add(linear, vector(data.coriolis[i], 3))
+        acceleration = data.u_over_d[i] - dot(vector(data.U_over_D[i], 0), angular)
+        acceleration -= dot(vector(data.U_over_D[i], 3), linear)
+        out[5 + i] = acceleration
+        angular = add(angular, scale(vector(data.motion[i], 0), acceleration))
+        linear = add(linear, scale(vector(data.motion[i], 3), acceleration))
 
 
 @kernel
 def solve_spatial(
     inertia: Symmetric, coupling: Matrix, mass: Symmetric, moment: Vector, force: Vector
 ) -> tuple[Vector, Vector]:
-    """Angular and linear acceleration of a body with a spatial inertia under a wrench."""
-    lightness = inverse_symmetric(mass)
+    """Angular and linear acceleration of a body of this spatial inertia under a wrench."""
+    inverse_mass = inverse_symmetric(mass)
     g = coupling
     rows = (
-        transform_symmetric(lightness, (g[0], g[1], g[2])),
-        transform_symmetric(lightness, (g[3], g[4], g[5])),
-        transform_symmetric(lightness, (g[6], g[7], g[8])),
+        transform_symmetric(inverse_mass, (g[0], g[1], g[2])),
+        transform_symmetric(inverse_mass, (g[3], g[4], g[5])),
+        transform_symmetric(inverse_mass, (g[6], g[7], g[8])),
     )
     # Schur complement J - G M^-1 G^T
     complement = (
@@ -121,7 +123,7 @@ def solve_spatial(
         inertia[4] - dot(rows[0], (g[6], g[7], g[8])),
         inertia[5] - dot(rows[1], (g[6], g[7], g[8])),
     )
-    lever = (dot(rows[0], force), dot(rows[1], force), dot(rows[2], force))
-    turning = transform_symmetric(inverse_symmetric(complement), subtract(moment, lever))
-    moving = transform_symmetric(lightness, subtract(force, transform_transposed(g, turning)))
-    return turning, moving
+    coupled = (dot(rows[0], force), dot(rows[1], force), dot(rows[2], force))
+    angular = transform_symmetric(inverse_symmetric(complement), subtract(moment, coupled))
+    linear = transform_symmetric(inverse_mass, subtract(force, transform_transposed(g, angular)))
+    return angular, linear

@@ -1,8 +1,7 @@
-"""``H(rho) qdd + c(rho, qdot) = F`` as the paper derives it (Section II-B).
+"""The inertia matrix H of ``H qdd + c = F`` by the composite-rigid-body algorithm, (8)-(10).
 
-Generalised velocity ``qdot = [v0, w0, thetadot]`` (n+6), inertial frame; order of H's and c's
-rows the same. Both are written in the sums of (8)-(10) and the recursion of (11)-(20), on
-inertial axes about the base CoM.
+Generalised velocity ``qdot = [v0, w0, thetadot]`` (n+6), base part on inertial axes; H's rows have
+the same order. The sums of (8)-(10) are taken on inertial axes about the base CoM.
 """
 
 from __future__ import annotations
@@ -23,25 +22,17 @@ from .algebra import (
     transform_symmetric,
     vector,
 )
-from .kinematics import forward_kinematics
 from .model import Data, Model
 
 Array = NDArray[np.float64]
 
 
 @kernel
-def mass_matrix_into(model: Model, quaternion: Array, theta: Array, data: Data, out: Array) -> None:
-    """Write into ``out`` (n+6, n+6) the inertia matrix H, (8)-(10)."""
-    forward_kinematics(model, quaternion, theta, data)
-    composite_bodies(model, data, out)
+def crba(model: Model, data: Data, out: Array) -> None:
+    """Write the inertia matrix H (n+6, n+6) into ``out``, after `forward_kinematics`.
 
-
-@kernel
-def composite_bodies(model: Model, data: Data, out: Array) -> None:
-    """H after `forward_kinematics`.
-
-    The momentum of all bodies from link j outwards, per unit rate of joint j, gives H's column
-    j; its base rows are ``J_Tw`` and ``H_wphi``, its joint rows ``H_M``.
+    The momentum of all bodies from link j outwards, per unit velocity of joint j, gives column j
+    of H; its base rows are ``J_Tw`` and ``H_wphi``, its joint rows ``H_M``.
     """
     mass = 0.0
     moment = (0.0, 0.0, 0.0)
@@ -52,15 +43,15 @@ def composite_bodies(model: Model, data: Data, out: Array) -> None:
         inertia = add_symmetric(inertia, symmetric(data.inertia[j]))
         if j == 0:
             break
-        turning, moving = vector(data.motion[j], 0), vector(data.motion[j], 3)
-        linear = add(scale(moving, mass), cross(turning, moment))
-        angular = add(transform_symmetric(inertia, turning), cross(moment, moving))
+        angular, linear = vector(data.motion[j], 0), vector(data.motion[j], 3)
+        linear_momentum = add(scale(linear, mass), cross(angular, moment))
+        angular_momentum = add(transform_symmetric(inertia, angular), cross(moment, linear))
         column = out[5 + j]
-        store(linear, column, 0)
-        store(angular, column, 3)
+        store(linear_momentum, column, 0)
+        store(angular_momentum, column, 3)
         for i in range(1, j + 1):
-            axis, arm = vector(data.motion[i], 0), vector(data.motion[i], 3)
-            column[5 + i] = dot(axis, angular) + dot(arm, linear)
+            angular, linear = vector(data.motion[i], 0), vector(data.motion[i], 3)
+            column[5 + i] = dot(angular, angular_momentum) + dot(linear, linear_momentum)
     for r in range(6):  # the paper puts v0 before w0
         for c in range(6):
             out[r, c] = 0.0

@@ -15,10 +15,10 @@ from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
 
 from .attitude import attitude_jacobian_inverse, rotate, rotate_back, rotation_matrix
-from .crba import composite_bodies
+from .crba import crba
 from .kinematics import forward_kinematics, spatial_velocities
 from .model import Data, Model
-from .rnea import newton_euler
+from .rnea import rnea_bias
 
 Array = NDArray[np.float64]
 
@@ -45,8 +45,8 @@ class RhoSpaceModel(Record):
 
 @kernel
 def rho_space_into(
-    model: Model, quaternion: Array, theta: Array, omega_base: Array, theta_rate: Array,
-    out: RhoSpaceModel,
+    model: Model, quaternion: Array, joint_positions: Array, omega_base: Array,
+    joint_velocities: Array, out: RhoSpaceModel,
 ) -> None:  # fmt: skip
     """Fill ``out.inertia`` and ``out.bias`` with H_S and c_S of the floating robot.
 
@@ -56,10 +56,10 @@ def rho_space_into(
     omega, convective, moved = out.vectors[0], out.vectors[1], out.vectors[2]
     rotation_matrix(quaternion, out.rotation)
     rotate(out.rotation, omega_base, omega)
-    forward_kinematics(model, quaternion, theta, out.data)
-    composite_bodies(model, out.data, full)
-    spatial_velocities(model, omega, theta_rate, out.data)
-    newton_euler(model, out.data, out.full_bias)
+    forward_kinematics(model, quaternion, joint_positions, out.data)
+    crba(model, out.data, full)
+    spatial_velocities(model, omega, joint_velocities, out.data)
+    rnea_bias(model, out.data, out.full_bias)
     _eliminate_translation(full, out.full_bias, inertia, bias)
     # J0 on inertial axes is the transpose of J0 in the base frame, so its J0^-T is the latter's
     # inverse. For a unit quaternion J0dot w0 = -|w0|^2 eps / 4.

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
-from space_robot_msgs_py.config.validation import Strict
+from space_robot_msgs_py.config.validation import StrictModel
 
 from ..robot import Robot
 from ..robot.file import Inertia
@@ -21,14 +21,14 @@ NonNegative = Annotated[float, Field(ge=0.0, le=1e6)]
 Frequencies = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
-class FrictionSettings(Strict):
+class FrictionSettings(StrictModel):
     """``f_f = f_C sign(thetadot) + f_V thetadot`` on every joint."""
 
     coulomb: NonNegative = Field(0.02, description="Coulomb friction f_C of each joint, N m")
     viscous: NonNegative = Field(0.2, description="viscous friction f_V of each joint, N m s/rad")
 
 
-class DisturbanceSettings(Strict):
+class DisturbanceSettings(StrictModel):
     """Disturbance torques: ``scale * amplitude * (sin(2 pi f1 t) + sin(2 pi f2 t))``, (61)."""
 
     scale: NonNegative = Field(0.0, description="factor on all disturbances, k of (61)-(63)")
@@ -44,7 +44,7 @@ class DisturbanceSettings(Strict):
     )
 
 
-class PayloadSettings(Strict):
+class PayloadSettings(StrictModel):
     """A payload as the last link's new mass and inertia; unknown to every controller."""
 
     mass: NonNegative = Field(

@@ -13,7 +13,7 @@ Item = TypeVar("Item")
 
 
 @dataclass(frozen=True, slots=True, order=True)
-class Parcel(Generic[Item]):
+class DelayedMessage(Generic[Item]):
     """Something on its way; parcels sort by arrival."""
 
     due: int
@@ -37,7 +37,7 @@ class Link(Generic[Item]):
         self._repeats = schedule.of(f"repeat_{what}")
         self._delays = schedule.of(f"delay_{what}")
         self._jitters = schedule.of(f"jitter_{what}")
-        self._under_way: list[Parcel[Item]] = []
+        self._under_way: list[DelayedMessage[Item]] = []
         self._sent = 0
 
     def send(self, tick: int, item: Item, stamp: int | None = None) -> None:
@@ -51,23 +51,23 @@ class Link(Generic[Item]):
         carried = tick if stamp is None else stamp
         copies = 1 + any(fault.happens_at(tick) for fault in self._repeats)
         for copy in range(copies):
-            heapq.heappush(self._under_way, Parcel(due + copy, self._sent, carried, item))
+            heapq.heappush(self._under_way, DelayedMessage(due + copy, self._sent, carried, item))
         self._sent += 1
 
-    def arrivals(self, tick: int) -> list[Parcel[Item]]:
+    def arrivals(self, tick: int) -> list[DelayedMessage[Item]]:
         """What has arrived up to ``tick`` and was not handed out before, in order of arrival."""
         arrived = []
         while self._under_way and self._under_way[0].due <= tick:
             arrived.append(heapq.heappop(self._under_way))
         return arrived
 
-    def push(self, tick: int, item: Item, stamp: int | None = None) -> list[Parcel[Item]]:
+    def push(self, tick: int, item: Item, stamp: int | None = None) -> list[DelayedMessage[Item]]:
         """`send`, then `arrivals`."""
         self.send(tick, item, stamp)
         return self.arrivals(tick)
 
 
-def awaited_stamp(states: Iterable[Parcel[Item]], tick: int, answered: int) -> int | None:
+def awaited_stamp(states: Iterable[DelayedMessage[Item]], tick: int, answered: int) -> int | None:
     """The tick whose command will come when these states reach a controller at ``tick``.
 
     That is the newest stamp among them, for a controller that leaves alone what is no newer than

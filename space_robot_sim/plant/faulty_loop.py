@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from space_robot_msgs_py.ros.health import Health
-from space_robot_msgs_py.ros.node_host import Shell
+from space_robot_msgs_py.ros.node_host import NodeHost
 
 from ..faults.link import awaited_stamp
 from .faults import PlantFaults
@@ -17,9 +17,9 @@ class FaultyPlantLoop(PlantLoop):
     A state that is lost, late or wrongly stamped has no answer to wait for.
     """
 
-    def __init__(self, shell: Shell, settings: PlantNodeSettings) -> None:
+    def __init__(self, host: NodeHost, settings: PlantNodeSettings) -> None:
         """See `PlantLoop`; ``settings.faults`` says what fails."""
-        super().__init__(shell, settings)
+        super().__init__(host, settings)
         plant = self._plant
         faults = settings.parsed_faults
         self._faults = PlantFaults(faults, settings.fault_seed, plant.robot, settings.period)
@@ -47,10 +47,11 @@ class FaultyPlantLoop(PlantLoop):
         if self._by_the_clock:
             self._wait_by_the_clock(self._asked)
         self._deliver_due()
-        return not self._shell.stopping
+        return not self._host.stopping
 
     def _step(self) -> None:
-        self._faults.actuators.apply(self._plant)
+        plant = self._plant
+        self._faults.actuators.apply(plant.tick, plant.torque_limit, plant.coulomb_friction)
         super()._step()
 
     def _deliver(self) -> None:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
 
-from ..dynamics.aba import forward_dynamics_into
+from ..dynamics.aba import aba
 from ..dynamics.attitude import quaternion_rate, rotate, rotation_matrix
 from ..dynamics.model import Data, Model
 from ..environment.environment import Environment, disturbance_torque, friction_torque
@@ -54,7 +54,7 @@ def state_derivative(
     out[0:3] = v0
     quaternion_rate(quaternion, w0, out[3:7])
     out[7 : 7 + n] = rate
-    forward_dynamics_into(model, quaternion, theta, w0, rate, force, stages.data, out[7 + n :])
+    aba(model, quaternion, theta, w0, rate, force, stages.data, out[7 + n :])
 
 
 @kernel

@@ -13,15 +13,15 @@ from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.ros.endpoints import (
     SPIN_S,
-    FollowedIn,
-    Out,
-    TakenByLoop,
+    FollowedSubscription,
+    PolledCallbackGroup,
+    RawPublisher,
     Waiter,
     flush,
     take_or_wait,
 )
 from space_robot_msgs_py.ros.health import Health, Level
-from space_robot_msgs_py.ros.node_host import Shell
+from space_robot_msgs_py.ros.node_host import NodeHost
 from space_robot_msgs_py.samples import Command
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.plain_codecs import ClockCodec
@@ -54,8 +54,8 @@ class PlantLoop:
 
     plant_class: ClassVar[type[Plant]] = Plant
 
-    def __init__(self, shell: Shell, settings: PlantNodeSettings) -> None:
-        self._shell, self._settings = shell, settings
+    def __init__(self, host: NodeHost, settings: PlantNodeSettings) -> None:
+        self._host, self._settings = host, settings
         robot = Robot.from_yaml(named_file("robots", settings.robot))
         self._plant = self.plant_class(robot, settings, settings.period)
         at_rest = Command(0, np.zeros(robot.n + 3))
@@ -66,11 +66,11 @@ class PlantLoop:
         self._commands = CommandCodec(robot.axis_names, timebase)
         self._clock = ClockCodec()
         self._guard = CommandGuard(robot.n + 3, settings.hold_ticks)
-        node = shell.node
-        self._joint_states = Out(node, topics.JOINT_STATES)
-        self._base_state = Out(node, topics.BASE_STATE)
-        self._clock_out = Out(node, topics.CLOCK)
-        self._command_in = FollowedIn(node, topics.COMMAND, TakenByLoop())
+        node = host.node
+        self._joint_states = RawPublisher(node, topics.JOINT_STATES)
+        self._base_state = RawPublisher(node, topics.BASE_STATE)
+        self._clock_out = RawPublisher(node, topics.CLOCK)
+        self._command_in = FollowedSubscription(node, topics.COMMAND, PolledCallbackGroup())
         spin_s = 0.0 if settings.fifo_priority else SPIN_S
         self._waiter = Waiter(node, self._command_in, spin_s=spin_s)
         self.outputs = (self._joint_states, self._base_state, self._clock_out)
@@ -87,24 +87,24 @@ class PlantLoop:
 
     def run(self) -> None:
         """Fly until the last tick, or until told to stop."""
-        shell, settings, plant, clock = self._shell, self._settings, self._plant, self._wall_clock
-        shell.wait_for_listeners(self.outputs, settings.wait_for)
+        host, settings, plant, clock = self._host, self._settings, self._plant, self._wall_clock
+        host.wait_for_listeners(self.outputs, settings.wait_for)
         began, first = time.monotonic(), plant.tick
         clock.start(plant.tick)
-        while not shell.stopping and (not settings.ticks or plant.tick < settings.ticks):
+        while not host.stopping and (not settings.ticks or plant.tick < settings.ticks):
             if not self._exchange():
                 break
             if plant.tick == 0:
                 clock.start(0)  # time begins when the loop is closed
             elif self._by_the_clock and clock.slip(plant.tick) and (remark := clock.remark()):
-                shell.log(remark)
+                host.log(remark)
             self._step()
-            shell.serve()
+            host.serve()
         elapsed = time.monotonic() - began
         flush(self.outputs, FLUSH_S)
         late = f", {self.late_ticks} ticks without an answer in time" if self.late_ticks else ""
-        late += f", {clock.slipped_s:.3f} s behind the wall clock" if clock.slipped_s else ""
-        shell.log(f"flew {(plant.tick - first) * settings.period:.4f} s in {elapsed:.2f} s{late}")
+        late += f", {clock.lost_time_s:.3f} s behind the wall clock" if clock.lost_time_s else ""
+        host.log(f"flew {(plant.tick - first) * settings.period:.4f} s in {elapsed:.2f} s{late}")
 
     def stand_down(self) -> None:
         """The actuators are left at zero."""
@@ -164,14 +164,14 @@ class PlantLoop:
         was_safe = guard.is_safe
         command = guard.act(plant.tick)
         if guard.is_safe is not was_safe:
-            self._shell.report_soon()
+            self._host.report_soon()
         plant.step(command)
 
     def _wait(self, stamp: int) -> bool:
         """Wait for the command that answers the state stamped so; False if told to stop."""
         if self._by_the_clock:
             self._wait_by_the_clock(stamp)
-            return not self._shell.stopping
+            return not self._host.stopping
         ask_again = time.monotonic() + ASK_AGAIN_S
         give_up = time.monotonic() + self._silence_s
         while True:
@@ -179,11 +179,11 @@ class PlantLoop:
             if data is not None and self._receive(data) == stamp:
                 self._time_answer()
                 return True
-            if self._shell.stopping:
+            if self._host.stopping:
                 return False
             now = time.monotonic()
             if now > give_up and self._heard >= 0:
-                self._shell.log(f"no command for {self._silence_s:g} s: the controller is silent")
+                self._host.log(f"no command for {self._silence_s:g} s: the controller is silent")
                 self._controller_silent = True
                 self._wall_clock.start(self._plant.tick)
                 return True
@@ -191,7 +191,7 @@ class PlantLoop:
                 ask_again = now + ASK_AGAIN_S
                 self._publish(*self._sent)
                 self._clock_out.publish(self._clock_sent)
-            self._shell.serve()
+            self._host.serve()
 
     def _wait_by_the_clock(self, stamp: int) -> None:
         """Take what comes until the tick is over."""
@@ -206,7 +206,7 @@ class PlantLoop:
             self._take_all(stamp)
         self._take_all(stamp)
         if self._controller_silent and self._heard > before:
-            self._shell.log("the controller answers again")
+            self._host.log("the controller answers again")
             self._controller_silent = False
 
     def _take_all(self, stamp: int) -> None:

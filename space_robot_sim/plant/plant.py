@@ -10,7 +10,7 @@ from pydantic import Field
 
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
-from space_robot_msgs_py.config.validation import Strict
+from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import Command, RobotState
 
@@ -33,7 +33,7 @@ RATE_LIMIT = 1e4
 """rad/s; a body that turns faster has left the physics (a diverged loop)."""
 
 
-class PlantSettings(Strict):
+class PlantSettings(StrictModel):
     """What the plant is told about its world, beside the robot's own file."""
 
     friction: FrictionSettings = FrictionSettings()
@@ -106,7 +106,7 @@ class Plant:
         self.period = period
         self.block = PlantMemory.block(n)
         """The plant's `PlantMemory`, for compiled loops."""
-        self.late = np.zeros((settings.command_latency_ticks, n + 3))
+        self.command_delay_buffer = np.zeros((settings.command_latency_ticks, n + 3))
         """Ring of the commands that are still on their way."""
         memory: PlantMemory = self.block[0]
         environment = Environment.build(n, settings.friction, settings.disturbance)
@@ -129,19 +129,31 @@ class Plant:
         return self.state.tick
 
     @property
+    def torque_limit(self) -> Array:
+        """(n+3,) largest torque of each axis, N m; may be changed in flight."""
+        memory: PlantMemory = self.block[0]
+        return memory.limit
+
+    @property
+    def coulomb_friction(self) -> Array:
+        """(n,) Coulomb friction of each joint, N m; may be changed in flight."""
+        memory: PlantMemory = self.block[0]
+        return memory.environment.coulomb
+
+    @property
     def saturated_ticks(self) -> int:
         """Ticks so far in which a torque was at its limit."""
         memory: PlantMemory = self.block[0]
         return int(memory.saturated_ticks)
 
     def step(self, command: Command) -> None:
-        """Hold ``command`` (or the one due, if commands come late) over one tick.
+        """Hold ``command`` (or the one due, if commands are delayed) over one tick.
 
         Raises:
             DivergedError: the state is no longer finite, or turns faster than `RATE_LIMIT`.
         """
         tick = self.state.tick
-        fastest = step(self.block, self.late, command.torque, tick, self.period)
+        fastest = step(self.block, self.command_delay_buffer, command.torque, tick, self.period)
         self.state.tick = tick + 1
         if not fastest <= RATE_LIMIT:
             raise self.diverged(fastest)
@@ -153,26 +165,30 @@ class Plant:
 
 
 @kernel
-def step(block: Block, late: Array, torque: Array, tick: int, period: float) -> float:
+def step(
+    block: Block, command_delay_buffer: Array, torque: Array, tick: int, period: float
+) -> float:
     """`advance` for callers from Python."""
-    fastest: float = advance(block[0], late, torque, tick, period)
+    fastest: float = advance(block[0], command_delay_buffer, torque, tick, period)
     return fastest
 
 
 @kernel
-def advance(memory: PlantMemory, late: Array, torque: Array, tick: int, period: float) -> float:
-    """Apply ``torque`` (n+3,), or the one due from the ring ``late``, from ``tick`` to the next.
+def advance(
+    memory: PlantMemory, command_delay_buffer: Array, torque: Array, tick: int, period: float
+) -> float:
+    """Apply ``torque`` (n+3,) from ``tick`` to the next, or the one due from the delay buffer.
 
     Returns:
         The fastest rate then, see `measure`.
     """
     applied, limit, saturated = memory.applied_torque, memory.limit, 0.0
-    latency = late.shape[0]
+    latency = command_delay_buffer.shape[0]
     for i in range(applied.size):
         due = torque[i]
         if latency > 0:
-            due = late[tick % latency, i]
-            late[tick % latency, i] = torque[i]
+            due = command_delay_buffer[tick % latency, i]
+            command_delay_buffer[tick % latency, i] = torque[i]
         applied[i] = min(max(due, -limit[i]), limit[i])
         if applied[i] != due:
             saturated = 1.0

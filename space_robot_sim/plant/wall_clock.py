@@ -17,7 +17,7 @@ class WallClock:
     def __init__(self, period: float) -> None:
         self._period = period
         self._begin = 0.0
-        self.slipped_s = 0.0
+        self.lost_time_s = 0.0
         """How far the wall clock has run ahead for good."""
         self._remarked_s, self._remarked_at = 0.0, -math.inf
 
@@ -35,15 +35,15 @@ class WallClock:
         if behind < SLIP_S:
             return 0.0
         self._begin += behind
-        self.slipped_s += behind
+        self.lost_time_s += behind
         return behind
 
     def remark(self) -> str:
         """What to say of the time lost since the last remark; empty if that was just now."""
         now = time.monotonic()
-        lost, since = self.slipped_s - self._remarked_s, now - self._remarked_at
+        lost, since = self.lost_time_s - self._remarked_s, now - self._remarked_at
         if since < REMARK_S or not lost:
             return ""
-        within = f" in {since:.1f} s, {self.slipped_s:.3f} s in all" if self._remarked_s else ""
-        self._remarked_s, self._remarked_at = self.slipped_s, now
+        within = f" in {since:.1f} s, {self.lost_time_s:.3f} s in all" if self._remarked_s else ""
+        self._remarked_s, self._remarked_at = self.lost_time_s, now
         return f"{lost:.3f} s behind the wall clock{within}: time goes on from here"

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..dynamics.aba import forward_dynamics_into
-from ..dynamics.crba import mass_matrix_into
+from ..dynamics.aba import aba
+from ..dynamics.crba import crba
+from ..dynamics.kinematics import forward_kinematics, spatial_velocities
 from ..dynamics.model import Data
-from ..dynamics.rnea import bias_force_into
+from ..dynamics.rnea import rnea_bias
 
 if TYPE_CHECKING:
     from .robot import Robot
@@ -49,9 +50,10 @@ def mass_matrix(robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: Array
         ValueError: an argument has the wrong shape, or the quaternion is not unit.
     """
     n = robot.n
-    out = np.empty((n + 6, n + 6))
-    theta = _vector(joint_positions, n, "joint_positions")
-    mass_matrix_into(robot.model, _quaternion(quaternion_wxyz), theta, Data.allocate(n), out)
+    out, data = np.empty((n + 6, n + 6)), Data.allocate(n)
+    positions = _vector(joint_positions, n, "joint_positions")
+    forward_kinematics(robot.model, _quaternion(quaternion_wxyz), positions, data)
+    crba(robot.model, data, out)
     return out
 
 
@@ -78,16 +80,12 @@ def bias_force(
         ValueError: an argument has the wrong shape, or the quaternion is not unit.
     """
     n = robot.n
-    out = np.empty(n + 6)
-    bias_force_into(
-        robot.model,
-        _quaternion(quaternion_wxyz),
-        _vector(joint_positions, n, "joint_positions"),
-        _vector(w0_inertial, 3, "w0_inertial"),
-        _vector(joint_velocities, n, "joint_velocities"),
-        Data.allocate(n),
-        out,
-    )
+    out, data = np.empty(n + 6), Data.allocate(n)
+    positions = _vector(joint_positions, n, "joint_positions")
+    velocities = _vector(joint_velocities, n, "joint_velocities")
+    forward_kinematics(robot.model, _quaternion(quaternion_wxyz), positions, data)
+    spatial_velocities(robot.model, _vector(w0_inertial, 3, "w0_inertial"), velocities, data)
+    rnea_bias(robot.model, data, out)
     return out
 
 
@@ -102,7 +100,7 @@ def forward_dynamics(
     """Acceleration ``qdd = H^-1 (F - c)``, arguments as in `bias_force`, ``force`` (n+6,)."""
     n = robot.n
     out = np.empty(n + 6)
-    forward_dynamics_into(
+    aba(
         robot.model,
         _quaternion(quaternion_wxyz),
         _vector(joint_positions, n, "joint_positions"),

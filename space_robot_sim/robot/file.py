@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from space_robot_msgs_py.config.validation import Strict
+from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.topics import BASE_AXES
 
 Array = NDArray[np.float64]
@@ -48,14 +48,14 @@ Inertia = Annotated[
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
-class BaseFile(Strict):
+class BaseFile(StrictModel):
     """``robot.base``."""
 
     mass: Mass
     inertia: Inertia
 
 
-class LinkFile(Strict):
+class LinkFile(StrictModel):
     """One entry of ``robot.links``: the joint towards the base, and the body it moves."""
 
     name: Annotated[str, Field(min_length=1)]
@@ -67,7 +67,7 @@ class LinkFile(Strict):
     com: Vector
 
 
-class ToolFile(Strict):
+class ToolFile(StrictModel):
     """``robot.tool``: from the last link's frame to the end effector's."""
 
     alpha_deg: float = 0.0
@@ -85,7 +85,7 @@ def _distinct_names(links: list[LinkFile]) -> list[LinkFile]:
     return links
 
 
-class RobotFile(Strict):
+class RobotFile(StrictModel):
     """``robot``, the whole of a robot's YAML."""
 
     name: Annotated[str, Field(min_length=1)]
@@ -94,5 +94,5 @@ class RobotFile(Strict):
     tool: ToolFile = ToolFile()
 
 
-class _Document(Strict):
+class _Document(StrictModel):
     robot: RobotFile

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.records import assign
-from space_robot_msgs_py.config.validation import check, read_yaml
+from space_robot_msgs_py.config.validation import read_yaml, validate
 from space_robot_msgs_py.topics import BASE_AXES
 
 from ..dynamics.model import Model
@@ -63,7 +63,7 @@ class Robot:
     @classmethod
     def from_dict(cls, content: dict[str, Any], where: str = "robot") -> Robot:
         """Build from the mapping a robot file holds (key ``robot`` at its top)."""
-        file = check(_Document, content, where).robot
+        file = validate(_Document, content, where).robot
         links = file.links
         return cls(
             name=file.name,
@@ -94,9 +94,9 @@ class Robot:
         model = Model.allocate(self.n)
         assign(
             model, mass=self.mass, inertia=inertia_elements(self.inertia), com=self.com,
-            joint_x=self.a, joint_z=self.d,
-            twist_cos=_exact_at_right_angles(np.cos(self.alpha)),
-            twist_sin=_exact_at_right_angles(np.sin(self.alpha)),
+            a=self.a, d=self.d,
+            cos_alpha=_exact_at_right_angles(np.cos(self.alpha)),
+            sin_alpha=_exact_at_right_angles(np.sin(self.alpha)),
         )  # fmt: skip
         return model
 

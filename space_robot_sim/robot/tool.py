@@ -55,10 +55,10 @@ def _chain(robot: Robot, quaternion: Array, theta: Array) -> tuple[Array, Array,
     at = np.zeros_like(axis_x)
     model = robot.model
     for i in range(robot.n):
-        ca, sa, ct, st = model.twist_cos[i], model.twist_sin[i], np.cos(theta[i]), np.sin(theta[i])
-        at += model.joint_x[i] * axis_x
+        ca, sa, ct, st = model.cos_alpha[i], model.sin_alpha[i], np.cos(theta[i]), np.sin(theta[i])
+        at += model.a[i] * axis_x
         axis_y, axis_z = ca * axis_y + sa * axis_z, ca * axis_z - sa * axis_y
-        at += model.joint_z[i] * axis_z
+        at += model.d[i] * axis_z
         axis_x, axis_y = ct * axis_x + st * axis_y, ct * axis_y - st * axis_x
     alpha, a, d = robot.tool
     ca, sa = np.cos(alpha), np.sin(alpha)

@@ -16,9 +16,9 @@ Array = NDArray[np.float64]
 
 MEASURED = {
     "attitude": "quaternion",
-    "rate": "omega_base",
-    "position": "joint_positions",
-    "velocity": "joint_velocities",
+    "gyro": "omega_base",
+    "joint_position": "joint_positions",
+    "joint_velocity": "joint_velocities",
 }
 """Field of `RobotState` by the name its faults have."""
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])

@@ -99,7 +99,14 @@ class Ours:
         self._force = np.zeros(n + 6)
 
     def step(self, steps: int) -> None:
-        plant_steps(self.plant.block, self.plant.late, self._torque, self._ticks, steps, PERIOD)
+        plant_steps(
+            self.plant.block,
+            self.plant.command_delay_buffer,
+            self._torque,
+            self._ticks,
+            steps,
+            PERIOD,
+        )
         self._ticks += steps
 
     def forward_dynamics(self, calls: int) -> None:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+from paths import CONFIG
 
 from space_robot_msgs_py import topics
 
-OVERRIDES = Path(__file__).resolve().parents[2] / "config/qos/record_overrides.yaml"
+OVERRIDES = CONFIG / "qos/record_overrides.yaml"
 
 
 def test_overrides_for_ros2_bag_record_are_the_topics_own() -> None:

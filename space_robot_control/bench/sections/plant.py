@@ -33,7 +33,7 @@ def plant(options: Options) -> list[Result]:
     seconds = interleave(
         {
             "step": lambda steps: plant_steps(
-                looped.block, looped.late, torque, 0, steps, period
+                looped.block, looped.command_delay_buffer, torque, 0, steps, period
             ),
             "call": repeated(lambda: called.step(command)),
             "dynamics": lambda calls: forward_dynamics_calls(parts.block, force, calls),

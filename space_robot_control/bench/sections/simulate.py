@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
-from ...analysis import analyse
+from ...analysis import analyze
 from ...flight.plan import Flight, FlightPlan
 from ...flight.simulate import simulate as fly
 from ..measure import Options, interleave, repeated
@@ -25,7 +25,7 @@ def simulate(options: Options) -> list[Result]:
     for law in laws:
         plan = FlightPlan(controller=law, duration=duration)
         parts[law] = lambda plan=plan: _flight(plan)  # type: ignore[misc]
-        parts[f"{law}, analysed"] = lambda plan=plan: analyse(_flight(plan))  # type: ignore[misc]
+        parts[f"{law}, analyzed"] = lambda plan=plan: analyze(_flight(plan))  # type: ignore[misc]
     options.progress(f"flights of {duration:g} s in this process")
     seconds = interleave(
         {name: repeated(part) for name, part in parts.items()},

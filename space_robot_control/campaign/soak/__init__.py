@@ -1,6 +1,6 @@
 """Flights back to back on the real graph, with faults drawn by chance, until a time is over."""
 
-from .draw import draw_flight
 from .run import soak
+from .sampling import sample_flight
 
-__all__ = ["draw_flight", "soak"]
+__all__ = ["sample_flight", "soak"]

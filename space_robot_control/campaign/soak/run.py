@@ -17,14 +17,15 @@ import psutil
 
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
+from ...analysis import analyze
 from ...flight.compilation import compile_kernels
 from ...flight.graph.following import InterruptedFlightError
 from ...flight.graph.orchestrator import fly, require_ros
 from ...flight.interruption import Interrupted
 from ...flight.plan import Flight, FlightPlan
-from .census import Census, shared_memory_files
-from .draw import breaks_tracking, command_line, draw_flight
-from .survival import Outcome, judge
+from .process_monitor import ProcessMonitor, shared_memory_files
+from .sampling import breaks_tracking, command_line, sample_flight
+from .verdict import Outcome, judge
 
 WARM_UP = 3
 """Flights after which this process should have what it needs."""
@@ -117,7 +118,7 @@ def soak(
 
     Args:
         seconds: of the wall clock.
-        seed: of the flights, see `draw_flight`.
+        seed: of the flights, see `sample_flight`.
         duration_s: of each flight, simulated.
         bags: an empty or new folder that keeps all bags; None: those of failed flights are kept
             below the system's folder for temporary files.
@@ -136,7 +137,7 @@ def soak(
         compile_kernels()
         while time.monotonic() < until:
             number = len(done.flights) + 1
-            plan = draw_flight(seed, number, duration_s)
+            plan = sample_flight(seed, number, duration_s)
             done.flights.append(_fly(number, plan, folder / f"flight_{number:04d}", bool(bags)))
             say(done.flights[-1].line())
     except (InterruptedFlightError, Interrupted) as ended:
@@ -154,9 +155,12 @@ def _fly(number: int, plan: FlightPlan, bag: Path, keep: bool) -> Flown:
     begin = time.monotonic()
     flight = Flight(plan)
     report, wrong = None, []
-    with Census() as census, redirect_stderr(io.StringIO()):  # the flight's own progress
+    with (
+        ProcessMonitor() as process_monitor,
+        redirect_stderr(io.StringIO()),
+    ):  # the flight's own progress
         try:
-            report = fly(flight, bag)
+            report = fly(flight, bag, analyze)
         except InterruptedFlightError:
             raise
         except SpaceRobotError as error:
@@ -165,11 +169,11 @@ def _fly(number: int, plan: FlightPlan, bag: Path, keep: bool) -> Flown:
             wrong.append(f"{type(error).__name__}: {error}")
     outcome = judge(flight, report, bag)
     outcome.wrong[:0] = wrong
-    outcome.wrong += [f"left behind: {process}" for process in census.left_behind]
+    outcome.wrong += [f"left behind: {process}" for process in process_monitor.left_behind]
     if outcome.survived and not keep:
         shutil.rmtree(bag)
     return Flown(
-        number, plan, time.monotonic() - begin, outcome, census.peak_mb,
+        number, plan, time.monotonic() - begin, outcome, process_monitor.peak_mb,
         psutil.Process().memory_info().rss / 1e6, bag if bag.exists() else None,
     )  # fmt: skip
 

@@ -59,7 +59,7 @@ def follow(
         follower = _Follower(graph, flight, parameters, monitor, stopped)
         with flight_progress(follower.total_s, flight.controller.law.name) as show:
             follower.bring_up(show)
-            follower.until_landed(show)
+            follower.until_complete(show)
         return follower.end()
     finally:
         monitor.close()
@@ -103,13 +103,13 @@ class _Follower:
 
     def _change(self, driver: LifecycleDriver, names: Sequence[str], transition: str) -> None:
         for name in driver.change(names, transition, self._check_start):
-            words = self._graph.nodes[name.removesuffix("_node")].last_words()
+            words = self._graph.nodes[name.removesuffix("_node")].output_tail()
             raise FlightError(f"{name} refused to {transition}:\n{words}")
 
-    def until_landed(self, show: FlightProgress) -> None:
+    def until_complete(self, show: FlightProgress) -> None:
         """Watch, inject, show."""
         monitor, injector = self._monitor, self._injector
-        while not self._watch.has_landed:
+        while not self._watch.is_complete:
             if self._stopped:
                 raise InterruptedFlightError(
                     f"stopped at {monitor.simulated_s:.2f} s", self._stopped[0]
@@ -128,7 +128,7 @@ class _Follower:
     def end(self) -> dict[str, Any]:
         """Stop the other nodes; what happened."""
         self._graph.stop()
-        self._watch.bury_recorder()
+        self._watch.check_recorder_exit()
         if self._stopped:
             raise InterruptedFlightError("stopped when the flight had landed", self._stopped[0])
         self._monitor.poll()  # the nodes' last reports
@@ -153,7 +153,7 @@ class _Follower:
             self._last_s, self._moved_at = monitor.simulated_s, now
             show(self._last_s, _remark(monitor.errors, self._last_s, now - self._begun_at))
         elif now - self._moved_at > STALL_TIMEOUT_S:
-            words = "\n".join(f"{n}:\n{p.last_words()}" for n, p in self._graph.nodes.items())
+            words = "\n".join(f"{n}:\n{p.output_tail()}" for n, p in self._graph.nodes.items())
             why = "".join(f"{node}: {mode}\n" for node, mode in monitor.complaints.items())
             raise FlightError(
                 f"no progress for {STALL_TIMEOUT_S:.0f} s at {self._last_s:.2f} s:\n{why}{words}"

@@ -11,7 +11,7 @@ from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.wire.definitions import decode
 from space_robot_msgs_py.wire.plain_codecs import TelemetryCodec
 
-from .visitor import Visitor
+from .temporary_node import TemporaryNode
 
 CLOCK_DEPTH = 1_000
 """All of a plant's messages are needed to tell them from another's."""
@@ -34,14 +34,18 @@ class Monitor:
     """Simulated time from /clock, errors from telemetry, the nodes' modes from /diagnostics."""
 
     def __init__(self, domain: int) -> None:
-        from space_robot_msgs_py.ros.endpoints import FollowedIn, In, TakenByLoop
+        from space_robot_msgs_py.ros.endpoints import (
+            FollowedSubscription,
+            PolledCallbackGroup,
+            RawSubscription,
+        )
 
-        self._visitor = Visitor("flight_monitor", domain)
+        self._visitor = TemporaryNode("flight_monitor", domain)
         self.node = self._visitor.node
-        group = TakenByLoop()
-        self._clock = FollowedIn(self.node, topics.CLOCK, group, depth=CLOCK_DEPTH)
-        self._telemetry = In(self.node, topics.TELEMETRY, group, depth=1)
-        self._diagnostics = In(self.node, topics.DIAGNOSTICS, group)
+        group = PolledCallbackGroup()
+        self._clock = FollowedSubscription(self.node, topics.CLOCK, group, depth=CLOCK_DEPTH)
+        self._telemetry = RawSubscription(self.node, topics.TELEMETRY, group, depth=1)
+        self._diagnostics = RawSubscription(self.node, topics.DIAGNOSTICS, group)
         self.simulated_s = 0.0
         self.has_begun = False
         """Whether the plant has sent a tick."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -13,11 +13,11 @@ from typing import Any
 import click
 
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
-from ...analysis import analyse
 from ..compilation import compile_kernels
 from ..interruption import handled_signals
 from ..plan import Flight, check_bag_path
@@ -26,11 +26,18 @@ from .following import follow
 from .processes import Graph, node_command, node_environment
 
 
-def fly(flight: Flight, bag: Path) -> dict[str, Any]:
+def fly(
+    flight: Flight, bag: Path, analyze: Callable[[FlightLog], dict[str, Any]]
+) -> dict[str, Any]:
     """Fly on a ROS 2 graph and return the report of the recorded bag.
 
     ``graph`` in the report says what happened in the graph; its ``failures`` are what keeps the
     flight from being whole though it was flown to its end.
+
+    Args:
+        flight: a checked plan.
+        bag: the folder to record to.
+        analyze: makes the report of the recorded flight.
 
     Raises:
         InputError: the bag cannot be made, or the domain is taken.
@@ -59,7 +66,7 @@ def fly(flight: Flight, bag: Path) -> dict[str, Any]:
                 error.args = (f"{error}; what was flown is in {bag}",)
             raise
         _say(f"flown and recorded in {time.monotonic() - begin:.1f} s, start-up included")
-    report = analyse(read_flight(bag, trust=True))
+    report = analyze(read_flight(bag, trust=True))
     report["graph"] = what_happened
     for warning in what_happened["warnings"]:
         _say(f"warning: {warning}")

@@ -103,7 +103,7 @@ class NodeProcess:
         """None while it runs."""
         return self._process.poll()
 
-    def obituary(self) -> str:
+    def exit_summary(self) -> str:
         """How it ended, once it has."""
         time.sleep(0.1)  # let it finish its last line
         code = self.exit_code or 0
@@ -112,9 +112,9 @@ class NodeProcess:
 
     def death(self) -> FlightError:
         """What to raise when it has ended too early."""
-        return FlightError(f"{self.obituary()} before the flight did:\n{self.last_words()}")
+        return FlightError(f"{self.exit_summary()} before the flight did:\n{self.output_tail()}")
 
-    def last_words(self) -> str:
+    def output_tail(self) -> str:
         """The end of what it printed."""
         self._output.seek(0)
         lines = self._output.read().decode(errors="replace").strip().splitlines()

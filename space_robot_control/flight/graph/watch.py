@@ -51,7 +51,7 @@ class Watch:
                 if node.exit_code != 0:
                     raise node.death()
                 continue
-            ended = "does not answer" if hangs else node.obituary()
+            ended = "does not answer" if hangs else node.exit_summary()
             events.append(Event(simulated_s, f"{name}_node", ended))
             if name == "controller":
                 self._lose_controller(node)
@@ -61,14 +61,14 @@ class Watch:
                     self.failures.append(f"{ended} at {simulated_s:.2f} s")
         return events
 
-    def bury_recorder(self) -> None:
+    def check_recorder_exit(self) -> None:
         """Once all nodes have been stopped: see whether the recorder kept everything."""
         recorder = self._graph.nodes["recorder"]
         if recorder.exit_code != 0 and "recorder" not in self._gone:
-            self.failures.append(recorder.last_words().splitlines()[-1].strip())
+            self.failures.append(recorder.output_tail().splitlines()[-1].strip())
 
     @property
-    def has_landed(self) -> bool:
+    def is_complete(self) -> bool:
         """Whether the plant has flown to its end."""
         return self._graph.nodes["plant"].exit_code == 0
 

@@ -14,7 +14,7 @@ import numpy as np
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import FlightError, InputError
 
-from ..graph.visitor import Visitor
+from ..graph.temporary_node import TemporaryNode
 from .commands import CommandList, Ticks
 from .recording import Reference, State
 
@@ -51,20 +51,26 @@ class Player:
         Raises:
             InputError: a plant or a mission is in this domain.
         """
-        from space_robot_msgs_py.ros.endpoints import In, Out, TakenByLoop, Waiter, take_or_wait
+        from space_robot_msgs_py.ros.endpoints import (
+            PolledCallbackGroup,
+            RawPublisher,
+            RawSubscription,
+            Waiter,
+            take_or_wait,
+        )
         from space_robot_msgs_py.ros.exclusive import Claim
 
         self._take_or_wait = take_or_wait
-        self._visitor = Visitor("replay_node", domain)
+        self._visitor = TemporaryNode("replay_node", domain)
         self.node = self._visitor.node
         try:
             self._claim = Claim(self.node, [topic.name for topic in (*STATES, *REFERENCES)])
         except InputError:
             self._visitor.leave()
             raise
-        self._outs = {t.name: Out(self.node, t) for t in (*STATES, *REFERENCES)}
+        self._outs = {t.name: RawPublisher(self.node, t) for t in (*STATES, *REFERENCES)}
         self._joints, self._base = (self._outs[topic.name] for topic in STATES)
-        self._commands = In(self.node, topics.COMMAND, TakenByLoop())
+        self._commands = RawSubscription(self.node, topics.COMMAND, PolledCallbackGroup())
         self._waiter = Waiter(self.node, self._commands)
         self._answers = answers
         self._references: list[_Stream] = []

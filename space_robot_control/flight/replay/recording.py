@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.description import read_description
 from space_robot_msgs_py.bag.folder import open_bag
-from space_robot_msgs_py.bag.message_accounting import excused_topics, message_tick
+from space_robot_msgs_py.bag.message_accounting import message_tick, topics_with_allowed_gaps
 from space_robot_msgs_py.bag.reader import REQUIRED, first_states, missing, timebase_of
 from space_robot_msgs_py.bag.selection import Selection
 from space_robot_msgs_py.config.text import printable
@@ -71,9 +71,9 @@ class Recording:
         """Ticks, about."""
         self.has_commands = bool(counts[topics.COMMAND])
         self.is_finished = self._bag.finished
-        self.answers_are_complete = bool(flight) and topics.COMMAND.name not in excused_topics(
+        self.answers_are_complete = bool(
             flight
-        )
+        ) and topics.COMMAND.name not in topics_with_allowed_gaps(flight)
         """Whether the controller has answered every state, so that no answer means a loss."""
 
     def commands(self, axis_names: tuple[str, ...]) -> Commands:

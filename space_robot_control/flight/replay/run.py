@@ -163,7 +163,7 @@ class _Run:
 
 def _bring_up(controller: NodeProcess, player: Player) -> None:
     if refused := _change_state(player, "configure", "activate"):
-        raise FlightError(f"{CONTROLLER} refused to {refused}:\n{controller.last_words()}")
+        raise FlightError(f"{CONTROLLER} refused to {refused}:\n{controller.output_tail()}")
     player.wait_for_controller()
 
 
@@ -188,7 +188,7 @@ def _check(controller: NodeProcess, stopped: list[int]) -> None:
         raise InterruptedFlightError("the replay was stopped", stopped[0])
     if controller.exit_code is not None:
         raise FlightError(
-            f"{controller.obituary()} before the replay was over:\n{controller.last_words()}"
+            f"{controller.exit_summary()} before the replay was over:\n{controller.output_tail()}"
         )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 COLUMNS = ("attitude", "joints_1_3", "joints_4_6", "base_torque", "torque_1_3", "torque_4_6")
-"""Keys of `space_robot_control.analysis.analyse` in the order of the table's columns."""
+"""Keys of `space_robot_control.analysis.analyze` in the order of the table's columns."""
 TRACKING, TORQUE = COLUMNS[:3], COLUMNS[3:]
 
 HEADINGS = {

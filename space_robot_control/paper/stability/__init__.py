@@ -2,7 +2,7 @@
 
 | module | what |
 |---|---|
-| `lemma_1` | norm and radius of ``W = E - H_S^-1 Hbar`` (69) |
+| `lemma_1` | norm and radius of ``W = E - H_S^-1 h_bar`` (69) |
 | `time_delay_error` | eps (65) and the bound beta of its derivative |
 | `circle_criterion` | G(s) and its peak (72)-(77) |
 | `lyapunov` | the LMI (51), M and gamma, the reaching time (56) |

@@ -66,7 +66,7 @@ def _above(check: Check) -> Text:
 
 
 def _lemma_1(study: Study) -> Table:
-    table = _table("Lemma 1: W = E - H_S^-1 Hbar (69)", "min", "max", "at t (s)", "below 1")
+    table = _table("Lemma 1: W = E - H_S^-1 h_bar (69)", "min", "max", "at t (s)", "below 1")
     rows = (
         ("spectral norm, as printed", study.lemma_1.norm, study.lemma_1.norm_below_one),
         ("spectral radius", study.lemma_1.radius, study.lemma_1.radius_below_one),

@@ -1,4 +1,4 @@
-"""Lemma 1 along a flight: does ``W = E - H_S^-1 Hbar`` (69) contract?
+"""Lemma 1 along a flight: does ``W = E - H_S^-1 h_bar`` (69) contract?
 
 By (68) the time-delay error obeys ``eps(t) = W eps(t - delta) + chi(t - delta)``. The lemma asks
 for a spectral norm of W below 1. W itself is not symmetric, but ``H_S^1/2 W H_S^-1/2`` is, so its
@@ -62,7 +62,7 @@ class Contraction:
 
 
 def contraction_matrix(inertia: Array, h_bar: Array) -> Array:
-    """(69): ``W = E - H_S^-1 Hbar`` of ``inertia`` (..., m, m) and the diagonal ``h_bar`` (m,)."""
+    """(69): ``W = E - H_S^-1 h_bar`` of ``inertia`` (..., m, m) and the diagonal ``h_bar`` (m,)."""
     return np.eye(len(h_bar)) - np.linalg.solve(inertia, np.diag(h_bar))
 
 
@@ -84,7 +84,7 @@ def contraction(robot: Robot, h_bar: Array, log: FlightLog) -> Contraction:
 
     Args:
         robot: the robot that flew, with its payload.
-        h_bar: (m,) diagonal of Hbar.
+        h_bar: (m,) diagonal of h_bar.
         log: the flight, looked at every `SAMPLING` seconds.
     """
     period = log.timebase.period

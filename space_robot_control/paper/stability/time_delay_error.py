@@ -1,9 +1,9 @@
 """The time-delay error (65) of a flight and the bound beta of its derivative.
 
-``eps = Hbar^-1 (N - N_hat)``, the error of the estimate in units of acceleration, from (33):
-``N = F_S - Hbar rhodd``. All three belong to one interval: a command given at tick k acts until
+``eps = h_bar^-1 (N - N_hat)``, the error of the estimate in units of acceleration, from (33):
+``N = F_S - h_bar rhodd``. All three belong to one interval: a command given at tick k acts until
 tick k+1, and the mean acceleration over it is ``(rhodot_k+1 - rhodot_k) / delta``. For a law
-``F_S = Hbar u + N_hat`` this is the paper's ``eps = u - rhodd``.
+``F_S = h_bar u + N_hat`` this is the paper's ``eps = u - rhodd``.
 
 A beta measured so is that of the closed loop. By (70) chi holds ``W (u(t) - u(t - delta))``, and u
 holds ``K_1 |s|^1/2 sign(s)``, whose slope at s = 0 has no bound: beta depends on the gains
