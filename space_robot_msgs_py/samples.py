@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .compiled.records import Record, shaped
 from .errors import MessageError
 
 Array = NDArray[np.float64]
@@ -48,34 +49,60 @@ class Timebase(NamedTuple):
         return tick
 
 
-@dataclass(slots=True)
-class RobotState:
-    """What the plant measures at a tick, and what it applied over the interval just ended."""
+class State(Record):
+    """The numbers of a `RobotState`, in one block for compiled code."""
 
-    tick: int
+    base_position: Array = shaped(lambda n: (3,))
+    """Position of the base's CoM in the inertial frame, m."""
+    quaternion: Array = shaped(lambda n: (4,))
+    """Base attitude ``[w, x, y, z]``, from the base frame to the inertial frame."""
+    base_velocity: Array = shaped(lambda n: (3,))
+    """Velocity of the base's CoM on inertial axes, m/s."""
+    omega_base: Array = shaped(lambda n: (3,))
+    """Base angular velocity in the *base* frame, as a gyro measures it, rad/s."""
+    joint_positions: Array = shaped(lambda n: (n,))
+    """Joint angles, rad."""
+    joint_velocities: Array = shaped(lambda n: (n,))
+    """Joint velocities, rad/s."""
+    applied_torque: Array = shaped(lambda n: (n + 3,))
+    """Torque applied over the last interval, N m: base x, y, z in the base frame, then joints."""
+
+
+STATE_FIELDS = tuple(State.__annotations__)
+"""Names of the numbers of a state, in their order in memory."""
+
+
+class RobotState:
+    """What the plant measures at a tick, and what it applied over the interval just ended.
+
+    Each field of `State` is an attribute, a view of ``block``, which compiled code reads whole.
+    """
+
+    __slots__ = ("block", "tick", *STATE_FIELDS)
     base_position: Array
-    """(3,) m, base CoM in the inertial frame."""
     quaternion: Array
-    """(4,) ``[w, x, y, z]``, base attitude."""
     base_velocity: Array
-    """(3,) m/s, base CoM, inertial frame."""
     omega_base: Array
-    """(3,) rad/s, base angular velocity in the *base* frame, as a gyro measures it."""
     joint_positions: Array
-    """(n,) rad."""
     joint_velocities: Array
-    """(n,) rad/s."""
     applied_torque: Array
-    """(n+3,) N m applied over the last interval: base x, y, z (base frame), then joints."""
+
+    def __init__(self, tick: int, block: NDArray[Any]) -> None:
+        """``block``: (1,) array of a `State`."""
+        self.tick, self.block = tick, block
+        for name in STATE_FIELDS:
+            setattr(self, name, block[0][name])
 
     @classmethod
     def allocate(cls, n: int) -> RobotState:
         """A state for ``n`` joints, at rest at the origin."""
-        quaternion = np.array([1.0, 0.0, 0.0, 0.0])
-        return cls(
-            0, np.zeros(3), quaternion, np.zeros(3), np.zeros(3), np.zeros(n), np.zeros(n),
-            np.zeros(n + 3),
-        )  # fmt: skip
+        state = cls(0, State.block(n))
+        state.quaternion[0] = 1.0
+        return state
+
+    def copy(self) -> RobotState:
+        """The same state in memory of its own."""
+        return RobotState(self.tick, self.block.copy())
 
 
 @dataclass(slots=True)

@@ -17,15 +17,15 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.flight_log import REFERENCE, STATE, FlightLog
+from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import FLIGHT_KEY, BagRecorder
-from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.samples import STATE_FIELDS, Timebase
 from space_robot_msgs_py.wire.definitions import definition, jazzy
 
 TIMEBASE = Timebase(500_000)
 FLIGHT = {"controller": "tde_stc", "case": "1", "period": 0.0005}
-COLUMNS = (*STATE, *REFERENCE, "commanded_torque")
+COLUMNS = (*STATE_FIELDS, *REFERENCE, "commanded_torque")
 
 Entry = tuple[str, str, int, bytes]
 """Topic, type, log time, message."""

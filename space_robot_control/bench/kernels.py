@@ -35,7 +35,7 @@ def plant_steps(
 def forward_dynamics_calls(block: Block, force: Array, calls: int) -> None:
     """``qdd = H^-1 (F - c)`` in the state of a `Plant`; ``force`` (n+6,)."""
     memory = block[0]
-    x, stages, n = memory.x, memory.stages, memory.joint_positions.size
+    x, stages, n = memory.x, memory.stages, memory.measured.joint_positions.size
     out = stages.slope[0, 7 + n :]
     for _ in range(calls):
         aba(

@@ -115,20 +115,22 @@ def fly_ticks(
         The tick reached, the fastest rate there, and what the controller found its state to be.
     """
     plant, memory = plant_block[0], controller_block[0]
+    measured = plant.measured
     fastest = 0.0
     for row in range(start - first_tick, stop - first_tick):
         k = first_tick + row
-        rows.base_position[row] = plant.base_position
-        rows.quaternion[row] = plant.quaternion
-        rows.base_velocity[row] = plant.base_velocity
-        rows.omega_base[row] = plant.omega_base
-        rows.joint_positions[row] = plant.joint_positions
-        rows.joint_velocities[row] = plant.joint_velocities
-        rows.applied_torque[row] = plant.applied_torque
+        rows.base_position[row] = measured.base_position
+        rows.quaternion[row] = measured.quaternion
+        rows.base_velocity[row] = measured.base_velocity
+        rows.omega_base[row] = measured.omega_base
+        rows.joint_positions[row] = measured.joint_positions
+        rows.joint_velocities[row] = measured.joint_velocities
+        rows.applied_torque[row] = measured.applied_torque
         torque = rows.commanded_torque[row]
         found = answer(
-            memory, law, gains, law_memory, h_bar, uses_model, k, plant.quaternion,
-            plant.omega_base, plant.joint_positions, plant.joint_velocities, plant.applied_torque,
+            memory, law, gains, law_memory, h_bar, uses_model, k, measured.quaternion,
+            measured.omega_base, measured.joint_positions, measured.joint_velocities,
+            measured.applied_torque,
             rows.reference_joints[row], rows.reference_base[row], torque, period,
         )  # fmt: skip
         if found != USABLE:

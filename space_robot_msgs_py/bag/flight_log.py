@@ -9,15 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..samples import LawInForce, RobotState, Timebase
+from ..samples import STATE_FIELDS, LawInForce, RobotState, Timebase
 
 Array = NDArray[np.float64]
 
-STATE = (
-    "base_position", "quaternion", "base_velocity", "omega_base", "joint_positions",
-    "joint_velocities", "applied_torque",
-)  # fmt: skip
-"""The columns a state fills."""
 REFERENCE = ("reference_joints", "reference_base")
 """The columns the desired motion fills."""
 
@@ -108,7 +103,7 @@ class FlightLog:
     @property
     def whole(self) -> NDArray[np.bool_]:
         """(N,) whether state and reference of a row are there and finite."""
-        return self.finite(STATE) & self.finite(REFERENCE)
+        return self.finite(STATE_FIELDS) & self.finite(REFERENCE)
 
     def finite(self, columns: Iterable[str]) -> NDArray[np.bool_]:
         """(N,) whether a row has no NaN in some of the columns."""
@@ -134,22 +129,17 @@ class FlightLog:
     def put(self, state: RobotState) -> None:
         """Copy a state into its tick's row."""
         k = state.tick - self.first_tick
-        self.base_position[k] = state.base_position
-        self.quaternion[k] = state.quaternion
-        self.base_velocity[k] = state.base_velocity
-        self.omega_base[k] = state.omega_base
-        self.joint_positions[k] = state.joint_positions
-        self.joint_velocities[k] = state.joint_velocities
-        self.applied_torque[k] = state.applied_torque
+        for name in STATE_FIELDS:
+            getattr(self, name)[k] = getattr(state, name)
 
     def state(self, tick: int) -> RobotState:
         """The state of a tick, as the plant measured it."""
         k = tick - self.first_tick
-        return RobotState(
-            tick, self.base_position[k], self.quaternion[k], self.base_velocity[k],
-            self.omega_base[k], self.joint_positions[k], self.joint_velocities[k],
-            self.applied_torque[k],
-        )  # fmt: skip
+        state = RobotState.allocate(len(self.joint_names))
+        state.tick = tick
+        for name in STATE_FIELDS:
+            getattr(state, name)[:] = getattr(self, name)[k]
+        return state
 
     def reference(self, tick: int) -> tuple[Array, Array]:
         """The joints' (3, n) and the base's (10,) row of a tick."""

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from .. import topics
 from ..errors import MessageError
-from ..samples import LawInForce, Timebase, in_order
+from ..samples import STATE_FIELDS, LawInForce, Timebase, in_order
 from ..wire.plain_codecs import LawCodec
 from .batch import Batch
-from .flight_log import REFERENCE, STATE, FlightLog
+from .flight_log import REFERENCE, FlightLog
 from .kernels import NO_STAMP, read_stamps
 from .layouts import (
     Describe,
@@ -197,7 +197,7 @@ class Rows:
 
     def _columns(self) -> list[NDArray[Any]]:
         return [
-            *(getattr(self.log, name) for name in (*STATE, *REFERENCE, "commanded_torque")),
+            *(getattr(self.log, name) for name in (*STATE_FIELDS, *REFERENCE, "commanded_torque")),
             *self._sent_ns.values(),
         ]
 

@@ -12,7 +12,7 @@ from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import DivergedError, InputError
-from space_robot_msgs_py.samples import Command, RobotState
+from space_robot_msgs_py.samples import Command, RobotState, State
 
 from ..dynamics.attitude import rotate_back, rotation_matrix
 from ..dynamics.model import Model
@@ -70,14 +70,8 @@ class PlantMemory(Record):
     """Ticks so far in which a torque was at its limit."""
     rotation: Array = shaped(lambda n: (3, 3))
     """Scratch."""
-    base_position: Array = shaped(lambda n: (3,))
-    quaternion: Array = shaped(lambda n: (4,))
-    base_velocity: Array = shaped(lambda n: (3,))
-    omega_base: Array = shaped(lambda n: (3,))
-    joint_positions: Array = shaped(lambda n: (n,))
-    joint_velocities: Array = shaped(lambda n: (n,))
-    applied_torque: Array = shaped(lambda n: (n + 3,))
-    """The measurements, as `RobotState` describes them."""
+    measured: State = nested(State)
+    """What the sensors report at the current tick."""
 
 
 class Plant:
@@ -115,13 +109,10 @@ class Plant:
         memory.x[7 : 7 + n] = np.radians(settings.initial_joints_deg)
         memory.limit[:] = settings.joint_torque_limit or np.inf
         memory.limit[:3] = settings.base_torque_limit or np.inf
-        self.state = RobotState(
-            0, memory.base_position, memory.quaternion, memory.base_velocity, memory.omega_base,
-            memory.joint_positions, memory.joint_velocities, memory.applied_torque,
-        )  # fmt: skip
+        self.state = RobotState(0, self.block["measured"])
         # at rest: what `measure` would say, without waiting for compiled code
-        memory.quaternion[:] = memory.x[3:7]
-        memory.joint_positions[:] = memory.x[7 : 7 + n]
+        self.state.quaternion[:] = memory.x[3:7]
+        self.state.joint_positions[:] = memory.x[7 : 7 + n]
 
     @property
     def tick(self) -> int:
@@ -182,7 +173,7 @@ def advance(
     Returns:
         The fastest rate then, see `measure`.
     """
-    applied, limit, saturated = memory.applied_torque, memory.limit, 0.0
+    applied, limit, saturated = memory.measured.applied_torque, memory.limit, 0.0
     latency = command_delay_buffer.shape[0]
     for i in range(applied.size):
         due = torque[i]
@@ -203,14 +194,15 @@ def advance(
 @kernel
 def measure(memory: PlantMemory) -> float:
     """Write what the sensors see; returns the fastest rate, rad/s (NaN if any is)."""
-    x, n = memory.x, memory.joint_positions.size
-    memory.base_position[:] = x[:3]
-    memory.quaternion[:] = x[3:7]
-    memory.joint_positions[:] = x[7 : 7 + n]
-    memory.base_velocity[:] = x[7 + n : 10 + n]
-    rotation_matrix(memory.quaternion, memory.rotation)
-    rotate_back(memory.rotation, x[10 + n : 13 + n], memory.omega_base)
-    memory.joint_velocities[:] = x[13 + n :]
+    x, measured = memory.x, memory.measured
+    n = measured.joint_positions.size
+    measured.base_position[:] = x[:3]
+    measured.quaternion[:] = x[3:7]
+    measured.joint_positions[:] = x[7 : 7 + n]
+    measured.base_velocity[:] = x[7 + n : 10 + n]
+    rotation_matrix(measured.quaternion, memory.rotation)
+    rotate_back(memory.rotation, x[10 + n : 13 + n], measured.omega_base)
+    measured.joint_velocities[:] = x[13 + n :]
     fastest = 0.0
     for i in range(10 + n, x.size):
         if not abs(x[i]) <= fastest:  # also true of NaN

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,8 +43,7 @@ class SensorFaults:
         """What the sensors make of the true ``state``; the same object at every call."""
         tick, measured = state.tick, self._measured
         measured.tick = tick
-        for name in ARRAYS:
-            getattr(measured, name)[:] = getattr(state, name)
+        measured.block[:] = state.block
         for fault, name in self._noises:
             if fault.acts_at(tick):
                 values: Array = getattr(measured, name)
@@ -62,9 +59,6 @@ class SensorFaults:
                 else:
                     values[:] = in_steps(values, fault.value)
         return measured
-
-
-ARRAYS = [field.name for field in fields(RobotState) if field.name != "tick"]
 
 
 def in_steps(values: Array, step: float) -> Array:

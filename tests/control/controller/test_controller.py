@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-
 import numpy as np
 import pytest
 from closed_loop import GAINS, PERIOD, Loop, law_of
@@ -144,7 +142,7 @@ def test_an_unusable_state_is_refused_and_forgotten(
     shown, spared = (Loop(paper_robot, law_of("tde_stc")) for _ in range(2))
     for loop in (shown, spared):
         loop.fly(20)
-    state = copy.deepcopy(shown.plant.state)
+    state = shown.plant.state.copy()
     getattr(state, field)[place] = value
     with pytest.raises(UnusableStateError, match="at tick 20 the") as caught:
         shown.controller.update(state, *shown.references.at(20))

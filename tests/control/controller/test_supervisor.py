@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.supervisor import REGULAR_ETA, SINGULAR_ETA, Mode, Supervisor
 from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
-from space_robot_msgs_py.samples import RobotState
+from space_robot_msgs_py.samples import STATE_FIELDS, RobotState
 from space_robot_sim import Robot
 
 Array = NDArray[np.float64]
@@ -78,7 +78,12 @@ def test_whatever_is_measured_commands_are_finite_and_it_comes_back(
         x = np.array(values)
         if quaternion is not None:
             x[:4] = np.array(quaternion) / np.linalg.norm(quaternion)
-        state = RobotState(tick, x[4:7], x[:4], x[7:10], x[10:13], x[13:19], x[19:25], x[22:31])
+        state = RobotState.allocate(6)
+        state.tick = tick
+        parts = (slice(4, 7), slice(4), slice(7, 10), slice(10, 13), slice(13, 19), slice(19, 25),
+                 slice(22, 31))  # fmt: skip
+        for name, part in zip(STATE_FIELDS, parts, strict=True):
+            getattr(state, name)[:] = x[part]
         assert_safe(supervisor, state)
     for k in range(1, 4):
         assert_safe(supervisor, state_at(tick + k))

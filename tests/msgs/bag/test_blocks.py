@@ -17,8 +17,9 @@ from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import fly_blocks, simulate
 from space_robot_msgs_py.bag import blocks
 from space_robot_msgs_py.bag.blocks import BLOCK_TICKS, block_bounds, blocks_of, joined, last_rows
-from space_robot_msgs_py.bag.flight_log import REFERENCE, STATE, FlightLog
+from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.samples import STATE_FIELDS
 
 
 def analyzed(log: FlightLog, cuts: list[int]) -> dict[str, Any]:
@@ -80,7 +81,7 @@ def test_rows_joined_are_those_there_were() -> None:
     before, after = last_rows(log.rows(0, 12), 5), log.rows(12, 30)
     both = joined(before, after)
     assert (both.first_tick, both.ticks) == (14, 23)
-    for name in (*STATE, *REFERENCE, "commanded_torque"):
+    for name in (*STATE_FIELDS, *REFERENCE, "commanded_torque"):
         np.testing.assert_array_equal(getattr(both, name), getattr(log, name)[7:])
         assert not np.shares_memory(getattr(before, name), getattr(log, name))
     assert last_rows(log, 99).ticks == 30
@@ -115,7 +116,7 @@ def test_a_long_flight_in_memory_from_blocks_and_from_its_bag_is_the_same(
     for block in parts:
         analysis.add(block)
     read = read_flight(tmp_path / "bag")
-    for name in (*STATE, *REFERENCE, "commanded_torque", "telemetry"):
+    for name in (*STATE_FIELDS, *REFERENCE, "commanded_torque", "telemetry"):
         column = np.concatenate([getattr(block, name) for block in parts])
         np.testing.assert_array_equal(column, getattr(whole, name))
         if name != "telemetry":
@@ -130,5 +131,5 @@ def test_blocks_are_flown_as_the_whole_is(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(blocks, "BLOCK_TICKS", 70)
     parts = simulate(Flight(plan))
     assert [b.ticks for b in blocks_of(parts)][-2:] == [70, 40]
-    for name in (*STATE, *REFERENCE, "commanded_torque", "telemetry"):
+    for name in (*STATE_FIELDS, *REFERENCE, "commanded_torque", "telemetry"):
         np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))

@@ -20,12 +20,13 @@ from bags import (
 )
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.flight_log import REFERENCE, STATE, FlightLog
+from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
 from space_robot_msgs_py.bag.gaps import fill_gaps
 from space_robot_msgs_py.bag.mcap_storage import McapStorage
 from space_robot_msgs_py.bag.reader import read_flight, timebase_of
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.bag.rows import stamps_of
+from space_robot_msgs_py.samples import STATE_FIELDS
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.plain_codecs import ClockCodec
 
@@ -121,7 +122,7 @@ def test_nothing_is_filled_where_the_recorder_lost_states(
 
 def test_a_filled_reference_is_at_rest() -> None:
     log = FlightLog.allocate(6, ("a", "b"), TIMEBASE)
-    for name in (*STATE, *REFERENCE):
+    for name in (*STATE_FIELDS, *REFERENCE):
         column = getattr(log, name)
         column[:] = np.arange(1.0, column.size + 1.0).reshape(column.shape)
     joints, base = log.reference_joints.copy(), log.reference_base.copy()

@@ -13,7 +13,7 @@ from oracles import rotation_of
 from random_robots import random_quaternion
 from random_samples import assert_same, random_sample
 
-from space_robot_msgs_py.samples import Command, RobotState
+from space_robot_msgs_py.samples import STATE_FIELDS, Command, RobotState
 from space_robot_sim.faults.catalogue import KINDS, parse_faults
 from space_robot_sim.faults.schedule import Schedule
 from space_robot_sim.sensors.corruption import STAMP_BACK_TICKS, STAMP_JUMP_TICKS, Corruption
@@ -46,7 +46,7 @@ def a_state(tick: int, seed: int = 1) -> RobotState:
 
 
 def changed(measured: RobotState, state: RobotState) -> set[str]:
-    names = [name for name in RobotState.__slots__ if name != "tick"]
+    names = list(STATE_FIELDS)
     return {n for n in names if (getattr(measured, n) != getattr(state, n)).any()}
 
 
