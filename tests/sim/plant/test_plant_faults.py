@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.samples import Command
+from space_robot_msgs_py.samples import STATE_FIELDS, Command
 from space_robot_sim.actuators.faults import ActuatorFaults
 from space_robot_sim.faults.catalogue import KINDS, parse_fault, parse_faults
 from space_robot_sim.faults.link import awaited_stamp
@@ -19,7 +19,6 @@ from space_robot_sim.plant.faults import PlantFaults
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.plant.settings import PlantNodeSettings
 from space_robot_sim.robot import Robot
-from space_robot_sim.sensors.faults import ARRAYS
 
 PERIOD = 5e-4
 TORQUE = np.array([5.0, -4.0, 3.0, 20.0, -30.0, 15.0, 4.0, -3.0, 2.0])
@@ -195,8 +194,8 @@ def test_measurements_carry_the_wrong_stamp_and_the_truth_its_own(paper_robot: R
     measured = plant_faults(paper_robot, "stamp_jump@0", "nan_state@0").measure(plant.state)
     assert measured.tick == 1_000_000
     assert plant.tick == 0
-    assert all(np.isfinite(getattr(plant.state, name)).all() for name in ARRAYS)
-    assert not all(np.isfinite(getattr(measured, name)).all() for name in ARRAYS)
+    assert all(np.isfinite(getattr(plant.state, name)).all() for name in STATE_FIELDS)
+    assert not all(np.isfinite(getattr(measured, name)).all() for name in STATE_FIELDS)
 
 
 def test_no_faults_are_false(paper_robot: Robot) -> None:
