@@ -32,13 +32,11 @@ setup(
         "click>=8.1",
         "jinja2>=3.1",
         "lz4>=4",
-        "markdown-it-py>=3",
         "matplotlib>=3.8",
         "mcap>=1.5",
         "numba>=0.58.1",
         "numpy>=1.26,<3",
         "psutil>=5.9",
-        "pyarrow>=14",
         "pydantic>=2.5",
         "pyyaml>=6",
         "rich>=13",
@@ -54,6 +52,7 @@ setup(
         # tests/benchmarks; bsk (Basilisk) holds back numpy and matplotlib, so a venv of its own
         "bench": ["bsk", "hypothesis", "mujoco", "pin"],
         "mutation": ["cosmic-ray"],  # tests/mutation
+        "parquet": ["pyarrow>=14"],  # `analyze --parquet`
         # ROS 2 Jazzy from wheels; never a requirement, for apt's ROS must stay untouched
         "ros": [
             "ros-jazzy-common-interfaces",
@@ -67,6 +66,7 @@ setup(
             "mypy",
             "pandas",
             "pin",
+            "pyarrow>=14",
             "pytest",
             "pytest-xdist",
             "ruff",

@@ -1,15 +1,14 @@
-"""A flight as a table for other programs: a named column with its unit for every number of a tick.
+"""The columns of a flight for other programs: each number of a tick has a name with its unit.
 
 Names are ``what_axis_unit``. Quaternions are ``[w, x, y, z]`` and have no unit.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -19,41 +18,37 @@ from .metrics import tracking_error
 
 Array = NDArray[np.float64]
 
-BATCH = 65_536
-"""Ticks that are laid out as a table at a time: what bounds the memory of an export."""
-METADATA_KEY = b"space_robot"
-"""Of a Parquet file's schema: what was flown and what was lost, as JSON."""
+BATCH = 16_384
+"""Ticks that are laid out at a time; this bounds the memory of an export."""
 XYZ, WXYZ = "xyz", "wxyz"
 
 
-def schema(log: FlightLog) -> pa.Schema:
-    """Names and types of the columns; its metadata is the flight's description."""
-    about = {
+def column_names(log: FlightLog) -> list[str]:
+    """The names of all columns, in order; the first is ``tick``, the only one of integers."""
+    return ["tick", *_names(log)]
+
+
+def batches(log: FlightLog) -> Iterator[tuple[NDArray[np.int64], Array]]:
+    """The rows of `column_names`, `BATCH` ticks at a time: ticks (K,) and all other columns (K, C).
+
+    NaN stands for a number that is not known.
+    """
+    error = tracking_error(log)
+    for start in range(0, log.ticks, BATCH):
+        rows = slice(start, min(start + BATCH, log.ticks))
+        ticks = np.arange(rows.start, rows.stop) + log.first_tick
+        yield ticks, np.hstack(_blocks(log, error, ticks, rows))
+
+
+def metadata(log: FlightLog) -> dict[str, Any]:
+    """What was flown, lost and found damaged, ready for JSON."""
+    return {
         "flight": log.flight,
         "laws": as_data(laws_of(log), log.timebase),
         "lost": log.lost, "unanswered_ticks": log.unanswered,
         "filled_ticks": log.filled, "unfinished": log.unfinished, "damage": list(log.damage),
         "foreign": list(log.foreign),
     }  # fmt: skip
-    fields = [pa.field("tick", pa.int64(), nullable=False)]
-    fields += [pa.field(name, pa.float64()) for name in _names(log)]
-    return pa.schema(fields, metadata={METADATA_KEY: json.dumps(about).encode()})
-
-
-def batches(log: FlightLog) -> Iterator[pa.RecordBatch]:
-    """The rows of `schema`, `BATCH` ticks at a time; NaN becomes null."""
-    layout = schema(log)
-    error = tracking_error(log)
-    for start in range(0, log.ticks, BATCH):
-        rows = slice(start, min(start + BATCH, log.ticks))
-        ticks = np.arange(rows.start, rows.stop) + log.first_tick
-        arrays = [pa.array(ticks)]
-        arrays += [
-            pa.array(np.ascontiguousarray(column), from_pandas=True)
-            for block in _blocks(log, error, ticks, rows)
-            for column in block.T
-        ]
-        yield pa.record_batch(arrays, schema=layout)
 
 
 def _names(log: FlightLog) -> list[str]:
@@ -86,7 +81,7 @@ def _names(log: FlightLog) -> list[str]:
 
 
 def _blocks(log: FlightLog, error: Array, ticks: NDArray[np.int64], rows: slice) -> list[Array]:
-    """(rows, columns) arrays in the order of `_names`."""
+    """Arrays (rows, columns) in the order of `_names`."""
     count = len(ticks)
     blocks = [
         (ticks * log.timebase.period_ns / 1e9)[:, np.newaxis],

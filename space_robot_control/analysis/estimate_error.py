@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.bag.blocks import Figure, joined, last_rows
+from space_robot_msgs_py.bag.blocks import Metric, joined, last_rows
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import laws_of
 from space_robot_msgs_py.errors import InputError
@@ -128,7 +128,7 @@ class EstimateErrors:
         return error if there.all() else error[there]
 
 
-class EstimateError(Figure):
+class EstimateError(Metric):
     """RMS and largest absolute value of `EstimateErrors`, by group of axes."""
 
     def __init__(self, log: FlightLog, h_bar: HBar, smoothing: float) -> None:

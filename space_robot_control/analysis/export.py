@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import csv
+import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from importlib.util import find_spec
+from io import TextIOWrapper
 from pathlib import Path
 from tempfile import mkstemp
 from typing import IO, Any
 
+import numpy as np
+
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
+
+from .columns import batches, column_names, metadata
+
+METADATA_KEY = b"space_robot"
+"""The key of the flight's description, as JSON, in the metadata of a Parquet file's schema."""
 
 
 def check_free(path: Path) -> None:
@@ -38,43 +49,57 @@ def make_folder(path: Path) -> None:
         raise InputError(f"{path}: no folder can be made there ({error.strerror})") from None
 
 
+def check_parquet() -> None:
+    """See that Parquet files can be written, before any work is done for them.
+
+    Raises:
+        InputError: pyarrow is not installed.
+    """
+    if find_spec("pyarrow") is None:
+        raise InputError("Parquet files need pyarrow: pip install 'space_robot[parquet]'")
+
+
 def write_csv(log: FlightLog, path: Path) -> None:
-    """The columns of `analysis.columns` as text; a number that is not known is empty.
+    """Write the columns of `analysis.columns` as text; a number that is not known is empty.
 
     Raises:
         InputError: the file exists or cannot be written.
     """
-    from pyarrow import csv
-
-    from .columns import batches, schema
-
-    with whole_file(path) as file, csv.CSVWriter(file, schema(log)) as writer:
-        for batch in batches(log):
-            writer.write_batch(batch)
+    with whole_file(path) as raw, TextIOWrapper(raw, encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(column_names(log))
+        for ticks, numbers in batches(log):
+            texts = numbers.astype(object)
+            texts[np.isnan(numbers)] = None
+            writer.writerows(np.column_stack([ticks.astype(object), texts]).tolist())
 
 
 def write_parquet(log: FlightLog, path: Path) -> None:
-    """The columns of `analysis.columns`, with the flight's description in the schema's metadata.
+    """Write the columns of `analysis.columns`; the schema's metadata describes the flight.
 
     Raises:
-        InputError: the file exists or cannot be written.
+        InputError: the file exists or cannot be written, or pyarrow is not installed.
     """
+    check_parquet()
+    import pyarrow as pa
     from pyarrow import parquet
 
-    from .columns import batches, schema
-
+    tick, *others = column_names(log)
+    schema = pa.schema(
+        [pa.field(tick, pa.int64(), nullable=False), *((name, pa.float64()) for name in others)],
+        metadata={METADATA_KEY: json.dumps(metadata(log)).encode()},
+    )
     with (
         whole_file(path) as file,
-        parquet.ParquetWriter(
-            file, schema(log), compression="zstd", use_dictionary=False
-        ) as writer,
+        parquet.ParquetWriter(file, schema, compression="zstd", use_dictionary=False) as writer,
     ):
-        for batch in batches(log):
-            writer.write_batch(batch)
+        for ticks, numbers in batches(log):
+            columns = [pa.array(np.ascontiguousarray(c), from_pandas=True) for c in numbers.T]
+            writer.write_batch(pa.record_batch([pa.array(ticks), *columns], schema=schema))
 
 
 def write_text(text: str, path: Path) -> None:
-    """``text`` in UTF-8.
+    """Write ``text`` in UTF-8.
 
     Raises:
         InputError: the file exists or cannot be written.
@@ -85,7 +110,7 @@ def write_text(text: str, path: Path) -> None:
 
 @contextmanager
 def whole_file(path: Path, replace: bool = False) -> Iterator[IO[Any]]:
-    """A file to write that takes its name only when all is in it.
+    """Open a file that takes its name only when all is in it.
 
     Args:
         path: its name, which must not be taken yet; a pipe or device is written as it is.

@@ -11,7 +11,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.bag.blocks import Figure, blocks_of
+from space_robot_msgs_py.bag.blocks import Metric, blocks_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from .spectrum import PowerAbove
@@ -138,7 +138,7 @@ class TotalVariation:
         return float(np.mean(self._variation[axes]) / ((self._rows - 1) * period))
 
 
-class Rms(Figure):
+class Rms(Metric):
     """The RMS of errors and torques, by definition and column of Table V."""
 
     def __init__(self, axes: int) -> None:
@@ -168,7 +168,7 @@ class Rms(Figure):
         }
 
 
-class Maxima(Figure):
+class Maxima(Metric):
     """Largest |error| and |torque| on any axis, by column of Table V."""
 
     def __init__(self, axes: int) -> None:
@@ -192,7 +192,7 @@ class Maxima(Figure):
         }
 
 
-class Chatter(Figure):
+class Chatter(Metric):
     """How rough the applied torques are, by measure and column of Table V."""
 
     def __init__(self, axes: int, period: float) -> None:
@@ -220,21 +220,21 @@ class Chatter(Figure):
 
 def rms(log: FlightLog) -> Table:
     """`Rms` of a whole log."""
-    figure = Rms(log.axes)
-    _add_all(figure, log)
-    return figure.result()
+    metric = Rms(log.axes)
+    _add_all(metric, log)
+    return metric.result()
 
 
 def chatter(log: FlightLog) -> Table:
     """`Chatter` of a whole log."""
-    figure = Chatter(log.axes, log.timebase.period)
-    _add_all(figure, log)
-    return figure.result()
+    metric = Chatter(log.axes, log.timebase.period)
+    _add_all(metric, log)
+    return metric.result()
 
 
-def _add_all(figure: Figure, log: FlightLog) -> None:
+def _add_all(metric: Metric, log: FlightLog) -> None:
     for block in blocks_of(log):
-        figure.add(block, tracking_error(block))
+        metric.add(block, tracking_error(block))
 
 
 def _columns(groups: dict[str, slice], base: str, prefix: str) -> dict[str, slice]:

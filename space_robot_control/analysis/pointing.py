@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.bag.blocks import Figure
+from space_robot_msgs_py.bag.blocks import Metric
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.tool import tool_pose
@@ -38,7 +38,7 @@ class PointingError(NamedTuple):
     """(N,) m, of the base's CoM from where it was at the first tick."""
 
 
-class Pointing(Figure):
+class Pointing(Metric):
     """RMS, maximum and last value of each figure of a `PointingError`."""
 
     def __init__(self, log: FlightLog, robot: Robot) -> None:

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from space_robot_msgs_py.bag.blocks import Figure, blocks_of
+from space_robot_msgs_py.bag.blocks import Metric, blocks_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, within
 from space_robot_msgs_py.errors import InputError
 
-from .actuation import Latency, Misses, Saturation, TorqueLimits
+from .actuation import Latency, MissedDeadlines, Saturation, TorqueLimits
 from .described import estimator, robot_of, torque_limits
 from .estimate_error import EstimateError
 from .metrics import Chatter, Maxima, Rms, tracking_error
@@ -44,7 +44,7 @@ class Analysis:
     def __init__(self) -> None:
         self.ticks = 0
         """Rows so far."""
-        self._figures: dict[str, Figure] = {}
+        self._figures: dict[str, Metric] = {}
         self._unavailable: dict[str, str] = {}
         self._head: dict[str, Any] = {}
         self._tail: dict[str, Any] = {}
@@ -116,22 +116,22 @@ def _without_gaps(log: FlightLog) -> FlightLog:
     return found
 
 
-def _misses(log: FlightLog) -> Misses:
+def _missed_deadlines(log: FlightLog) -> MissedDeadlines:
     try:
         limits = torque_limits(log)
     except InputError:
         limits = TorqueLimits(np.inf, np.inf)
-    return Misses(int(log.flight.get("command_latency_ticks", 0)), limits)
+    return MissedDeadlines(int(log.flight.get("command_latency_ticks", 0)), limits)
 
 
-_FIGURES: dict[str, Callable[[FlightLog], Figure]] = {
+_FIGURES: dict[str, Callable[[FlightLog], Metric]] = {
     "rms": lambda log: Rms(log.axes),
     "maxima": lambda log: Maxima(log.axes),
     "chatter": lambda log: Chatter(log.axes, log.timebase.period),
     "settling": Settling,
     "saturation": lambda log: Saturation(torque_limits(log)),
     "latency": lambda log: Latency(log.timebase.period),
-    "misses": _misses,
+    "missed_deadlines": _missed_deadlines,
     "estimate_error": lambda log: EstimateError(log, *estimator(log)),
     "pointing": lambda log: Pointing(log, robot_of(log)),
 }

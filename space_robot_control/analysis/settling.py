@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.bag.blocks import Figure
+from space_robot_msgs_py.bag.blocks import Metric
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
@@ -22,7 +22,7 @@ SHORTEST_WATCH = 0.1
 """s of flight after a waypoint without which nothing can be said of settling there."""
 
 
-class Settling(Figure):
+class Settling(Metric):
     """The shortest time after the last waypoint from which each error column stays in `BAND`.
 
     As in control engineering (e.g. Ogata, Modern Control Engineering, 5-3), with a band in

@@ -206,7 +206,9 @@ def _latency(report: Report, name: str) -> str:
 
 
 def _differing(report: Report) -> str:
-    return str(report["misses"]["differing_ticks"]) if report["misses"] else NONE
+    return (
+        str(report["missed_deadlines"]["differing_ticks"]) if report["missed_deadlines"] else NONE
+    )
 
 
 def _axes(key: str, kind: str) -> str:

@@ -109,7 +109,9 @@ class TimedPlantLoop(PlantLoop):
     def run(self) -> None:
         """Fly, then write the times down."""
         super().run()
-        self._watch.save(self.file, command_ticks=self._command_ticks, late_ticks=self.late_ticks)
+        self._watch.save(
+            self.file, command_ticks=self._command_ticks, missed_deadlines=self.missed_deadlines
+        )
 
 
 class TimedControllerLoop(ControllerLoop):

@@ -77,8 +77,16 @@ def analyze(
     from space_robot_msgs_py.bag.reader import read_flight
 
     from ..analysis import analyze, excerpt
-    from ..analysis.export import check_free, write_csv, write_parquet, write_text
+    from ..analysis.export import (
+        check_free,
+        check_parquet,
+        write_csv,
+        write_parquet,
+        write_text,
+    )
 
+    if parquet:
+        check_parquet()
     names = _names(bags)
     exports = [
         (write, dict(zip(names, _files(where, names, suffix), strict=True)))

@@ -1,4 +1,4 @@
-"""Long flights in parts: figures of merit are summed up block by block, in flat memory."""
+"""Long flights come in blocks: metrics are summed up block by block, in flat memory."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ BLOCK_TICKS = 60_000
 """Rows of a block but the last: 30 s at 2 kHz, the paper's whole mission."""
 
 
-class Figure(ABC):
-    """A figure of merit that is summed up block by block.
+class Metric(ABC):
+    """A number, or several, that tell how well a flight was flown, summed up block by block.
 
-    The same blocks give the same bits, and blocks cut elsewhere the same figure but for rounding:
+    The same blocks give the same bits, and blocks cut elsewhere the same numbers but for rounding:
     what spans two blocks (a difference, a delay) is taken across their border.
     """
 
@@ -31,7 +31,7 @@ class Figure(ABC):
 
     @abstractmethod
     def result(self) -> Any:
-        """The figure of all rows so far, ready for JSON.
+        """Return the metric of all rows so far, ready for JSON.
 
         Raises:
             InputError: this flight does not have it.
@@ -39,26 +39,26 @@ class Figure(ABC):
 
 
 def block_bounds(ticks: int) -> Iterator[tuple[int, int]]:
-    """First row and the row after the last of every block of a flight of ``ticks``."""
+    """Yield the first row and the row after the last of each block of a flight of ``ticks``."""
     for start in range(0, ticks, BLOCK_TICKS):
         yield start, min(start + BLOCK_TICKS, ticks)
 
 
 def blocks_of(log: FlightLog) -> Iterator[FlightLog]:
-    """The blocks of a log that is in memory as a whole, counted from its first row; views."""
+    """Yield the blocks of a log that is in memory as a whole, as views, from its first row on."""
     for start, stop in block_bounds(log.ticks):
         yield log.rows(start, stop)
 
 
 def last_rows(log: FlightLog, count: int) -> FlightLog:
-    """A copy of the last ``count`` rows, or of all if there are fewer."""
+    """Copy the last ``count`` rows, or all if there are fewer."""
     rows = log.rows(max(0, log.ticks - count), log.ticks)
     columns: dict[str, Any] = {name: c.copy() for name, c in _columns(rows).items()}
     return replace(rows, **columns)
 
 
 def joined(before: FlightLog | None, log: FlightLog) -> FlightLog:
-    """``log`` with the rows of ``before`` in front; ``log`` itself if there are none."""
+    """Put the rows of ``before`` in front of ``log``; without any it is ``log`` itself."""
     if before is None:
         return log
     columns: dict[str, Any] = {

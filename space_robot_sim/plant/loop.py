@@ -82,8 +82,8 @@ class PlantLoop:
         self._sent, self._clock_sent = (b"", b""), b""
         self._sent_at = 0.0
         self._answers, self._latency_s, self._latency_max_s = 0, 0.0, 0.0
-        self.late_ticks = 0
-        """Ticks that were not answered before their end."""
+        self.missed_deadlines = 0
+        """Ticks whose command was not there by their end, be it late or never sent."""
 
     def run(self) -> None:
         """Fly until the last tick, or until told to stop."""
@@ -102,7 +102,7 @@ class PlantLoop:
             host.serve()
         elapsed = time.monotonic() - began
         flush(self.outputs, FLUSH_S)
-        late = f", {self.late_ticks} ticks without an answer in time" if self.late_ticks else ""
+        late = f", {self.missed_deadlines} missed deadlines" if self.missed_deadlines else ""
         late += f", {clock.lost_time_s:.3f} s behind the wall clock" if clock.lost_time_s else ""
         host.log(f"flew {(plant.tick - first) * settings.period:.4f} s in {elapsed:.2f} s{late}")
 
@@ -118,7 +118,7 @@ class PlantLoop:
         guard, tick = self._guard, self._plant.tick
         values: dict[str, float | int | str] = {
             "tick": tick,
-            "unanswered_ticks": self.late_ticks,
+            "missed_deadlines": self.missed_deadlines,
             "held_ticks": guard.held_ticks(tick),
             "saturated_ticks": self._plant.saturated_ticks,
             **{f"refused: {reason}": count for reason, count in guard.refused.items()},
@@ -160,7 +160,7 @@ class PlantLoop:
 
     def _step(self) -> None:
         plant, guard = self._plant, self._guard
-        self.late_ticks += guard.answered != plant.tick
+        self.missed_deadlines += guard.answered != plant.tick
         was_safe = guard.is_safe
         command = guard.act(plant.tick)
         if guard.is_safe is not was_safe:

@@ -55,7 +55,7 @@ def _rows(name: str, flight: Flight, runs: list[GraphRun], target: Target | None
 
 
 def _answered_in_time(run: GraphRun, flight: Flight) -> float:
-    return 1.0 - int(run.plant["late_ticks"]) / flight.ticks
+    return 1.0 - int(run.plant["missed_deadlines"]) / flight.ticks
 
 
 def _lateness_us(run: GraphRun, period: float) -> NDArray[np.float64]:

@@ -6,8 +6,6 @@ import json
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from markdown_it import MarkdownIt
-
 from space_robot_msgs_py.config.files import config_directory
 
 from ...analysis.template import template
@@ -43,6 +41,5 @@ def render(
 
 
 def errata() -> str:
-    """``docs/errata.md`` as HTML, from the source tree or where it was installed."""
-    path = config_directory().parent / "docs" / "errata.md"
-    return str(MarkdownIt("commonmark").enable("table").render(path.read_text("utf-8")))
+    """The text of ``docs/errata.md``, from the source tree or where it was installed."""
+    return (config_directory().parent / "docs" / "errata.md").read_text("utf-8")

@@ -13,7 +13,12 @@ from hypothesis import strategies as st
 from random_logs import random_log
 
 from space_robot_control.analysis import analyze
-from space_robot_control.analysis.actuation import Latency, Misses, Saturation, TorqueLimits
+from space_robot_control.analysis.actuation import (
+    Latency,
+    MissedDeadlines,
+    Saturation,
+    TorqueLimits,
+)
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -28,7 +33,7 @@ def flown(**options: Any) -> FlightLog:
 
 
 def differing(log: FlightLog, latency_ticks: int, limits: TorqueLimits) -> tuple[int, int]:
-    figure = Misses(latency_ticks, limits)
+    figure = MissedDeadlines(latency_ticks, limits)
     figure.add(log, np.empty(0))
     return figure.differing, figure.compared
 
@@ -58,12 +63,12 @@ def test_without_commands_nothing_is_known(commands: np.ndarray | None) -> None:
     log = flown(duration=0.01)
     log.commanded_torque = commands
     report = analyze(log)
-    assert report["misses"] is None
-    assert report["unavailable"]["misses"] == "the commands were not recorded"
+    assert report["missed_deadlines"] is None
+    assert report["unavailable"]["missed_deadlines"] == "the commands were not recorded"
 
 
 @given(st.sampled_from([1, 3, 6, 7]), st.integers(0, 99), st.integers(0, 4), st.integers(0, 60))
-def test_misses_and_saturation_are_those_of_plain_loops(
+def test_missed_deadlines_and_saturation_are_those_of_plain_loops(
     n: int, seed: int, latency_ticks: int, cut: int
 ) -> None:
     """Filled ticks repeat the state before; what stands there was not measured."""
@@ -91,12 +96,12 @@ def test_misses_and_saturation_are_those_of_plain_loops(
         compared += 1
         clipped = [max(-y, min(y, x)) for x, y in zip(commanded, limit, strict=True)]
         differ += clipped != applied
-    misses, saturation = Misses(latency_ticks, SOME), Saturation(SOME)
+    missed_deadlines, saturation = MissedDeadlines(latency_ticks, SOME), Saturation(SOME)
     for start, stop in ((0, cut), (cut, min(cut + 1, 60)), (min(cut + 1, 60), 60)):
         if start < stop:
-            misses.add(log.rows(start, stop), np.empty(0))
+            missed_deadlines.add(log.rows(start, stop), np.empty(0))
             saturation.add(log.rows(start, stop), np.empty(0))
-    assert (misses.differing, misses.compared) == (differ, compared)
+    assert (missed_deadlines.differing, missed_deadlines.compared) == (differ, compared)
     assert saturation.result() == {
         "base_torque_limit_n_m": 2.0, "joint_torque_limit_n_m": 1.5, "ticks": saturated,
         "share": saturated / 60,
@@ -114,7 +119,7 @@ def test_saturation_is_the_plants() -> None:
     # the plant's own count has no torque at tick 0, but one more at the end
     assert 0 < counted <= int(flight.plant.block[0]["saturated_ticks"]) <= counted + 1
     assert differing(log, 0, limits) == (0, 399)
-    assert report["misses"] == {
+    assert report["missed_deadlines"] == {
         "unanswered_ticks": 0, "compared_ticks": 399, "differing_ticks": 0,
     }  # fmt: skip
     assert differing(log, 0, NONE)[0] > 0

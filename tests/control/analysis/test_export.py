@@ -11,8 +11,8 @@ import pytest
 from pyarrow import csv, parquet
 
 from space_robot_control.analysis import excerpt, tracking_error
-from space_robot_control.analysis.columns import BATCH, METADATA_KEY, batches, schema
-from space_robot_control.analysis.export import whole_file, write_csv, write_parquet
+from space_robot_control.analysis.columns import BATCH, batches, column_names
+from space_robot_control.analysis.export import METADATA_KEY, whole_file, write_csv, write_parquet
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -75,6 +75,16 @@ def test_parquet_has_every_bit_and_what_was_flown(log: FlightLog, tmp_path: Path
     assert about["lost"] == log.lost
 
 
+def test_without_pyarrow_there_is_csv_and_one_line_on_parquet(
+    log: FlightLog, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("space_robot_control.analysis.export.find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"pip install 'space_robot\[parquet\]'"):
+        write_parquet(log, tmp_path / "flight.parquet")
+    write_csv(log, tmp_path / "flight.csv")
+    assert [path.name for path in tmp_path.iterdir()] == ["flight.csv"]
+
+
 def test_an_excerpt_keeps_its_time(log: FlightLog, tmp_path: Path) -> None:
     write_csv(excerpt(log, 0.05, None), tmp_path / "part.csv")
     table = csv.read_csv(tmp_path / "part.csv")
@@ -84,10 +94,10 @@ def test_an_excerpt_keeps_its_time(log: FlightLog, tmp_path: Path) -> None:
 
 def test_every_column_has_one_name_and_what_is_not_known_has_none() -> None:
     log = FlightLog.allocate(BATCH + 5, ("a", "b"), Timebase(500_000))
-    names = schema(log).names
+    names = column_names(log)
     assert len(set(names)) == len(names)
     assert not any(name.startswith(("commanded", "latency")) for name in names)
-    sizes = [batch.num_rows for batch in batches(log)]
+    sizes = [len(ticks) for ticks, _ in batches(log)]
     assert sizes == [BATCH, 5]
 
 

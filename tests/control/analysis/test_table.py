@@ -72,7 +72,7 @@ def test_every_line_is_its_figure(reports: list[dict[str, Any]]) -> None:
             ms, ticks = (r["latency"][f"{name}_{unit}"] for unit in ("ms", "ticks"))
             texts["latency", name] = f"{ms:.3g} ({ticks:.3g})"
         texts["commands", "unanswered"] = str(r["unanswered_ticks"])
-        texts["commands", "not as commanded"] = str(r["misses"]["differing_ticks"])
+        texts["commands", "not as commanded"] = str(r["missed_deadlines"]["differing_ticks"])
         for kind, label in (("rms", "RMS"), ("max", "max")):
             for group, name in GROUPS.items():
                 value = r["estimate_error"][kind][group]
