@@ -71,7 +71,7 @@ class Latency(Metric):
             self._known.append(log.latency_s[np.isfinite(log.latency_s)])
 
     def result(self) -> dict[str, float]:
-        """Return ``p50``, ``p99`` and ``max`` as ``..._ms`` and ``..._ticks``, and the ``answers``."""
+        """Return ``p50``, ``p99``, ``max`` as ``..._ms`` and ``..._ticks``, and ``answers``."""
         known = np.concatenate([np.empty(0), *self._known])
         if not len(known):
             raise InputError("no wall-clock times of states and commands: not flown as a graph")

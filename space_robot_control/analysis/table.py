@@ -114,7 +114,7 @@ def remarks(report: Report) -> list[str]:
         text for text in (report["unfinished"], *report["damage"], *report["foreign"]) if text
     ]
     if report["unanswered_ticks"]:
-        found.append(f"ticks the controller did not answer in time: {report['unanswered_ticks']}")
+        found.append(f"ticks that no command was recorded for: {report['unanswered_ticks']}")
     if report["filled_ticks"]:
         found.append(
             f"ticks without a usable state, shown as the one before: {report['filled_ticks']}"
