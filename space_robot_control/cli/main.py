@@ -18,7 +18,6 @@ from space_robot_msgs_py.ros.lifeline import hold_to_standard_input
 from ..flight.interruption import Interrupted, raising_signals
 from ..flight.node_modules import MODULES, SUFFIX
 from .analyze import analyze
-from .bench import bench
 from .options import OPTIONS, flight_options
 from .replay import replay
 from .reproduce import reproduce
@@ -40,7 +39,6 @@ def cli() -> None:
       space-robot analyze flights/<bag>...          figures of merit of recorded flights
       space-robot replay flights/<bag>              its states to a live controller, compared
       space-robot reproduce                         the paper's Table V and figures, flown again
-      space-robot bench                             how fast it is here
       space-robot soak --minutes 5                  flights with faults drawn by chance
     """
 
@@ -175,7 +173,6 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
 
 
 cli.add_command(analyze)
-cli.add_command(bench)
 cli.add_command(replay)
 cli.add_command(reproduce)
 cli.add_command(soak)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from typing import ClassVar
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.files import named_file
@@ -33,14 +32,12 @@ STAND_DOWN_S = 0.1
 class ControllerLoop:
     """Takes the newest state, waits for its reference, answers; never answers a tick anew."""
 
-    controller_class: ClassVar[type[Controller]] = Controller
-
     def __init__(self, host: NodeHost, settings: ControllerNodeSettings) -> None:
         self._host, self._settings = host, settings
         robot = Robot.from_yaml(named_file("robots", settings.robot))
         self._laws = LawSet(host, settings, robot.n + 3)
         self._laws.warm_up(robot)
-        self._controller = self.controller_class(
+        self._controller = Controller(
             robot, self._laws.chosen, settings.period, settings.acceleration_filter_hz
         )
         self._supervisor = Supervisor(self._controller, robot.n + 3, settings.hold_ticks)

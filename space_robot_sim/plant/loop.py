@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from typing import ClassVar
 
 import numpy as np
 
@@ -52,12 +51,10 @@ class PlantLoop:
     for: then, and always by the wall clock, a tick lasts its period and the last command is held.
     """
 
-    plant_class: ClassVar[type[Plant]] = Plant
-
     def __init__(self, host: NodeHost, settings: PlantNodeSettings) -> None:
         self._host, self._settings = host, settings
         robot = Robot.from_yaml(named_file("robots", settings.robot))
-        self._plant = self.plant_class(robot, settings, settings.period)
+        self._plant = Plant(robot, settings, settings.period)
         at_rest = Command(0, np.zeros(robot.n + 3))
         Plant(robot, settings, settings.period).step(at_rest)  # loads the compiled code
         timebase = settings.timebase

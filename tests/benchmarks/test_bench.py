@@ -1,4 +1,4 @@
-"""``space-robot bench``: that it works and computes right; no time is asserted anywhere."""
+"""The benchmarks: that they work and compute right; no time is asserted anywhere."""
 
 from __future__ import annotations
 
@@ -14,16 +14,19 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from paths import ROOT
+from paths import TESTS
 from rich.console import Console
 
-from space_robot_control.bench import Options, Result, Target, interleave, repeated
-from space_robot_control.bench.display import print_section
-from space_robot_control.bench.sections import SECTIONS
-from space_robot_control.bench.sections.laws import Recorded
-from space_robot_control.cli.main import cli
+from benchmarks.command import SECTIONS, bench
+from benchmarks.display import print_section
+from benchmarks.measure import Options, interleave, repeated
+from benchmarks.result import Result, Target
+from benchmarks.sections import section
+from benchmarks.sections.laws import Recorded
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
+
+COMMAND = [sys.executable, str(TESTS / "benchmarks")]
 
 
 class Clock:
@@ -109,8 +112,8 @@ def test_table_shows_everything(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     path = tmp_path_factory.mktemp("bench") / "bench.json"
-    arguments = ["bench", "--short", "plant", "laws", "simulate", "--json", "--output", str(path)]
-    result = CliRunner().invoke(cli, arguments, catch_exceptions=False)
+    arguments = ["--short", "plant", "laws", "simulate", "--json", "--output", str(path)]
+    result = CliRunner().invoke(bench, arguments, catch_exceptions=False)
     assert result.exit_code == 0, result.output
     found: dict[str, Any] = json.loads(result.stdout)
     assert json.loads(path.read_text("utf-8")) == found
@@ -169,7 +172,7 @@ def test_recorded_flight_is_flown_again_to_the_bit() -> None:
 
 
 def test_unknown_section_is_named_with_the_allowed_ones() -> None:
-    result = CliRunner().invoke(cli, ["bench", "plants"])
+    result = CliRunner().invoke(bench, ["plants"])
     assert result.exit_code == 2
     assert "'plants'" in result.stderr
     for name in SECTIONS:
@@ -177,15 +180,16 @@ def test_unknown_section_is_named_with_the_allowed_ones() -> None:
 
 
 def test_help_names_every_section() -> None:
-    text = CliRunner().invoke(cli, ["bench", "--help"]).stdout
+    text = CliRunner().invoke(bench, ["--help"]).stdout
     for name in SECTIONS:
         assert name in text
 
 
 def test_output_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "space_robot_control.cli.main", "bench", "--output"]
     path = tmp_path / "missing" / "bench.json"
-    result = subprocess.run([*command, str(path)], capture_output=True, text=True, check=False)
+    result = subprocess.run(
+        [*COMMAND, "--output", str(path)], capture_output=True, text=True, check=False
+    )
     assert result.returncode == 2
     assert str(path) in result.stderr
     assert len(result.stderr.splitlines()) == 1
@@ -198,18 +202,52 @@ def test_output_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
 def test_peers_fly_the_same_robot(tmp_path: Path) -> None:
     picture = tmp_path / "growth.png"
     result = subprocess.run(
-        [sys.executable, "tests/benchmarks", "--short", "--json", "--plot", str(picture)],
-        capture_output=True, text=True, check=False, cwd=ROOT,
+        [*COMMAND, "peers", "growth", "--short", "--json", "--plot", str(picture)],
+        capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert result.returncode == 0, result.stderr
-    found = json.loads(result.stdout)
-    assert {row["beside"] for row in found["plant"]} >= {"mujoco", "pinocchio, 4 aba from Python"}
-    checks = found["checks"] + found["growth"]["checks"]
-    assert {check["peer"] for check in checks} >= {"mujoco", "pinocchio"}
-    for check in checks:
-        assert check["same"]
-        assert check["moved"] > 1e-3
-    for competitor in found["growth"]["competitors"].values():
-        assert len(competitor["median_us"]) == len(found["growth"]["joints"]) == 2
-        assert competitor["exponent_from_10_joints"] is None
+    found = json.loads(result.stdout)["sections"]
+    beside = {row["beside"] for row in found["peers"]}
+    assert beside >= {"mujoco", "pinocchio, 4 aba from Python"}
+    for name, joints in (("peers", (6,)), ("growth", (6, 7))):
+        checks = [row for row in found[name] if row["is_condition"]]
+        for n in joints:
+            moved, *apart = (row for row in checks if row["name"].startswith(f"{n} joints"))
+            assert moved["name"].endswith("motion")
+            assert moved["median"] > 1e-3
+            assert {"mujoco apart", "pinocchio apart"} <= {
+                row["name"].split(": ")[1] for row in apart
+            }
+            assert all(row["reached"] for row in apart)
+    names = [row["name"] for row in found["growth"]]
+    for peer in ("mujoco, step", "pinocchio, aba in C++", "pinocchio, aba from Python"):
+        assert [row["beside"] for row in found["growth"]].count(peer) == 2
+        assert f"exponent, all sizes: {peer}" in names
+    assert not [name for name in names if name.startswith("exponent, from 10 joints on")]
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_peer_that_is_another_robot_ends_the_command_with_exit_code_1(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    row = Result("apart", "", (1e-6,), target=Target(1e-9), is_condition=True)
+    monkeypatch.setattr("benchmarks.sections.plant.plant", lambda options: [row])
+    result = CliRunner().invoke(bench, ["plant", "--short"])
+    assert result.exit_code == 1
+    assert "missed" in result.stdout
+
+
+def test_every_section_is_a_function_of_its_file() -> None:
+    folder = TESTS / "benchmarks/sections"
+    files = {path.stem for path in folder.glob("*.py")} - {"__init__"}
+    assert files == {name.replace("-", "_") for name in SECTIONS}
+    for name in set(SECTIONS) - {"peers", "growth"}:
+        assert callable(section(name))
+
+
+def test_missing_peers_are_left_out_with_a_word(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("benchmarks.peers.is_installed", lambda module: False)
+    result = CliRunner().invoke(bench, ["peers", "growth", "--short", "--json"])
+    assert result.exit_code == 0
+    assert json.loads(result.stdout)["sections"] == {}
+    assert "peers is left out: no MuJoCo and no Pinocchio here" in result.stderr

@@ -13,10 +13,11 @@ from Basilisk.simulation import (
 from Basilisk.utilities import RigidBodyKinematics, SimulationBaseClass
 from numpy.typing import NDArray
 from oracles import quaternion_of, rotation_of
-from peers import PERIOD, Start
 from scipy.spatial.transform import Rotation
 
 from space_robot_sim import mass_matrix
+
+from .simulators import PERIOD, Start
 
 Array = NDArray[np.float64]
 

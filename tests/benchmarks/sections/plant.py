@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_msgs_py.samples import Command
 from space_robot_sim.plant.plant import Plant
 
-from ...flight.plan import Flight, FlightPlan
 from ..kernels import forward_dynamics_calls, plant_steps, state_derivatives
 from ..measure import Options, interleave, repeated
 from ..result import Result

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from space_robot_control.analysis import analyze
+from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.flight.simulate import simulate as fly
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
-from ...analysis import analyze
-from ...flight.plan import Flight, FlightPlan
-from ...flight.simulate import simulate as fly
 from ..measure import Options, interleave, repeated
 from ..result import Result, Target
 

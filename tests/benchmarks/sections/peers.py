@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from checks import HAS_BASILISK, all_peers, same_motion
-from peers import BATCH, FRICTION, MuJoCo, Ours, Pinocchio, Start
-
-from space_robot_control.bench import Options, Result, Target, interleave
-from space_robot_control.bench.sections.plant import moving_plant
+from ..measure import Options, interleave
+from ..peers import is_installed
+from ..peers.checks import all_peers, same_motion
+from ..peers.simulators import BATCH, FRICTION, MuJoCo, Ours, Pinocchio, Start
+from ..result import Result, Target
+from .plant import moving_plant
 
 CHECK_STEPS = 400
 
 
-def plant_step(options: Options) -> tuple[list[Result], list[dict[str, Any]]]:
+def peers(options: Options) -> list[Result]:
     """Rows beside each peer, and the checks that it is the same robot.
 
     The peers have viscous friction only, which costs them least; MuJoCo with Coulomb friction, a
@@ -31,8 +30,8 @@ def plant_step(options: Options) -> tuple[list[Result], list[dict[str, Any]]]:
         "aba": pinocchio.calls,
         "aba in C++": pinocchio.batches_in_cpp,
     }
-    if HAS_BASILISK:
-        from basilisk import Basilisk
+    if is_installed("Basilisk"):
+        from ..peers.basilisk import Basilisk
 
         competitors["basilisk"] = Basilisk(start, FRICTION.viscous).step
     options.progress("one plant step beside its peers")
@@ -48,6 +47,6 @@ def plant_step(options: Options) -> tuple[list[Result], list[dict[str, Any]]]:
         row("aba", "pinocchio, 4 aba from Python", factor=4.0),
         row("aba in C++", "pinocchio, 4 aba in C++", factor=4.0 / BATCH),
     ]
-    if HAS_BASILISK:
+    if is_installed("Basilisk"):
         results.insert(2, row("basilisk", "basilisk", Target(5.0, 8.0, "ratio")))
-    return results, checks
+    return results + checks

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from ...flight.plan import Flight, FlightPlan
-from ..graph import WARM_UP_TICKS, GraphRun, fly_graph, naive_ticks_per_s
+from space_robot_control.flight.plan import Flight, FlightPlan
+
+from ..graph_flights import WARM_UP_TICKS, GraphRun, fly_graph, naive_ticks_per_s
 from ..measure import Options
 from ..result import Beside, Result, Target
 

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_control.controller.kernels import answer
+from space_robot_control.flight.closed_loop import Rows
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_sim.dynamics.aba import aba
 from space_robot_sim.plant.integrator import state_derivative
 from space_robot_sim.plant.plant import advance
-
-from ..controller.kernels import answer
-from ..flight.closed_loop import Rows
 
 Array = NDArray[np.float64]
 Block = NDArray[Any]

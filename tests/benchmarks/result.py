@@ -44,6 +44,8 @@ class Result:
     better: Literal["less", "more"] = "less"
     """Which values are the better ones."""
     note: str = ""
+    is_condition: bool = False
+    """Without it the other rows mean nothing: a miss ends the command with exit code 1."""
 
     @classmethod
     def timed(
@@ -141,6 +143,7 @@ class Result:
             "asked": asked,
             "reached": self.reached,
             "reached_aim": self.reached_aim,
+            "is_condition": self.is_condition,
             "note": self.note,
             "samples": {name: list(samples) for name, samples in everything.items()},
         }

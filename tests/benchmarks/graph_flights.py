@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 import time
 from collections.abc import Iterator
@@ -13,16 +14,16 @@ import numpy as np
 import psutil
 from numpy.typing import NDArray
 
+from space_robot_control.flight.graph.domain import ros_domain
+from space_robot_control.flight.graph.orchestrator import flight_parameters, require_ros
+from space_robot_control.flight.graph.processes import Graph, node_environment, ros_arguments
+from space_robot_control.flight.node_modules import MODULES
+from space_robot_control.flight.plan import Flight
 from space_robot_msgs_py.bag.reader import read_coverage
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.ros.run_module import module_command
 
-from ..flight.graph.domain import ros_domain
-from ..flight.graph.orchestrator import flight_parameters, require_ros
-from ..flight.graph.processes import Graph, node_environment, ros_arguments
-from ..flight.node_modules import MODULES
-from ..flight.plan import Flight
-
+TESTS = Path(__file__).resolve().parents[1]
 WATCH_S = 0.2
 WARM_UP_TICKS = 500
 TIMEOUT_S = 1800.0
@@ -84,7 +85,7 @@ def fly_graph(flight: Flight, empty: bool = False, timed: bool = True) -> GraphR
         work = "empty" if empty else "full"
         files = {node: Path(folder) / f"{node}.npz" for node in ("plant", "controller")}
         stopwatches = {
-            node: ["space_robot_control.bench.nodes", node, work, str(file)]
+            node: ["benchmarks.nodes", node, work, str(file)]
             for node, file in files.items()
             if timed
         }
@@ -92,7 +93,7 @@ def fly_graph(flight: Flight, empty: bool = False, timed: bool = True) -> GraphR
             node: module_command(*stopwatches.get(node, [module]), *ros_arguments(parameters[node]))
             for node, module in MODULES.items()
         }
-        with Graph(commands, node_environment(domain)) as graph:
+        with Graph(commands, _environment(domain)) as graph:
             use = _watch(graph)
         coverage = read_coverage(bag)
         return GraphRun(
@@ -113,12 +114,19 @@ def naive_ticks_per_s(ticks: int) -> float:
     with tempfile.TemporaryDirectory(prefix="space_robot_bench_") as folder, ros_domain() as domain:
         file = Path(folder) / "rate"
         commands = {
-            node: module_command("space_robot_control.bench.naive", node, str(file), str(ticks))
+            node: module_command("benchmarks.naive", node, str(file), str(ticks))
             for node in ("controller", "plant")
         }
-        with Graph(commands, node_environment(domain)) as graph:
+        with Graph(commands, _environment(domain)) as graph:
             _watch(graph)
         return float(file.read_text("utf-8"))
+
+
+def _environment(domain: int) -> dict[str, str]:
+    """What a node's process is started with; it finds the modules of the benchmarks."""
+    environment = node_environment(domain)
+    paths = (str(TESTS), environment.get("PYTHONPATH", ""))
+    return {**environment, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
 
 
 def _watch(graph: Graph) -> dict[str, NodeUse]:

@@ -22,11 +22,12 @@ from oracles import (
 )
 from random_robots import State
 
-from space_robot_control.bench.kernels import forward_dynamics_calls, plant_steps
 from space_robot_sim.dynamics.attitude import quaternion_rate
 from space_robot_sim.environment.environment import DisturbanceSettings, FrictionSettings
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.robot import Robot
+
+from ..kernels import forward_dynamics_calls, plant_steps
 
 Array = NDArray[np.float64]
 

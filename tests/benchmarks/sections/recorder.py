@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from ...flight.plan import Flight, FlightPlan
-from ..graph import NodeUse, fly_graph
+from space_robot_control.flight.plan import Flight, FlightPlan
+
+from ..graph_flights import NodeUse, fly_graph
 from ..measure import Options
 from ..result import Result, Target
 

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 from .result import Target
 
@@ -26,6 +27,8 @@ class Options:
     """Batches of each competitor (None: as many as the section thinks fit)."""
     progress: Callable[[str], None] = lambda what: None
     """Told what is measured next."""
+    plot: Path | None = None
+    """File of the growth's picture."""
 
     @property
     def batch_s(self) -> float:

@@ -1,6 +1,6 @@
 """Plant and controller nodes with a stopwatch, as they are or empty.
 
-    python -m space_robot_control.bench.nodes plant|controller full|empty FILE --ros-args ...
+    python -m benchmarks.nodes plant|controller full|empty FILE --ros-args ...
 
 The empty ones send and take every message and compute nothing: what the middleware and rclpy
 cost. The times are written to FILE (.npz) when the node ends.
@@ -17,15 +17,14 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_control.controller.controller import Controller
+from space_robot_control.controller.loop import ControllerLoop
+from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_msgs_py.ros.node_host import NodeHost, run_node
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.plant.loop import PlantLoop
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantNodeSettings
-
-from ..controller.controller import Controller
-from ..controller.loop import ControllerLoop
-from ..controller.settings import ControllerNodeSettings
 
 Array = NDArray[np.float64]
 
@@ -65,27 +64,30 @@ class Stopwatch:
         np.savez(file, **arrays, **further)
 
 
-class EmptyPlant(Plant):
-    """Counts ticks."""
+def empty_plant(plant: Plant) -> None:
+    """Let ``plant`` count ticks and compute nothing."""
 
-    def step(self, command: Command) -> None:
-        """Nothing but the count."""
-        self.state.tick += 1
+    def step(command: Command) -> None:
+        plant.state.tick += 1
+
+    plant.step = step  # type: ignore[method-assign]
 
 
-class EmptyController(Controller):
-    """Answers with the same torque always."""
+def empty_controller(controller: Controller) -> None:
+    """Let ``controller`` answer with no torque always."""
+    command = Command(0, np.zeros_like(controller.signals.error))
 
-    def update(self, state: RobotState, joints: Array, base: Array) -> Command:
-        """Nothing but the stamp."""
-        self._command.tick = state.tick
-        return self._command
+    def update(state: RobotState, joints: Array, base: Array) -> Command:
+        command.tick = state.tick
+        return command
+
+    controller.update = update  # type: ignore[method-assign]
 
 
 class TimedPlantLoop(PlantLoop):
     """The plant node's loop with a stopwatch."""
 
-    file = ""
+    file, is_empty = "", False
 
     def __init__(self, host: NodeHost, settings: PlantNodeSettings) -> None:
         """See `PlantLoop`."""
@@ -104,6 +106,8 @@ class TimedPlantLoop(PlantLoop):
 
         self._commands.decode = noting_tick  # type: ignore[method-assign]
         watch.attach(self._commands, "decode", "decode command")
+        if self.is_empty:
+            empty_plant(self._plant)
         watch.attach(self._plant, "step", "step plant")
 
     def run(self) -> None:
@@ -117,7 +121,7 @@ class TimedPlantLoop(PlantLoop):
 class TimedControllerLoop(ControllerLoop):
     """The controller node's loop with a stopwatch."""
 
-    file = ""
+    file, is_empty = "", False
 
     def __init__(self, host: NodeHost, settings: ControllerNodeSettings) -> None:
         """See `ControllerLoop`."""
@@ -128,6 +132,8 @@ class TimedControllerLoop(ControllerLoop):
         watch.attach(self._states.codec, "decode_joints", "decode joints")
         watch.attach(base, "take", "take base")
         watch.attach(self._states.codec, "decode_base", "decode base")
+        if self.is_empty:
+            empty_controller(self._controller)
         watch.attach(self._controller, "update", "update controller")
         watch.attach(self._commands, "encode", "encode command")
         watch.attach(self._command_out, "publish", "publish command")
@@ -142,9 +148,7 @@ def main() -> NoReturn:
     """See the module."""
     node, work, file, *arguments = sys.argv[1:]
     TimedPlantLoop.file = TimedControllerLoop.file = file
-    if work == "empty":
-        TimedPlantLoop.plant_class = EmptyPlant
-        TimedControllerLoop.controller_class = EmptyController
+    TimedPlantLoop.is_empty = TimedControllerLoop.is_empty = work == "empty"
     sys.argv[1:] = arguments  # what rclpy reads
     if node == "plant":
         run_node(PlantNodeSettings, TimedPlantLoop)

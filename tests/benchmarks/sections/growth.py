@@ -3,24 +3,32 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from checks import HAS_BASILISK, all_peers, same_motion
-from peers import BATCH, FRICTION, MuJoCo, Ours, Pinocchio, Start
 from random_robots import random_robot
 
-from space_robot_control.bench import Options, interleave
-from space_robot_control.bench.measure import Competitor
+from ..measure import Competitor, Options, interleave
+from ..peers import is_installed
+from ..peers.checks import all_peers, same_motion
+from ..peers.simulators import BATCH, FRICTION, MuJoCo, Ours, Pinocchio, Start
+from ..result import Result
 
 JOINTS = (3, 5, 7, 10, 15, 20, 30)
 SHORT_JOINTS = (6, 7)
 LARGE = 10
 """Joints from which on the growth is stated once more: below, what is constant hides it."""
 CHECK_STEPS = 200
+STEP, DYNAMICS = "space_robot, step", "space_robot, forward dynamics"
 IN_CPP = "pinocchio, aba in C++"
+BESIDE = {
+    "mujoco, step": STEP,
+    "basilisk, step": STEP,
+    IN_CPP: DYNAMICS,
+    "pinocchio, aba from Python": DYNAMICS,
+}
+"""What of ours stands beside a peer's."""
 
 
 @dataclass
@@ -30,15 +38,8 @@ class Growth:
     joints: tuple[int, ...]
     samples_us: dict[str, list[list[float]]] = field(default_factory=dict)
     """By competitor; a list of samples for each number of joints."""
-    first_call_s: list[dict[str, float]] = field(default_factory=list)
-    """Of our kernels, for each number of joints; they are compiled for each."""
-    checks: list[dict[str, Any]] = field(default_factory=list)
 
-    def medians_us(self, competitor: str) -> list[float]:
-        """One for each number of joints."""
-        return [float(np.median(samples)) for samples in self.samples_us[competitor]]
-
-    def exponents(self, competitor: str, least: int = 0) -> list[float]:
+    def exponents(self, competitor: str, least: int = 0) -> tuple[float, ...]:
         """k of ``time ~ n^k`` by least squares of the logarithms, for n from ``least`` on.
 
         One for each repetition: the sizes are measured in turn, so a machine that is slow for a
@@ -46,49 +47,47 @@ class Growth:
         """
         large = [n >= least for n in self.joints]
         if sum(large) < 2:
-            return []
+            return ()
         logarithms = np.log(self.samples_us[competitor])[large]
         sizes = np.log(np.array(self.joints)[large])
-        return [float(np.polyfit(sizes, times, 1)[0]) for times in logarithms.T]
+        return tuple(float(np.polyfit(sizes, times, 1)[0]) for times in logarithms.T)
 
-    def exponent(self, competitor: str, least: int = 0) -> float | None:
-        """Median of `exponents`."""
-        found = self.exponents(competitor, least)
-        return float(np.median(found)) if found else None
-
-    def record(self) -> dict[str, Any]:
-        """As JSON holds it."""
-        return {
-            "joints": list(self.joints),
-            "first_call_s": self.first_call_s,
-            "competitors": {
-                name: {
-                    "median_us": self.medians_us(name),
-                    "exponent": self.exponent(name),
-                    "exponents": self.exponents(name),
-                    f"exponent_from_{LARGE}_joints": self.exponent(name, LARGE),
-                    f"exponents_from_{LARGE}_joints": self.exponents(name, LARGE),
-                    "samples_us": samples,
-                }
-                for name, samples in self.samples_us.items()
-            },
-            "checks": self.checks,
-        }
+    def results(self) -> list[Result]:
+        """Times by number of joints, then exponents."""
+        rows = []
+        for peer, ours in BESIDE.items():
+            if peer in self.samples_us:
+                rows += [
+                    Result.timed(
+                        f"{ours}, {n} joints", "us",
+                        [1e-6 * t for t in self.samples_us[ours][i]],
+                        (peer, [1e-6 * t for t in self.samples_us[peer][i]]),
+                    )
+                    for i, n in enumerate(self.joints)
+                ]  # fmt: skip
+        for least, where in ((0, "all sizes"), (LARGE, f"from {LARGE} joints on")):
+            for name in self.samples_us:
+                if found := self.exponents(name, least):
+                    rows.append(Result(f"exponent, {where}: {name}", "", found))
+        return rows
 
 
-def growth(options: Options, joints: Sequence[int] = JOINTS) -> Growth:
+def growth(options: Options) -> list[Result]:
     """Forward dynamics beside Pinocchio's, steps beside MuJoCo's and Basilisk's."""
-    found = Growth(tuple(joints))
+    joints = SHORT_JOINTS if options.short else JOINTS
+    found = Growth(joints)
     sizes: dict[str, list[Competitor]] = {}
+    first_calls, checks = [], []
     for n in joints:
         options.progress(f"the first call and the motion of {n} joints")
         robot = random_robot(np.random.default_rng(n), n)
         pushed, start = Start.moving(robot, rate=0.5, torque=1.0), Start.moving(robot)
         ours = Ours(pushed, with_environment=True)
-        found.first_call_s.append(
-            {"step": _timed(ours.step), "forward dynamics": _timed(ours.forward_dynamics)}
-        )
-        found.checks += same_motion(pushed, all_peers(pushed), CHECK_STEPS)
+        for name, call in (("step", ours.step), ("forward dynamics", ours.forward_dynamics)):
+            first_calls.append(
+                Result(f"first {name} of a process, {n} joints", "s", (_seconds(call),))
+            )
+        checks += same_motion(pushed, all_peers(pushed), CHECK_STEPS)
         for name, run in _competitors(start).items():
             sizes.setdefault(name, []).append(run)
     options.progress("all of them in turn")
@@ -99,26 +98,30 @@ def growth(options: Options, joints: Sequence[int] = JOINTS) -> Growth:
         found.samples_us[name] = [
             [scale * t for t in seconds[f"{name} {i}"]] for i in range(len(runs))
         ]
-    return found
+    if options.plot:
+        from ..growth_plot import draw_growth
+
+        draw_growth(found, options.plot)
+    return [*found.results(), *first_calls, *checks]
 
 
 def _competitors(start: Start) -> dict[str, Competitor]:
     ours, pinocchio = Ours(start, with_environment=True), Pinocchio(start)
     competitors: dict[str, Competitor] = {
-        "space_robot, step": ours.step,
+        STEP: ours.step,
         "mujoco, step": MuJoCo(start, FRICTION.viscous).step,
-        "space_robot, forward dynamics": Ours(start, with_environment=True).forward_dynamics,
+        DYNAMICS: Ours(start, with_environment=True).forward_dynamics,
         IN_CPP: pinocchio.batches_in_cpp,
         "pinocchio, aba from Python": pinocchio.calls,
     }
-    if HAS_BASILISK:
-        from basilisk import Basilisk
+    if is_installed("Basilisk"):
+        from ..peers.basilisk import Basilisk
 
         competitors["basilisk, step"] = Basilisk(start, FRICTION.viscous).step
     return competitors
 
 
-def _timed(call: Callable[[int], None]) -> float:
+def _seconds(call: Callable[[int], None]) -> float:
     begin = time.perf_counter()
     call(1)
     return time.perf_counter() - begin

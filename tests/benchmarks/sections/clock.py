@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...flight.plan import Flight, FlightPlan
-from ..graph import WARM_UP_TICKS, GraphRun, fly_graph
+from space_robot_control.flight.plan import Flight, FlightPlan
+
+from ..graph_flights import WARM_UP_TICKS, GraphRun, fly_graph
 from ..measure import Options
 from ..result import Result, Target
 

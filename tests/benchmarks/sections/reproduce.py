@@ -6,9 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from ...paper.reproduction.flights import ROWS
-from ...paper.reproduction.processes import cores
-from ...paper.reproduction.reproduce import reproduce as run
+from space_robot_control.paper.reproduction.flights import ROWS
+from space_robot_control.paper.reproduction.processes import cores
+from space_robot_control.paper.reproduction.reproduce import reproduce as run
+
 from ..measure import Options, interleave
 from ..result import Result, Target
 

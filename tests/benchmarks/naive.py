@@ -1,6 +1,6 @@
 """The graph's loop as one would write it first: message objects, callbacks, an executor.
 
-    python -m space_robot_control.bench.naive plant|controller FILE TICKS
+    python -m benchmarks.naive plant|controller FILE TICKS
 
 Two nodes that send the messages of the graph back and forth and do nothing else; no recorder, no
 mission. The plant writes its rate, ticks/s, to FILE.

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...controller.controller import Controller
-from ...flight.closed_loop import Rows, law_pointer
-from ...flight.plan import Flight, FlightPlan
-from ...flight.simulate import simulate
-from ...laws import CompiledLaw
-from ...laws import laws as all_laws
+from space_robot_control.controller.controller import Controller
+from space_robot_control.flight.closed_loop import Rows, law_pointer
+from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.flight.simulate import simulate
+from space_robot_control.laws import CompiledLaw
+from space_robot_control.laws import laws as all_laws
+
 from ..kernels import controller_ticks, law_ticks
 from ..measure import Competitor, Options, interleave
 from ..result import Result, Target
