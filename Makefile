@@ -15,13 +15,14 @@ export PYTHONPYCACHEPREFIX := $(CURDIR)/$(VENV)/pycache
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
 
-.PHONY: help setup fly test lint mutation clean
+.PHONY: help setup fly test lint bench mutation clean
 
 help:
 	@echo "make setup               .venv with the package and ROS 2 Jazzy"
 	@echo "make fly [ARGS=...]      fly case 1 under TDE-STC, e.g. make fly ARGS='--controller ctc'"
 	@echo "make test [ARGS=...]     style, types and tests; ARGS go to pytest"
 	@echo "make lint                style and types only"
+	@echo "make bench [ARGS=...]    how fast it is, e.g. make bench ARGS='plant laws'; --help tells more"
 	@echo "make mutation [ARGS=...] small faults put in, one at a time: do the tests notice?"
 	@echo "make clean               delete .venv and what was built or cached here"
 	@echo "PYTHON=python3.12 chooses the Python (3.10 to 3.13) of a new .venv."
@@ -38,6 +39,9 @@ lint: $(VENV)/.tests
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
+
+bench: $(VENV)/.tests
+	@$(VENV)/bin/python tests/benchmarks $(ARGS)
 
 mutation: $(VENV)/.tests
 	@$(PIP_INSTALL) --editable '.[ros,test,mutation]'
