@@ -14,7 +14,7 @@ from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 
 from ..laws import laws
-from .graph.processes import child_process
+from .child_process import child_process
 from .plan import Flight, FlightPlan
 from .simulate import simulate
 

@@ -9,8 +9,8 @@ import signal
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -59,22 +59,6 @@ def ros_arguments(parameters: Mapping[str, Any]) -> list[str]:
     for name, value in parameters.items():
         arguments += ["-p", f"{name}:={json.dumps(value)}"]  # JSON is YAML, which ROS reads
     return arguments
-
-
-@contextmanager
-def child_process(command: Sequence[str], **options: Any) -> Iterator[subprocess.Popen[bytes]]:
-    """A process that does not outlive the context, nor this process; ``options``: of `Popen`.
-
-    It must be one that holds to its standard input, see `lifeline`.
-    """
-    environment = {**clean_environment(), **lifeline.held(), **options.pop("env", {})}
-    with subprocess.Popen(
-        command, stdin=subprocess.PIPE, env=environment, start_new_session=True, **options
-    ) as process:
-        try:
-            yield process
-        finally:
-            process.terminate()
 
 
 class NodeProcess:

@@ -8,10 +8,10 @@ import tempfile
 import time
 from pathlib import Path
 
+from space_robot_control.flight.child_process import child_process
 from space_robot_control.flight.graph.domain import ros_domain
 from space_robot_control.flight.graph.monitor import Monitor
 from space_robot_control.flight.graph.orchestrator import require_ros
-from space_robot_control.flight.graph.processes import child_process
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.ros.run_module import module_command
 

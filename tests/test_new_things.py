@@ -1,0 +1,64 @@
+"""What must be touched for something new: no more than the table in CONTRIBUTING.md says."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from paths import CONFIG, ROOT
+
+import space_robot_control.laws as room_of_laws
+from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.flight.simulate import simulate
+from space_robot_control.laws import laws
+
+MODEL = "tde_stc"
+"""The law that the new one is a copy of."""
+
+
+@pytest.fixture
+def new_law(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A law's file as if it were in laws/, and the folder of its gains."""
+    folder, gains = tmp_path / "laws", tmp_path / "gains"
+    folder.mkdir()
+    gains.mkdir()
+    source = ROOT / f"space_robot_control/laws/{MODEL}.py"
+    (folder / "newest.py").write_text(source.read_text("utf-8").replace(f'"{MODEL}"', '"newest"'))
+    given = (CONFIG / f"gains/paper/tuned/{MODEL}.yaml").read_text("utf-8")
+    (gains / "newest.yaml").write_text(given.replace(MODEL, "newest"))
+    monkeypatch.setattr(room_of_laws, "__path__", [*room_of_laws.__path__, str(folder)])
+    laws.cache_clear()
+    yield gains
+    laws.cache_clear()
+    sys.modules.pop(f"{room_of_laws.__name__}.newest", None)
+
+
+def test_a_law_is_one_file_in_laws_and_one_of_gains(new_law: Path) -> None:
+    """It is found by its name, and flies in compiled code as the one it is a copy of."""
+    assert "newest" in laws()
+    own = simulate(Flight(FlightPlan(controller="newest", gains=str(new_law), duration=0.01)))
+    model = simulate(Flight(FlightPlan(controller=MODEL, gains="tuned", duration=0.01)))
+    assert own.commanded_torque is not None
+    assert model.commanded_torque is not None
+    np.testing.assert_array_equal(own.commanded_torque, model.commanded_torque)
+
+
+def test_a_law_stands_in_one_file_of_its_name() -> None:
+    for name, law in laws().items():
+        assert law.__module__ == f"{room_of_laws.__name__}.{name}"
+        assert importlib.import_module(law.__module__).__doc__
+
+
+def test_a_robot_is_one_file(tmp_path: Path) -> None:
+    """With a mission and gains of those that are there."""
+    text = (CONFIG / "robots/paper.yaml").read_text("utf-8")
+    (tmp_path / "newest.yaml").write_text(text)
+    plan = FlightPlan(
+        robot=str(tmp_path / "newest.yaml"), mission=str(CONFIG / "missions/paper.yaml"),
+        gains=str(CONFIG / "gains/paper/tuned"), duration=0.001,
+    )  # fmt: skip
+    assert simulate(Flight(plan)).ticks == 2
