@@ -36,7 +36,6 @@ setup(
         "mcap>=1.5",
         "numba>=0.58.1",
         "numpy>=1.26,<3",
-        "psutil>=5.9",
         "pydantic>=2.5",
         "pyyaml>=6",
         "rich>=13",
@@ -50,7 +49,7 @@ setup(
         # pyarrow 26 does not work
         "apt": ["colcon-common-extensions", "numpy<2", "pyarrow<26"],
         # tests/benchmarks; bsk (Basilisk) holds back numpy and matplotlib, so a venv of its own
-        "bench": ["bsk", "hypothesis", "mujoco", "pin"],
+        "bench": ["bsk", "hypothesis", "mujoco", "pin", "psutil>=5.9"],
         "mutation": ["cosmic-ray"],  # tests/mutation
         "parquet": ["pyarrow>=14"],  # `analyze --parquet`
         # ROS 2 Jazzy from wheels; never a requirement, for apt's ROS must stay untouched
@@ -59,6 +58,7 @@ setup(
             "ros-jazzy-rclpy",
             "ros-rmw-fastrtps-cpp==8.4.3",  # Jazzy's: newer ones belong to other distributions
         ],
+        "soak": ["psutil>=5.9"],  # `soak`
         "test": [
             "cvxpy",
             "hypothesis",
@@ -66,8 +66,12 @@ setup(
             "mypy",
             "pandas",
             "pin",
+            "pre-commit",
+            "psutil>=5.9",
             "pyarrow>=14",
             "pytest",
+            "pytest-cov",
+            "pytest-timeout",
             "pytest-xdist",
             "ruff",
             "scipy-stubs",

@@ -19,7 +19,7 @@ from space_robot_msgs_py import topics
 
 ROOT = Path(__file__).resolve().parents[1]
 EXECUTABLES = sorted((ROOT / "resource/executables").iterdir())
-TOOLS = ("mujoco", "cvxpy", "hypothesis", "pinocchio")
+TOOLS = ("mujoco", "cvxpy", "hypothesis", "pinocchio", "psutil", "pyarrow")
 ROSDEP = {"pyyaml": "yaml"}
 """Names of rosdep's keys, behind python3-, where they are not the package's."""
 

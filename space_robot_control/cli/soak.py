@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 
 import click
@@ -61,6 +62,10 @@ def soak(
       space-robot soak --minutes 480 --seed 7 --output soak.json
       space-robot soak --minutes 2 --duration 1 --json | jq '.each[] | select(.survived | not)'
     """
+    if find_spec("psutil") is None:
+        from space_robot_msgs_py.errors import InputError
+
+        raise InputError("soak needs psutil: pip install 'space_robot[soak]'")
     from ..campaign.soak import soak as run
     from ..campaign.soak.display import print_soak
     from ..flight.terminal import terminal

@@ -212,11 +212,11 @@ def _check_memory(flight: Flight) -> None:
     Raises:
         InputError: it has not.
     """
-    from psutil import virtual_memory
+    from .memory import available_bytes
 
     row = unflown(flight, 0, 1)
     columns = (value for f in fields(row) if isinstance(value := getattr(row, f.name), np.ndarray))
-    needed, free = flight.ticks * sum(c.nbytes for c in columns), virtual_memory().available
+    needed, free = flight.ticks * sum(c.nbytes for c in columns), available_bytes()
     if needed > free:
         raise InputError(
             f"duration {flight.ticks * flight.period:g} s: the whole flight in memory needs "

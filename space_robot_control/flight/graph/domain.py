@@ -7,8 +7,7 @@ import socket
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-
-import psutil
+from pathlib import Path
 
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.ros.lifeline import PATIENCE_S
@@ -90,10 +89,12 @@ def _refusal(domain: int, holder: Holder) -> InputError:
 
 
 def _is_alive(pid: int) -> bool:
+    """Whether a process runs; one that has ended and is only waited for (state Z) does not."""
     try:
-        return psutil.Process(pid).status() != psutil.STATUS_ZOMBIE
-    except psutil.NoSuchProcess:
+        stat = Path(f"/proc/{pid}/stat").read_text("utf-8", errors="replace")
+    except OSError:
         return False
+    return stat.rpartition(")")[2].split()[0] != "Z"
 
 
 def _in_use(domain: int) -> bool:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import shlex
 
 import click
+import pytest
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -25,6 +27,7 @@ from space_robot_control.campaign.soak.verdict import unplanned_deaths
 from space_robot_control.cli.main import cli
 from space_robot_control.flight.plan import Flight
 from space_robot_control.laws import laws
+from space_robot_msgs_py.errors import InputError
 from space_robot_sim.faults.catalogue import KINDS, Fault, parse_faults
 
 SEEDS = st.integers(0, 2**63)
@@ -146,3 +149,10 @@ def test_a_process_is_known_by_its_command_line() -> None:
     assert node_of(["python", "/ws/lib/space_robot/controller_node", "-p", wait]) == "controller"
     assert node_of(["ros2", "run", "space_robot", "mission_node"]) == "mission"
     assert node_of(["python", "-c", "pass", wait]) == ""
+
+
+def test_without_psutil_there_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("space_robot_control.cli.soak.find_spec", lambda name: None)
+    result = CliRunner().invoke(cli, ["soak", "--minutes", "0.01"])
+    assert isinstance(result.exception, InputError)
+    assert str(result.exception) == "soak needs psutil: pip install 'space_robot[soak]'"

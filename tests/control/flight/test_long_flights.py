@@ -13,6 +13,7 @@ import pytest
 from flights import COMMAND, ros_environment, space_robot
 
 from space_robot_control.flight import disk_space as room
+from space_robot_control.flight import memory
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight
@@ -20,9 +21,9 @@ from space_robot_msgs_py.errors import InputError
 
 PEAK = """
 import resource, sys
-from space_robot_control.analysis import blocks
+from space_robot_msgs_py.bag import blocks
 blocks.BLOCK_TICKS = 4000
-from space_robot_control.cli import cli
+from space_robot_control.cli.main import cli
 cli.main(sys.argv[1:], standalone_mode=False)
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
@@ -75,12 +76,16 @@ def test_a_whole_flight_in_memory_that_does_not_fit_is_refused() -> None:
 
 def test_memory_that_is_there_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
     plan = FlightPlan(duration=0.01)
-    memory = namedtuple("memory", "available")
-    monkeypatch.setattr(psutil, "virtual_memory", lambda: memory(20 * 1000))
+    monkeypatch.setattr(memory, "available_bytes", lambda: 20 * 1000)
     simulate(Flight(plan))
-    monkeypatch.setattr(psutil, "virtual_memory", lambda: memory(20 * 800))
+    monkeypatch.setattr(memory, "available_bytes", lambda: 20 * 800)
     with pytest.raises(InputError, match="fly a shorter one"):
         simulate(Flight(plan))
+
+
+def test_what_is_available_is_what_psutil_says() -> None:
+    told = psutil.virtual_memory().available
+    assert memory.available_bytes() == pytest.approx(told, rel=0.2)
 
 
 def test_a_bag_without_room_is_told_before(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
