@@ -3,6 +3,10 @@
 PYTHON ?= python3
 VENV := .venv
 PACKAGES := space_robot_control space_robot_msgs_py space_robot_sim
+PYTEST := $(VENV)/bin/python -m pytest --numprocesses 2 --dist loadfile
+# Tests of kernels that are short enough without compiler.
+INTERPRETED := tests/sim/dynamics tests/sim/environment tests/sim/robot tests/sim/sensors tests/sim/plant \
+  tests/control/laws tests/control/controller tests/msgs/compiled tests/msgs/wire
 PIP_INSTALL := $(VENV)/bin/python -m pip install -qq --disable-pip-version-check
 
 # A ROS sourced in this terminal must not mix with the one in .venv.
@@ -15,12 +19,14 @@ export PYTHONPYCACHEPREFIX := $(CURDIR)/$(VENV)/pycache
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
 
-.PHONY: help setup fly test lint bench mutation clean
+.PHONY: help setup fly test quick coverage lint bench mutation clean
 
 help:
 	@echo "make setup               .venv with the package and ROS 2 Jazzy"
 	@echo "make fly [ARGS=...]      fly case 1 under TDE-STC, e.g. make fly ARGS='--controller ctc'"
 	@echo "make test [ARGS=...]     style, types and tests; ARGS go to pytest"
+	@echo "make quick [ARGS=...]    the tests that start no ROS and take little time"
+	@echo "make coverage            which lines the tests run; twice as long as make test"
 	@echo "make lint                style and types only"
 	@echo "make bench [ARGS=...]    how fast it is, e.g. make bench ARGS='plant laws'; --help tells more"
 	@echo "make mutation [ARGS=...] small faults put in, one at a time: do the tests notice?"
@@ -33,7 +39,18 @@ fly: $(VENV)/.flies
 	@$(VENV)/bin/space-robot fly --controller tde_stc --case 1 $(ARGS)
 
 test: lint
-	$(VENV)/bin/python -m pytest --numprocesses 2 --dist loadfile $(ARGS)
+	$(PYTEST) $(ARGS)
+
+quick: $(VENV)/.tests
+	$(PYTEST) -m "not ros and not slow" $(ARGS)
+
+# The kernels' lines are seen where they run as plain Python: tests/interpreted_kernels.py.
+coverage: $(VENV)/.tests
+	rm -f .coverage .coverage.*
+	$(PYTEST) --cov --cov-report= $(ARGS)
+	PYTHONPATH=tests $(PYTEST) --cov --cov-append --cov-report= -p interpreted_kernels \
+	  -m "not ros" $(INTERPRETED)
+	$(VENV)/bin/coverage report
 
 lint: $(VENV)/.tests
 	$(VENV)/bin/ruff check .
@@ -48,7 +65,7 @@ mutation: $(VENV)/.tests
 	$(VENV)/bin/python tests/mutation $(ARGS)
 
 clean:
-	rm -rf $(VENV) build install log *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) build install log *.egg-info .coverage .coverage.* .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find $(PACKAGES) tests -name __pycache__ -prune -exec rm -rf {} +
 
 # Stamps: what is installed in .venv, renewed when the packaging changes.

@@ -1,11 +1,11 @@
-"""Fixtures for all tests; the hypothesis profile: the same examples on every run; what may lack."""
+"""Fixtures and marks for all tests; the same examples of hypothesis on every run; what may lack."""
 
 from __future__ import annotations
 
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING
 
 import pytest
@@ -21,7 +21,7 @@ else:
     settings.load_profile("ci")
 
 from flights import Flown, Start, ros_environment, space_robot
-from paths import CONFIG
+from paths import CONFIG, TESTS
 
 from space_robot_control.flight.graph.domain import ros_domain
 from space_robot_control.flight.node_modules import MODULES
@@ -47,6 +47,45 @@ class _MissingTool:
 
 
 sys.meta_path.append(_MissingTool())
+
+OF_ROS = {"domain", "free_domain", "fly", "start", "ground"}
+"""Fixtures of tests that start ROS processes, or are a node of their own."""
+WITH_ROS = ("control/flight/graph/", "control/flight/replay/")
+SLOW = (
+    "benchmarks/", "control/campaign/", "control/paper/", "control/cli/test_output.py",
+    "control/cli/test_stability_command.py", "control/flight/test_interruption.py",
+    "control/flight/test_long_flights.py", "msgs/bag/test_bag_fuzz.py",
+    "msgs/bag/test_description_fuzz.py", "test_packaging.py", "test_shown_outputs.py",
+)  # fmt: skip
+"""Folders and files whose tests take seconds each."""
+TIMEOUT_S = 600
+"""Of each test, its fixtures included: kernels may have to be compiled first."""
+
+
+def marks(where: str, fixtures: Iterable[str]) -> Iterator[str]:
+    """The marks of a test in the file ``where``, relative to tests/, that uses ``fixtures``."""
+    if where.startswith(WITH_ROS) or OF_ROS.intersection(fixtures):
+        yield "ros"
+    if where.startswith(SLOW):
+        yield "slow"
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Tell of the marks."""
+    config.addinivalue_line("markers", "ros: starts ROS processes; given by fixture and folder")
+    config.addinivalue_line("markers", "slow: takes seconds; given by folder, or by the test")
+    if not config.pluginmanager.hasplugin("timeout"):  # where `colcon test` runs, perhaps
+        config.addinivalue_line("markers", "timeout(seconds): needs pytest-timeout")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark by fixture and by folder; limit every test's time."""
+    for item in items:
+        where = item.path.relative_to(TESTS).as_posix()
+        for mark in marks(where, getattr(item, "fixturenames", ())):
+            item.add_marker(mark)
+        if not item.get_closest_marker("timeout"):
+            item.add_marker(pytest.mark.timeout(TIMEOUT_S))
 
 
 @pytest.fixture(scope="session")

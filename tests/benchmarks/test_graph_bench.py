@@ -11,6 +11,8 @@ import pytest
 from flights import ros_environment
 from paths import TESTS
 
+pytestmark = pytest.mark.ros
+
 
 @pytest.fixture(scope="module")
 def sections() -> dict[str, list[dict[str, Any]]]:

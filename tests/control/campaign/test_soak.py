@@ -18,6 +18,7 @@ from space_robot_control.campaign.soak import sample_flight
 from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")
+pytestmark = pytest.mark.ros
 
 SEED, DURATION_S = 3, 0.5
 
