@@ -19,7 +19,7 @@ export PYTHONPYCACHEPREFIX := $(CURDIR)/$(VENV)/pycache
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
 
-.PHONY: help setup fly test quick coverage lint bench mutation clean
+.PHONY: help setup fly test quick coverage hooks lint bench mutation clean
 
 help:
 	@echo "make setup               .venv with the package and ROS 2 Jazzy"
@@ -27,6 +27,7 @@ help:
 	@echo "make test [ARGS=...]     style, types and tests; ARGS go to pytest"
 	@echo "make quick [ARGS=...]    the tests that start no ROS and take little time"
 	@echo "make coverage            which lines the tests run; twice as long as make test"
+	@echo "make hooks               from then on a commit passes style, types and the quick tests"
 	@echo "make lint                style and types only"
 	@echo "make bench [ARGS=...]    how fast it is, e.g. make bench ARGS='plant laws'; --help tells more"
 	@echo "make mutation [ARGS=...] small faults put in, one at a time: do the tests notice?"
@@ -51,6 +52,9 @@ coverage: $(VENV)/.tests
 	PYTHONPATH=tests $(PYTEST) --cov --cov-append --cov-report= -p interpreted_kernels \
 	  -m "not ros" $(INTERPRETED)
 	$(VENV)/bin/coverage report
+
+hooks: $(VENV)/.tests
+	$(VENV)/bin/pre-commit install
 
 lint: $(VENV)/.tests
 	$(VENV)/bin/ruff check .
