@@ -107,7 +107,7 @@ def third_party_imports() -> set[str]:
 def test_the_docs_name_every_extra_that_a_command_needs() -> None:
     """By the line that its error shows; and no extra that is not there."""
     extras = setup_keyword("extras_require")
-    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
     text = "\n".join(page.read_text("utf-8") for page in pages)
     for extra in OF_EXTRAS.values():
         assert f"pip install 'space_robot[{extra}]'" in text, extra

@@ -67,7 +67,7 @@ AREAS = {
     "faults": _rooms(
         SIM, "faults", further=("tests/sim/sensors/test_*.py", "tests/sim/plant/test_*.py")
     ),
-    "sensors and actuators": Area(
+    "sensors": Area(
         (f"{SIM}/sensors/*.py", f"{SIM}/actuators/*.py"),
         ("tests/sim/sensors/test_*.py", "tests/sim/plant/test_*.py"),
     ),
