@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-from space_robot_msgs_py.ros.node_host import run_node
+from space_robot_msgs_py.ros.node_host import NodeKind, run_nodes
 
 from .controller.loop import ControllerLoop
 from .controller.settings import ControllerNodeSettings
 
+NODE = NodeKind(ControllerNodeSettings, ControllerLoop, changeable=("controller",))
+
 
 def main() -> NoReturn:
     """Entry point of controller_node."""
-    run_node(ControllerNodeSettings, ControllerLoop, changeable=("controller",))
+    run_nodes(NODE)
 
 
 if __name__ == "__main__":

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-from space_robot_msgs_py.ros.node_host import run_node
+from space_robot_msgs_py.ros.node_host import NodeKind, run_nodes
 
 from .mission.loop import MissionLoop
 from .mission.settings import MissionNodeSettings
 
+NODE = NodeKind(MissionNodeSettings, MissionLoop)
+
 
 def main() -> NoReturn:
     """Entry point of mission_node."""
-    run_node(MissionNodeSettings, MissionLoop)
+    run_nodes(NODE)
 
 
 if __name__ == "__main__":

@@ -4,24 +4,28 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-from space_robot_msgs_py.ros.node_host import NodeHost, run_node
+from space_robot_msgs_py.ros.managed_node import ManagedNode
+from space_robot_msgs_py.ros.node_host import NodeKind, run_nodes
 
 from .plant.loop import PlantLoop
 from .plant.settings import PlantNodeSettings
 
 
-def make_loop(host: NodeHost, settings: PlantNodeSettings) -> PlantLoop:
+def make_loop(node: ManagedNode[PlantNodeSettings], settings: PlantNodeSettings) -> PlantLoop:
     """The loop that the settings ask for."""
     if any(settings.faults):
         from .plant.faulty_loop import FaultyPlantLoop
 
-        return FaultyPlantLoop(host, settings)
-    return PlantLoop(host, settings)
+        return FaultyPlantLoop(node, settings)
+    return PlantLoop(node, settings)
+
+
+NODE = NodeKind(PlantNodeSettings, make_loop)
 
 
 def main() -> NoReturn:
     """Entry point of plant_node."""
-    run_node(PlantNodeSettings, make_loop)
+    run_nodes(NODE)
 
 
 if __name__ == "__main__":

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Sequence
 from importlib import import_module
-from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import click
 
@@ -18,9 +16,10 @@ from space_robot_msgs_py.ros.lifeline import hold_to_standard_input
 from ..flight.interruption import Interrupted, raising_signals
 from ..flight.node_modules import MODULES, SUFFIX
 from .analyze import analyze
-from .options import OPTIONS, flight_options
+from .fly import fly
 from .replay import replay
 from .reproduce import reproduce
+from .simulate import simulate
 from .soak import soak
 from .stability import stability
 from .streams import is_of_output, standard_streams
@@ -43,138 +42,11 @@ def cli() -> None:
     """
 
 
-def _plan(**options: Any) -> Any:
-    from space_robot_msgs_py.config.validation import validate
-
-    from ..flight.plan import Flight, FlightPlan
-
-    return Flight(validate(FlightPlan, options, "options"))
-
-
-def _faults(context: click.Context, given: Sequence[str]) -> Sequence[str]:
-    if list(given) == ["list"]:
-        from space_robot_sim.faults.catalogue import KINDS, help_lines
-
-        click.echo("\n".join(help_lines(KINDS)))
-        context.exit()
-    return given
-
-
-def _report(report: dict[str, Any], as_json: bool) -> None:
-    from ..flight.terminal import echo_json, terminal
-
-    if as_json:
-        echo_json(report)
-        return
-    from .report_display import print_report
-
-    print_report(report, terminal())
-
-
-@cli.command()
-@flight_options(*OPTIONS)
-@click.option("--realtime", is_flag=True, help="Pace by the wall clock instead of lockstep.")
-@click.option(
-    "--fifo-priority",
-    type=click.IntRange(0, 98),
-    default=0,
-    help="Ask for SCHED_FIFO for plant and controller; for machines with cores to spare.",
-)
-@click.option(
-    "--fault", "faults", multiple=True, metavar="KIND@T[-END][:ARG]",
-    help="Inject a fault at T simulated seconds; may be repeated; --fault list lists all kinds.",
-    callback=lambda context, option, given: _faults(context, given),
-)  # fmt: skip
-@click.option("--seed", type=int, default=0, help="Seed of the faults' random numbers.")
-@click.option("--restart-controller", is_flag=True, help="Start a dead or hung controller again.")
-@click.option("--domain", type=int, help="ROS domain [default: ROS_DOMAIN_ID, or a free one].")
-def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
-    """Fly a mission on a ROS 2 graph, record it, and print the RMS table.
-
-    Starts plant, controller, mission and recorder as processes of their own (through `ros2 run`
-    where that is installed), configures and activates them, follows the flight, stops them,
-    checks the bag. Set ROS_DOMAIN_ID or --domain to watch the flight from another terminal.
-
-    \b
-    Examples:
-      space-robot fly --controller tde_smc --duration 5
-      space-robot fly --case 4-2 --bag flights/heavy --json
-      space-robot fly --command-latency-ticks 2
-      space-robot fly --swap 5:tde_smc --swap 10:tde_stc
-      space-robot fly --fault kill_controller@3 --restart-controller
-      space-robot fly --fault drop_state@2-4:0.1 --fault noise_gyro@0:1e-5 --seed 7
-    """
-    from ..analysis import analyze
-    from ..flight.graph.orchestrator import fly as fly_graph
-    from .failure import told_as_json
-
-    flight = _plan(**options)
-    bag = bag or flight.default_bag()
-    with told_as_json(flight, bag, as_json):
-        report = fly_graph(flight, bag, analyze)
-    _report(report, as_json)
-    if failures := report["graph"]["failures"]:
-        from space_robot_msgs_py.errors import FlightError
-
-        raise FlightError("; ".join(failures))
-
-
-@cli.command()
-@flight_options(*OPTIONS)
-def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
-    """Fly the same mission in this process, without ROS; the numbers are those of `fly`.
-
-    \b
-    Examples:
-      space-robot simulate --controller tde_tsmc
-      space-robot simulate --no-friction --case 2 --json
-      space-robot simulate --bag flights/in_process
-    """
-    from contextlib import closing
-
-    from space_robot_msgs_py.errors import FlightError
-
-    from ..analysis import Analysis
-    from ..flight.compilation import compile_kernels
-    from ..flight.disk_space import room_remark
-    from ..flight.plan import check_bag_path
-    from ..flight.progress import flight_progress
-    from ..flight.simulate import fly_blocks
-    from .failure import failed_report
-
-    flight = _plan(**options)
-    flight.check_in_process()
-    if bag:
-        check_bag_path(bag)
-        if remark := room_remark(flight, bag):
-            click.echo(remark, err=True)
-    compile_kernels()
-    period, analysis, began = flight.period, Analysis(), time.monotonic()
-    with flight_progress(flight.ticks * period, flight.controller.law.name) as show:
-
-        def progress(tick: int) -> None:
-            rate = tick * period / (time.monotonic() - began)
-            show(tick * period, f"{rate:.0f} times real time")
-
-        failure = None
-        with closing(fly_blocks(flight, bag, progress)) as blocks:
-            try:
-                for block in blocks:
-                    analysis.add(block)
-            except FlightError as error:
-                failure = error
-    report = analysis.report() if analysis.ticks else {}
-    if failure and as_json:
-        report = failed_report(flight, bag, failure, report)
-    if report:
-        _report(report, as_json)
-    if failure:
-        raise failure
-
-
 cli.add_command(analyze)
+cli.add_command(fly)
 cli.add_command(replay)
 cli.add_command(reproduce)
+cli.add_command(simulate)
 cli.add_command(soak)
 cli.add_command(stability)
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from ..flight.plan import Flight
 
 Decorator = Callable[[Any], Any]
 NODES = ("plant", "controller", "mission", "recorder")
@@ -196,6 +199,19 @@ def flight_options(*names: str) -> Decorator:
         return function
 
     return decorate
+
+
+def plan_flight(**options: Any) -> Flight:
+    """The flight that a command's options ask for.
+
+    Raises:
+        InputError: they do not fit together, or name what there is not.
+    """
+    from space_robot_msgs_py.config.validation import validate
+
+    from ..flight.plan import Flight, FlightPlan
+
+    return Flight(validate(FlightPlan, options, "options"))
 
 
 def check_writable(path: Path) -> None:

@@ -9,12 +9,20 @@ from rich.console import Console
 from rich.table import Table
 
 from ..analysis.table import Line, flown, law_of, lines, notes, remarks, unit_of
-from ..flight.terminal import say, show
+from ..flight.terminal import echo_json, say, show, terminal
 
 LABELS = 44
 """Columns of the terminal that names and units take beside the figures of several bags."""
 NARROWEST = 17
 """Columns of one bag."""
+
+
+def show_report(report: dict[str, Any], as_json: bool) -> None:
+    """Print the report of a flight on standard output."""
+    if as_json:
+        echo_json(report)
+    else:
+        print_report(report, terminal())
 
 
 def print_report(report: dict[str, Any], console: Console) -> None:

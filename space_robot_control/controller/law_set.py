@@ -12,7 +12,7 @@ from space_robot_msgs_py.bag.law_history import LawChange, same
 from space_robot_msgs_py.config.trees import nest
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import SpaceRobotError
-from space_robot_msgs_py.ros.node_host import NodeHost
+from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.parameters import overrides
 from space_robot_msgs_py.samples import LawInForce, RobotState
 from space_robot_sim.robot import Robot
@@ -27,13 +27,13 @@ from .swaps import Swap, parse_swaps
 class LawSet:
     """The laws of the gain set as parameters: ``controller``, and ``<law>.<gain>`` for each."""
 
-    def __init__(self, host: NodeHost, settings: ControllerNodeSettings, axes: int) -> None:
+    def __init__(self, node: ManagedNode[Any], settings: ControllerNodeSettings, axes: int) -> None:
         """Build all laws and declare their gains.
 
         Raises:
             InputError: a law, a gain or a swap that cannot be.
         """
-        self._host, self._settings, self._axes = host, settings, axes
+        self._node, self._settings, self._axes = node, settings, axes
         self._laws: dict[str, ControlLaw] = {}
         first = find_law(settings.controller).name
         for name in dict.fromkeys([first, *available_laws(settings)]):
@@ -47,10 +47,10 @@ class LawSet:
         self._swaps: list[Swap] = parse_swaps(settings.swaps, settings.period)
         for swap in self._swaps:
             one_of(swap.name, self._laws, "controller", " of swaps")
-        descriptor = host.node.describe_parameter("controller")
+        descriptor = node.describe_parameter("controller")
         descriptor.additional_constraints = f"one of {', '.join(self._laws)}"
-        host.node.set_descriptor("controller", descriptor)
-        host.node.add_on_set_parameters_callback(self._on_set)
+        node.set_descriptor("controller", descriptor)
+        node.add_on_set_parameters_callback(self._on_set)
 
     def warm_up(self, robot: Robot) -> None:
         """Load every law's compiled code, so that no first tick and no swap comes late."""
@@ -81,19 +81,19 @@ class LawSet:
         when = (
             f"from tick {change.law.tick} on (t = {change.law.tick * self._settings.period:.4f} s)"
         )
-        self._host.log(f"controller: {change}, {when}")
+        self._node.log(f"controller: {change}, {when}")
         if self._was_swapped:
             self._was_swapped = False
             name = Parameter("controller", value=change.law.name)  # type: ignore[no-untyped-call]
-            self._host.node.set_parameters([name])
+            self._node.set_parameters([name])
 
     def close(self) -> None:
         """Take no more changes."""
-        self._host.node.remove_on_set_parameters_callback(self._on_set)
+        self._node.remove_on_set_parameters_callback(self._on_set)
 
     def _declared(self, wanted: str) -> ControlLaw:
         law = build_law(wanted, self._settings, self._axes)
-        node = self._host.node
+        node = self._node
         given = overrides(node, [f"{law.name}.{gain}" for gain in law.gain_descriptions])
         tree = {**law.gains, **nest(given).get(law.name, {})}
         law.gains = check_gains(tree, type(law), self._axes, "controller parameters")

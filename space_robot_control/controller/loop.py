@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import time
 
+import numpy as np
+from numpy.typing import NDArray
+
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.files import named_file
-from space_robot_msgs_py.ros.endpoints import SPIN_S, RawPublisher, flush
+from space_robot_msgs_py.ros.endpoints import RawPublisher, flush
 from space_robot_msgs_py.ros.health import Health, Level
-from space_robot_msgs_py.ros.node_host import NodeHost
+from space_robot_msgs_py.ros.loop import Wait
+from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.wire.codecs import CommandCodec
 from space_robot_msgs_py.wire.plain_codecs import LawCodec, TelemetryCodec
 from space_robot_msgs_py.wire.stamp_guard import StampGuard
@@ -21,6 +25,8 @@ from .settings import ControllerNodeSettings
 from .state_input import StateInput
 from .supervisor import Mode, Supervisor
 
+Array = NDArray[np.float64]
+
 FLUSH_S = 1.0
 LOOK_AHEAD_S = 0.02
 """The reference is looked for this often though it is not needed yet, so that no flood of others'
@@ -32,10 +38,15 @@ STAND_DOWN_S = 0.1
 class ControllerLoop:
     """Takes the newest state, waits for its reference, answers; never answers a tick anew."""
 
-    def __init__(self, host: NodeHost, settings: ControllerNodeSettings) -> None:
-        self._host, self._settings = host, settings
+    is_complete = False
+
+    def __init__(
+        self, node: ManagedNode[ControllerNodeSettings], settings: ControllerNodeSettings
+    ) -> None:
+        """Load the laws' compiled code, so that no tick comes late for it."""
+        self._node, self._settings = node, settings
         robot = Robot.from_yaml(named_file("robots", settings.robot))
-        self._laws = LawSet(host, settings, robot.n + 3)
+        self._laws = LawSet(node, settings, robot.n + 3)
         self._laws.warm_up(robot)
         self._controller = Controller(
             robot, self._laws.chosen, settings.period, settings.acceleration_filter_hz
@@ -43,54 +54,69 @@ class ControllerLoop:
         self._supervisor = Supervisor(self._controller, robot.n + 3, settings.hold_ticks)
         self._stamps = StampGuard(settings.longest_jump)
         timebase = settings.timebase
-        spin_s = 0.0 if settings.fifo_priority else SPIN_S
-        self._states = StateInput(host.node, robot, timebase, spin_s)
-        self._references = ReferenceInput(host, robot, timebase, settings.reference_timeout)
+        self._states = StateInput(node, robot, timebase)
+        self._references = ReferenceInput(node, robot, timebase, settings.reference_timeout)
         self._commands = CommandCodec(robot.axis_names, timebase)
         self._telemetry = TelemetryCodec(robot.axis_names)
         self._law = LawCodec(timebase)
-        node = host.node
         self._command_out = RawPublisher(node, topics.COMMAND)
         self._telemetry_out = RawPublisher(node, topics.TELEMETRY)
         self._law_out = RawPublisher(node, topics.LAW)
         self.outputs = (self._command_out, self._telemetry_out, self._law_out)
+        self.wait_for = settings.wait_for
         self._answered, self._answer = -1, b""
+        self._unanswered = -1
+        """A state's tick whose reference has not come yet; -1: none."""
         self._state_at = time.monotonic()
+        self._look_ahead_at = 0.0
 
-    def run(self) -> None:
-        """Answer states until told to stop."""
-        host = self._host
-        host.wait_for_listeners(self.outputs, self._settings.wait_for)
-        look_ahead = 0.0
-        while not host.stopping:
-            tick = self._states.take()
-            if tick is None:
-                self._references.take()  # ahead of need
-            else:
-                self._answer_tick(tick)
-                if self._state_at > look_ahead:
-                    self._references.take()
-                    look_ahead = self._state_at + LOOK_AHEAD_S
-            host.serve()
-        flush(self.outputs, FLUSH_S)
+    def begin(self) -> None:
+        """Begin with the next state."""
+        self._unanswered = -1
+
+    def step(self) -> Wait | None:
+        """Take a state and answer it, if it and its reference are there."""
+        tick = self._unanswered
+        if tick < 0:
+            found = self._states.take()
+            if found is None:
+                self._look_ahead(time.monotonic())
+                return self._states.wait
+            tick = found
+            if tick == self._answered:  # the plant asked again: the same answer
+                self._command_out.publish(self._answer)
+                return None
+            if tick != self._stamps.last and not self._believe(tick):
+                return None
+        reference = self._references.at(tick)
+        if reference is None:
+            is_awaited = self._references.is_awaited
+            self._unanswered = tick if is_awaited else -1
+            return self._references.wait if is_awaited else None
+        self._unanswered = -1
+        self._answer_tick(tick, *reference)
+        self._look_ahead(self._state_at)
+        return None
 
     def stand_down(self) -> None:
         """Answer one more state, with no torque: the plant holds that."""
-        if self._answered < 0 or not self._host.node.count_publishers(topics.JOINT_STATES.name):
-            return
-        until = time.monotonic() + STAND_DOWN_S
-        while time.monotonic() < until:
-            tick = self._states.take()
-            if tick is not None and tick > self._answered:
+        if self._answered >= 0 and self._node.count_publishers(topics.JOINT_STATES.name):
+            until = time.monotonic() + STAND_DOWN_S
+            tick = self._unanswered
+            while tick <= self._answered and time.monotonic() < until:
+                self._node.let_others_work()
+                found = self._states.take()
+                tick = self._answered if found is None else found
+            if tick > self._answered:
                 self._command_out.publish(self._commands.encode(self._supervisor.stand_down(tick)))
-                return
+        flush(self.outputs, FLUSH_S)
 
     def close(self) -> None:
         """Leave the parameters alone."""
         self._laws.close()
 
     def health(self) -> Health:
-        """Mode, law, rejections."""
+        """Tell the mode, the law, and what was rejected."""
         supervisor, references = self._supervisor, self._references
         rejected = self._states.rejected + references.rejected + supervisor.rejected
         silence = time.monotonic() - self._state_at
@@ -116,15 +142,13 @@ class ControllerLoop:
             return Health("holding the reference: the mission is silent", Level.WARN, values)
         return Health("nominal", values=values)
 
-    def _answer_tick(self, tick: int) -> None:
-        if tick == self._answered:  # the plant asked again: the same answer
-            self._command_out.publish(self._answer)
-            return
-        if tick != self._stamps.last and not self._believe(tick):
-            return
-        reference = self._references.at(tick)
-        if reference is None:
-            return
+    def _look_ahead(self, now: float) -> None:
+        """Take references now and then though none is needed yet."""
+        if now > self._look_ahead_at:
+            self._references.take()
+            self._look_ahead_at = now + LOOK_AHEAD_S
+
+    def _answer_tick(self, tick: int, joints: Array, base: Array) -> None:
         controller = self._controller
         change = self._laws.change_at(tick)
         if change:
@@ -134,19 +158,19 @@ class ControllerLoop:
         state = self._states.state
         state.tick = tick
         mode = self._supervisor.mode
-        command = self._supervisor.answer(state, *reference)
-        if self._supervisor.mode is not mode:
-            self._host.report_soon()
+        command = self._supervisor.answer(state, joints, base)
         self._answer = self._commands.encode(command)
         self._command_out.publish(self._answer)
         self._answered = tick
+        if self._supervisor.mode is not mode:
+            self._node.report()
         if change:
             self._laws.tell(change)
         if tick % self._settings.telemetry_decimation == 0:
             self._telemetry_out.publish(self._telemetry.encode(tick, controller.telemetry()))
 
     def _believe(self, tick: int) -> bool:
-        """Whether a state's stamp fits, or begins a new time; then its sender is followed."""
+        """Judge a state's stamp: it fits, or begins a new time; then its sender is followed."""
         stamps, last = self._stamps, self._stamps.last
         if not stamps.passes(tick):
             self._states.reject("stamp")
@@ -156,7 +180,7 @@ class ControllerLoop:
         if stamps.is_new_time:
             references.begin(tick)
             if last >= 0:
-                self._host.log(f"a new time begins at tick {tick}, after {last}")
+                self._node.log(f"a new time begins at tick {tick}, after {last}")
         references.now = tick
         self._state_at = time.monotonic()
         return True

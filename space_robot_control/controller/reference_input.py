@@ -8,11 +8,12 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from rclpy.node import Node
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.ros.endpoints import FollowedSubscription, PolledCallbackGroup, Waiter
-from space_robot_msgs_py.ros.node_host import NodeHost
+from space_robot_msgs_py.ros.endpoints import FollowedSubscription, PolledCallbackGroup
+from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 from space_robot_sim.robot import Robot
@@ -32,11 +33,11 @@ WAIT_TOLD_S = 0.5
 
 
 class ReferenceInput:
-    """Takes both halves of the reference into a `ReferenceBuffer`."""
+    """Takes both halves of the reference into a `ReferenceBuffer`, without waiting for them."""
 
-    def __init__(self, host: NodeHost, robot: Robot, timebase: Timebase, timeout_s: float) -> None:
-        """``timeout_s``: how long `at` waits for the mission."""
-        self._host, self._timeout_s = host, timeout_s
+    def __init__(self, node: Node, robot: Robot, timebase: Timebase, timeout_s: float) -> None:
+        """``timeout_s``: how long the mission is waited for."""
+        self._timeout_s = timeout_s
         self.buffer = ReferenceBuffer(robot.n)
         self.rejected: Counter[str] = Counter()
         """Messages not used, by reason."""
@@ -44,10 +45,12 @@ class ReferenceInput:
         """Ticks for which a point before was held."""
         self.is_missing = False
         """Whether the last one was."""
+        self._until = 0.0
+        """How long the reference that is needed now is waited for; 0: none is."""
         self._waits_since = 0.0
         """When the wait began that has not ended well yet; 0: none."""
         codec, buffer = ReferenceCodec(robot.joint_names, timebase), self.buffer
-        node, group = host.node, PolledCallbackGroup()
+        group = PolledCallbackGroup()
         self._halves = (
             _Half(
                 FollowedSubscription(node, topics.REFERENCE_JOINTS, group, QUEUE_DEPTH),
@@ -59,47 +62,53 @@ class ReferenceInput:
             ),
         )  # fmt: skip
         self.inputs = tuple(half.input for half in self._halves)
-        self._waiter = Waiter(node, *self.inputs)
+        self.wait = Wait(PATIENCE_S, self.inputs)
+        """What is waited for while `at` has no row."""
 
     @property
     def is_waited_for(self) -> bool:
         """Whether a reference has been waited for in vain, for so long that it is worth a word."""
         return bool(self._waits_since) and time.monotonic() - self._waits_since > WAIT_TOLD_S
 
+    @property
+    def is_awaited(self) -> bool:
+        """Whether the tick that `at` had no row for may still get one."""
+        return self._until > 0.0
+
     def at(self, tick: int) -> tuple[Array, Array] | None:
         """The (3, n) and (10,) rows of ``tick``, or its last point where the mission stays away.
 
-        None if told to stop, or if nothing has come that could be held.
+        None if they have not come yet (`is_awaited`), or if nothing has come that could be held.
         """
         buffer = self.buffer
-        if not buffer.covers(tick) and not self._wait(tick):
-            held = None if self._host.stopping else buffer.hold(tick)
-            if held:
-                self.is_missing, self._waits_since = True, 0.0
-                self.held += 1
-            return held
-        self.is_missing, self._waits_since = False, 0.0
-        return buffer.at(tick)
+        if buffer.covers(tick) or self._look_for(tick):
+            self.is_missing, self._waits_since, self._until = False, 0.0, 0.0
+            return buffer.at(tick)
+        if self.is_awaited:
+            return None
+        if held := buffer.hold(tick):
+            self.is_missing, self._waits_since = True, 0.0
+            self.held += 1
+        return held
 
     def take(self) -> bool:
         """Take the next good message of each half; whether there was any."""
         return any([half.take(self.rejected) for half in self._halves])
 
-    def _wait(self, tick: int) -> bool:
-        """Take what comes until it covers ``tick``; False if it stays away."""
-        begin = time.monotonic()
-        self._waits_since = self._waits_since or begin
-        until = begin + (0.0 if self.is_missing else self._timeout_s)
-        while not self.buffer.covers(tick):
-            if self._host.stopping:
-                return False
-            has_come, now = self.take(), time.monotonic()
-            if now >= until + (DRAIN_S if has_come else 0.0):
-                return self.buffer.covers(tick)
-            if not has_come:
-                self._waiter.wait(PATIENCE_S)
-            self._host.serve()
-        return True
+    def _look_for(self, tick: int) -> bool:
+        """Take what has come until it covers ``tick``; give up once it has stayed away too long."""
+        now = time.monotonic()
+        self._waits_since = self._waits_since or now
+        self._until = self._until or now + (0.0 if self.is_missing else self._timeout_s)
+        turn_until = now + DRAIN_S
+        while has_come := self.take():
+            if self.buffer.covers(tick):
+                return True
+            if (now := time.monotonic()) >= turn_until:
+                break
+        if now >= self._until + (DRAIN_S if has_come else 0.0):
+            self._until = 0.0
+        return False
 
 
 class _Half:

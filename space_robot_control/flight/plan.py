@@ -50,6 +50,8 @@ class FlightPlan(StrictModel):
     """Laws to swap to in flight, each as ``T:LAW``."""
     restart_controller: bool = False
     """Whether a controller that died or hangs is started again."""
+    composed: bool = False
+    """Whether all nodes are in one process, stepped in turn."""
     domain: Annotated[int | None, Field(ge=0, le=232)] = None
     """ROS domain to fly in (None: ROS_DOMAIN_ID, or a free one)."""
     compression: Compression | None = None
@@ -132,6 +134,7 @@ class Flight:
         self.parameters = settings.parameters(laws)
         """What every node is given over its files, by dotted name."""
         self.orchestrator_faults = parse_faults(plan.faults_of("orchestrator"), KINDS)
+        self._check_composed()
         self.law = next(iter(laws.values()))
         """In force at the start."""
         self.plant = Plant(self.robot, settings.plant, self.period)
@@ -156,6 +159,17 @@ class Flight:
                 f"({MOST_TICKS} ticks of {self.period:g} s), got {duration:g} s"
             )
         return ticks
+
+    def _check_composed(self) -> None:
+        if not self.plan.composed:
+            return
+        asked = [f"fault {fault}" for fault in self.plan.faults_of("orchestrator")]
+        if self.plan.restart_controller:
+            asked.append("restart_controller")
+        if asked:
+            raise InputError(
+                f"{', '.join(asked)}: that needs a process for each node: fly without --composed"
+            )
 
     def check_in_process(self) -> None:
         """See that the flight does without a graph of nodes.

@@ -7,51 +7,28 @@ it has succeeded. Nothing is sent before activate.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from typing import Any, Generic, Protocol, TypeVar
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
 
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from ..config.settings import NodeSettings
 from ..errors import InputError, SpaceRobotError
 from .diagnostics import Diagnostics
-from .endpoints import RawPublisher
 from .exclusive import Claim, claim_name, foreign_publishers
 from .health import SENT, Health, Level
 from .locks import FileLock
+from .loop import Loop
 from .parameters import declare_settings, refuse_unknown
+from .rclpy_internals import declared_parameters, forget_parameters, guard_change_state
 from .service_calls import ServiceCalls
 
 Schema = TypeVar("Schema", bound=NodeSettings)
 AUTOSTART = "autostart"
 DISCOVERY_S = 0.3
 LOOK_AGAIN_S = 0.3
-
-
-class Loop(Protocol):
-    """What a node does; made with its settings in configure."""
-
-    @property
-    def outputs(self) -> Sequence[RawPublisher]:
-        """Topics that nobody else may publish."""
-
-    def run(self) -> None:
-        """Work while the node is active; return when the host is stopping, or at the end."""
-
-    def stand_down(self) -> None:
-        """Leave the graph safe: called on deactivate, and before the end of an active node."""
-
-    def close(self) -> None:
-        """Let go of everything: called on cleanup and at the end.
-
-        Raises:
-            FlightError: something that was promised has not been kept.
-        """
-
-    def health(self) -> Health:
-        """What to tell of oneself; called some times a second."""
+PAUSE_S = 1e-3
 
 
 class ManagedNode(LifecycleNode, Generic[Schema]):
@@ -69,8 +46,8 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         self.loop: Loop | None = None
         self.is_active = False
         self.is_shut_down = False
-        self.is_running = False
-        """Whether the loop's `run` is on the stack."""
+        self.let_others_work: Callable[[], None] = lambda: time.sleep(PAUSE_S)
+        """To be called by a loop that stands down while it waits for what another node does."""
         self._topics: list[str] = []
         self._claim: Claim | None = None
         self._name: FileLock | None = None
@@ -84,14 +61,18 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         self._diagnostics = Diagnostics(self)
         self._own = self._entities()
         self.calls = ServiceCalls(self)
-        self._guard_change_state()
+        guard_change_state(self, self._refuse_transition)
+
+    def log(self, text: str) -> None:
+        """Say something on the node's log."""
+        self.get_logger().info(text)
 
     def report(self) -> None:
         """Report the health, if it is time again or the mode has changed."""
         self._diagnostics.report(self._health())
 
     def _health(self) -> Health:
-        """The loop's, with the messages it has sent: the recorder looks whether all have come."""
+        """Ask the loop, and add the messages it has sent: the recorder looks if all have come."""
         if self.loop is None:
             return Health("unconfigured")
         health = self.loop.health()
@@ -99,8 +80,8 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         values = {**health.values, **sent, "service_calls": self.calls.count}
         if not self.is_active:
             return Health("inactive", values=values)
-        if health.level is Level.OK and (strangers := self._strangers()):
-            return Health(strangers, Level.WARN, values)
+        if health.level is Level.OK and (foreign := self._foreign_publishers()):
+            return Health(foreign, Level.WARN, values)
         if health.level is Level.OK and self.calls.is_overloaded:
             return Health("more service calls than can be answered in flight", Level.WARN, values)
         return Health(health.mode, health.level, values)
@@ -134,15 +115,6 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         if outcome is not TransitionCallbackReturn.SUCCESS:
             raise self.error or SpaceRobotError(f"{self.get_name()} cannot be started")
 
-    def run_loop(self) -> None:
-        """Let the loop run until it returns."""
-        assert self.loop is not None
-        self.is_running = True
-        try:
-            self.loop.run()
-        finally:
-            self.is_running = False
-
     def end(self) -> None:
         """Shut down, unless that has been done, and let go of everything.
 
@@ -173,49 +145,48 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         return self._try(configure, undo=self._release)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """From here on the loop runs, unless a stranger publishes what is this node's."""
+        """Let the loop be stepped from here on, unless another node publishes this one's topics."""
 
         def activate() -> None:
-            if strangers := self._lasting_strangers():
-                raise InputError(strangers)
+            if foreign := self._lasting_foreign_publishers():
+                raise InputError(foreign)
             self.is_active = True
 
         return self._try(activate)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """The loop stops."""
+        """Stop the loop."""
         return self._try(self._stand_down)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Topics and parameters are gone; a new configure reads the files again."""
+        """Remove topics and parameters; a new configure reads the files again."""
         return self._try(self._release)
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """The end, from any state."""
+        """End the node, from any state."""
 
         def shut_down() -> None:
             self.is_shut_down = True
             self._stand_down()
-            if not self.is_running:  # else the loop's own topics would go under its hands
-                self._release()
+            self._release()
 
         return self._try(shut_down)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Something unforeseen was raised in a transition: the node is of no more use."""
+        """Give the node up: something unforeseen was raised in a transition."""
         return TransitionCallbackReturn.FAILURE
 
-    def _strangers(self) -> str:
-        """Who else publishes this node's topics, in words; empty if nobody."""
+    def _foreign_publishers(self) -> str:
+        """Tell who else publishes this node's topics, in words; empty if nobody."""
         crowded = [topic for topic in self._topics if self.count_publishers(topic) > 1]
-        strangers = foreign_publishers(self, crowded)
-        return "; ".join(f"{t} is also published by {', '.join(n)}" for t, n in strangers.items())
+        foreign = foreign_publishers(self, crowded)
+        return "; ".join(f"{t} is also published by {', '.join(n)}" for t, n in foreign.items())
 
-    def _lasting_strangers(self) -> str:
-        """`_strangers`, asked twice: one that is just being discovered has no name yet."""
-        if self._strangers():
+    def _lasting_foreign_publishers(self) -> str:
+        """Look twice for foreign publishers: one that is just being discovered has no name yet."""
+        if self._foreign_publishers():
             time.sleep(LOOK_AGAIN_S)
-        return self._strangers()
+        return self._foreign_publishers()
 
     def _try(
         self, action: Callable[[], None], undo: Callable[[], None] | None = None
@@ -255,25 +226,11 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
                 self.destroy_publisher(publisher)
             for subscription in subscriptions - self._own[1]:
                 self.destroy_subscription(subscription)
-            for name in parameters - self._own[2]:
-                self._parameters.pop(name)  # undeclare_parameter refuses read-only ones
-                self._descriptors.pop(name)
+            forget_parameters(self, parameters - self._own[2])
 
     def _entities(self) -> tuple[set[Any], set[Any], set[str]]:
-        return set(self.publishers), set(self.subscriptions), set(self._parameters)
+        return set(self.publishers), set(self.subscriptions), declared_parameters(self)
 
-    def _guard_change_state(self) -> None:
-        """Answer a transition that does not exist in the present state: rclpy would die of it."""
-        service = self._service_change_state
-        change_state = service.callback
-
-        def guarded(request: Any, response: Any) -> Any:
-            try:
-                return change_state(request, response)
-            except _rclpy.RCLError:
-                response.success = False
-                self.error = InputError("this transition is not possible in the present state")
-                self.get_logger().error(str(self.error))
-                return response
-
-        service.callback = guarded
+    def _refuse_transition(self) -> None:
+        self.error = InputError("this transition is not possible in the present state")
+        self.get_logger().error(str(self.error))

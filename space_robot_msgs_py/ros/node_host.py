@@ -1,15 +1,16 @@
-"""A node's process: ROS up, the lifecycle, the loop while active, a clean end, an exit code."""
+"""A process of nodes: ROS up, the lifecycle, the loops of the active nodes stepped, a clean end.
+
+As a rule a process hosts one node; a composed graph is several nodes in one process.
+"""
 
 from __future__ import annotations
 
 import faulthandler
-import gc
 import signal
 import sys
 import textwrap
-import time
 from collections.abc import Callable, Sequence
-from typing import NoReturn, TypeVar
+from typing import Any, Generic, NamedTuple, NoReturn, TypeVar
 
 from .process_environment import set_defaults
 
@@ -22,128 +23,111 @@ from rclpy.signals import SignalHandlerOptions  # noqa: E402
 from ..config.settings import NodeSettings, leaves  # noqa: E402
 from ..config.validation import short  # noqa: E402
 from ..errors import InputError, SpaceRobotError  # noqa: E402
-from .endpoints import RawPublisher  # noqa: E402
 from .lifeline import hold_to_standard_input  # noqa: E402
-from .managed_node import AUTOSTART, Loop, ManagedNode  # noqa: E402
-from .scheduling import ask_for_fifo  # noqa: E402
+from .loop import Loop  # noqa: E402
+from .managed_node import AUTOSTART, ManagedNode  # noqa: E402
+from .turns import Turns  # noqa: E402
 
 Schema = TypeVar("Schema", bound=NodeSettings)
 
-SERVICE_PERIOD_S = 0.1
-"""A look for service calls takes a millisecond, a whole tick's time: not too often."""
-SERVICE_SHARE = 0.1
-"""Of a loop's time, for service calls that wait one behind another."""
-LONGEST_PAUSE_S = 1.0
-LISTENER_PERIOD_S = 0.02
-REMIND_S = 5.0
+
+class NodeKind(NamedTuple, Generic[Schema]):
+    """How a node is made."""
+
+    schema: type[Schema]
+    """Its parameters; it tells the node's name, too."""
+    make_loop: Callable[[ManagedNode[Schema], Schema], Loop]
+    changeable: tuple[str, ...] = ()
+    """Names of the parameters that may be changed in flight."""
+
+    def make_node(self) -> ManagedNode[Schema]:
+        """Join the graph, unconfigured."""
+        return ManagedNode(self.schema, self.make_loop, self.changeable)
 
 
 class NodeHost:
-    """What a loop needs of its process: whether to stop, and time for services."""
+    """Starts, serves, steps and ends the nodes of this process."""
 
-    def __init__(self, node: ManagedNode[Schema]) -> None:
-        self.node = node
-        self.signalled = False
-        """Whether the process has been told to end."""
-        self._next_service = self._next_report = 0.0
+    def __init__(self, nodes: Sequence[ManagedNode[Any]]) -> None:
+        """Take the nodes, in the order in which they are started."""
+        self._nodes = nodes
+        self._turns = Turns(nodes)
+        self._is_signalled = False
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._stop)
         hold_to_standard_input()
 
     def _stop(self, number: int, frame: object) -> None:
-        self.signalled = True
+        self._is_signalled = True
 
-    @property
-    def stopping(self) -> bool:
-        """Whether the loop must return: the node is not active any more, or ends."""
-        return self.signalled or not self.node.is_active
+    def run(self) -> None:
+        """Start the nodes that start by themselves; then serve and step until the end.
 
-    def log(self, text: str) -> None:
-        """Say something on the node's log."""
-        self.node.get_logger().info(text)
+        That is a signal, a loop that is complete, or the shutdown of all nodes.
 
-    def serve(self) -> None:
-        """Let services run and report the health if it is time again; call it often.
-
-        Not once the loop must return: a transition would take its topics from under its hands.
+        Raises:
+            SpaceRobotError: a node cannot be started, or its loop cannot go on.
         """
-        if self.stopping:
-            return
-        now = time.monotonic()
-        if now >= self._next_service:
-            has_run = self.node.calls.run_one()
-            begin, now = now, time.monotonic()
-            # after one call look for another soon, but let them take no more than their share;
-            # the answer to a client that has gone takes the middleware 0.1 s
-            pause = min((now - begin) / SERVICE_SHARE, LONGEST_PAUSE_S)
-            self._next_service = now + (pause if has_run else SERVICE_PERIOD_S)
-        if now >= self._next_report:
-            self._next_report = now + SERVICE_PERIOD_S
-            self.node.report()
+        for node in self._nodes:
+            node.claim_name()
+        for node in self._nodes:
+            if node.autostart and not self._is_signalled:
+                node.start()
+        take_turn = self._turns.take
+        while not self._is_signalled and take_turn():
+            pass
 
-    def report_soon(self) -> None:
-        """Report the health at the next `serve`: the mode has changed."""
-        self._next_service = self._next_report = 0.0
-
-    def wait_for_listeners(self, outputs: Sequence[RawPublisher], names: Sequence[str]) -> None:
-        """Return when the named nodes listen to all of ``outputs``, or when stopping."""
-        remind = time.monotonic() + REMIND_S
-        while not self.stopping:
-            missing = {out.topic.name: out.missing_listeners(names) for out in outputs}
-            if not any(missing.values()):
-                return
-            if time.monotonic() > remind:
-                remind += REMIND_S
-                waiting = ", ".join(f"{', '.join(v)} on {k}" for k, v in missing.items() if v)
-                self.log(f"waiting for {waiting}")
-            self.serve()
-            time.sleep(LISTENER_PERIOD_S)
+    def end(self) -> list[tuple[str, SpaceRobotError]]:
+        """End all nodes, the last one first; which ones could not end as they should, and why."""
+        failures = []
+        for node in reversed(self._nodes):
+            try:
+                node.end()
+            except SpaceRobotError as error:
+                failures.append((node.get_name(), error))
+        return failures
 
 
-def run_node(
-    schema: type[Schema],
-    make_loop: Callable[[NodeHost, Schema], Loop],
-    changeable: tuple[str, ...] = (),
-    arguments: list[str] | None = None,
-) -> NoReturn:
-    """Run a node until its loop returns while active, or until it is shut down.
+def run_nodes(*kinds: NodeKind[Any], arguments: list[str] | None = None) -> NoReturn:
+    """Run nodes in this process until a loop is complete, or until all are shut down.
 
     Exit code 0 at the end or on SIGINT, SIGTERM or SIGHUP, 2 on bad input, 1 on a failed flight,
     each failure with one line on standard error.
+
+    Args:
+        kinds: the nodes in the order in which they are started; they end in the reverse order.
+        arguments: the command line (None: this process').
     """
     faulthandler.enable()  # a crash of the middleware leaves a word on where it was
+    schemas = [kind.schema for kind in kinds]
+    who = schemas[0].ros_name() if len(kinds) == 1 else "composed nodes"
     try:
         _, *others = rclpy.utilities.remove_ros_args(sys.argv if arguments is None else arguments)
         if others:
-            _answer(schema, others)
+            _answer(schemas, others)
         rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
     except InputError as error:
-        sys.exit(_say(schema, error))
+        sys.exit(_say(who, error))
     except Exception as error:  # RCLError is private; whatever it is, the arguments are at fault
-        sys.exit(_say(schema, InputError(str(error).splitlines()[0])))
-    node: ManagedNode[Schema] = ManagedNode(
-        schema, lambda node, settings: make_loop(host, settings), changeable
-    )
-    host = NodeHost(node)
+        sys.exit(_say(who, InputError(str(error).splitlines()[0])))
+    nodes = [kind.make_node() for kind in kinds]
+    host = NodeHost(nodes)
     code = 0
     try:
-        node.claim_name()
-        if node.autostart:
-            node.start()
-        _live(node, host)
+        host.run()
     except SpaceRobotError as error:
-        code = _say(schema, error)
+        code = _say(who, error)
     try:
-        node.end()
-    except SpaceRobotError as error:
-        code = code or _say(schema, error)
+        for name, failure in host.end():
+            code = code or _say(name, failure)
     finally:
-        node.destroy_node()
+        for node in nodes:
+            node.destroy_node()
         rclpy.utilities.try_shutdown()
     sys.exit(code)
 
 
-def _answer(schema: type[NodeSettings], others: Sequence[str]) -> None:
+def _answer(schemas: Sequence[type[NodeSettings]], others: Sequence[str]) -> None:
     """Print the usage and end, if that is what the arguments that are not for ROS ask for.
 
     Raises:
@@ -154,29 +138,16 @@ def _answer(schema: type[NodeSettings], others: Sequence[str]) -> None:
             f"unknown argument {short(others[0])}: a node takes only those of ROS, after "
             "--ros-args (--help tells more)"
         )
-    name = schema.ros_name()
-    parameters = ", ".join([AUTOSTART, *(key for key, _ in leaves(schema))])
-    print(f"usage: {name} [--ros-args [-p NAME:=VALUE]... [--params-file FILE] [-r FROM:=TO]...]")
-    print(textwrap.fill(f"parameters: {parameters}", 96, subsequent_indent="  "))
+    for schema in schemas:
+        name = schema.ros_name()
+        parameters = ", ".join([AUTOSTART, *(key for key, _ in leaves(schema))])
+        print(
+            f"usage: {name} [--ros-args [-p NAME:=VALUE]... [--params-file FILE] [-r FROM:=TO]...]"
+        )
+        print(textwrap.fill(f"parameters: {parameters}", 96, subsequent_indent="  "))
     sys.exit(0)
 
 
-def _live(node: ManagedNode[Schema], host: NodeHost) -> None:
-    """Run the loop whenever the node is active, until it has come to its end."""
-    while not host.signalled and not node.is_shut_down:
-        if not node.is_active or node.loop is None:
-            node.calls.run_one(SERVICE_PERIOD_S)
-            node.report()
-            continue
-        gc.collect()
-        gc.freeze()  # what lives until the end need not be looked through in the loop
-        if node.settings and node.settings.fifo_priority:
-            host.log(ask_for_fifo(node.settings.fifo_priority))
-        node.run_loop()
-        if node.is_active:
-            return
-
-
-def _say(schema: type[NodeSettings], error: SpaceRobotError) -> int:
-    print(f"{schema.ros_name()}: error: {error}", file=sys.stderr, flush=True)
+def _say(who: str, error: SpaceRobotError) -> int:
+    print(f"{who}: error: {error}", file=sys.stderr, flush=True)
     return error.exit_code

@@ -26,7 +26,7 @@ class ServiceCalls(SingleThreadedExecutor):
         """When the first of the calls ended after each of which another one waited."""
 
     def run_one(self, timeout_s: float = 0.0) -> bool:
-        """Run a call that waits, or comes within ``timeout_s``; whether there was one."""
+        """Run a call that waits, or comes within ``timeout_s``; tell whether there was one."""
         # the end of a call wakes the executor, whose next look then ends at once and finds nothing
         callback = self._next(timeout_s) or (self._next(0.0) if self._busy_since else None)
         if callback is None:
@@ -41,6 +41,10 @@ class ServiceCalls(SingleThreadedExecutor):
             raise error
         self.count += 1
         return True
+
+    def forget_waiting(self) -> None:
+        """Forget how long calls have waited: another node of this process was to blame."""
+        self._busy_since = None
 
     def _next(self, timeout_s: float) -> Any:
         try:

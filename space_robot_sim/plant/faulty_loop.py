@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from space_robot_msgs_py.ros.health import Health
-from space_robot_msgs_py.ros.node_host import NodeHost
+from space_robot_msgs_py.ros.managed_node import ManagedNode
 
 from ..faults.link import awaited_stamp
 from .faults import PlantFaults
-from .loop import PlantLoop
+from .loop import NONE, PlantLoop, SentState
 from .settings import PlantNodeSettings
 
 
@@ -17,50 +19,40 @@ class FaultyPlantLoop(PlantLoop):
     A state that is lost, late or wrongly stamped has no answer to wait for.
     """
 
-    def __init__(self, host: NodeHost, settings: PlantNodeSettings) -> None:
+    def __init__(self, node: ManagedNode[PlantNodeSettings], settings: PlantNodeSettings) -> None:
         """See `PlantLoop`; ``settings.faults`` says what fails."""
-        super().__init__(host, settings)
-        plant = self._plant
+        super().__init__(node, settings)
+        robot = self._plant.robot
         faults = settings.parsed_faults
-        self._faults = PlantFaults(faults, settings.fault_seed, plant.robot, settings.period)
-        self._asked = -1
+        self._faults = PlantFaults(faults, settings.fault_seed, robot, settings.period)
+        self._asked = NONE
         """Tick of the newest state that a controller can have answered."""
 
     def health(self) -> Health:
-        """Says that what is wrong is meant to be."""
+        """Say that what is wrong is meant to be."""
         health = super().health()
         return Health(health.mode, health.level, {**health.values, "faults": "injected"})
 
-    def _exchange(self) -> bool:
-        plant, faults = self._plant, self._faults
-        measured = faults.measure(plant.state)
+    def _measure(self) -> Iterator[SentState]:
+        tick, faults = self._plant.tick, self._faults
+        measured = faults.measure(self._plant.state)
         messages = self._states.encode(measured)
-        arriving = faults.states.push(plant.tick, messages, measured.tick)
-        self._publish_clock()
-        for parcel in arriving:
-            self._publish(*parcel.item)
-            stamp = awaited_stamp([parcel], plant.tick, self._asked)
+        for arriving in faults.states.push(tick, messages, measured.tick):
+            stamp = awaited_stamp([arriving], tick, self._asked)
             if stamp is not None:
                 self._asked = stamp
-                if not self._by_the_clock and not self._wait(stamp):
-                    return False
-        if self._by_the_clock:
-            self._wait_by_the_clock(self._asked)
-        self._deliver_due()
-        return not self._host.stopping
+            joints, base = arriving.item
+            yield SentState(joints, base, NONE if stamp is None else stamp)
 
-    def _step(self) -> None:
-        plant = self._plant
-        self._faults.actuators.apply(plant.tick, plant.torque_limit, plant.coulomb_friction)
-        super()._step()
+    def _end_tick(self) -> None:
+        guard, plant, faults = self._guard, self._plant, self._faults
+        for command in faults.commands.arrivals(plant.tick):
+            guard.offered.tick, guard.offered.torque[:] = command.stamp, command.item
+            guard.accept(plant.tick)
+        faults.actuators.apply(plant.tick, plant.torque_limit, plant.coulomb_friction)
+        super()._end_tick()
 
     def _deliver(self) -> None:
         faults, offered, tick = self._faults, self._guard.offered, self._plant.tick
         faults.corruption.spoil_command(offered, tick)
         faults.commands.send(tick, offered.torque.copy(), offered.tick)
-
-    def _deliver_due(self) -> None:
-        guard, tick = self._guard, self._plant.tick
-        for parcel in self._faults.commands.arrivals(tick):
-            guard.offered.tick, guard.offered.torque[:] = parcel.stamp, parcel.item
-            guard.accept(tick)

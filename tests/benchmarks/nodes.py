@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.loop import ControllerLoop
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_msgs_py.ros.node_host import NodeHost, run_node
+from space_robot_msgs_py.ros.managed_node import ManagedNode
+from space_robot_msgs_py.ros.node_host import NodeKind, run_nodes
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.plant.loop import PlantLoop
 from space_robot_sim.plant.plant import Plant
@@ -89,9 +90,9 @@ class TimedPlantLoop(PlantLoop):
 
     file, is_empty = "", False
 
-    def __init__(self, host: NodeHost, settings: PlantNodeSettings) -> None:
+    def __init__(self, node: ManagedNode[PlantNodeSettings], settings: PlantNodeSettings) -> None:
         """See `PlantLoop`."""
-        super().__init__(host, settings)
+        super().__init__(node, settings)
         self._watch = watch = Stopwatch()
         watch.attach(self._states, "encode", "encode state")
         watch.attach(self._joint_states, "publish", "publish joints")
@@ -110,9 +111,8 @@ class TimedPlantLoop(PlantLoop):
             empty_plant(self._plant)
         watch.attach(self._plant, "step", "step plant")
 
-    def run(self) -> None:
-        """Fly, then write the times down."""
-        super().run()
+    def close(self) -> None:
+        """Write the times down."""
         self._watch.save(
             self.file, command_ticks=self._command_ticks, missed_deadlines=self.missed_deadlines
         )
@@ -123,9 +123,11 @@ class TimedControllerLoop(ControllerLoop):
 
     file, is_empty = "", False
 
-    def __init__(self, host: NodeHost, settings: ControllerNodeSettings) -> None:
+    def __init__(
+        self, node: ManagedNode[ControllerNodeSettings], settings: ControllerNodeSettings
+    ) -> None:
         """See `ControllerLoop`."""
-        super().__init__(host, settings)
+        super().__init__(node, settings)
         self._watch = watch = Stopwatch()
         joints, base = self._states.inputs
         watch.attach(joints, "take", "take joints")
@@ -138,9 +140,9 @@ class TimedControllerLoop(ControllerLoop):
         watch.attach(self._commands, "encode", "encode command")
         watch.attach(self._command_out, "publish", "publish command")
 
-    def run(self) -> None:
-        """Answer, then write the times down."""
-        super().run()
+    def close(self) -> None:
+        """Write the times down."""
+        super().close()
         self._watch.save(self.file)
 
 
@@ -151,8 +153,8 @@ def main() -> NoReturn:
     TimedPlantLoop.is_empty = TimedControllerLoop.is_empty = work == "empty"
     sys.argv[1:] = arguments  # what rclpy reads
     if node == "plant":
-        run_node(PlantNodeSettings, TimedPlantLoop)
-    run_node(ControllerNodeSettings, TimedControllerLoop, changeable=("controller",))
+        run_nodes(NodeKind(PlantNodeSettings, TimedPlantLoop))
+    run_nodes(NodeKind(ControllerNodeSettings, TimedControllerLoop, changeable=("controller",)))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A graph of nodes from their start to the landing: brought up, watched, shown, stopped."""
+"""A graph of nodes from their start to the flight's end: brought up, watched, shown, stopped."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def follow(
     graph: Graph, flight: Flight, parameters: dict[str, dict[str, Any]], domain: int,
     stopped: list[int],
 ) -> dict[str, Any]:  # fmt: skip
-    """Fly on started nodes until the plant has ended the flight; what happened.
+    """Fly on started nodes until the plant has ended the flight; report what happened.
 
     Args:
         graph: the processes, not configured yet.
@@ -84,6 +84,7 @@ class _Follower:
             restart_command=(
                 node_command("controller", again) if flight.plan.restart_controller else None
             ),
+            last_tick=flight.ticks,
         )  # fmt: skip
         self._events: list[Event] = []
         self._begun_at = 0.0
@@ -103,8 +104,8 @@ class _Follower:
 
     def _change(self, driver: LifecycleDriver, names: Sequence[str], transition: str) -> None:
         for name in driver.change(names, transition, self._check_start):
-            words = self._graph.nodes[name.removesuffix("_node")].output_tail()
-            raise FlightError(f"{name} refused to {transition}:\n{words}")
+            output = self._graph.host_of(name.removesuffix("_node")).output_tail()
+            raise FlightError(f"{name} refused to {transition}:\n{output}")
 
     def until_complete(self, show: FlightProgress) -> None:
         """Watch, inject, show."""
@@ -126,11 +127,11 @@ class _Follower:
         show(self.total_s, "")
 
     def end(self) -> dict[str, Any]:
-        """Stop the other nodes; what happened."""
+        """Stop the other nodes; report what happened."""
         self._graph.stop()
         self._watch.check_recorder_exit()
         if self._stopped:
-            raise InterruptedFlightError("stopped when the flight had landed", self._stopped[0])
+            raise InterruptedFlightError("stopped when the flight was complete", self._stopped[0])
         self._monitor.poll()  # the nodes' last reports
         found = degradation(self._monitor.values, self._fault_kinds, self._realtime)
         return {
@@ -153,10 +154,10 @@ class _Follower:
             self._last_s, self._moved_at = monitor.simulated_s, now
             show(self._last_s, _remark(monitor.errors, self._last_s, now - self._begun_at))
         elif now - self._moved_at > STALL_TIMEOUT_S:
-            words = "\n".join(f"{n}:\n{p.output_tail()}" for n, p in self._graph.nodes.items())
+            output = "\n".join(f"{n}:\n{p.output_tail()}" for n, p in self._graph.nodes.items())
             why = "".join(f"{node}: {mode}\n" for node, mode in monitor.complaints.items())
             raise FlightError(
-                f"no progress for {STALL_TIMEOUT_S:.0f} s at {self._last_s:.2f} s:\n{why}{words}"
+                f"no progress for {STALL_TIMEOUT_S:.0f} s at {self._last_s:.2f} s:\n{why}{output}"
             )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,9 +21,13 @@ from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 from ..compilation import compile_kernels
 from ..interruption import handled_signals
 from ..plan import Flight, check_bag_path
+from .composed import NAME, composed_command
 from .domain import ros_domain
 from .following import follow
 from .processes import Graph, node_command, node_environment
+
+COMPOSED_DRAIN_S = 0.002
+"""In one process the recorder takes little and often: while it does, no tick is flown."""
 
 
 def fly(
@@ -53,11 +57,7 @@ def fly(
         try:
             _say(f"flying on ROS_DOMAIN_ID={domain}, recording to {bag}")
             parameters = flight_parameters(flight, bag)
-            commands = {
-                node: node_command(node, {**values, "autostart": False})
-                for node, values in parameters.items()
-            }
-            with Graph(commands, node_environment(domain)) as graph:
+            with Graph(_commands(flight, parameters), node_environment(domain)) as graph:
                 what_happened = follow(graph, flight, parameters, domain, stopped)
         except BaseException as error:
             if not _has_states(bag):
@@ -72,6 +72,14 @@ def fly(
         _say(f"warning: {warning}")
     _check(report, flight)
     return report
+
+
+def _commands(flight: Flight, parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
+    """Command lines of the processes: one a node, or one for all."""
+    told = {node: {**values, "autostart": False} for node, values in parameters.items()}
+    if flight.plan.composed:
+        return {NAME: composed_command(told)}
+    return {node: node_command(node, values) for node, values in told.items()}
 
 
 def _claim(bag: Path) -> None:
@@ -122,6 +130,8 @@ def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
         "bag": str(bag.absolute()),
         "flight": json.dumps(flight.description),
     }
+    if flight.plan.composed:
+        parameters["recorder"].setdefault("drain_period", COMPOSED_DRAIN_S)
     return parameters
 
 

@@ -22,7 +22,7 @@ from space_robot_msgs_py.ros.run_module import clean_environment, module_command
 from ..node_modules import MODULES
 
 PACKAGE = "space_robot"
-LAST_WORDS = 5
+TAIL_LINES = 5
 
 
 def has_ros2_run() -> bool:
@@ -53,11 +53,13 @@ def node_command(node: str, parameters: Mapping[str, Any]) -> list[str]:
     return command + ros_arguments(parameters)
 
 
-def ros_arguments(parameters: Mapping[str, Any]) -> list[str]:
-    """Parameters as a node's command line takes them."""
+def ros_arguments(parameters: Mapping[str, Any], node: str = "") -> list[str]:
+    """Parameters as a node's command line takes them; only for the named ``node``, if given."""
+    prefix = f"{node}:" if node else ""
     arguments = ["--ros-args"] if parameters else []
     for name, value in parameters.items():
-        arguments += ["-p", f"{name}:={json.dumps(value)}"]  # JSON is YAML, which ROS reads
+        # JSON is YAML, which ROS reads
+        arguments += ["-p", f"{prefix}{name}:={json.dumps(value)}"]
     return arguments
 
 
@@ -79,30 +81,30 @@ class NodeProcess:
 
     @property
     def pid(self) -> int:
-        """Of the process, and of its group."""
+        """Number of the process, and of its group."""
         return self._process.pid
 
     @property
     def exit_code(self) -> int | None:
-        """None while it runs."""
+        """Exit code of the process; None while it runs."""
         return self._process.poll()
 
     def exit_summary(self) -> str:
-        """How it ended, once it has."""
+        """Say how it ended, once it has."""
         time.sleep(0.1)  # let it finish its last line
         code = self.exit_code or 0
         how = f"with exit code {code}" if code >= 0 else f"by signal {-code}"
         return f"{self.node} ended {how}"
 
-    def death(self) -> FlightError:
-        """What to raise when it has ended too early."""
+    def early_end(self) -> FlightError:
+        """The error to raise when it has ended too early."""
         return FlightError(f"{self.exit_summary()} before the flight did:\n{self.output_tail()}")
 
     def output_tail(self) -> str:
         """The end of what it printed."""
         self._output.seek(0)
         lines = self._output.read().decode(errors="replace").strip().splitlines()
-        return "\n".join(f"  {line}" for line in lines[-LAST_WORDS:]) or "  (it said nothing)"
+        return "\n".join(f"  {line}" for line in lines[-TAIL_LINES:]) or "  (it said nothing)"
 
     def signal(self, number: int) -> None:
         """Send a signal to the whole group: ``ros2 run`` would keep it to itself."""
@@ -142,9 +144,10 @@ class Graph:
     """The processes of one flight; leaving the context leaves none behind."""
 
     def __init__(self, commands: Mapping[str, Sequence[str]], environment: Mapping[str, str]):
-        """``commands``: the command line of each node."""
+        """``commands``: the command line of each node, or of the process that hosts them all."""
         self._commands, self._environment = commands, environment
         self.nodes: dict[str, NodeProcess] = {}
+        self._leader = "plant" if "plant" in commands else next(iter(commands))
 
     def __enter__(self) -> Graph:
         try:
@@ -171,6 +174,15 @@ class Graph:
         for node in sorted(self.nodes.values(), key=lambda node: node is recorder):
             node.stop()
 
+    @property
+    def leader(self) -> NodeProcess:
+        """The process that ends, with exit code 0, when the flight has come to its end."""
+        return self.nodes[self._leader]
+
+    def host_of(self, node: str) -> NodeProcess:
+        """The process of a node."""
+        return self.nodes.get(node, self.leader)
+
     def restart(self, name: str, command: Sequence[str]) -> None:
         """Put a new process in the place of one that is dead or hangs."""
         old = self.nodes[name]
@@ -183,9 +195,9 @@ class Graph:
         """Whether the plant has flown to its end.
 
         Raises:
-            FlightError: a node has died; with its last words.
+            FlightError: a process has ended too early; with the end of its output.
         """
-        for name, node in self.nodes.items():
-            if node.exit_code is not None and (node.exit_code != 0 or name != "plant"):
-                raise node.death()
-        return self.nodes["plant"].exit_code == 0
+        for node in self.nodes.values():
+            if node.exit_code is not None and (node.exit_code != 0 or node is not self.leader):
+                raise node.early_end()
+        return self.leader.exit_code == 0

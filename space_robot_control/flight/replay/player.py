@@ -55,10 +55,9 @@ class Player:
             PolledCallbackGroup,
             RawPublisher,
             RawSubscription,
-            Waiter,
-            take_or_wait,
         )
         from space_robot_msgs_py.ros.exclusive import Claim
+        from space_robot_msgs_py.ros.waiting import Waiter, take_or_wait
 
         self._take_or_wait = take_or_wait
         self._visitor = TemporaryNode("replay_node", domain)
@@ -71,7 +70,7 @@ class Player:
         self._outs = {t.name: RawPublisher(self.node, t) for t in (*STATES, *REFERENCES)}
         self._joints, self._base = (self._outs[topic.name] for topic in STATES)
         self._commands = RawSubscription(self.node, topics.COMMAND, PolledCallbackGroup())
-        self._waiter = Waiter(self.node, self._commands)
+        self._waiter = Waiter(self.node)
         self._answers = answers
         self._references: list[_Stream] = []
         self._played = array("q")
@@ -222,5 +221,5 @@ class Player:
             left = moment - time.perf_counter()
             if left <= 0.0:
                 return
-            self._waiter.wait(min(left, POLL_S))
+            self._waiter.wait((self._commands,), min(left, POLL_S))
             self.check()

@@ -26,7 +26,7 @@ def planned(monkeypatch: pytest.MonkeyPatch) -> list[FlightPlan]:
         plans.append(validate(FlightPlan, options, "options"))
         raise InputError("not to be flown")
 
-    monkeypatch.setattr(cli, "_plan", plan)
+    monkeypatch.setattr("space_robot_control.cli.simulate.plan_flight", plan)
     return plans
 
 
