@@ -24,6 +24,7 @@ setup(
     packages=find_packages(include=[f"{NAME}_*"]),
     package_data={
         "space_robot_control.analysis": ["templates/*.j2"],
+        "space_robot_control.analysis.figures": ["*.mplstyle"],
         "space_robot_control.paper.reproduction": ["templates/*.j2"],
         "space_robot_msgs_py.ros": ["*.xml"],
     },

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .pictures import Picture
-from .table import DEFINITIONS, Report, law_of, lines, notes, remarks
+from .figure_set import SavedFigure
+from .table import DEFINITIONS, lines
 from .template import template
+from .words import Report, law_of, notes, remarks
 
 
 def render(
     reports: Mapping[str, Report],
     descriptions: Mapping[str, dict[str, Any]],
-    pictures: Sequence[Picture],
+    figures: Sequence[SavedFigure],
 ) -> str:
-    """The page, without references to anything outside itself.
+    """Render the page, without references to anything outside itself.
 
     Args:
         reports: of `analyze`, by name of the bag.
         descriptions: what was flown, as the bags have it.
-        pictures: of all of them.
+        figures: of all of them.
     """
     shown = lines(list(reports.values()))
     groups = {group: [line for line in shown if line.group == group] for group in DEFINITIONS}
@@ -34,15 +34,11 @@ def render(
         notes={name: [*remarks(r), *notes(r)] for name, r in reports.items()},
         whole={name: _whole(report) for name, report in reports.items()},
         descriptions={name: json.dumps(d, indent=1) for name, d in descriptions.items()},
-        pictures=[(picture.caption, _data(picture)) for picture in pictures],
+        figures=figures,
     )
 
 
 def _whole(report: Report) -> bool:
-    """Whether the bag holds the flight without loss, gap or damage."""
+    """Tell whether the bag holds the flight without loss, gap or damage."""
     missing = any(report["lost"].values()) or report["filled_ticks"]
     return not (missing or report["unfinished"] or report["damage"])
-
-
-def _data(picture: Picture) -> str:
-    return "data:image/svg+xml;base64," + base64.b64encode(picture.svg.read_bytes()).decode()

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
-from space_robot_msgs_py.bag.law_history import in_words
-
 from .pointing import ARCSEC
 from .settling import BAND
-
-Report = dict[str, Any]
+from .words import Report
 
 UNITS = {"attitude": "-", "joints": "rad", "base_torque": "N m", "torque": "N m"}
 NONE = "-"
@@ -50,18 +47,6 @@ class Line(NamedTuple):
     unit: str
     texts: list[str]
     """One a report; `NONE` where it does not have the figure."""
-
-
-def flown(described: Mapping[str, Any]) -> str:
-    """What was flown, in a few words; ``described``: a report, or the description in a bag."""
-    law = law_of(described)
-    known = [f"{key} {described[key]}" for key in ("case", "gains") if described.get(key)]
-    return ", ".join([str(law or "unknown law"), *known])
-
-
-def law_of(described: Mapping[str, Any]) -> str | None:
-    """The law, or all the laws and when they changed, in words; None: nobody says."""
-    return in_words(described.get("laws", ())) or described.get("controller")
 
 
 def unit_of(column: str) -> str:
@@ -104,30 +89,6 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
         _line("recording", "damage found", "", reports, lambda r: str(len(r["damage"]))),
     ]
     return found
-
-
-def remarks(report: Report) -> list[str]:
-    """What the figures of a report do not say: damage, what is missing and why, in sentences."""
-    lost = {topic: count for topic, count in report["lost"].items() if count}
-    found = [f"messages lost: {lost or 'none'}"]
-    found += [
-        text for text in (report["unfinished"], *report["damage"], *report["foreign"]) if text
-    ]
-    if report["unanswered_ticks"]:
-        found.append(f"ticks that no command was recorded for: {report['unanswered_ticks']}")
-    if report["filled_ticks"]:
-        found.append(
-            f"ticks without a usable state, shown as the one before: {report['filled_ticks']}"
-        )
-    return found
-
-
-def notes(report: Report) -> list[str]:
-    """What is to be known of single figures: whence they count, or why there is none."""
-    missing = [f"no {key.replace('_', ' ')}: {why}" for key, why in report["unavailable"].items()]
-    if settling := report["settling"]:
-        return [f"settling is counted from the waypoint at {settling['after_s']:g} s", *missing]
-    return missing
 
 
 def _rms_and_chatter(reports: Sequence[Report]) -> Iterator[Line]:

@@ -98,11 +98,11 @@ def analyze(
         *([html] if html else []),
     ):
         check_free(path)
-    album = None
+    figure_set = None
     if plot or html:
-        from ..analysis.pictures import Album
+        from ..analysis.figure_set import FigureSet
 
-        album = Album()
+        figure_set = FigureSet()
     reports: dict[str, dict[str, Any]] = {}
     descriptions: dict[str, dict[str, Any]] = {}
     for name, bag in zip(names, bags, strict=True):
@@ -111,19 +111,20 @@ def analyze(
         for write, paths in exports:
             write(log, paths[name])
             click.echo(f"wrote {paths[name]}", err=True)
-        if album:
-            album.add(name, log)
+        if figure_set:
+            figure_set.add(name, log)
         del log  # before the next is read: a long flight fills a gigabyte
     with ExitStack() as stack:
-        if album:
+        if figure_set:
             folder = plot or Path(stack.enter_context(TemporaryDirectory()))
-            pictures = album.save(folder)
+            figures = figure_set.save(folder)
             if plot:
-                click.echo(f"wrote {', '.join(str(p.png) for p in pictures)} and .svg", err=True)
+                files = ", ".join(str(figure.svg.with_suffix(".png")) for figure in figures)
+                click.echo(f"wrote {files} and .svg", err=True)
             if html:
                 from ..analysis.page import render
 
-                write_text(render(reports, descriptions, pictures), html)
+                write_text(render(reports, descriptions, figures), html)
                 click.echo(f"wrote {html}", err=True)
     _print(reports, as_json)
 

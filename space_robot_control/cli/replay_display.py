@@ -10,7 +10,7 @@ from rich.table import Table
 
 from space_robot_msgs_py.bag.law_history import in_words
 
-from ..analysis.table import flown as words_of
+from ..analysis.words import flown as words_of
 from ..flight.terminal import say, show
 
 COUNTS = {

@@ -1,4 +1,4 @@
-"""Recorded and replayed torques as files: a table for other tools, a picture for people."""
+"""Recorded and replayed torques as files: a table for other tools, a figure for people."""
 
 from __future__ import annotations
 
@@ -11,31 +11,21 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..analysis.export import whole_file
-from ..analysis.figures.files import save_figure
-from ..analysis.figures.lines import draw_lines
-from ..analysis.figures.quantity import Quantity
-from ..analysis.figures.scale import draw_scales
 from ..analysis.figures.style import (
-    LEFT,
-    LEGEND_LINE,
-    PAGE_WIDTH,
-    RIGHT,
-    TIME_AXIS,
     house_style,
     legend_above,
     page,
-    panel,
-    title_height,
+    plain,
+    plot_lines,
+    save_figure,
 )
 from ..flight.replay.comparison import Comparison
 
 COLUMNS = 3
-_WIDTH = (PAGE_WIDTH - COLUMNS * (LEFT + RIGHT)) / COLUMNS
-_HEIGHT, _NAME = 34.0, 5.0
 
 
 def write_csv(comparison: Comparison, period: float, path: Path) -> None:
-    """One row a tick: tick, time in s, and of each axis the torques, N m (empty: no command)."""
+    """Write a row a tick: tick, time, s, and the torques of each axis, N m (empty: none)."""
     ticks, recorded, replayed = comparison.table()
     names = [
         f"{axis}_{which}" for which in ("recorded", "replayed") for axis in comparison.axis_names
@@ -52,26 +42,23 @@ def write_csv(comparison: Comparison, period: float, path: Path) -> None:
 
 
 def write_plot(comparison: Comparison, period: float, title: str, path: Path) -> tuple[Path, ...]:
-    """``path`` as PNG and as SVG, whatever its ending; the files."""
+    """Draw ``path`` as PNG and as SVG, whatever its ending; return the files."""
     return save_figure(torques(comparison, period, title), path.with_suffix(""))
 
 
 @house_style()
 def torques(comparison: Comparison, period: float, title: str) -> Figure:
-    """Recorded and replayed torque of every axis over time."""
+    """Plot the recorded and the replayed torque of every axis over time."""
     ticks, recorded, replayed = comparison.table()
     time, names = ticks.astype(np.float64) * period, comparison.axis_names
-    top = title_height(title) + LEGEND_LINE
-    row_height = _NAME + _HEIGHT + TIME_AXIS
-    figure = page(top + row_height * math.ceil(len(names) / COLUMNS), title)
-    legend_above(figure, LEFT, top, ("recorded", "replayed"), PAGE_WIDTH - LEFT, dashed=True)
+    rows = math.ceil(len(names) / COLUMNS)
+    figure = page(14.0 + 48.0 * rows, title)
+    cells = figure.add_gridspec(rows, COLUMNS)
     for index, name in enumerate(names):
-        row, column = divmod(index, COLUMNS)
-        left = LEFT + column * (LEFT + RIGHT + _WIDTH)
-        axes = panel(figure, left, top + row * row_height + _NAME, _WIDTH, _HEIGHT)
+        axes = figure.add_subplot(cells[divmod(index, COLUMNS)])
         both = np.column_stack([recorded[:, index], replayed[:, index]])
-        draw_lines(axes, time, both, Quantity.of(both, "torque", "N m"), dashed=True)
-        axes.set_title(name)
-        axes.set_xlabel("time (s)")
-        draw_scales(axes)
+        plot_lines(axes, time, both, dashed=True)
+        axes.set_title(plain(name))
+        axes.set(xlabel="time (s)", ylabel="torque (N m)")
+    legend_above(figure, ("recorded", "replayed"), dashed=True)
     return figure

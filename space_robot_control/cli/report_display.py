@@ -8,7 +8,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from ..analysis.table import Line, flown, law_of, lines, notes, remarks, unit_of
+from ..analysis.table import Line, lines, unit_of
+from ..analysis.words import flown, law_of, notes, remarks
 from ..flight.terminal import echo_json, say, show, terminal
 
 LABELS = 44

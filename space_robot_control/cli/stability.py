@@ -59,7 +59,7 @@ def stability(initial_error: float, as_json: bool, plot: Path | None, **options:
         from ..paper.stability.figures import draw
 
         written = draw(found, plot)
-        names = ", ".join(map(str, written)) or "nothing: the pictures are of K_1 and K_2"
+        names = ", ".join(map(str, written)) or "nothing: the figures are of K_1 and K_2"
         click.echo(f"wrote {names}", err=True)
     if as_json:
         echo_json(report(found))

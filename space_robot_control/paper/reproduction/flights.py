@@ -11,10 +11,11 @@ from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import DivergedError, InputError
 
 from ...analysis import metrics
-from ...analysis.figures import BaseTorque, control_results
+from ...analysis.figure_set import FigureFolder
+from ...analysis.figures import control_results
+from ...analysis.plot_series import BaseTorque
 from ...flight.plan import Flight, FlightPlan
 from ...flight.simulate import simulate
-from .gallery import Gallery
 from .provenance import parameters
 from .table_v import PRINTED
 
@@ -63,7 +64,7 @@ class Row:
 
     @property
     def stem(self) -> str:
-        """Of the name of its picture."""
+        """The name of its figure's files, without their endings."""
         return f"case{self.case}_{self.controller}"
 
     @property
@@ -86,7 +87,7 @@ class Planned(NamedTuple):
 
     @property
     def compared(self) -> bool:
-        """Whether it stands for its law in the pictures of all laws."""
+        """True for the flight that stands for its law in the figures of all laws."""
         return self.shown and self.row.case == COMPARED_CASE
 
 
@@ -120,8 +121,8 @@ class Result:
     """Of the flights that are compared."""
 
 
-def fly(planned: Planned, duration: float | None, gallery: Gallery | None) -> Result:
-    """Fly one row in one variant; if it is shown it is also drawn for the ``gallery``."""
+def fly(planned: Planned, duration: float | None, figures: FigureFolder | None) -> Result:
+    """Fly one row in one variant; if it is shown it is also drawn into ``figures``."""
     row, variant, _ = planned
     flight = Flight(
         FlightPlan(
@@ -134,9 +135,9 @@ def fly(planned: Planned, duration: float | None, gallery: Gallery | None) -> Re
         log = simulate(flight)
     except DivergedError as error:
         return Result(row, variant, told, error.tick)
-    if planned.shown and gallery is not None:
+    if planned.shown and figures is not None:
         title = f"{row.controller}, case {row.case}: {variant.title}"
-        gallery.hang(control_results(log, title), row.stem)
+        figures.save(control_results(log, title), row.stem)
     return Result(
         row, variant, told, None, metrics.rms(log),
         metrics.chatter(log) if row.case == COMPARED_CASE and variant.friction else None,

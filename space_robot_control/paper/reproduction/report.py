@@ -4,21 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from space_robot_msgs_py.config.files import config_directory
 
 from ...analysis.template import template
 from .claims import Claim
-from .gallery import Picture
+from .figures import FigureGroup
 from .table import Block
-
-
-class Chapter(NamedTuple):
-    """Pictures under one heading."""
-
-    title: str
-    pictures: list[Picture]
 
 
 def render(
@@ -26,9 +19,9 @@ def render(
     parameters: dict[str, Any],
     claims: Sequence[Claim],
     tables: Sequence[Block],
-    chapters: Sequence[Chapter],
+    figure_groups: Sequence[FigureGroup],
 ) -> str:
-    """The page as HTML without references to anything outside itself.
+    """Render the page as HTML, without references to anything outside itself.
 
     Raises:
         InputError: the package's data files are not installed.
@@ -36,10 +29,10 @@ def render(
     parameter_texts = {name: json.dumps(value, indent=1) for name, value in parameters.items()}
     return template("space_robot_control.paper.reproduction", "report.html.j2").render(
         provenance=provenance, parameters=parameter_texts, claims=claims, tables=tables,
-        chapters=chapters, errata=errata(),
+        figure_groups=figure_groups, errata=errata(),
     )  # fmt: skip
 
 
 def errata() -> str:
-    """The text of ``docs/errata.md``, from the source tree or where it was installed."""
+    """Read ``docs/errata.md`` from the source tree or where it was installed."""
     return (config_directory().parent / "docs" / "errata.md").read_text("utf-8")

@@ -12,12 +12,12 @@ from typing import Any
 
 from space_robot_msgs_py.errors import InputError
 
+from ...analysis.figure_set import FigureFolder
 from .chatter import HEADINGS as CHATTER_HEADINGS
 from .chatter import chatter
 from .claims import claims
+from .figures import figure_groups, start_comparisons
 from .flights import Planned, Result, Row, fly, plan
-from .gallery import Gallery
-from .pictures import chapters, start_comparisons
 from .processes import processes
 from .provenance import provenance
 from .report import render
@@ -71,12 +71,12 @@ def reproduce(
     folder.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=folder.parent, prefix=".reproduce-") as temporary:
         work = Path(temporary) / folder.name
-        gallery = Gallery(work / "figures", png=not brief)
-        gallery.folder.mkdir(parents=True)
+        figures = FigureFolder(work / "figures", png=not brief)
+        figures.path.mkdir(parents=True)
         planned = list(plan(rows, brief))
         with processes(jobs) as pool:
-            results = _fly_and_draw(pool, planned, duration, gallery, progress)
-        record = _write(rows, results, duration or FULL_DURATION, brief, gallery)
+            results = _fly_and_draw(pool, planned, duration, figures, progress)
+        record = _write(rows, results, duration or FULL_DURATION, brief, figures)
         if folder.exists():
             shutil.rmtree(folder)
         work.rename(folder)
@@ -87,21 +87,21 @@ def _fly_and_draw(
     pool: Executor,
     planned: Sequence[Planned],
     duration: float | None,
-    gallery: Gallery,
+    figures: FigureFolder,
     progress: Callable[[int], Callable[[], None]],
 ) -> list[Result]:
     """The results in the order of ``planned``."""
     # first those the comparisons wait for, last those that take the shortest
     order = sorted(planned, key=lambda flight: (not flight.compared, not flight.shown))
-    futures = {flight: pool.submit(fly, flight, duration, gallery) for flight in order}
+    futures = {flight: pool.submit(fly, flight, duration, figures) for flight in order}
     done = progress(len(planned))  # may start a thread: not before the processes are forked
     for future in futures.values():
         future.add_done_callback(lambda _: done())
     compared = [futures[flight].result() for flight in planned if flight.compared]
-    pictures = list(start_comparisons(pool, compared, duration, gallery))
+    drawings = list(start_comparisons(pool, compared, duration, figures))
     results = [futures[flight].result() for flight in planned]
-    for picture in pictures:
-        picture.result()
+    for drawing in drawings:
+        drawing.result()
     return results
 
 
@@ -110,9 +110,9 @@ def _write(
     results: Sequence[Result],
     duration: float,
     brief: bool,
-    gallery: Gallery,
+    figures: FigureFolder,
 ) -> dict[str, Any]:
-    folder, comparison = gallery.folder.parent, cells(results)
+    folder, comparison = figures.path.parent, cells(results)
     judged, chattering = claims(results, comparison), chatter(results)
     chatter_table = Block(
         "Chatter in case 1, printed friction", CHATTER_HEADINGS, [c.texts() for c in chattering]
@@ -135,6 +135,6 @@ def _write(
     (folder / f"{TABLE}.md").write_text(as_markdown(title, tables), "utf-8")
     (folder / f"{TABLE}.csv").write_text(as_csv(comparison), "utf-8")
     (folder / f"{TABLE}.json").write_text(json.dumps(record, indent=1) + "\n", "utf-8")
-    page = render(flown, told, judged, tables, list(chapters(rows, gallery)))
+    page = render(flown, told, judged, tables, list(figure_groups(rows, figures)))
     (folder / "report.html").write_text(page, "utf-8")
     return record

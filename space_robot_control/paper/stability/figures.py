@@ -1,4 +1,4 @@
-"""Pictures of a stability study: the Nyquist plot of G (74) and V(t) against its bound (55)."""
+"""Figures of a stability study: the Nyquist plot of G (74) and V(t) against its bound (55)."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...analysis.figures.files import save_figure
-from ...analysis.figures.style import PAGE_WIDTH, house_style
+from ...analysis.figures.style import GREY, house_style, page, save_figure
 from .circle_criterion import transfer_function
 from .study import Study
 from .super_twisting import SuperTwisting
 
-BLACK, BLUE, ORANGE, GREY = "#000000", "#0072B2", "#D55E00", "#707070"
-"""Of Okabe and Ito, told apart by the colour-blind and in grey print."""
+BLACK, BLUE, ORANGE = "#000000", "#0072B2", "#D55E00"
+"""Colours of Okabe and Ito, told apart by the colour-blind and in grey print."""
 POINTS = 1500
 """Points of a line; more would only make the SVG larger."""
 
@@ -53,7 +52,7 @@ def nyquist(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
             rf"$\beta$ tolerated {tolerated:.3g}, measured {measured:.3g} or more"
         )
     figure.supxlabel(r"real part of $G(j\omega)$ (s$^3$/rad; base: s$^3$)")
-    figure.supylabel(r"imaginary part of $G(j\omega)$ (s$^3$/rad; base: s$^3$)", x=0.012)
+    figure.supylabel(r"imaginary part of $G(j\omega)$ (s$^3$/rad; base: s$^3$)")
     _legend(figure, panels)
     return figure
 
@@ -122,22 +121,15 @@ def lyapunov(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
         panel.set_xlim(reaching.time[1], None)
         panel.minorticks_off()
     figure.supxlabel("time (s)")
-    figure.supylabel("V(t) / V(0) (dimensionless)", x=0.012)
+    figure.supylabel("V(t) / V(0) (dimensionless)")
     _legend(figure, panels)
     return figure
 
 
 def _grid(panels: int, columns: int, height: float) -> tuple[Figure, list[Axes]]:
-    """A page of ``panels`` in ``columns``, ``height`` mm from one to the next below."""
+    """Make a page of ``panels`` in ``columns``, ``height`` mm from one to the next below."""
     columns, rows = max(1, min(columns, panels)), max(1, -(-panels // columns))
-    page_height = height * rows + 14.0
-    figure = Figure(figsize=(PAGE_WIDTH / 25.4, page_height / 25.4))
-    gap = 14.0  # mm, for the title and the numbers between two rows
-    # placed by hand: matplotlib's layout engines draw everything twice
-    figure.subplots_adjust(
-        left=23.0 / PAGE_WIDTH, right=1.0 - 4.0 / PAGE_WIDTH, bottom=13.0 / page_height,
-        top=1.0 - 15.0 / page_height, hspace=gap / (height - gap), wspace=0.3,
-    )  # fmt: skip
+    figure = page(height * rows + 14.0)
     return figure, [figure.add_subplot(rows, columns, 1 + i) for i in range(panels)]
 
 
@@ -149,4 +141,4 @@ def _legend(figure: Figure, panels: list[Axes]) -> None:
         for handle, label in zip(*panel.get_legend_handles_labels(), strict=True)
     }
     if lines:
-        figure.legend(lines.values(), lines.keys(), loc="upper center", ncols=len(lines))
+        figure.legend(lines.values(), lines.keys(), loc="outside upper center", ncols=len(lines))

@@ -20,7 +20,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from space_robot_control.analysis import analyze
-from space_robot_control.analysis.pictures import Album
+from space_robot_control.analysis.figure_set import FigureSet
 from space_robot_control.cli.report_display import print_comparison, print_figures, print_report
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.replay.choice import ControllerChoice
@@ -183,8 +183,8 @@ def test_markup_in_names_is_drawn_as_it_is(bag: Path, tmp_path: Path, name: str)
     redescribed(bag, json.dumps({**described, "controller": name, "case": name, "gains": name}))
     log = read_flight(shutil.copytree(bag, tmp_path / "bag"))
     log.joint_names = (name, *log.joint_names[1:])
-    album = Album()
-    album.add(name, log)
-    album.save(tmp_path)
-    album.add(f"{name} again", log)
-    album.save(tmp_path)
+    figure_set = FigureSet()
+    figure_set.add(name, log)
+    figure_set.save(tmp_path)
+    figure_set.add(f"{name} again", log)
+    figure_set.save(tmp_path)

@@ -1,0 +1,77 @@
+"""The figures of the report: the mission, the laws side by side, each row by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future
+from typing import NamedTuple
+
+from matplotlib.figure import Figure
+
+from ...analysis.figure_set import FigureFolder, SavedFigure
+from ...analysis.figures import chatter, desired_joints, junctions
+from ...analysis.plot_series import BaseTorque
+from ...flight.plan import Flight, FlightPlan
+from ...flight.simulate import unflown
+from .flights import ROBOT, Result, Row
+
+FIGURE_OF_CASE = {"1": "6", "2": "7", "3": "8", "4-1": "9a", "4-2": "9b"}
+MISSION = "figure5_desired_joints"
+
+
+class Comparison(NamedTuple):
+    """A figure of all laws."""
+
+    stem: str
+    caption: str
+    draw: Callable[[Mapping[str, BaseTorque]], Figure]
+
+
+COMPARISONS = (
+    Comparison("chatter", "Chatter of the base torque in case 1", chatter),
+    Comparison("junctions", "Base torque at the junction of the two motions, case 1", junctions),
+)
+
+
+class FigureGroup(NamedTuple):
+    """Figures under one heading."""
+
+    title: str
+    figures: list[SavedFigure]
+
+
+def start_comparisons(
+    pool: Executor, results: Sequence[Result], duration: float | None, folder: FigureFolder
+) -> Iterator[Future[None]]:
+    """Draw the mission and the comparisons of ``results`` in other processes."""
+    flights = {r.row.controller: r.base_torque for r in results if r.base_torque is not None}
+    if flights:
+        yield pool.submit(_draw_mission, duration, folder)
+        for comparison in COMPARISONS:
+            yield pool.submit(_draw_comparison, comparison, flights, folder)
+
+
+def _draw_mission(duration: float | None, folder: FigureFolder) -> None:
+    log = unflown(Flight(FlightPlan(robot=ROBOT, duration=duration)))
+    folder.save(desired_joints(log), MISSION)
+
+
+def _draw_comparison(
+    comparison: Comparison, flights: Mapping[str, BaseTorque], folder: FigureFolder
+) -> None:
+    folder.save(comparison.draw(flights), comparison.stem)
+
+
+def figure_groups(rows: Sequence[Row], folder: FigureFolder) -> Iterator[FigureGroup]:
+    """Yield the figures that were drawn, the mission's first, then case by case."""
+    laws = [(MISSION, "Figure 5: desired joint angles"), *(c[:2] for c in COMPARISONS)]
+    if figures := folder.saved(laws):
+        yield FigureGroup("The mission, and the laws beside one another", figures)
+    for case, number in FIGURE_OF_CASE.items():
+        captions = [
+            (row.stem, f"Figure {number}: {row.controller}, {row.shown.title}")
+            for row in rows
+            if row.case == case
+        ]
+        if figures := folder.saved(captions):
+            yield FigureGroup(f"Case {case}", figures)
