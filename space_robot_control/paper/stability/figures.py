@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...analysis.figures.style import GREY, house_style, page, save_figure
+from ...analysis.figures.style import GREY, house_style, page, plain, save_figure
 from .circle_criterion import transfer_function
 from .study import Study
 from .super_twisting import SuperTwisting
@@ -48,7 +48,7 @@ def nyquist(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
         tolerated, measured = twisting.tolerated_beta[axes[0]], np.min(twisting.beta[axes])
         _nyquist_panel(panel, gains, float(tolerated), float(measured))
         panel.set_title(
-            f"{', '.join(names[axis] for axis in axes)}\n"
+            f"{plain(', '.join(names[axis] for axis in axes))}\n"
             rf"$\beta$ tolerated {tolerated:.3g}, measured {measured:.3g} or more"
         )
     figure.supxlabel(r"real part of $G(j\omega)$ (s$^3$/rad; base: s$^3$)")
@@ -96,7 +96,7 @@ def lyapunov(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
         twisting.reaching_time, strict=True,
     )  # fmt: skip
     for axis, (panel, name, certificate, measured, check) in enumerate(rows):
-        panel.set_title(name)
+        panel.set_title(plain(name))
         if certificate is None:
             panel.text(0.5, 0.5, "no solution of (51)", ha="center", transform=panel.transAxes)
             continue
