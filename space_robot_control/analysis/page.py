@@ -6,7 +6,6 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .figure_set import SavedFigure
 from .table import DEFINITIONS, lines
 from .template import template
 from .words import Report, law_of, notes, remarks
@@ -15,14 +14,14 @@ from .words import Report, law_of, notes, remarks
 def render(
     reports: Mapping[str, Report],
     descriptions: Mapping[str, dict[str, Any]],
-    figures: Sequence[SavedFigure],
+    figures: Sequence[tuple[str, str]],
 ) -> str:
     """Render the page, without references to anything outside itself.
 
     Args:
         reports: of `analyze`, by name of the bag.
         descriptions: what was flown, as the bags have it.
-        figures: of all of them.
+        figures: caption and data URI of each.
     """
     shown = lines(list(reports.values()))
     groups = {group: [line for line in shown if line.group == group] for group in DEFINITIONS}

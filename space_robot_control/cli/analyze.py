@@ -100,7 +100,7 @@ def analyze(
         check_free(path)
     figure_set = None
     if plot or html:
-        from ..analysis.figure_set import FigureSet
+        from ..analysis.figures.figure_set import FigureSet
 
         figure_set = FigureSet()
     reports: dict[str, dict[str, Any]] = {}
@@ -124,7 +124,8 @@ def analyze(
             if html:
                 from ..analysis.page import render
 
-                write_text(render(reports, descriptions, figures), html)
+                shown = [(figure.caption, figure.data_uri) for figure in figures]
+                write_text(render(reports, descriptions, shown), html)
                 click.echo(f"wrote {html}", err=True)
     _print(reports, as_json)
 

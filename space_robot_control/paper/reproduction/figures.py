@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
-from ...analysis.figure_set import FigureFolder, SavedFigure
 from ...analysis.figures import chatter, desired_joints, junctions
+from ...analysis.figures.figure_set import FigureFolder, SavedFigure
 from ...analysis.plot_series import BaseTorque
 from ...flight.plan import Flight, FlightPlan
 from ...flight.simulate import unflown

@@ -11,8 +11,8 @@ from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import DivergedError, InputError
 
 from ...analysis import metrics
-from ...analysis.figure_set import FigureFolder
 from ...analysis.figures import control_results
+from ...analysis.figures.figure_set import FigureFolder
 from ...analysis.plot_series import BaseTorque
 from ...flight.plan import Flight, FlightPlan
 from ...flight.simulate import simulate

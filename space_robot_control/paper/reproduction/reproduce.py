@@ -12,7 +12,7 @@ from typing import Any
 
 from space_robot_msgs_py.errors import InputError
 
-from ...analysis.figure_set import FigureFolder
+from ...analysis.figures.figure_set import FigureFolder
 from .chatter import HEADINGS as CHATTER_HEADINGS
 from .chatter import chatter
 from .claims import claims

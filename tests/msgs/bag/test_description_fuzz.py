@@ -20,7 +20,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from space_robot_control.analysis import analyze
-from space_robot_control.analysis.figure_set import FigureSet
+from space_robot_control.analysis.figures.figure_set import FigureSet
 from space_robot_control.cli.report_display import print_comparison, print_figures, print_report
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.replay.choice import ControllerChoice

@@ -12,18 +12,12 @@ from matplotlib.figure import Figure
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, laws_of
 
-from .figures import (
-    chatter,
-    control_results,
-    desired_joints,
-    errors_and_torques,
-    junctions,
-    latency_histogram,
-    pointing,
-    save_figure,
-)
-from .plot_series import PlotSeries
-from .words import flown
+from ..plot_series import PlotSeries
+from ..words import flown
+from .base_torque import chatter, junctions
+from .overlay import errors_and_torques, latency_histogram, pointing
+from .single_flight import control_results, desired_joints
+from .style import save_figure
 
 
 class SavedFigure(NamedTuple):
