@@ -39,6 +39,8 @@ SPIN_BEFORE_DEADLINE_S = 100e-6
 GIVE_WAY_S = 100e-6
 FLUSH_S = 5.0
 """How long a flight's end waits for its listeners: one may be stopped, or dead."""
+STOPPED_FLUSH_S = 1.0
+"""How long a plant that was told to stop waits: its listeners may be ending, too."""
 MOST_AT_ONCE = 100
 """Commands taken before the clock is looked at again: somebody may flood the topic."""
 HOLDING_TICKS = 20
@@ -101,7 +103,7 @@ class PlantLoop:
             self._step()
             shell.serve()
         elapsed = time.monotonic() - began
-        flush(self.outputs, FLUSH_S)
+        flush(self.outputs, STOPPED_FLUSH_S if shell.stopping else FLUSH_S)
         late = f", {self.late_ticks} ticks without an answer in time" if self.late_ticks else ""
         late += f", {clock.slipped_s:.3f} s behind the wall clock" if clock.slipped_s else ""
         shell.log(f"flew {(plant.tick - first) * settings.period:.4f} s in {elapsed:.2f} s{late}")
