@@ -40,6 +40,8 @@ SPIN_BEFORE_DEADLINE_S = 100e-6
 GIVE_WAY_S = 100e-6
 FLUSH_S = 5.0
 """How long a flight's end waits for its listeners: one may be stopped, or dead."""
+STOPPED_FLUSH_S = 1.0
+"""How long a plant that was told to stop waits: its listeners may be ending, too."""
 MOST_AT_ONCE = 100
 """Commands taken before the clock is looked at again: somebody may flood the topic."""
 HOLDING_TICKS = 20
@@ -140,7 +142,7 @@ class PlantLoop:
         """Leave the actuators at zero, and let the listeners have all that was sent."""
         self._guard.release()
         elapsed = time.monotonic() - self._began_at
-        flush(self.outputs, FLUSH_S)
+        flush(self.outputs, FLUSH_S if self.is_complete else STOPPED_FLUSH_S)
         clock, missed = self._wall_clock, self.missed_deadlines
         late = f", {missed} missed deadlines" if missed else ""
         late += f", {clock.lost_time_s:.3f} s behind the wall clock" if clock.lost_time_s else ""
