@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled.records import Record, shaped
+from .compiled.records import Block, Record, shaped
 from .errors import MessageError
 
 Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ class RobotState:
     joint_velocities: Array
     applied_torque: Array
 
-    def __init__(self, tick: int, block: NDArray[Any]) -> None:
+    def __init__(self, tick: int, block: Block) -> None:
         """``block``: (1,) array of a `State`."""
         self.tick, self.block = tick, block
         for name in STATE_FIELDS:
@@ -103,6 +103,37 @@ class RobotState:
     def copy(self) -> RobotState:
         """The same state in memory of its own."""
         return RobotState(self.tick, self.block.copy())
+
+
+class Reference(Record):
+    """The desired motion at a tick, laid out as the two parts of a `ReferenceChunk`'s row."""
+
+    joint_positions: Array = shaped(lambda n: (n,))
+    """rad."""
+    joint_velocities: Array = shaped(lambda n: (n,))
+    """rad/s."""
+    joint_accelerations: Array = shaped(lambda n: (n,))
+    """rad/s2."""
+    quaternion: Array = shaped(lambda n: (4,))
+    """Base attitude ``[w, x, y, z]``, from the base frame to the inertial frame."""
+    omega_base: Array = shaped(lambda n: (3,))
+    """Angular velocity of the base in the base frame, rad/s."""
+    alpha_base: Array = shaped(lambda n: (3,))
+    """Angular acceleration of the base in the base frame, rad/s2."""
+
+    @staticmethod
+    def parts(references: Block) -> tuple[Array, Array]:
+        """Views (k, 3, n) and (k, 10) of the joints' and the base's part of k references."""
+        k, size = len(references), references.itemsize // 8
+        numbers = references.view(np.float64).reshape(k, size)
+        return numbers[:, :-10].reshape(k, 3, (size - 10) // 3), numbers[:, -10:]
+
+    @classmethod
+    def at_rest(cls, n: int) -> Block:
+        """A block of one that asks for rest at zero."""
+        block = cls.block(n)
+        block[0].quaternion[0] = 1.0
+        return block
 
 
 @dataclass(slots=True)
@@ -130,6 +161,13 @@ class ReferenceChunk:
     def stop(self) -> int:
         """Tick after the last row."""
         return self.start + len(self.joints)
+
+    def references(self) -> Block:
+        """(k,) array of a `Reference` each, a copy."""
+        found: Block = np.empty(len(self.joints), Reference.dtype(self.joints.shape[2]))
+        joints, base = Reference.parts(found)
+        joints[:], base[:] = self.joints, self.base
+        return found
 
 
 class LawInForce(NamedTuple):

@@ -66,7 +66,7 @@ class Loop:
                 state.applied_torque[:] = self._last
             if self.flipped:
                 state.quaternion *= -1.0
-            command = self.controller.update(state, *self.references.at(tick))
+            command = self.controller.update(state, self.references.at(tick))
             assert command.tick == tick
             self._last[:] = command.torque
             errors.append(self.controller.signals.error.copy())

@@ -8,6 +8,8 @@ before any module uses them; so it is a hundred times slower, and for short test
 
 from __future__ import annotations
 
+import ctypes
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -25,5 +27,28 @@ def _field_first(self: np.record, name: str) -> Any:
     return self[name] if name in fields else np.void.__getattribute__(self, name)
 
 
-kernels.kernel = kernels.subroutine = kernels.function_pointer = _as_it_is  # type: ignore[assignment]
+class _RecordFunction:
+    """A `RecordFunction` that reads what lies at the addresses of its records."""
+
+    def __init__(
+        self, function: Callable[..., None], layouts: Sequence[np.dtype[Any]], _: object
+    ) -> None:
+        self._function, self._layouts = function, layouts
+
+    def __call__(self, *arguments: Any) -> None:
+        *records, last = arguments
+        self.call(*(record.__array_interface__["data"][0] for record in records), last)
+
+    def call(self, *arguments: Any) -> None:
+        *addresses, last = arguments
+        places = zip(self._layouts, addresses, strict=True)
+        records = [
+            np.frombuffer((ctypes.c_char * layout.itemsize).from_address(address), layout)[0]
+            for layout, address in places
+        ]
+        self._function(*records, last)
+
+
+kernels.kernel = kernels.subroutine = _as_it_is  # type: ignore[assignment]
+kernels.RecordFunction = _RecordFunction  # type: ignore[misc, assignment]
 np.record.__getattribute__ = _field_first  # type: ignore[method-assign]

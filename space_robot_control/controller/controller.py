@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.records import assign
+from space_robot_msgs_py.compiled.records import Block, assign
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.robot import Robot
@@ -18,8 +18,8 @@ from .kernels import (
     TOO_LARGE,
     USABLE,
     ControllerMemory,
-    actuate,
-    sense,
+    apply_transfer,
+    compute_signals,
 )
 from .time_delay_estimation import low_pass_weight
 
@@ -49,14 +49,8 @@ class Controller:
         assign(memory.pair, smoothing=low_pass_weight(acceleration_filter_hz, period))
         self._memory = memory
         self._command = Command(-1, np.zeros(robot.n + 3))
-        self.signals = Signals(
-            error=memory.error,
-            error_rate=memory.error_rate,
-            acceleration_desired=memory.acceleration_desired,
-            n_hat=memory.n_hat,
-            inertia=memory.nominal.inertia,
-            bias=memory.nominal.bias,
-        )
+        self.signals = Signals.view(self.block["signals"])
+        """What the law saw at the last tick."""
         self.law = law
 
     @property
@@ -75,13 +69,12 @@ class Controller:
         self.signals.n_hat[:] = 0.0
         assign(self._memory, transfer_left=-1.0)
 
-    def update(self, state: RobotState, joints: Array, base: Array) -> Command:
+    def update(self, state: RobotState, reference: Block) -> Command:
         """The torque that answers a measured state.
 
         Args:
             state: the plant's measurements, with the torque it applied since the last tick.
-            joints: (3, n) desired position, velocity, acceleration of the joints.
-            base: (10,) desired quaternion, angular velocity, angular acceleration (base frame).
+            reference: of a `Reference`.
 
         Returns:
             The command for this tick, valid until the next call.
@@ -92,32 +85,30 @@ class Controller:
             SingularAttitudeError: the base has turned by 180 degrees.
         """
         law, command = self._law, self._command
-        found = sense(
-            self.block, state.tick, state.quaternion, state.omega_base, state.joint_positions,
-            state.joint_velocities, state.applied_torque, joints, base, law.h_bar, law.uses_model,
-            self.period,
-        )  # fmt: skip
-        if found != USABLE:
-            raise unusable(found, state.tick, state.quaternion)
-        actuate(self.block, state.tick, law.force(self.signals), command.torque)
+        status = compute_signals(
+            self.block, state.tick, state.block, reference, law.h_bar, law.uses_model, self.period
+        )
+        if status != USABLE:
+            raise unusable(status, state.tick, state.quaternion)
+        apply_transfer(self.block, state.tick, law.force(self.signals), command.torque)
         command.tick = state.tick
         return command
 
     def telemetry(self) -> tuple[Array, Array, Array, Array]:
         """s, u, N_hat and e of the last tick, (m,) each."""
-        law = self._law
-        return law.sliding_surface, law.pseudo_acceleration, self.signals.n_hat, self.signals.error
+        memory, signals = self._law.memory, self.signals
+        return memory.s, memory.u, signals.n_hat, signals.error
 
 
-def unusable(found: int, tick: int, quaternion: Array) -> UnusableStateError:
-    """What to raise when `form_signals` has ``found`` a state not usable."""
-    if found == SINGULAR:
+def unusable(status: int, tick: int, quaternion: Array) -> UnusableStateError:
+    """What to raise for a state of a ``status`` other than `USABLE`."""
+    if status == SINGULAR:
         return SingularAttitudeError(tick, float(quaternion[0]))
-    if found == NOT_UNIT:
+    if status == NOT_UNIT:
         norm = float(np.linalg.norm(quaternion))
         why = f"the base's quaternion has norm {norm:.6g}, not 1"
         return UnusableStateError(tick, why, "quaternion not unit")
-    if found == TOO_LARGE:
+    if status == TOO_LARGE:
         return UnusableStateError(
             tick, f"the state has a number beyond {LARGEST:g}", "state too large"
         )

@@ -96,10 +96,11 @@ def check_gains(content: Tree, law: type[ControlLaw], axes: int, where: str) -> 
     Raises:
         InputError: a gain is missing, unknown, of the wrong length or out of its range.
     """
+    descriptions = law.gain_descriptions()
     for name in content:
-        one_of(name, law.gain_descriptions, f"gain of {law.name}", f" in {where}")
+        one_of(name, descriptions, f"gain of {law.name}", f" in {where}")
     gains = {}
-    for name, description in law.gain_descriptions.items():
+    for name, description in descriptions.items():
         key = f"{where}: {law.name}.{name}"
         if name not in content:
             raise InputError(f"{key}: missing ({description})")

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.parameter import Parameter
 
-from space_robot_msgs_py.bag.law_history import LawChange, same
+from space_robot_msgs_py.bag.law_history import LawChange
 from space_robot_msgs_py.config.trees import nest
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import SpaceRobotError
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.parameters import overrides
-from space_robot_msgs_py.samples import LawInForce, RobotState
+from space_robot_msgs_py.samples import Reference, RobotState
 from space_robot_sim.robot import Robot
 
-from ..laws import ControlLaw, find_law
+from ..laws import ControlLaw
 from .controller import Controller
-from .gains import available_laws, build_law, check_gains, gain_lengths, gain_range
+from .gains import PARAMETERS, build_laws, check_gains, gain_lengths, gain_range
+from .law_changes import LawChanges
 from .settings import ControllerNodeSettings
 from .swaps import Swap, parse_swaps
 
@@ -34,15 +34,13 @@ class LawSet:
             InputError: a law, a gain or a swap that cannot be.
         """
         self._node, self._settings, self._axes = node, settings, axes
-        self._laws: dict[str, ControlLaw] = {}
-        first = find_law(settings.controller).name
-        for name in dict.fromkeys([first, *available_laws(settings)]):
-            self._laws[name] = self._declared(settings.controller if name == first else name)
-        self.chosen = self._laws[first]
+        self._laws = build_laws(settings, axes)
+        for law in self._laws.values():
+            self._declare(law)
+        self.chosen = next(iter(self._laws.values()))
         self._may_differ = True
         """Whether law or gains may be others than at the last tick answered."""
-        self._before: LawInForce | None = None
-        """What was in force at that tick."""
+        self._changes = LawChanges()
         self._was_swapped = False
         self._swaps: list[Swap] = parse_swaps(settings.swaps, settings.period)
         for swap in self._swaps:
@@ -57,7 +55,7 @@ class LawSet:
         rest = RobotState.allocate(robot.n)
         for law in self._laws.values():
             controller = Controller(robot, law, self._settings.period)
-            controller.update(rest, np.zeros((3, robot.n)), np.eye(10)[0])
+            controller.update(rest, Reference.at_rest(robot.n))
 
     def change_at(self, tick: int) -> LawChange | None:
         """Choose the law of the swaps that are due; what is in force, if not as before.
@@ -70,11 +68,7 @@ class LawSet:
         if not self._may_differ:
             return None
         self._may_differ = False
-        before, law = self._before, self.chosen.in_force(tick, is_first=self._before is None)
-        if before and same(before, law):
-            return None
-        self._before = law
-        return LawChange(before, law)
+        return self._changes.at(tick, self.chosen)
 
     def tell(self, change: LawChange) -> None:
         """Log a change, and let the parameter ``controller`` follow a planned swap."""
@@ -91,26 +85,25 @@ class LawSet:
         """Take no more changes."""
         self._node.remove_on_set_parameters_callback(self._on_set)
 
-    def _declared(self, wanted: str) -> ControlLaw:
-        law = build_law(wanted, self._settings, self._axes)
-        node = self._node
-        given = overrides(node, [f"{law.name}.{gain}" for gain in law.gain_descriptions])
-        tree = {**law.gains, **nest(given).get(law.name, {})}
-        law.gains = check_gains(tree, type(law), self._axes, "controller parameters")
-        for gain, description in law.gain_descriptions.items():
+    def _declare(self, law: ControlLaw) -> None:
+        """Declare a law's gains, and take those given as parameters over those of its file."""
+        node, descriptions = self._node, law.gain_descriptions()
+        given = overrides(node, [f"{law.name}.{gain}" for gain in descriptions])
+        tree = {**law.gain_values, **nest(given).get(law.name, {})}
+        law.gain_values = check_gains(tree, type(law), self._axes, PARAMETERS)
+        for gain, values in law.gain_values.items():
             node.declare_parameter(
-                f"{law.name}.{gain}", law.gains[gain].tolist(),
+                f"{law.name}.{gain}", values.tolist(),
                 ParameterDescriptor(
-                    description=description,
+                    description=descriptions[gain],
                     additional_constraints=f"{gain_lengths(self._axes)}; {gain_range(gain)}",
                 ),
                 ignore_override=True,
             )  # fmt: skip
-        return law
 
     def _on_set(self, parameters: list[Any]) -> SetParametersResult:
         """Check all changes first, then make them; the loop sees them at its next tick."""
-        gains = {name: dict(law.gains) for name, law in self._laws.items()}
+        gains = {name: law.gain_values for name, law in self._laws.items()}
         chosen = self.chosen
         try:
             for parameter in parameters:
@@ -124,6 +117,6 @@ class LawSet:
         except SpaceRobotError as error:
             return SetParametersResult(successful=False, reason=str(error))
         for name, law in self._laws.items():
-            law.gains = gains[name]
+            law.gain_values = gains[name]
         self.chosen, self._may_differ = chosen, True
         return SetParametersResult(successful=True)

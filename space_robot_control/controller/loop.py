@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import time
 
-import numpy as np
-from numpy.typing import NDArray
-
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.ros.endpoints import RawPublisher, flush
 from space_robot_msgs_py.ros.health import Health, Level
@@ -24,8 +22,6 @@ from .reference_input import ReferenceInput
 from .settings import ControllerNodeSettings
 from .state_input import StateInput
 from .supervisor import Mode, Supervisor
-
-Array = NDArray[np.float64]
 
 FLUSH_S = 1.0
 LOOK_AHEAD_S = 0.02
@@ -94,7 +90,7 @@ class ControllerLoop:
             self._unanswered = tick if is_awaited else -1
             return self._references.wait if is_awaited else None
         self._unanswered = -1
-        self._answer_tick(tick, *reference)
+        self._answer_tick(tick, reference)
         self._look_ahead(self._state_at)
         return None
 
@@ -148,7 +144,7 @@ class ControllerLoop:
             self._references.take()
             self._look_ahead_at = now + LOOK_AHEAD_S
 
-    def _answer_tick(self, tick: int, joints: Array, base: Array) -> None:
+    def _answer_tick(self, tick: int, reference: Block) -> None:
         controller = self._controller
         change = self._laws.change_at(tick)
         if change:
@@ -158,7 +154,7 @@ class ControllerLoop:
         state = self._states.state
         state.tick = tick
         mode = self._supervisor.mode
-        command = self._supervisor.answer(state, joints, base)
+        command = self._supervisor.answer(state, reference)
         self._answer = self._commands.encode(command)
         self._command_out.publish(self._answer)
         self._answered = tick

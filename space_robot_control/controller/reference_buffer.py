@@ -7,8 +7,9 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.samples import ReferenceChunk
+from space_robot_msgs_py.samples import Reference, ReferenceChunk
 
 from .kernels import LARGEST
 
@@ -34,8 +35,8 @@ class ReferenceBuffer:
         """``capacity``: rows; a mission's lead and one chunk of it (20,000) must find place."""
         self.now = EMPTY
         """The tick that is needed; `EMPTY` while it is not known."""
-        self._joints = _Ring(np.zeros((capacity, 3, n)))
-        self._base = _Ring(np.zeros((capacity, 10)))
+        self._references: Block = np.zeros(capacity, Reference.dtype(n))
+        self._joints, self._base = map(_Ring, Reference.parts(self._references))
         self._aside: deque[tuple[_Ring, int, Array]] = deque(maxlen=MOST_PUT_ASIDE)
 
     def begin(self, tick: int) -> None:
@@ -68,13 +69,13 @@ class ReferenceBuffer:
         i = tick % len(self._joints.ticks)
         return bool(self._joints.ticks[i] == tick and self._base.ticks[i] == tick)
 
-    def at(self, tick: int) -> tuple[Array, Array]:
-        """The (3, n) and (10,) rows of a tick that `covers`."""
-        i = tick % len(self._joints.ticks)
-        return self._joints.rows[i], self._base.rows[i]
+    def at(self, tick: int) -> Block:
+        """The `Reference` of a tick that `covers`."""
+        i = tick % len(self._references)
+        return self._references[i : i + 1]
 
-    def hold(self, tick: int) -> tuple[Array, Array] | None:
-        """Rows for a ``tick`` that is not covered: the last point before it, at rest.
+    def hold(self, tick: int) -> Block | None:
+        """The `Reference` for a ``tick`` that is not covered: the last point before it, at rest.
 
         None if nothing has come yet.
         """
@@ -84,9 +85,10 @@ class ReferenceBuffer:
         i = int(np.argmax(whole))
         if whole[i] == EMPTY:
             return None
-        joints, base = np.zeros_like(self._joints.rows[i]), np.zeros_like(self._base.rows[i])
-        joints[0], base[:4] = self._joints.rows[i, 0], self._base.rows[i, :4]
-        return joints, base
+        held = np.zeros_like(self._references[:1])
+        for name in ("joint_positions", "quaternion"):
+            held[name] = self._references[name][i]
+        return held
 
     def _store(self, ring: _Ring, start: int, rows: Array, only_missing: bool) -> bool:
         if not np.all(np.abs(rows) <= LARGEST):
@@ -111,7 +113,7 @@ class ReferenceBuffer:
 
 
 class _Ring:
-    """Rows by tick modulo their number, and whose tick each is."""
+    """One part of the references by tick modulo their number, and whose tick each is."""
 
     def __init__(self, rows: Array) -> None:
         self.rows = rows

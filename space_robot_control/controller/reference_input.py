@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rclpy.node import Node
 
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.ros.endpoints import FollowedSubscription, PolledCallbackGroup
 from space_robot_msgs_py.ros.loop import Wait
@@ -75,8 +76,8 @@ class ReferenceInput:
         """Whether the tick that `at` had no row for may still get one."""
         return self._until > 0.0
 
-    def at(self, tick: int) -> tuple[Array, Array] | None:
-        """The (3, n) and (10,) rows of ``tick``, or its last point where the mission stays away.
+    def at(self, tick: int) -> Block | None:
+        """The `Reference` of ``tick``, or its last point where the mission stays away.
 
         None if they have not come yet (`is_awaited`), or if nothing has come that could be held.
         """
@@ -86,7 +87,8 @@ class ReferenceInput:
             return buffer.at(tick)
         if self.is_awaited:
             return None
-        if held := buffer.hold(tick):
+        held = buffer.hold(tick)
+        if held is not None:
             self.is_missing, self._waits_since = True, 0.0
             self.held += 1
         return held

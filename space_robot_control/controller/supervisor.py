@@ -16,6 +16,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Command, RobotState
 
@@ -25,10 +26,10 @@ from .time_delay_estimation import LONGEST_GAP
 
 Array = NDArray[np.float64]
 
-SINGULAR_ETA = 0.02
-"""|eta| below which the flight is given up for the time being: 177.7 degrees."""
-REGULAR_ETA = 0.05
-"""|eta| from which it goes on: 174.3 degrees."""
+SAFE_BELOW_ETA = 0.02
+"""|eta| below which the mode is safe, since the torques grow without bound: 177.7 degrees."""
+NOMINAL_FROM_ETA = 0.05
+"""|eta| from which it is nominal again: 174.3 degrees."""
 
 
 class Mode(Enum):
@@ -54,18 +55,17 @@ class Supervisor:
         self._last_tick = -1
         self._held_since = 0
 
-    def answer(self, state: RobotState, joints: Array, base: Array) -> Command:
+    def answer(self, state: RobotState, reference: Block) -> Command:
         """The command for a state, of the law or a safe one; see `Controller.update`."""
         controller = self.controller
         if self.mode is Mode.SAFE or not 0 < state.tick - self._last_tick <= LONGEST_GAP:
             controller.engage()
         try:
             eta = abs(state.quaternion[0])
-            if eta < (REGULAR_ETA if self.mode is Mode.SAFE else SINGULAR_ETA) and _is_unit(
-                state.quaternion
-            ):
+            least = NOMINAL_FROM_ETA if self.mode is Mode.SAFE else SAFE_BELOW_ETA
+            if eta < least and _is_unit(state.quaternion):
                 raise SingularAttitudeError(state.tick, float(state.quaternion[0]))
-            self._command = controller.update(state, joints, base)
+            self._command = controller.update(state, reference)
         except UnusableStateError as error:
             return self._safe_command(error)
         self._last_tick = state.tick

@@ -6,48 +6,55 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.samples import Reference, State
 from space_robot_sim.dynamics.attitude import attitude_jacobian, rotate, rotate_back
+
+from ..laws import Signals
 
 Array = NDArray[np.float64]
 
 
 @kernel
-def measured_rate(
-    quaternion: Array, omega_base: Array, joint_velocities: Array, jacobian: Array, rate: Array
-) -> None:
-    """Write J0 into ``jacobian`` and rhodot (m,) into ``rate`` (22)."""
+def measured_rate(state: State, quaternion: Array, jacobian: Array, rate: Array) -> None:
+    """Write J0 into ``jacobian`` and rhodot (m,) into ``rate`` (22).
+
+    ``quaternion`` is the state's or its negative, here and below.
+    """
     attitude_jacobian(quaternion, jacobian)
-    rotate(jacobian, omega_base, rate[:3])
-    rate[3:] = joint_velocities
+    rotate(jacobian, state.omega_base, rate[:3])
+    rate[3:] = state.joint_velocities
 
 
 @kernel
 def tracking_errors(
-    quaternion: Array, joint_positions: Array, rate: Array, joints: Array, base: Array,
-    jacobian: Array, error: Array, error_rate: Array, acceleration: Array,
+    state: State, quaternion: Array, rate: Array, reference: Reference, jacobian: Array,
+    signals: Signals,
 ) -> None:  # fmt: skip
-    """Write e, edot and rhodd_d (m,).
+    """Write e, edot and rhodd_d into ``signals``.
 
-    ``joints`` (3, n) holds desired position, velocity, acceleration; ``base`` (10,) the desired
-    quaternion, angular velocity and acceleration in the base frame. Of the two quaternions of
-    the desired attitude the one on the measured side is taken. ``jacobian`` is scratch.
+    Of the two quaternions of the desired attitude the one on the measured side is taken.
+    ``jacobian`` is scratch.
     """
+    error, error_rate = signals.error, signals.error_rate
+    acceleration, desired, omega = (
+        signals.acceleration_desired, reference.quaternion, reference.omega_base,
+    )  # fmt: skip
     dot = 0.0
     for k in range(4):
-        dot += quaternion[k] * base[k]
+        dot += quaternion[k] * desired[k]
     side = 1.0 if dot >= 0.0 else -1.0
-    attitude_jacobian(base[:4], jacobian)
-    rotate(jacobian, base[4:7], error_rate[:3])
-    rotate(jacobian, base[7:10], acceleration[:3])
-    squared_rate = base[4] * base[4] + base[5] * base[5] + base[6] * base[6]
+    attitude_jacobian(desired, jacobian)
+    rotate(jacobian, omega, error_rate[:3])
+    rotate(jacobian, reference.alpha_base, acceleration[:3])
+    squared_rate = omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2]
     for k in range(3):
-        error[k] = side * base[1 + k] - quaternion[1 + k]
+        error[k] = side * desired[1 + k] - quaternion[1 + k]
         error_rate[k] = side * error_rate[k] - rate[k]
-        acceleration[k] = side * (acceleration[k] - 0.25 * squared_rate * base[1 + k])
-    for i in range(joint_positions.size):
-        error[3 + i] = joints[0, i] - joint_positions[i]
-        error_rate[3 + i] = joints[1, i] - rate[3 + i]
-        acceleration[3 + i] = joints[2, i]
+        acceleration[k] = side * (acceleration[k] - 0.25 * squared_rate * desired[1 + k])
+    for i in range(state.joint_positions.size):
+        error[3 + i] = reference.joint_positions[i] - state.joint_positions[i]
+        error_rate[3 + i] = reference.joint_velocities[i] - rate[3 + i]
+        acceleration[3 + i] = reference.joint_accelerations[i]
 
 
 @kernel

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.compiled.kernels import function_pointer, kernel
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import DivergedError
-from space_robot_sim.plant.plant import RATE_LIMIT, Block, Plant, advance
+from space_robot_sim.plant.plant import RATE_LIMIT, Plant, advance
 
 from ..controller.controller import Controller, unusable
-from ..controller.kernels import USABLE, answer
-from ..laws import CompiledLaw
+from ..controller.kernels import USABLE, controller_tick
+from ..laws.compiled import CompiledLaw, LawCode
 
 Array = NDArray[np.float64]
 
 
 class Rows(NamedTuple):
-    """The columns of a `FlightLog` that a closed loop reads (the reference) and writes."""
+    """The columns of a `FlightLog` that a closed loop writes."""
 
     base_position: Array
     quaternion: Array
@@ -32,8 +30,6 @@ class Rows(NamedTuple):
     joint_positions: Array
     joint_velocities: Array
     applied_torque: Array
-    reference_joints: Array
-    reference_base: Array
     commanded_torque: Array
     telemetry: Array
 
@@ -57,14 +53,13 @@ def close_loop(plant: Plant, controller: Controller, log: FlightLog, start: int,
     if not isinstance(law, CompiledLaw):
         _close_loop_in_python(plant, controller, log, start, stop)
         return
-    tick, fastest, found = fly_ticks(
-        law_pointer(type(law).kernel), law.gain_matrix, law.memory, law.h_bar, law.uses_model,
-        plant.block, plant.command_delay_buffer, controller.block, Rows.of(log), log.first_tick,
-        start, stop, plant.period,
+    tick, fastest, status = fly_ticks(
+        law.code, plant.block, plant.command_delay_buffer, controller.block, plant.state.block,
+        log.references(start, stop), Rows.of(log), start, log.first_tick, plant.period,
     )  # fmt: skip
     plant.state.tick = tick
-    if found != USABLE:
-        raise unusable(found, tick, plant.state.quaternion)
+    if status != USABLE:
+        raise unusable(status, tick, plant.state.quaternion)
     if not fastest <= RATE_LIMIT:
         raise plant.diverged(fastest)
 
@@ -85,40 +80,28 @@ def _close_loop_in_python(
     for tick in range(start, stop):
         row = tick - log.first_tick
         log.put(plant.state)
-        command = controller.update(plant.state, *log.reference(tick))
+        command = controller.update(plant.state, log.references(tick, tick + 1))
         rows.commanded_torque[row] = command.torque
         rows.telemetry[row] = controller.telemetry()
         plant.step(command)
 
 
-@cache
-def law_pointer(law: Callable[..., None]) -> Any:
-    """A law's kernel as `fly_ticks` takes it."""
-    vector, matrix = numba.float64[::1], numba.float64[:, ::1]
-    signature = numba.void(
-        vector, vector, vector, vector, matrix, vector, matrix, matrix, numba.float64
-    )
-    return function_pointer(law, signature)
-
-
 @kernel
 def fly_ticks(
-    law: Callable[..., None], gains: Array, law_memory: Array, h_bar: Array, uses_model: bool,
-    plant_block: Block, command_delay_buffer: Array, controller_block: Block, rows: Rows,
-    first_tick: int, start: int, stop: int, period: float,
+    law: LawCode, plant_block: Block, command_delay_buffer: Array, controller_block: Block,
+    state: Block, references: Block, rows: Rows, start: int, first_tick: int, period: float,
 ) -> tuple[int, float, int]:  # fmt: skip
-    """The loop of `close_loop` for a law given as a function pointer.
+    """The loop of `close_loop` from the tick ``start`` on, a tick for each reference.
 
-    ``first_tick`` is that of row 0.
+    ``state`` is the plant's, ``first_tick`` the tick of row 0.
 
     Returns:
-        The tick reached, the fastest rate there, and what the controller found its state to be.
+        The tick reached, the fastest rate there, and the status of its state.
     """
-    plant, memory = plant_block[0], controller_block[0]
-    measured = plant.measured
-    fastest = 0.0
-    for row in range(start - first_tick, stop - first_tick):
-        k = first_tick + row
+    plant, measured, fastest = plant_block[0], state[0], 0.0
+    for k in range(references.size):
+        tick = start + k
+        row = tick - first_tick
         rows.base_position[row] = measured.base_position
         rows.quaternion[row] = measured.quaternion
         rows.base_velocity[row] = measured.base_velocity
@@ -126,20 +109,16 @@ def fly_ticks(
         rows.joint_positions[row] = measured.joint_positions
         rows.joint_velocities[row] = measured.joint_velocities
         rows.applied_torque[row] = measured.applied_torque
-        torque = rows.commanded_torque[row]
-        found = answer(
-            memory, law, gains, law_memory, h_bar, uses_model, k, measured.quaternion,
-            measured.omega_base, measured.joint_positions, measured.joint_velocities,
-            measured.applied_torque,
-            rows.reference_joints[row], rows.reference_base[row], torque, period,
-        )  # fmt: skip
-        if found != USABLE:
-            return k, fastest, found
-        rows.telemetry[row, 0] = law_memory[0]
-        rows.telemetry[row, 1] = law_memory[1]
-        rows.telemetry[row, 2] = memory.n_hat
-        rows.telemetry[row, 3] = memory.error
-        fastest = advance(plant, command_delay_buffer, torque, k, period)
+        torque, telemetry = rows.commanded_torque[row], rows.telemetry[row]
+        status = controller_tick(
+            controller_block, law, tick, state, references[k : k + 1], torque, period
+        )
+        if status != USABLE:
+            return tick, fastest, status
+        signals = controller_block[0].signals
+        telemetry[0], telemetry[1] = law.memory[0].s, law.memory[0].u
+        telemetry[2], telemetry[3] = signals.n_hat, signals.error
+        fastest = advance(plant, command_delay_buffer, torque, tick, period)
         if not fastest <= RATE_LIMIT:
-            return k + 1, fastest, USABLE
-    return stop, fastest, USABLE
+            return tick + 1, fastest, USABLE
+    return start + references.size, fastest, USABLE

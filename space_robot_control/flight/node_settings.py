@@ -84,7 +84,7 @@ class FlightSettings(NamedTuple):
         gains = {
             f"{name}.{gain}": values.tolist()
             for name, law in laws.items()
-            for gain, values in law.gains.items()
+            for gain, values in law.gain_values.items()
         }
         found = {}
         for node, names in self.given.items():

@@ -204,7 +204,7 @@ class Flight:
     @property
     def gains_used(self) -> dict[str, list[float]]:
         """The numbers of the gains of the law in force at the start, an axis each."""
-        return {name: row.tolist() for name, row in self.law.gains.items()}
+        return {name: row.tolist() for name, row in self.law.gain_values.items()}
 
     @property
     def description(self) -> dict[str, Any]:

@@ -17,7 +17,6 @@ import numpy as np
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.blocks import block_bounds
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.bag.law_history import same
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.samples import Command, LawInForce
@@ -25,6 +24,7 @@ from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.plain_codecs import ClockCodec, LawCodec, TelemetryCodec
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 
+from ..controller.law_changes import LawChanges
 from .closed_loop import close_loop, measured_ticks
 from .plan import Flight
 
@@ -134,12 +134,13 @@ def fly_blocks(
     flight.check_in_process()
     block_of = block_of or (lambda start, stop: unflown(flight, start, stop))
     laws: tuple[LawInForce, ...] = ()
+    changes = LawChanges()
     with _recording(flight, bag) as messages:
         for start, stop in block_bounds(flight.ticks):
             block = block_of(start, stop)
             block.laws = laws
             try:
-                _fly_block(flight, block, messages, progress)
+                _fly_block(flight, block, changes, messages, progress)
             except Exception as error:
                 measured = measured_ticks(flight.plant, error)
                 yield _ended_early(block, measured - start, flight.plant.tick - start)
@@ -173,8 +174,9 @@ def simulate(
 
 
 def _fly_block(
-    flight: Flight, block: FlightLog, messages: Messages | None, progress: Callable[[int], None]
-) -> None:
+    flight: Flight, block: FlightLog, changes: LawChanges, messages: Messages | None,
+    progress: Callable[[int], None],
+) -> None:  # fmt: skip
     plant, controller, swaps = flight.plant, flight.controller, dict(flight.swaps)
     first, end = block.first_tick, block.first_tick + block.ticks
     cuts = {*range(first, end, STRETCH_TICKS), *(k for k in swaps if first <= k < end), end}
@@ -182,9 +184,8 @@ def _fly_block(
         progress(start)
         if start in swaps and swaps[start].name != controller.law.name:
             controller.law = swaps[start]
-        law = controller.law.in_force(start, is_first=not block.laws)
-        if not block.laws or not same(block.laws[-1], law):
-            block.laws += (law,)
+        if change := changes.at(start, controller.law):
+            block.laws += (change.law,)
         try:
             close_loop(plant, controller, block, start, stop)
         except Exception as error:

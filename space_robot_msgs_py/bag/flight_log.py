@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..samples import STATE_FIELDS, LawInForce, RobotState, Timebase
+from ..compiled.records import Block
+from ..samples import STATE_FIELDS, LawInForce, ReferenceChunk, RobotState, Timebase
 
 Array = NDArray[np.float64]
 
@@ -141,10 +142,11 @@ class FlightLog:
             getattr(state, name)[:] = getattr(self, name)[k]
         return state
 
-    def reference(self, tick: int) -> tuple[Array, Array]:
-        """The joints' (3, n) and the base's (10,) row of a tick."""
-        k = tick - self.first_tick
-        return self.reference_joints[k], self.reference_base[k]
+    def references(self, start: int, stop: int) -> Block:
+        """(stop - start,) array of the ticks' `Reference` each, a copy."""
+        rows = slice(start - self.first_tick, stop - self.first_tick)
+        chunk = ReferenceChunk(start, self.reference_joints[rows], self.reference_base[rows])
+        return chunk.references()
 
     def truncated(self, ticks: int) -> FlightLog:
         """The first ``ticks`` rows."""

@@ -7,18 +7,20 @@ all three packages: any edit starts a fresh cache, and all processes share what 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import ctypes
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 
 from .cache import cache_directory
 
 _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _njit: Any = numba.njit
 config: Any = numba.config
+_FunctionType: Any = numba.types.WrapperAddressProtocol
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
@@ -45,18 +47,42 @@ def subroutine(function: _Function) -> _Function:
     return cast(_Function, _njit(no_cpython_wrapper=True, **_OPTIONS)(function))
 
 
-@cache
-def function_pointer(function: Callable[..., Any], signature: Any) -> Any:
-    """A kernel as a value that a compiled loop can be given, as one type for all of them.
+class RecordFunction(_FunctionType):  # type: ignore[misc]
+    """A kernel of records, and a float at last, as a value that a compiled loop can be given.
 
-    A loop then need not be compiled again for every function it may call.
+    The kernel is compiled for the layouts of its own records. A loop sees it as a function of
+    other layouts, which all such kernels share, and is compiled once for all of them: a record
+    is passed by its address, and what lies there is the kernel's affair alone.
     """
-    compiled: Any = function
-    with _our_cache():
-        try:
-            return numba.cfunc(signature, cache=True, error_model="numpy")(compiled.py_func)
-        except OSError:  # no room in the cache
-            return numba.cfunc(signature, error_model="numpy")(compiled.py_func)
+
+    def __init__(
+        self, function: Callable[..., Any], layouts: Iterable[np.dtype[Any]],
+        seen_as: Iterable[np.dtype[Any]],
+    ) -> None:  # fmt: skip
+        """``layouts``: of the kernel's records; ``seen_as``: those a loop passes in their place."""
+        compiled: Any = function
+        own, self._signature = _signature(layouts), _signature(seen_as)
+        with _our_cache():
+            try:
+                self._code = numba.cfunc(own, cache=True, error_model="numpy")(compiled.py_func)
+            except OSError:  # no room in the cache
+                self._code = numba.cfunc(own, error_model="numpy")(compiled.py_func)
+        self._address = int(self._code.address or 0)
+        pointers = [ctypes.c_void_p] * (len(own.args) - 1)
+        self.call = ctypes.CFUNCTYPE(None, *pointers, ctypes.c_double)(self._address)
+        """Run it from Python, on the records at these addresses."""
+
+    def __wrapper_address__(self) -> int:
+        """Address of the machine code, for Numba."""
+        return self._address
+
+    def signature(self) -> Any:
+        """The type that a loop sees, for Numba."""
+        return self._signature
+
+
+def _signature(layouts: Iterable[np.dtype[Any]]) -> Any:
+    return numba.void(*(numba.from_dtype(layout) for layout in layouts), numba.float64)
 
 
 @contextmanager

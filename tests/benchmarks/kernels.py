@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.kernels import answer
-from space_robot_control.flight.closed_loop import Rows
+from space_robot_control.controller.kernels import controller_tick
+from space_robot_control.laws.compiled import LawCode
 from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Block
 from space_robot_sim.dynamics.aba import aba
 from space_robot_sim.plant.integrator import state_derivative
 from space_robot_sim.plant.plant import advance
 
 Array = NDArray[np.float64]
-Block = NDArray[Any]
 
 
 @kernel
@@ -58,31 +55,17 @@ def state_derivatives(block: Block, torque: Array, disturbance: Array, calls: in
 
 @kernel
 def controller_ticks(
-    law: Callable[..., None], gains: Array, law_memory: Array, h_bar: Array, uses_model: bool,
-    block: Block, rows: Rows, ticks: int, torque: Array, period: float,
+    law: LawCode, block: Block, states: Block, references: Block, ticks: int, torque: Array,
+    period: float,
 ) -> None:  # fmt: skip
     """All that an on-board computer does in a tick, over the rows of a recorded flight."""
-    memory, recorded = block[0], rows.quaternion.shape[0]
     for i in range(ticks):
-        k = i % recorded
-        answer(
-            memory, law, gains, law_memory, h_bar, uses_model, k, rows.quaternion[k],
-            rows.omega_base[k], rows.joint_positions[k], rows.joint_velocities[k],
-            rows.applied_torque[k], rows.reference_joints[k], rows.reference_base[k], torque,
-            period,
-        )  # fmt: skip
+        k = i % states.size
+        controller_tick(block, law, k, states[k : k + 1], references[k : k + 1], torque, period)
 
 
 @kernel
-def law_ticks(
-    law: Callable[..., None], gains: Array, law_memory: Array, signals: Array, inertia: Array,
-    bias: Array, ticks: int, period: float,
-) -> None:  # fmt: skip
-    """A law's equation alone; ``signals`` (ticks, 4, m) are e, edot, rhodd_d and N_hat."""
-    recorded = signals.shape[0]
+def law_ticks(law: LawCode, signals: Block, ticks: int, period: float) -> None:
+    """A law's equation alone, over rows of recorded signals."""
     for i in range(ticks):
-        k = i % recorded
-        law(
-            signals[k, 0], signals[k, 1], signals[k, 2], signals[k, 3], inertia, bias, gains,
-            law_memory, period,
-        )  # fmt: skip
+        law.run(signals[i % signals.size], law.gains[0], law.memory[0], period)

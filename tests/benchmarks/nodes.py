@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.loop import ControllerLoop
 from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.node_host import NodeKind, run_nodes
 from space_robot_msgs_py.samples import Command, RobotState
@@ -78,7 +79,7 @@ def empty_controller(controller: Controller) -> None:
     """Let ``controller`` answer with no torque always."""
     command = Command(0, np.zeros_like(controller.signals.error))
 
-    def update(state: RobotState, joints: Array, base: Array) -> Command:
+    def update(state: RobotState, reference: Block) -> Command:
         command.tick = state.tick
         return command
 

@@ -16,7 +16,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import LawInForce
 from space_robot_sim.robot import Robot
 
-from ...controller.gains import available_laws, build_law, check_gains, gain_files, gains_as_path
+from ...controller.gains import build_law, build_laws, gain_files, gains_as_path, split_gains
 from ...controller.settings import ControllerNodeSettings
 from ...controller.swaps import parse_swaps
 from ...laws import ControlLaw, find_law
@@ -86,7 +86,7 @@ class ControllerChoice:
         self.swaps = [text for text in self.parameters.get("swaps", []) if text.strip()]
         """Laws swapped to in flight."""
         try:
-            self.robot, now = self._check(law)
+            self.robot, now = self._check()
         except InputError as error:
             if not self._left_out:
                 raise
@@ -94,7 +94,7 @@ class ControllerChoice:
                 f"{error}; the gains flown are of {self._left_out!r}, read only with --trust"
             ) from None
         self.is_as_flown = is_same_law and (
-            not gains or gains == flown.get("gains") or _same(now.gains, recorded_gains)
+            not gains or gains == flown.get("gains") or _same(now.gain_values, recorded_gains)
         )
         """Whether law and gains are those that flew; what was ``given`` is not looked at."""
         self.follows_flight = is_same_law and "swaps" not in given
@@ -146,25 +146,16 @@ class ControllerChoice:
         _write(folder / f"{law.name}.yaml", {f"{NODE}_node": {"ros__parameters": section}})
         return str(folder)
 
-    def _check(self, law: type[ControlLaw]) -> tuple[Robot, ControlLaw]:
-        """The robot, and the law as it will fly."""
-        settings = ControllerNodeSettings.resolve(
-            {name: value for name, value in self.parameters.items() if "." not in name}
-        )
+    def _check(self) -> tuple[Robot, ControlLaw]:
+        """The robot, and the law with the gains of the files, see `build_law`."""
+        own, gains = split_gains(self.parameters)
+        settings = ControllerNodeSettings.resolve(own)
         robot = Robot.from_yaml(named_file("robots", settings.robot))
         axes = robot.n + 3
-        built = {law.name: build_law(settings.controller, settings, axes)}
-        for name in available_laws(settings):
-            built.setdefault(name, build_law(name, settings, axes))
+        laws = build_laws(settings, axes, gains)
         for swap in parse_swaps(settings.swaps, settings.period):
-            one_of(swap.name, built, "controller", " of swaps")
-        for name, value in self.parameters.items():
-            law_name, dot, gain = name.partition(".")
-            if dot:
-                one_of(law_name, built, "controller", f" in {NODE}.{name}")
-                tree = {**built[law_name].gains, gain: value}
-                check_gains(tree, type(built[law_name]), axes, f"{NODE} parameters")
-        return robot, built[law.name]
+            one_of(swap.name, laws, "controller", " of swaps")
+        return robot, build_law(settings.controller, settings, axes)
 
 
 def recorded_parameters(flight: Mapping[str, Any]) -> dict[str, Any]:

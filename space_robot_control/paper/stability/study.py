@@ -73,7 +73,7 @@ def study(plan: FlightPlan, initial_error: float, fly: Fly) -> Study:
     """
     flight = Flight(plan)
     check_law(flight)
-    gains, period = flight.controller.law.gains, flight.period
+    gains, period = flight.controller.law.gain_values, flight.period
     h_bar = gains["h_bar"]
     log = fly(flight, "as planned")
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller
-from space_robot_control.flight.closed_loop import Rows, law_pointer
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
-from space_robot_control.laws import CompiledLaw
+from space_robot_control.laws import CompiledLaw, Signals
 from space_robot_control.laws import laws as all_laws
+from space_robot_control.laws.compiled import LawCode
+from space_robot_msgs_py.compiled.records import Block
 
 from ..kernels import controller_ticks, law_ticks
 from ..measure import Competitor, Options, interleave
@@ -27,6 +27,7 @@ REFERENCE = "ctc"
 TICK_US = {"tde_stc": Target(1.0)}
 """Asked of a controller's tick, us."""
 TICKS = 2000
+SIGNALS = 20
 
 
 @dataclass(frozen=True)
@@ -35,13 +36,12 @@ class Recorded:
 
     controller: Controller
     """As before the first tick."""
-    rows: Rows
-    signals: Array
-    """(ticks, 4, m): e, edot, rhodd_d, N_hat of every tick."""
-    inertia: Array
-    """H_S of the last tick, if the law uses it."""
-    bias: Array
-    """c_S, likewise."""
+    states: Block
+    """(ticks,) `State` of every tick."""
+    references: Block
+    """(ticks,) `Reference` of every tick."""
+    signals: Block
+    """(`SIGNALS`,) `Signals` of the last ticks, which stay in the processor's cache."""
 
     @classmethod
     def of(cls, name: str, ticks: int) -> Recorded:
@@ -51,34 +51,33 @@ class Recorded:
         log = simulate(flight)
         law, period = flight.controller.law, flight.period
         controller = Controller(flight.robot, law, period)
-        signals, seen = np.zeros((ticks, 4, log.axes)), controller.signals
+        states = np.concatenate([log.state(tick).block for tick in range(ticks)])
+        references, signals = (
+            log.references(0, ticks),
+            np.zeros(SIGNALS, Signals.dtype(log.axes - 3)),
+        )
         for tick in range(ticks):
-            controller.update(log.state(tick), *log.reference(tick))
-            signals[tick] = seen.error, seen.error_rate, seen.acceleration_desired, seen.n_hat
-        fresh = Controller(flight.robot, law, period)
-        return cls(fresh, Rows.of(log), signals, seen.inertia.copy(), seen.bias.copy())
+            controller.update(log.state(tick), references[tick : tick + 1])
+            signals[tick % SIGNALS] = controller.block["signals"][0]
+        return cls(Controller(flight.robot, law, period), states, references, signals)
 
     def whole_tick(self) -> tuple[Competitor, Array]:
         """Signals, law and torque; and the array (m,) the torque is written into."""
-        law, pointer = self._law()
-        torque, period = np.zeros(law.memory.shape[1]), self.controller.period
+        law = self._law()
+        torque, period = np.zeros_like(law.memory[0].force), self.controller.period
         return lambda ticks: controller_ticks(
-            pointer, law.gain_matrix, law.memory, law.h_bar, law.uses_model,
-            self.controller.block, self.rows, ticks, torque, period,
-        ), torque  # fmt: skip
+            law, self.controller.block, self.states, self.references, ticks, torque, period
+        ), torque
 
     def equation(self) -> Competitor:
         """The law's equation alone."""
-        law, pointer = self._law()
-        return lambda ticks: law_ticks(
-            pointer, law.gain_matrix, law.memory, self.signals, self.inertia, self.bias, ticks,
-            self.controller.period,
-        )  # fmt: skip
+        law = self._law()
+        return lambda ticks: law_ticks(law, self.signals, ticks, self.controller.period)
 
-    def _law(self) -> tuple[CompiledLaw, Any]:
+    def _law(self) -> LawCode:
         law = self.controller.law
         assert isinstance(law, CompiledLaw)
-        return law, law_pointer(type(law).kernel)
+        return law.code
 
 
 def laws(options: Options) -> list[Result]:

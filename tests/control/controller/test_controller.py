@@ -15,7 +15,7 @@ from space_robot_control.controller.kernels import LARGEST
 from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
 from space_robot_control.laws import find_law
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
-from space_robot_msgs_py.samples import RobotState
+from space_robot_msgs_py.samples import Reference, ReferenceChunk, RobotState
 from space_robot_sim import Robot, forward_dynamics
 from space_robot_sim.environment.environment import FrictionSettings
 
@@ -49,7 +49,9 @@ def test_computed_torque_causes_the_acceleration_it_demands(case: Case) -> None:
     joints = rng.normal(size=(3, robot.n))
     k_p, k_d = rng.uniform(1.0, 50.0, axes), rng.uniform(1.0, 10.0, axes)
     controller = Controller(robot, find_law("ctc")({"k_p": k_p, "k_d": k_d}, PERIOD), PERIOD)
-    torque = controller.update(measured(case), joints, base).torque
+    torque = controller.update(
+        measured(case), ReferenceChunk(0, joints[None], base[None]).references()
+    ).torque
     # what is wanted
     near = base[:4] if base[:4] @ s.quaternion >= 0.0 else -base[:4]
     j0, j0_desired = attitude_jacobian_inertial(s.quaternion), attitude_jacobian_base(near)
@@ -60,7 +62,7 @@ def test_computed_torque_causes_the_acceleration_it_demands(case: Case) -> None:
     error = np.concatenate([near[1:] - s.quaternion[1:], joints[0] - s.theta])
     error_rate = np.concatenate([epsilon_rate_desired - j0 @ s.w0, joints[1] - s.rate])
     u_pd = acceleration + k_d * error_rate + k_p * error
-    np.testing.assert_allclose(controller.law.pseudo_acceleration, u_pd, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(controller.law.memory.u, u_pd, rtol=1e-9, atol=1e-9)
     # what happens
     force = np.concatenate([np.zeros(3), rotation_of(s.quaternion).apply(torque[:3]), torque[3:]])
     result = forward_dynamics(robot, s.quaternion, s.theta, s.w0, s.rate, force)[3:]
@@ -114,7 +116,7 @@ def test_half_a_turn_is_an_error_not_a_nan(paper_robot: Robot, quaternion: list[
     state = RobotState.allocate(6)
     state.tick, state.quaternion[:] = 321, quaternion
     with pytest.raises(SingularAttitudeError, match=r"tick 321.*eta.*180 degrees") as caught:
-        controller.update(state, np.zeros((3, 6)), np.eye(10)[0])
+        controller.update(state, Reference.at_rest(6))
     assert caught.value.tick == 321
 
 
@@ -145,7 +147,7 @@ def test_an_unusable_state_is_refused_and_forgotten(
     state = shown.plant.state.copy()
     getattr(state, field)[place] = value
     with pytest.raises(UnusableStateError, match="at tick 20 the") as caught:
-        shown.controller.update(state, *shown.references.at(20))
+        shown.controller.update(state, shown.references.at(20))
     assert (caught.value.tick, caught.value.kind) == (20, kind)
     np.testing.assert_array_equal(shown.fly(20)[1], spared.fly(20)[1])
 
@@ -157,7 +159,7 @@ def test_numbers_of_opposite_sign_do_not_hide_one_another(paper_robot: Robot) ->
         state = RobotState.allocate(6)
         state.quaternion[0], state.joint_velocities[:2] = 1.0, [value, -value]
         with pytest.raises(UnusableStateError):
-            controller.update(state, np.zeros((3, 6)), np.eye(10)[0])
+            controller.update(state, Reference.at_rest(6))
 
 
 # Force and torque
@@ -176,15 +178,15 @@ def test_on_a_turning_base_torque_becomes_force_with_the_attitude_it_began_at(
         later = -later
     assume(min(abs(case.state.quaternion[0]), abs(later[0])) > 0.05)
     torque = rng.normal(size=9)
-    reference = np.zeros((3, 6)), np.eye(10)[0]
+    reference = Reference.at_rest(6)
     for ticks, began_at in ((1, case.state.quaternion), (LONGEST_GAP, case.state.quaternion),
                             (LONGEST_GAP + 1, later)):  # fmt: skip
         controller = Controller(case.robot, law_of("tde_stc"), PERIOD)
         state = measured(case)
-        controller.update(state, *reference)
+        controller.update(state, reference)
         sign = np.sign(controller.block[0].quaternion @ state.quaternion)
         state.tick, state.quaternion[:], state.applied_torque[:] = ticks, later, torque
-        controller.update(state, *reference)
+        controller.update(state, reference)
         # either quaternion of an attitude will do, but the same one throughout
         j0 = attitude_jacobian_base(sign * began_at)
         force = controller.block[0].applied_force
@@ -205,7 +207,7 @@ def test_a_transfer_lasts_20_ms(paper_robot: Robot, period: float, ticks: int) -
     shares = []
     for tick in range(1, ticks + 4):
         state.tick = tick
-        controller.update(state, np.zeros((3, 6)), np.eye(10)[0])
+        controller.update(state, Reference.at_rest(6))
         own = controller.law.force(controller.signals)
         shares.append(np.abs(controller.block[0].force - own).max())
     assert all(share > 0.0 for share in shares[:ticks])
@@ -245,7 +247,7 @@ def test_close_to_half_a_turn_the_torque_is_finite(paper_robot: Robot, name: str
     controller = Controller(paper_robot, law_of(name), PERIOD)
     state = RobotState.allocate(6)
     state.quaternion[:] = [1e-4, np.sqrt(1.0 - 1e-8), 0.0, 0.0]
-    assert np.isfinite(controller.update(state, np.zeros((3, 6)), np.eye(10)[0]).torque).all()
+    assert np.isfinite(controller.update(state, Reference.at_rest(6)).torque).all()
 
 
 def test_telemetry_is_of_the_last_tick(paper_robot: Robot) -> None:
@@ -256,7 +258,7 @@ def test_telemetry_is_of_the_last_tick(paper_robot: Robot) -> None:
     law, signals = loop.controller.law, loop.controller.signals
     np.testing.assert_array_equal(e, errors[-1])
     np.testing.assert_allclose(s, signals.error_rate + errors[-1], rtol=1e-13)
-    np.testing.assert_allclose(law.force(signals), law.gains["h_bar"] * u + n_hat, rtol=1e-13)
+    np.testing.assert_allclose(law.force(signals), law.gains.h_bar * u + n_hat, rtol=1e-13)
     loop.controller.law = law_of("ctc")
     loop.fly(1)
     np.testing.assert_array_equal(loop.controller.telemetry()[2], np.zeros(9))

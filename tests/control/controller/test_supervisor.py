@@ -12,15 +12,20 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller
-from space_robot_control.controller.supervisor import REGULAR_ETA, SINGULAR_ETA, Mode, Supervisor
+from space_robot_control.controller.supervisor import (
+    NOMINAL_FROM_ETA,
+    SAFE_BELOW_ETA,
+    Mode,
+    Supervisor,
+)
 from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
-from space_robot_msgs_py.samples import STATE_FIELDS, RobotState
+from space_robot_msgs_py.samples import STATE_FIELDS, Reference, RobotState
 from space_robot_sim import Robot
 
 Array = NDArray[np.float64]
 
 AXES, HOLD = 9, 5
-REST = np.zeros((3, 6)), np.eye(10)[0]
+REST = Reference.at_rest(6)
 """The reference that asks for rest at zero."""
 
 
@@ -56,7 +61,7 @@ streams = st.lists(st.tuples(ticks, numbers, st.none() | unit), min_size=1, max_
 def assert_safe(supervisor: Supervisor, state: RobotState) -> None:
     """A finite command for the state's tick, none in safe mode; the reason is known."""
     before = supervisor.rejected.total()
-    command = supervisor.answer(state, *REST)
+    command = supervisor.answer(state, REST)
     assert np.isfinite(command.torque).all()
     assert command.tick == state.tick
     nominal = supervisor.mode is Mode.NOMINAL
@@ -98,7 +103,7 @@ def test_a_bad_state_is_answered_with_the_last_torque_for_a_while(
     supervisor, bad, last = supervisor_of(paper_robot, hold_ticks=hold_ticks), 0, np.zeros(AXES)
     for tick, is_good in enumerate(good):
         state = state_at(tick)
-        command = supervisor.answer(state if is_good else with_nan(state), *REST)
+        command = supervisor.answer(state if is_good else with_nan(state), REST)
         bad = 0 if is_good else bad + 1
         if is_good:
             assert supervisor.mode is Mode.NOMINAL
@@ -125,10 +130,10 @@ def test_what_was_wrong_is_counted_and_held_over(
 ) -> None:
     """An attitude of zeros is a broken sensor, not half a turn."""
     supervisor = supervisor_of(paper_robot)
-    torque = supervisor.answer(state_at(0), *REST).torque.copy()
+    torque = supervisor.answer(state_at(0), REST).torque.copy()
     state = state_at(1)
     spoil(state)
-    np.testing.assert_array_equal(supervisor.answer(state, *REST).torque, torque)
+    np.testing.assert_array_equal(supervisor.answer(state, REST).torque, torque)
     assert supervisor.rejected == {kind: 1}
     assert supervisor.mode is Mode.HOLDING
 
@@ -139,7 +144,7 @@ def test_a_bad_state_leaves_no_trace(paper_robot: Robot) -> None:
     for loop in (with_bad, without):
         loop.fly_supervised(100)
     for bad in (with_nan(state_at(100)), state_at(100, scale=1.1)):
-        with_bad.supervisor.answer(bad, *REST)
+        with_bad.supervisor.answer(bad, REST)
     torques = with_bad.fly_supervised(50)[1]
     np.testing.assert_array_equal(torques, without.fly_supervised(50)[1])
 
@@ -149,9 +154,9 @@ def test_a_bad_state_leaves_no_trace(paper_robot: Robot) -> None:
 
 def test_near_half_a_turn_it_is_safe_until_well_away(paper_robot: Robot) -> None:
     supervisor = supervisor_of(paper_robot)
-    between = 0.5 * (SINGULAR_ETA + REGULAR_ETA)
+    between = 0.5 * (SAFE_BELOW_ETA + NOMINAL_FROM_ETA)
     modes = []
-    etas = [0.5, between, 0.9 * SINGULAR_ETA, between, 1.1 * REGULAR_ETA, -between]
+    etas = [0.5, between, 0.9 * SAFE_BELOW_ETA, between, 1.1 * NOMINAL_FROM_ETA, -between]
     for tick, eta in enumerate(etas):
         assert_safe(supervisor, state_at(tick, eta))
         modes.append(supervisor.mode)
@@ -160,10 +165,10 @@ def test_near_half_a_turn_it_is_safe_until_well_away(paper_robot: Robot) -> None
 
 
 def test_a_single_bad_state_near_half_a_turn_is_held_over(paper_robot: Robot) -> None:
-    supervisor, between = supervisor_of(paper_robot), 0.5 * (SINGULAR_ETA + REGULAR_ETA)
+    supervisor, between = supervisor_of(paper_robot), 0.5 * (SAFE_BELOW_ETA + NOMINAL_FROM_ETA)
     modes = []
     for state in (state_at(0, between), with_nan(state_at(1, between)), state_at(2, between)):
-        supervisor.answer(state, *REST)
+        supervisor.answer(state, REST)
         modes.append(supervisor.mode)
     assert modes == [Mode.NOMINAL, Mode.HOLDING, Mode.NOMINAL]
 
@@ -176,30 +181,30 @@ def test_after_a_jump_in_time_it_answers_as_a_new_one(paper_robot: Robot, begin:
     """Bit for bit: the plant has started anew, or states have long been missing."""
     used, new = supervisor_of(paper_robot), supervisor_of(paper_robot)
     for tick in range(1000, 1100):
-        used.answer(state_at(tick, 0.9), *REST)
+        used.answer(state_at(tick, 0.9), REST)
     for tick in range(begin, begin + 60):
-        command = used.answer(state_at(tick, 0.8), *REST).torque
-        np.testing.assert_array_equal(command, new.answer(state_at(tick, 0.8), *REST).torque)
+        command = used.answer(state_at(tick, 0.8), REST).torque
+        np.testing.assert_array_equal(command, new.answer(state_at(tick, 0.8), REST).torque)
 
 
 def test_time_that_goes_back_while_holding_does_not_make_it_hold_for_longer(
     paper_robot: Robot,
 ) -> None:
     supervisor = supervisor_of(paper_robot)
-    supervisor.answer(state_at(1000), *REST)
+    supervisor.answer(state_at(1000), REST)
     for tick in (1001, 3):
-        supervisor.answer(with_nan(state_at(tick)), *REST)
+        supervisor.answer(with_nan(state_at(tick)), REST)
     assert supervisor.mode is Mode.SAFE
 
 
 def test_standing_down_commands_nothing_and_forgets(paper_robot: Robot) -> None:
     supervisor = supervisor_of(paper_robot)
     for tick in range(40):
-        supervisor.answer(state_at(tick), *REST)
+        supervisor.answer(state_at(tick), REST)
     command = supervisor.stand_down(40)
     assert command.tick == 40
     assert not command.torque.any()
-    assert not supervisor.answer(with_nan(state_at(41)), *REST).torque.any()
+    assert not supervisor.answer(with_nan(state_at(41)), REST).torque.any()
 
 
 # In flight
@@ -223,7 +228,7 @@ class Supervised(Loop):
             if blind:
                 seen = RobotState.allocate(6)
                 seen.tick, seen.quaternion[:] = tick, np.nan
-            command = self.supervisor.answer(seen, *self.references.at(tick))
+            command = self.supervisor.answer(seen, self.references.at(tick))
             errors.append(self.controller.signals.error.copy())
             torques.append(command.torque.copy())
             self.plant.step(command)

@@ -19,6 +19,8 @@ from space_robot_control.controller.tracking import (
     torque_from_force,
     tracking_errors,
 )
+from space_robot_control.laws import Signals
+from space_robot_msgs_py.samples import ReferenceChunk, State
 from space_robot_sim.dynamics.attitude import attitude_jacobian_inverse
 
 Array = NDArray[np.float64]
@@ -33,9 +35,24 @@ class Errors(NamedTuple):
 
 
 def errors_of(quaternion: Array, theta: Array, rate: Array, joints: Array, base: Array) -> Errors:
-    out = Errors(*(np.full(len(rate), np.nan) for _ in range(3)))
-    tracking_errors(quaternion, theta, rate, joints, base, np.zeros((3, 3)), *out)
-    return out
+    n = len(theta)
+    state, signals = State.allocate(n), Signals.allocate(n)
+    state.joint_positions[:] = theta
+    for column in (signals.error, signals.error_rate, signals.acceleration_desired):
+        column[:] = np.nan
+    (reference,) = ReferenceChunk(0, joints[None], base[None]).references()
+    tracking_errors(state, quaternion, rate, reference, np.zeros((3, 3)), signals)
+    return Errors(signals.error, signals.error_rate, signals.acceleration_desired)
+
+
+def rate_of(
+    quaternion: Array, omega_base: Array, joint_velocities: Array, jacobian: Array
+) -> Array:
+    """rhodot; J0 is written into ``jacobian``."""
+    state, rate = State.allocate(len(joint_velocities)), np.zeros(len(joint_velocities) + 3)
+    state.omega_base[:], state.joint_velocities[:] = omega_base, joint_velocities
+    measured_rate(state, quaternion, jacobian, rate)
+    return rate
 
 
 def epsilon_along(base: Array, time: float) -> Array:
@@ -53,8 +70,8 @@ def random_base(rng: np.random.Generator) -> Array:
 def test_measured_rate_is_epsdot_and_thetadot(rng: np.random.Generator, n: int) -> None:
     """epsdot by a finite difference of the attitude; omega in the base frame."""
     base, joint_velocities = random_base(rng), rng.normal(size=n)
-    rate, jacobian = np.zeros(n + 3), np.zeros((3, 3))
-    measured_rate(base[:4], base[4:7], joint_velocities, jacobian, rate)
+    jacobian = np.zeros((3, 3))
+    rate = rate_of(base[:4], base[4:7], joint_velocities, jacobian)
     step = 1e-6
     epsilon_rate = (epsilon_along(base, step) - epsilon_along(base, -step)) / (2 * step)
     np.testing.assert_allclose(rate[:3], epsilon_rate, atol=1e-8)
@@ -98,8 +115,7 @@ def test_of_both_desired_quaternions_the_nearer_is_taken(rng: np.random.Generato
 def test_no_error_where_measured_is_desired() -> None:
     rng = np.random.default_rng(1)
     base, joints = random_base(rng), rng.normal(size=(3, 4))
-    rate, jacobian = np.zeros(7), np.zeros((3, 3))
-    measured_rate(-base[:4], base[4:7], joints[1], jacobian, rate)
+    rate = rate_of(-base[:4], base[4:7], joints[1], np.zeros((3, 3)))
     errors = errors_of(-base[:4], joints[0], rate, joints, base)
     np.testing.assert_array_equal(errors.e, np.zeros(7))
     np.testing.assert_array_equal(errors.edot, np.zeros(7))
@@ -109,9 +125,8 @@ def test_no_error_where_measured_is_desired() -> None:
 def test_force_and_torque_do_the_same_work(rng: np.random.Generator, n: int) -> None:
     """tau = J^T F_S, so F_S.rhodot = tau.[omega_base, thetadot] at any rate."""
     q, omega, joint_velocities = random_quaternion(rng), rng.normal(size=3), rng.normal(size=n)
-    force, torque, rate = rng.normal(size=n + 3), np.zeros(n + 3), np.zeros(n + 3)
-    jacobian = np.zeros((3, 3))
-    measured_rate(q, omega, joint_velocities, jacobian, rate)
+    force, torque, jacobian = rng.normal(size=n + 3), np.zeros(n + 3), np.zeros((3, 3))
+    rate = rate_of(q, omega, joint_velocities, jacobian)
     torque_from_force(jacobian, force, torque)
     np.testing.assert_allclose(torque[:3], attitude_jacobian_base(q).T @ force[:3], atol=1e-14)
     work = torque[:3] @ omega + torque[3:] @ joint_velocities

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 import pytest
 import yaml
@@ -11,7 +9,7 @@ from closed_loop import H_BAR, PERIOD, Loop, law_of
 from numpy.typing import NDArray
 from paths import CONFIG
 
-from space_robot_control.laws import ControlLaw, Signals, find_law
+from space_robot_control.laws import ControlLaw, LawGains, Signals, find_law, per_axis
 from space_robot_msgs_py.errors import FlightError
 from space_robot_sim import Robot
 from space_robot_sim.environment.environment import (
@@ -86,9 +84,9 @@ def test_swapping_in_a_used_law_resets_it(paper_robot: Robot) -> None:
     law = law_of("tde_tsmc")
     loop = Loop(paper_robot, law)
     loop.fly(50)
-    assert law.sliding_surface.any()
+    assert law.memory.s.any()
     loop.controller.law = law
-    np.testing.assert_array_equal(law.sliding_surface, np.zeros(9))
+    np.testing.assert_array_equal(law.memory.s, np.zeros(9))
 
 
 def test_computed_torque_brings_the_base_back_from_a_large_turn(paper_robot: Robot) -> None:
@@ -107,14 +105,18 @@ def test_computed_torque_brings_the_base_back_from_a_large_turn(paper_robot: Rob
     np.testing.assert_allclose(errors[-1], np.zeros(9), atol=1e-5)
 
 
+class EchoGains(LawGains):
+    h_bar: Array = per_axis("constant inertia", "kg m2")
+
+
 class EchoLaw(ControlLaw):
     """Keeps the acceleration there is: F_S = N_hat + h_bar rhodd_d."""
 
     name = "echo"
-    gain_descriptions: ClassVar = {"h_bar": "constant inertia, kg m2"}
+    gains_type = EchoGains
 
     def force(self, signals: Signals) -> Array:
-        return signals.n_hat + self.gains["h_bar"] * signals.acceleration_desired
+        return signals.n_hat + self.gains.h_bar * signals.acceleration_desired
 
 
 def test_a_law_of_ones_own_flies(paper_robot: Robot) -> None:

@@ -9,7 +9,7 @@ import pytest
 from closed_loop import PERIOD, Loop, law_of
 
 from space_robot_control.flight.closed_loop import close_loop
-from space_robot_control.laws import ControlLaw, Signals
+from space_robot_control.laws import ControlLaw, LawGains, Signals, per_axis
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import DivergedError, SingularAttitudeError
 from space_robot_msgs_py.samples import Timebase
@@ -57,23 +57,29 @@ def test_compiled_flight_is_the_one_of_single_steps(
             np.testing.assert_array_equal(now, last)
 
 
+class PlainGains(LawGains):
+    h_bar: np.ndarray = per_axis("constant inertia", "kg m2")
+    lambda_: np.ndarray = per_axis("slope of the sliding surface", "1/s")
+
+
 class PlainTorque(ControlLaw):
     """A law without a kernel; the same equation as tde_stc's with K_1 = K_2 = 0."""
 
     name = "plain"
-    gain_descriptions = {"h_bar": "kg m2", "lambda": "1/s"}  # noqa: RUF012
+    gains_type = PlainGains
 
     def force(self, signals: Signals) -> np.ndarray:
         gains, x = self.gains, signals
-        self.sliding_surface[:] = x.error_rate + gains["lambda"] * x.error
-        self.pseudo_acceleration[:] = x.acceleration_desired + gains["lambda"] * x.error_rate
-        return gains["h_bar"] * self.pseudo_acceleration + x.n_hat
+        self.memory.s[:] = x.error_rate + gains.lambda_ * x.error
+        self.memory.u[:] = x.acceleration_desired + gains.lambda_ * x.error_rate
+        force: np.ndarray = gains.h_bar * self.memory.u + x.n_hat
+        return force
 
 
 def test_a_law_in_python_flies_as_its_compiled_twin(paper_robot: Robot) -> None:
     compiled = law_of("tde_stc")
-    compiled.gains = {**compiled.gains, "k_1": np.zeros(9), "k_2": np.zeros(9)}
-    plain = PlainTorque({k: compiled.gains[k] for k in ("h_bar", "lambda")}, PERIOD)
+    compiled.gain_values = {**compiled.gain_values, "k_1": np.zeros(9), "k_2": np.zeros(9)}
+    plain = PlainTorque({k: compiled.gain_values[k] for k in ("h_bar", "lambda")}, PERIOD)
     one, other = (closed(Loop(paper_robot, law), [0, TICKS]) for law in (compiled, plain))
     assert one.telemetry is not None
     assert other.telemetry is not None
@@ -87,7 +93,7 @@ def test_divergence_is_found_at_its_tick(paper_robot: Robot) -> None:
     ticks = []
     for fly in (lambda loop: closed(loop, [0, TICKS]), lambda loop: loop.fly(TICKS)):
         law = law_of("ctc")
-        law.gains = {"k_p": np.full(9, 5e6), "k_d": np.full(9, 5e4)}
+        law.gain_values = {"k_p": np.full(9, 5e6), "k_d": np.full(9, 5e4)}
         with pytest.raises(DivergedError) as caught:
             fly(Loop(paper_robot, law))
         ticks.append(caught.value.tick)

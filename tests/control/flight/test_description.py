@@ -40,7 +40,7 @@ def test_bag_has_all_to_fly_it_again(tmp_path: Path) -> None:
     assert PlantNodeSettings.resolve(told["plant"]) == flight.plant_settings
     settings = ControllerNodeSettings.resolve(told["controller"])
     law = build_law(said["controller"], settings, robot.n + 3)
-    assert {name: row.tolist() for name, row in law.gains.items()} == said["gains_used"]
+    assert {name: row.tolist() for name, row in law.gain_values.items()} == said["gains_used"]
 
 
 def test_robot_is_told_though_its_file_is_gone(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from flights import space_robot
 from space_robot_control.analysis import analyze
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import fly_blocks, simulate
-from space_robot_control.laws import ControlLaw, Signals
+from space_robot_control.laws import ControlLaw, LawGains, Signals, per_axis
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
@@ -29,11 +29,15 @@ COLUMNS = (
 )  # fmt: skip
 
 
+class NoGains(LawGains):
+    none: np.ndarray = per_axis("nothing")
+
+
 class Failing(ControlLaw):
     """Gives no torque, and fails at a tick."""
 
     name = "failing"
-    gain_descriptions = {"none": "-"}  # noqa: RUF012
+    gains_type = NoGains
 
     def __init__(self, at: int, how: Callable[[], float]) -> None:
         super().__init__({"none": np.zeros(AXES)}, 0.0005)
@@ -84,8 +88,7 @@ def stepped(flight: Flight) -> list[list[np.ndarray]]:
             found.append(row)
             if tick in swaps:
                 controller.law = swaps[tick]
-            chunk = flight.mission.chunk(tick, 1)
-            command = controller.update(state, chunk.joints[0], chunk.base[0])
+            command = controller.update(state, flight.mission.chunk(tick, 1).references())
             row.append(command.torque.copy())
             flight.plant.step(Command(tick, command.torque))
     except (FlightError, ZeroDivisionError):

@@ -218,7 +218,7 @@ def _values(name: str, field: Any) -> st.SearchStrategy[Any]:
 
 def _any_parameters() -> st.SearchStrategy[Parameters]:
     gains = {
-        f"{name}.{gain}": _AXES for name, law in laws().items() for gain in law.gain_descriptions
+        f"{name}.{gain}": _AXES for name, law in laws().items() for gain in law.gain_descriptions()
     }
     nodes = {}
     for schema in SCHEMAS:
@@ -260,14 +260,14 @@ def test_all_that_is_made_of_a_plan_agrees(parameters: Parameters) -> None:
     built = build_laws(controller, 9, gains)
     law = next(iter(built.values()))
     assert said["controller"] == law.name
-    assert said["gains_used"] == {name: row.tolist() for name, row in law.gains.items()}
+    assert said["gains_used"] == {name: row.tolist() for name, row in law.gain_values.items()}
     theirs = Plant(Robot.from_yaml(named_file("robots", plant.robot)), plant, plant.period)
     assert theirs.block.tobytes() == flight.plant.block.tobytes()
     assert theirs.command_delay_buffer.shape == flight.plant.command_delay_buffer.shape
     robot = Robot.from_yaml(named_file("robots", controller.robot))
     loop = Controller(robot, law, controller.period, controller.acceleration_filter_hz)
     assert loop.block.tobytes() == flight.controller.block.tobytes()
-    assert law.gain_matrix.tobytes() == flight.controller.law.gain_matrix.tobytes()
+    assert law.gains_block.tobytes() == flight.controller.law.gains_block.tobytes()
     reference = Mission(6, mission, mission.period).chunk(0, 100)
     np.testing.assert_array_equal(reference.joints, flight.mission.chunk(0, 100).joints)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from space_robot_control.laws import ControlLaw, Signals, find_law, laws
+from space_robot_control.laws import (
+    CompiledLaw,
+    ControlLaw,
+    LawGains,
+    LawMemory,
+    Signals,
+    find_law,
+    laws,
+    per_axis,
+)
 from space_robot_control.laws.ctc_smc import saturation
 from space_robot_msgs_py.errors import InputError
 
@@ -37,10 +46,11 @@ class History:
         self.inertia = root @ root.transpose(0, 2, 1)
 
     def at(self, k: int) -> Signals:
-        return Signals(
-            self.e[k].copy(), self.edot[k].copy(), self.rhodd_d[k].copy(), self.n_hat[k].copy(),
-            self.inertia[k].copy(), self.bias[k].copy(),
-        )  # fmt: skip
+        signals = Signals.view(Signals.block(self.e.shape[1] - 3))
+        signals.error[:], signals.error_rate[:] = self.e[k], self.edot[k]
+        signals.acceleration_desired[:], signals.n_hat[:] = self.rhodd_d[k], self.n_hat[k]
+        signals.nominal.inertia[:], signals.nominal.bias[:] = self.inertia[k], self.bias[k]
+        return signals
 
     def through_model(self, u: Array) -> Array:
         """H_S u + c_S at every tick."""
@@ -93,7 +103,7 @@ EQUATIONS: dict[str, Callable[[History, Gains], Array]] = {
 
 def random_gains(law: type[ControlLaw], axes: int, seed: int) -> Gains:
     rng = np.random.default_rng(seed)
-    gains = {name: rng.uniform(0.1, 5.0, axes) for name in law.gain_descriptions}
+    gains = {name: rng.uniform(0.1, 5.0, axes) for name in law.gain_descriptions()}
     if "delta" in gains:
         gains["delta"] *= 1e-2
     return gains
@@ -118,6 +128,42 @@ def test_force_is_the_equation(name: str, axes: int) -> None:
     expected = EQUATIONS[name](history, gains)
     actual = forces(law(gains, PERIOD), history)
     np.testing.assert_allclose(actual, expected, rtol=1e-11, atol=1e-12)
+
+
+def listed_backwards(record: type[Any], base: type[Any]) -> type[Any]:
+    """The same fields in the opposite order, all of them behind those of ``base``."""
+    own = [item for item in record.fields().items() if item[0] not in base.fields()]
+    backwards = type("Backwards", (base,), dict(reversed(own)))
+    assert list(backwards.fields()) == [*base.fields(), *(name for name, _ in reversed(own))]
+    return backwards
+
+
+@pytest.mark.parametrize("name", EQUATIONS)
+def test_the_order_of_listing_changes_nothing(name: str) -> None:
+    """Gains and memory go by name: swapped lines of a law's declarations command the same."""
+    law, history = find_law(name), History(9, seed=8)
+    assert issubclass(law, CompiledLaw)
+
+    class Backwards(law):  # type: ignore[misc, valid-type]
+        gains_type = listed_backwards(law.gains_type, LawGains)
+        memory_type = listed_backwards(law.memory_type, LawMemory)
+
+    gains = random_gains(law, 9, seed=9)
+    swapped = Backwards(dict(reversed(gains.items())), PERIOD)
+    as_listed = law(gains, PERIOD)
+    assert swapped.gains_block.tobytes() != as_listed.gains_block.tobytes()
+    np.testing.assert_array_equal(forces(swapped, history), forces(as_listed, history))
+    for signal in ("s", "u"):
+        now, then = getattr(swapped.memory, signal), getattr(as_listed.memory, signal)
+        np.testing.assert_array_equal(now, then)
+
+
+def test_a_gain_named_as_a_word_of_python_has_its_name_for_the_user() -> None:
+    law = find_law("tde_stc")
+    assert list(law.gain_descriptions()) == ["h_bar", "lambda", "k_1", "k_2"]
+    assert law.gain_descriptions()["lambda"] == "slope of the sliding surface (38), 1/s"
+    built = law({name: np.full(9, k) for k, name in enumerate(law.gain_descriptions())}, PERIOD)
+    assert built.gains.lambda_.tolist() == built.gain_values["lambda"].tolist() == [1.0] * 9
 
 
 @pytest.mark.parametrize("name", EQUATIONS)
@@ -146,8 +192,12 @@ def test_force_leaves_the_signals_alone(name: str) -> None:
     law, history = find_law(name), History(9, 5)
     signals = history.at(0)
     law(random_gains(law, 9, seed=4), PERIOD).force(signals)
-    for field in Signals.__slots__:
-        np.testing.assert_array_equal(getattr(signals, field), getattr(history.at(0), field))
+    before = history.at(0)
+    for name in Signals.fields().keys() - {"nominal"}:
+        np.testing.assert_array_equal(getattr(signals, name), getattr(before, name))
+    for name in ("inertia", "bias"):
+        now, then = getattr(signals.nominal, name), getattr(before.nominal, name)
+        np.testing.assert_array_equal(now, then)
 
 
 def test_terminal_surface_starts_at_zero_whatever_the_error() -> None:
@@ -158,7 +208,7 @@ def test_terminal_surface_starts_at_zero_whatever_the_error() -> None:
     for k in (0, 7):
         controller.reset()
         force = controller.force(history.at(k))
-        np.testing.assert_array_equal(controller.sliding_surface, np.zeros(9))
+        np.testing.assert_array_equal(controller.memory.s, np.zeros(9))
         u_pd = history.rhodd_d[k] + gains["k_d"] * history.edot[k] + gains["k_p"] * history.e[k]
         np.testing.assert_allclose(force, gains["h_bar"] * u_pd + history.n_hat[k], rtol=1e-13)
 
@@ -190,14 +240,20 @@ def test_saturation_never_falls_and_has_no_step(a: float, b: float, delta: float
     assert 0.0 <= rise <= (high - low) / delta + 1e-12
 
 
+class LeadGains(LawGains):
+    h_bar: Array = per_axis("constant inertia", "kg m2")
+    k: Array = per_axis("derivative gain", "1/s")
+
+
 class LeadLaw(ControlLaw):
     """A sixth law, as a user would write it: PD on the time-delay estimate."""
 
     name = "lead"
-    gain_descriptions: ClassVar = {"h_bar": "constant inertia, kg m2", "k": "1/s"}
+    gains_type = LeadGains
 
     def force(self, signals: Signals) -> Array:
-        return self.gains["h_bar"] * self.gains["k"] * signals.error_rate + signals.n_hat
+        force: Array = self.gains.h_bar * self.gains.k * signals.error_rate + signals.n_hat
+        return force
 
 
 def test_a_law_of_ones_own_is_found_by_module_and_class() -> None:

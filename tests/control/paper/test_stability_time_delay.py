@@ -100,7 +100,7 @@ def test_error_is_what_the_paper_defines(law: str, robot: str) -> None:
         controller=law, case="2", robot=robot, duration=0.1, parameters={"plant": plant}
     )
     flight = Flight(plan)
-    log, gains = simulate(flight), flight.controller.law.gains
+    log, gains = simulate(flight), flight.controller.law.gain_values
     assert log.telemetry is not None
     error = time_delay_error(log, gains["h_bar"])
     assert np.abs(error).max() > 1e-3

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
+from space_robot_msgs_py.compiled.records import Record, assign, nested, prefix, shaped
 
 Array = NDArray[np.float64]
 
@@ -62,3 +62,28 @@ def test_assign_copies_arrays_and_records() -> None:
 def test_assigning_to_an_unknown_field_is_an_error() -> None:
     with pytest.raises(ValueError, match="no field of name mass"):
         assign(Outer.allocate(2), mass=1.0)
+
+
+class Longer(Outer):
+    more: Array = shaped(lambda n: (n,))
+
+
+def test_a_record_begins_with_the_fields_of_its_base() -> None:
+    """Who knows the base alone reads and writes them in the same memory."""
+    block = Longer.block(4)
+    assert list(Longer.fields()) == ["vector", "scalar", "inner", "more"]
+    block[0].more[:] = 7.0
+    fill(prefix(block, Outer.dtype(4))[0])
+    np.testing.assert_array_equal(block[0].vector, np.full(8, 2.0))
+    assert block[0].inner.matrix[1, 2] == 4.0
+    assert block[0].more.tolist() == [7.0] * 4
+
+
+def test_a_view_is_the_same_memory() -> None:
+    block = Longer.block(3)
+    view = Longer.view(block)
+    view.more[:], view.inner.matrix[2, 0] = 1.5, 6.0
+    assert block[0].more.tolist() == [1.5] * 3
+    assert block[0].inner.matrix[2, 0] == 6.0
+    assert view.address == block.ctypes.data
+    assert not hasattr(view, "scalar"), "a copy of it would not be the same memory"

@@ -49,11 +49,11 @@ def test_layers_and_overrides() -> None:
 def test_printed_gains_are_table_iv() -> None:
     settings = ControllerNodeSettings.resolve({"gains": "printed"})
     stc = build_law("tde_stc", settings, 9).gains
-    np.testing.assert_array_equal(stc["k_1"], [0.02, 0.02, 0.02, 0.2, 0.2, 0.2, 0.4, 0.2, 0.2])
-    np.testing.assert_array_equal(stc["k_2"], np.r_[[8e-5] * 3, [3e-3] * 3, 4e-3, 2e-3, 2e-3])
+    np.testing.assert_array_equal(stc.k_1, [0.02, 0.02, 0.02, 0.2, 0.2, 0.2, 0.4, 0.2, 0.2])
+    np.testing.assert_array_equal(stc.k_2, np.r_[[8e-5] * 3, [3e-3] * 3, 4e-3, 2e-3, 2e-3])
     ctc = build_law("ctc", settings, 9).gains
-    np.testing.assert_array_equal(ctc["k_p"], np.r_[7.5e6, [5e6] * 5, 5e4, 5e4, 8e3])
-    np.testing.assert_array_equal(ctc["k_d"], np.r_[[5e4] * 6, 2e3, 8e3, 1e2])
+    np.testing.assert_array_equal(ctc.k_p, np.r_[7.5e6, [5e6] * 5, 5e4, 5e4, 8e3])
+    np.testing.assert_array_equal(ctc.k_d, np.r_[[5e4] * 6, 2e3, 8e3, 1e2])
 
 
 @pytest.mark.parametrize(("robot", "axes"), [("paper", 9), ("seven_joint", 10)])

@@ -90,7 +90,7 @@ def described(**options: Any) -> dict[str, Any]:
     return {
         **flight.description,
         "parameters": {"controller": flight.parameters["controller"]},
-        "gains_used": {name: row.tolist() for name, row in law.gains.items()},
+        "gains_used": {name: row.tolist() for name, row in law.gain_values.items()},
         "robot_file": read_yaml(named_file("robots", flight.plan.robot)),
     }
 
@@ -105,7 +105,7 @@ def test_robot_and_gains_are_the_recorded_numbers(tmp_path: Path) -> None:
     assert choice.robot.mass[0] == 1234.5
     assert choice.swaps == ["0.1:ctc"]
     settings = ControllerNodeSettings.resolve(choice.parameters)
-    assert build_law("tde_stc", settings, 9).gains["k_1"].tolist() == [7.0] * 9
+    assert build_law("tde_stc", settings, 9).gains.k_1.tolist() == [7.0] * 9
     assert build_law("ctc", settings, 9).name == "ctc"
 
 
@@ -149,7 +149,7 @@ def test_older_bags_have_names_only(tmp_path: Path) -> None:
         (None, {"controller": "pid"}, "unknown controller 'pid'"),
         (None, {"gains": "old"}, "unknown gain set 'old'"),
         (None, {"given": {"tde_stc.k_9": [1.0]}}, "unknown gain of tde_stc 'k_9'"),
-        (None, {"given": {"pid.k": [1.0]}}, "unknown controller 'pid' in controller.pid.k"),
+        (None, {"given": {"pid.k": [1.0]}}, "unknown law 'pid' in controller parameters"),
         (None, {"given": {"tde_stc.h_bar": [-1.0]}}, "above 0"),
         (None, {"given": {"hold_tick": 1}}, "unknown key"),
     ],
