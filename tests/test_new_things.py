@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from paths import CONFIG, ROOT
 
+import space_robot_control.cli as room_of_commands
 import space_robot_control.laws as room_of_laws
+from space_robot_control.cli.main import cli, commands
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_control.laws import laws
@@ -51,6 +53,14 @@ def test_a_law_stands_in_one_file_of_its_name() -> None:
     for name, law in laws().items():
         assert law.__module__ == f"{room_of_laws.__name__}.{name}"
         assert importlib.import_module(law.__module__).__doc__
+
+
+def test_a_command_is_one_file_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "newest.py").write_text("import click\n\n@click.command()\ndef newest(): ...\n")
+    monkeypatch.setattr(room_of_commands, "__path__", [*room_of_commands.__path__, str(tmp_path)])
+    found = {command.name for command in commands()}
+    sys.modules.pop(f"{room_of_commands.__name__}.newest")
+    assert found == {*cli.commands, "newest"}
 
 
 def test_a_robot_is_one_file(tmp_path: Path) -> None:

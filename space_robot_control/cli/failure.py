@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from space_robot_msgs_py.errors import DivergedError, FlightError, InputError
 
-from ..flight.terminal import echo_json
-
 if TYPE_CHECKING:
     from ..flight.plan import Flight
 
@@ -26,6 +24,8 @@ def told_as_json(flight: Flight, bag: Path | None, as_json: bool) -> Iterator[No
         yield
     except FlightError as error:
         if as_json:
+            from ..flight.terminal import echo_json
+
             echo_json(failed_report(flight, bag, error, _figures(bag)))
         raise
 

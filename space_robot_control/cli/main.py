@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import pkgutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib import import_module
 from typing import NoReturn
 
@@ -15,13 +16,6 @@ from space_robot_msgs_py.ros.lifeline import hold_to_standard_input
 
 from ..flight.interruption import Interrupted, raising_signals
 from ..flight.node_modules import MODULES, SUFFIX
-from .analyze import analyze
-from .fly import fly
-from .replay import replay
-from .reproduce import reproduce
-from .simulate import simulate
-from .soak import soak
-from .stability import stability
 from .streams import is_of_output, standard_streams
 
 
@@ -42,13 +36,18 @@ def cli() -> None:
     """
 
 
-cli.add_command(analyze)
-cli.add_command(fly)
-cli.add_command(replay)
-cli.add_command(reproduce)
-cli.add_command(simulate)
-cli.add_command(soak)
-cli.add_command(stability)
+def commands() -> Iterator[click.Command]:
+    """The commands of this folder: each has its file's name, without an underscore."""
+    folder = import_module(__package__)
+    for module in pkgutil.iter_modules(folder.__path__):
+        if "_" not in module.name and module.name != "main":
+            value = getattr(import_module(f"{__package__}.{module.name}"), module.name, None)
+            if isinstance(value, click.Command):
+                yield value
+
+
+for command in commands():
+    cli.add_command(command)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
