@@ -6,6 +6,7 @@ import json
 import os
 import time
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -46,14 +47,20 @@ class RecorderLoop:
     is_complete = False
 
     def __init__(
-        self, node: ManagedNode[RecorderNodeSettings], settings: RecorderNodeSettings
-    ) -> None:
+        self, node: ManagedNode[RecorderNodeSettings], settings: RecorderNodeSettings,
+        gives_way: bool = False,
+    ) -> None:  # fmt: skip
         """Open the bag and listen to all topics.
+
+        Args:
+            node: its node.
+            settings: its parameters.
+            gives_way: whether other processes go first.
 
         Raises:
             InputError: the flight is no JSON, or the bag cannot be made.
         """
-        self._node, self._settings = node, settings
+        self._node, self._settings, self._gives_way = node, settings, gives_way
         try:
             flight = json.loads(settings.flight)
         except json.JSONDecodeError as error:
@@ -161,7 +168,7 @@ class RecorderLoop:
                 timely += 1
                 if taken.sent_ns >= begin_ns:
                     self._recorder.record(entry.topic, *taken)
-            if self._until_ns is None:  # once told to stop, it is in a hurry
+            if self._gives_way and self._until_ns is None:  # once told to stop, it is in a hurry
                 os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
         return TURN, timely
 
@@ -196,7 +203,7 @@ NODE = NodeKind(RecorderNodeSettings, RecorderLoop)
 def main() -> NoReturn:
     """Entry point of recorder_node."""
     os.nice(max(0, NICENESS - os.nice(0)))
-    run_nodes(NODE)
+    run_nodes(NodeKind(RecorderNodeSettings, partial(RecorderLoop, gives_way=True)))
 
 
 if __name__ == "__main__":

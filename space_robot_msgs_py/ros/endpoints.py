@@ -17,7 +17,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from ..topics import Topic
 from ..wire.source_guard import SourceGuard
-from .rclpy_internals import take_serialized
+from .rclpy_internals import raw_publish, take_serialized
 from .serialized_take import Received, serialized_take
 
 MOST_REFUSED = 1_000
@@ -63,13 +63,14 @@ class RawPublisher:
         self.topic = topic
         self._node = node
         self._publisher = node.create_publisher(message_type(topic.type), topic.name, qos(topic))
+        self._publish = raw_publish(self._publisher)
         self.sent = 0
         """Messages sent."""
 
     def publish(self, data: bytes) -> None:
         """Send serialized bytes."""
         self.sent += 1
-        self._publisher.publish(data)
+        self._publish(data)
 
     @property
     def listener_count(self) -> int:

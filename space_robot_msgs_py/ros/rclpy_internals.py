@@ -15,6 +15,7 @@ from rclpy.context import Context
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 
 VERSIONS = ("7.",)
 """Beginnings of rclpy's versions that this was written for: Jazzy's."""
@@ -39,10 +40,18 @@ def pointer(handle: Any) -> int:
 
 
 def take_serialized(handle: Any, message_type: Any) -> tuple[bytes, dict[str, int]] | None:
-    """The next message of a subscription, by its handle, with its info: rclpy's own take."""
-    with handle:
-        taken: tuple[bytes, dict[str, int]] | None = handle.take_message(message_type, True)
+    """Take a subscription's next message, by its handle, with its info: rclpy's own take.
+
+    Without rclpy's guard against another thread that destroys the subscription meanwhile.
+    """
+    taken: tuple[bytes, dict[str, int]] | None = handle.take_message(message_type, True)
     return taken
+
+
+def raw_publish(publisher: Publisher) -> Callable[[bytes], None]:
+    """The publisher's function for serialized messages; see `take_serialized` for its guard."""
+    publish: Callable[[bytes], None] = publisher.handle.publish_raw
+    return publish
 
 
 class SubscriptionWaitSet:
@@ -59,6 +68,28 @@ class SubscriptionWaitSet:
         for handle in handles:
             self._set.add_subscription(handle)
         self._set.wait(max(1, int(timeout_s * 1e9)))
+
+
+class ServiceWaitSet:
+    """A wait set for all services of a node."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._services: list[Any] = []
+        self._set: Any = None
+
+    def is_called(self) -> bool:
+        """Tell at once whether a request waits: in 20 us, where an executor's look takes 1 ms."""
+        if (services := list(self._node.services)) != self._services:
+            self._services = services
+            handle: Any = self._node.context.handle
+            with handle:
+                self._set = _rclpy.WaitSet(0, 0, 0, 0, len(services), 0, handle)
+        self._set.clear_entities()
+        for service in services:
+            self._set.add_service(service.handle)
+        self._set.wait(0)
+        return bool(self._set.get_ready_entities("service"))
 
 
 def parameter_overrides(node: Node) -> Mapping[str, Any]:

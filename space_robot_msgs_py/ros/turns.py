@@ -18,6 +18,8 @@ from .waiting import SPIN_S, Waiter
 LISTENER_PERIOD_S = 0.02
 REMIND_S = 5.0
 LONG_CALL_S = 0.1
+GLANCE_S = 1e-3
+"""A node among several looks so often whether a message has come that is not expected at once."""
 NO_WAIT = Wait(0.0)
 
 
@@ -84,6 +86,8 @@ class Turns:
             return
         if inputs := [entry for seat in seats for entry in seat.wait.inputs]:
             self._waiter.wait(inputs, left)
+            for seat in seats:
+                seat.glance_at = 0.0
         else:
             time.sleep(left)
 
@@ -104,6 +108,8 @@ class Seat:
         """What its loop waits for."""
         self.wake_at = 0.0
         """When it is to be stepped though no message has come, by the monotonic clock."""
+        self.glance_at = 0.0
+        """When it may be stepped at the earliest."""
         self._loop: Loop | None = None
         """The loop while it is stepped."""
         self._remind_at = 0.0
@@ -124,7 +130,7 @@ class Seat:
         if not self.node.is_active:
             self._loop = None
             return False
-        if now < self.wake_at and not self.wait.inputs:
+        if now < self.glance_at:
             return False
         if self._loop is None and not self._begin(now):
             return False
@@ -132,9 +138,14 @@ class Seat:
         wait = self._loop.step()
         if wait is None:
             return True
-        self.wait = wait
-        self.wake_at = now + wait.seconds
+        self._wait(wait, now)
         return False
+
+    def _wait(self, wait: Wait, now: float) -> None:
+        self.wait = wait
+        self.glance_at = self.wake_at = now + wait.seconds
+        if wait.inputs:
+            self.glance_at = 0.0 if wait.is_brief else min(now + GLANCE_S, self.wake_at)
 
     def _begin(self, now: float) -> bool:
         """Begin the loop of a node that has become active, once its listeners are there."""
@@ -147,7 +158,7 @@ class Seat:
                 self._remind_at = now + REMIND_S
                 waiting = ", ".join(f"{', '.join(v)} on {k}" for k, v in missing.items() if v)
                 node.log(f"waiting for {waiting}")
-            self.wait, self.wake_at = Wait(LISTENER_PERIOD_S), now + LISTENER_PERIOD_S
+            self._wait(Wait(LISTENER_PERIOD_S), now)
             return False
         self._remind_at = 0.0
         gc.collect()
