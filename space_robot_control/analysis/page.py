@@ -6,7 +6,8 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .table import DEFINITIONS, lines
+from .report_tables import comparison_table
+from .tables import Column, Table, Verdict
 from .template import template
 from .words import Report, law_of, notes, remarks
 
@@ -23,18 +24,28 @@ def render(
         descriptions: what was flown, as the bags have it.
         figures: caption and data URI of each.
     """
-    shown = lines(list(reports.values()))
-    groups = {group: [line for line in shown if line.group == group] for group in DEFINITIONS}
     return template("space_robot_control.analysis", "flights.html.j2").render(
-        reports=reports,
-        laws={name: law_of(report) for name, report in reports.items()},
-        groups={group: found for group, found in groups.items() if found},
-        definitions=DEFINITIONS,
+        names=list(reports),
+        recorded=_recorded(reports),
+        metrics=comparison_table(reports),
         notes={name: [*remarks(r), *notes(r)] for name, r in reports.items()},
-        whole={name: _whole(report) for name, report in reports.items()},
         descriptions={name: json.dumps(d, indent=1) for name, d in descriptions.items()},
         figures=figures,
     )
+
+
+def _recorded(reports: Mapping[str, Report]) -> Table:
+    names = ("bag", "law", "case", "gains", "robot", "time analysed", "ticks", "recording")
+    rows = [
+        [
+            name, law_of(report) or "not said",
+            *(report[key] or "not said" for key in ("case", "gains", "robot")),
+            f"{report['from_s']:g} to {report['to_s']:g} s", report["ticks"],
+            Verdict("", "whole", "good") if _whole(report) else Verdict("", "not whole", "bad"),
+        ]
+        for name, report in reports.items()
+    ]  # fmt: skip
+    return Table.of("", [Column(name) for name in names], rows)
 
 
 def _whole(report: Report) -> bool:

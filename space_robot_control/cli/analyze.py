@@ -137,7 +137,7 @@ def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
         found = list(reports.values())
         echo_json(found[0] if len(found) == 1 else found)
         return
-    from .report_display import print_comparison, print_figures, print_report
+    from .report_display import print_comparison, print_metrics, print_report
 
     console = terminal()
     if len(reports) > 1:
@@ -145,7 +145,7 @@ def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
         return
     for report in reports.values():
         print_report(report, console)
-        print_figures(report, console)
+        print_metrics(report, console)
 
 
 def _names(bags: Sequence[Path]) -> list[str]:

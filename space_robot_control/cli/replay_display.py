@@ -1,17 +1,17 @@
-"""What a person sees of a replay: counts, the first difference, the differences by axis."""
+"""A replay on a terminal: counts, the first difference, the differences by axis."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.table import Table
 
 from space_robot_msgs_py.bag.law_history import in_words
 
+from ..analysis.tables import Column, Table
+from ..analysis.terminal import print_table
 from ..analysis.words import flown as words_of
-from ..flight.terminal import say, show
+from ..flight.terminal import say
 
 COUNTS = {
     "played": "states sent",
@@ -28,12 +28,7 @@ ALWAYS = ("played", "compared", "equal")
 def print_replay(report: dict[str, Any], console: Console) -> None:
     """Print the report of `run.Replay`."""
     say(console, title(report))
-    table = Table(show_header=False)
-    table.add_column()
-    table.add_column(justify="right", no_wrap=True)
-    for name, count in counts(report):
-        table.add_row(name, count)
-    show(table, console)
+    print_table(Table.of("", (Column(is_label=True), Column()), counts(report)), console)
     if first := report["first_difference"]:
         _print_first(first, console)
     if not report["identical"]:
@@ -45,7 +40,7 @@ def print_replay(report: dict[str, Any], console: Console) -> None:
 
 
 def title(report: dict[str, Any]) -> str:
-    """What was replayed, by whom."""
+    """Say what was replayed, by whom."""
     now = report["replayed"]
     pace = "in lockstep" if report["lockstep"] else f"at {report['rate']:g} times real time"
     law, swaps = now["controller"], ""
@@ -59,7 +54,7 @@ def title(report: dict[str, Any]) -> str:
 
 
 def counts(report: dict[str, Any]) -> list[tuple[str, str]]:
-    """Name and number of each line of the table; what is zero and rare is left out."""
+    """List name and number of each line of the table; what is zero and rare is left out."""
     rows = [(words, str(report[k])) for k, words in COUNTS.items() if k in ALWAYS or report[k]]
     for key, words in (("recorded", "in the bag"), ("replayed", "now")):
         if number := report["unreadable"][key]:
@@ -69,7 +64,7 @@ def counts(report: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def verdict(report: dict[str, Any]) -> str:
-    """The outcome in a line."""
+    """Say the outcome in a line."""
     flown, first = report["recorded"], report["first_difference"]
     if not report["has_commands"]:
         return "the bag has no commands to compare with"
@@ -87,26 +82,23 @@ def verdict(report: dict[str, Any]) -> str:
 
 
 def _print_first(first: dict[str, Any], console: Console) -> None:
-    table = Table(
-        title=f"first difference: tick {first['tick']}, t = {first['time_s']:.4f} s",
-        title_justify="left", box=SIMPLE_HEAD, show_edge=False,  # so all digits fit in 80 columns
+    title = f"first difference: tick {first['tick']}, t = {first['time_s']:.4f} s"
+    columns = (
+        Column("field", is_label=True), Column("recorded"), Column("replayed"),
+        Column("by", spec=".3g"),
     )  # fmt: skip
-    for name in ("field", "recorded", "replayed", "by"):
-        table.add_column(name, justify="left" if name == "field" else "right", overflow="fold")
-    for field in first["fields"]:
-        amount = field["difference"]
-        table.add_row(
+    rows = [
+        [
             field["field"], str(field["recorded"]), str(field["replayed"]),
-            "" if amount is None else f"{amount:.3g}",
-        )  # fmt: skip
-    show(table, console)
+            "" if field["difference"] is None else field["difference"],
+        ]
+        for field in first["fields"]
+    ]  # fmt: skip
+    print_table(Table.of(title, columns, rows), console, dense=True)  # all digits in 80 columns
 
 
 def _print_axes(report: dict[str, Any], console: Console) -> None:
-    table = Table(title="torque, N m, over the ticks compared", title_justify="left")
-    names = ("axis", "RMS recorded", "RMS replayed", "RMS of difference", "largest difference")
-    for name in names:
-        table.add_column(name, justify="left" if name == "axis" else "right")
-    for axis, numbers in report["axes"].items():
-        table.add_row(axis, *("-" if v is None else f"{v:.4g}" for v in numbers.values()))
-    show(table, console)
+    names = ("RMS recorded", "RMS replayed", "RMS of difference", "largest difference")
+    columns = Column("axis", is_label=True), *(Column(name, spec=".4g") for name in names)
+    rows = [[axis, *numbers.values()] for axis, numbers in report["axes"].items()]
+    print_table(Table.of("torque, N m, over the ticks compared", columns, rows), console)

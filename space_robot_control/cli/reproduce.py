@@ -71,21 +71,13 @@ def reproduce(
 
 
 def _summary(record: dict[str, Any], out: Path) -> None:
-    from rich.table import Table
-    from rich.text import Text
+    from ..analysis.terminal import print_table
+    from ..flight.terminal import say, terminal
+    from ..paper.reproduction.claims import claims_table
 
-    from ..flight.terminal import say, show, terminal
-
-    table = Table("claim", "measured", "limit", "")
-    for claim in record["claims"]:
-        verdict = Text("holds", "green") if claim["holds"] else Text("fails", "red")
-        table.add_row(
-            claim["text"], f"{claim['value']:.4g}", f"{claim['relation']} {claim['limit']:g}",
-            verdict,
-        )  # fmt: skip
     console = terminal()
     if record["claims"]:
-        show(table, console)
+        print_table(claims_table(record["claims"]), console)
     diverged = {
         (cell["controller"], cell["gains"], cell["diverged_tick"])
         for cell in record["cells"]

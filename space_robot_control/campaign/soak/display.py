@@ -1,27 +1,21 @@
-"""What a person sees of a soak: a table, and the flights that failed."""
+"""A soak on a terminal: a table, and the flights that failed."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from rich.console import Console
-from rich.table import Table
 
-from ...flight.terminal import say, show
+from ...analysis.tables import Column, Table
+from ...analysis.terminal import print_table
+from ...flight.terminal import say
 
 
 def print_soak(report: dict[str, Any], console: Console) -> None:
     """Print the report of `run.Soak`."""
     ended = ", interrupted" if report["interrupted"] else ""
-    table = Table(
-        title=f"soak, seed {report['seed']}{ended}", title_justify="left", show_header=False
-    )
-    table.add_column()
-    table.add_column(justify="right", no_wrap=True)
-    table.add_column()
-    for row in rows(report):
-        table.add_row(*row)
-    show(table, console)
+    columns = Column(is_label=True), Column(), Column(is_label=True)
+    print_table(Table.of(f"soak, seed {report['seed']}{ended}", columns, rows(report)), console)
     for flown in report["each"]:
         if flown["survived"]:
             continue
@@ -34,7 +28,7 @@ def print_soak(report: dict[str, Any], console: Console) -> None:
 
 
 def rows(report: dict[str, Any]) -> list[tuple[str, str, str]]:
-    """Name, figure and remark of each line of the table."""
+    """List name, number and remark of each line of the table."""
     growth, files = report["memory_growth_mb"], report["shared_memory_files"]
     return [
         ("flights", str(report["flights"]), ""),

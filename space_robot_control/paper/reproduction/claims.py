@@ -1,10 +1,11 @@
-"""What the paper claims of its law, put as inequalities and judged by the flights."""
+"""The paper's claims of its law, put as inequalities and judged by the flights."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
+from ...analysis.tables import Column, Table, Verdict
 from .flights import Result
 from .table import Cell
 from .table_v import TORQUE, TRACKING
@@ -13,7 +14,7 @@ TDE_LAWS = ("tde_smc", "tde_tsmc", "tde_stc")
 
 
 class Claim(NamedTuple):
-    """``value`` against ``limit``."""
+    """An inequality between ``value`` and ``limit``."""
 
     text: str
     value: float
@@ -23,16 +24,32 @@ class Claim(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Whether the inequality is met."""
+        """True if the inequality is met."""
         return self.value <= self.limit if self.relation == "<=" else self.value >= self.limit
 
     def as_record(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return it as a dictionary, ready for JSON."""
         return {**self._asdict(), "holds": self.holds}
 
 
+def claims_table(records: Iterable[dict[str, Any]]) -> Table:
+    """Tabulate claims, as `Claim.as_record` has them, each with its verdict."""
+    columns = (
+        Column("claim", is_label=True), Column("measured", spec=".4g"), Column("limit"),
+        Column(is_label=True),
+    )  # fmt: skip
+    rows = [
+        [
+            claim["text"], claim["value"], f"{claim['relation']} {claim['limit']:g}",
+            Verdict("", "holds", "good") if claim["holds"] else Verdict("", "fails", "bad"),
+        ]
+        for claim in records
+    ]  # fmt: skip
+    return Table.of("", columns, rows)
+
+
 def claims(results: Sequence[Result], comparison: Sequence[Cell]) -> list[Claim]:
-    """Every claim whose flights are among the results."""
+    """Judge every claim whose flights are among the results."""
     paper = [c for c in comparison if c.definition == "mean_axis" and c.gains == "printed"]
     found = list(_torques(paper))
     found += _tracking(paper)

@@ -8,17 +8,16 @@ from typing import Any
 
 from space_robot_msgs_py.config.files import config_directory
 
+from ...analysis.tables import Table
 from ...analysis.template import template
-from .claims import Claim
 from .figures import FigureGroup
-from .table import Block
 
 
 def render(
     provenance: dict[str, Any],
     parameters: dict[str, Any],
-    claims: Sequence[Claim],
-    tables: Sequence[Block],
+    claims: Table,
+    tables: Sequence[Table],
     figure_groups: Sequence[FigureGroup],
 ) -> str:
     """Render the page as HTML, without references to anything outside itself.

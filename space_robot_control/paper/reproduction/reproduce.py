@@ -13,15 +13,15 @@ from typing import Any
 from space_robot_msgs_py.errors import InputError
 
 from ...analysis.figures.figure_set import FigureFolder
-from .chatter import HEADINGS as CHATTER_HEADINGS
-from .chatter import chatter
-from .claims import claims
+from ...analysis.tables import as_csv, as_markdown, as_records
+from .chatter import chatter, chatter_table
+from .claims import claims, claims_table
 from .figures import figure_groups, start_comparisons
 from .flights import Planned, Result, Row, fly, plan
 from .processes import processes
 from .provenance import provenance
 from .report import render
-from .table import Block, as_csv, as_markdown, as_records, blocks, cells
+from .table import cells, cells_table, variant_tables
 
 TABLE = "table_v"
 FULL_DURATION = 30.0
@@ -114,27 +114,28 @@ def _write(
 ) -> dict[str, Any]:
     folder, comparison = figures.path.parent, cells(results)
     judged, chattering = claims(results, comparison), chatter(results)
-    chatter_table = Block(
-        "Chatter in case 1, printed friction", CHATTER_HEADINGS, [c.texts() for c in chattering]
-    )
-    tables = [*blocks(comparison), chatter_table]
+    tables = [*variant_tables(comparison), chatter_table(chattering)]
+    numbers = cells_table(comparison)
     flown = {**provenance(), "duration_s": duration, "brief": brief}
     told = {
         f"{r.row.controller}, case {r.row.case}, {r.variant.gains} gains": r.parameters
         for r in results
         if r.variant.friction
     }
+    claim_records = [claim.as_record() for claim in judged]
     record = {
         "provenance": flown,
-        "claims": [claim.as_record() for claim in judged],
-        "cells": as_records(comparison),
+        "claims": claim_records,
+        "cells": as_records(numbers),
         "chatter": [row._asdict() for row in chattering],
         "parameters": told,
     }
     title = "Table V: measured / printed (ratio)"
     (folder / f"{TABLE}.md").write_text(as_markdown(title, tables), "utf-8")
-    (folder / f"{TABLE}.csv").write_text(as_csv(comparison), "utf-8")
+    (folder / f"{TABLE}.csv").write_text(as_csv(numbers), "utf-8")
     (folder / f"{TABLE}.json").write_text(json.dumps(record, indent=1) + "\n", "utf-8")
-    page = render(flown, told, judged, tables, list(figure_groups(rows, figures)))
+    page = render(
+        flown, told, claims_table(claim_records), tables, list(figure_groups(rows, figures))
+    )
     (folder / "report.html").write_text(page, "utf-8")
     return record

@@ -1,14 +1,19 @@
-"""Measured beside printed: one record a flight, definition and column; Markdown, CSV, JSON."""
+"""Measured beside printed: one record a flight, definition and column, and tables of them."""
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from ...analysis.tables import Column, Table
 from .flights import DEFINITIONS, VARIANTS, Result, Variant
 from .table_v import COLUMNS, HEADINGS, printed
+
+COLUMN_HEADS = (
+    Column("controller", is_label=True),
+    Column("case", is_label=True),
+    *(Column(*heading) for heading in HEADINGS.values()),
+)
 
 
 class Cell(NamedTuple):
@@ -28,7 +33,7 @@ class Cell(NamedTuple):
 
 
 def cells(results: Sequence[Result]) -> list[Cell]:
-    """Every comparison of every flight."""
+    """Compare every flight in every column, by both definitions."""
     return [
         _cell(result, definition, column)
         for result in results
@@ -47,37 +52,19 @@ def _cell(result: Result, definition: str, column: str) -> Cell:
     )  # fmt: skip
 
 
-def as_csv(comparison: Sequence[Cell]) -> str:
-    """One line a cell, with a heading; full precision."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(Cell._fields)
-    writer.writerows(comparison)
-    return text.getvalue()
+def cells_table(comparison: Sequence[Cell]) -> Table:
+    """Tabulate every number by itself, a row a cell, for other programs."""
+    return Table.of("Table V", [Column(name) for name in Cell._fields], comparison)
 
 
-def as_records(comparison: Sequence[Cell]) -> list[dict[str, Any]]:
-    """The same for JSON."""
-    return [cell._asdict() for cell in comparison]
-
-
-class Block(NamedTuple):
-    """A table as texts."""
-
-    title: str
-    headings: list[str]
-    rows: list[list[str]]
-
-
-def blocks(comparison: Sequence[Cell]) -> list[Block]:
-    """One table a variant flown and definition, cells ``measured / printed (ratio)``."""
+def variant_tables(comparison: Sequence[Cell]) -> list[Table]:
+    """Tabulate each variant flown by each definition, cells ``measured / printed (ratio)``."""
     found = []
     for definition, meaning in DEFINITIONS.items():
         for variant in VARIANTS:
             rows = _rows(comparison, variant, definition)
-            headings = ["controller", "case", *HEADINGS.values()]
             if rows:
-                found.append(Block(f"{variant.title}; {meaning}", headings, rows))
+                found.append(Table.of(f"{variant.title}; {meaning}", COLUMN_HEADS, rows))
     return found
 
 
@@ -101,15 +88,3 @@ def _text(cell: Cell) -> str:
     form = ".4f" if "torque" in cell.column else ".2e"
     ratio = f"{cell.ratio:.3f}" if cell.ratio > 0.01 else f"{cell.ratio:.1e}"
     return f"{cell.measured:{form}} / {cell.printed:{form}} ({ratio})"
-
-
-def as_markdown(title: str, tables: Sequence[Block]) -> str:
-    """A document of tables."""
-    lines = [f"# {title}", ""]
-    for table in tables:
-        lines += [f"## {table.title}", ""]
-        lines.append("| " + " | ".join(table.headings) + " |")
-        lines.append("|" + "---|" * len(table.headings))
-        lines += ["| " + " | ".join(row) + " |" for row in table.rows]
-        lines.append("")
-    return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""Table V as printed: what the flights are compared with."""
+"""Table V as printed, which the flights are compared with."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ COLUMNS = ("attitude", "joints_1_3", "joints_4_6", "base_torque", "torque_1_3", 
 TRACKING, TORQUE = COLUMNS[:3], COLUMNS[3:]
 
 HEADINGS = {
-    "attitude": "attitude",
-    "joints_1_3": "joints 1-3, rad",
-    "joints_4_6": "joints 4-6, rad",
-    "base_torque": "base torque, N m",
-    "torque_1_3": "torque 1-3, N m",
-    "torque_4_6": "torque 4-6, N m",
+    "attitude": ("attitude", ""),
+    "joints_1_3": ("joints 1-3", "rad"),
+    "joints_4_6": ("joints 4-6", "rad"),
+    "base_torque": ("base torque", "N m"),
+    "torque_1_3": ("torque 1-3", "N m"),
+    "torque_4_6": ("torque 4-6", "N m"),
 }
+"""Name and unit of each column."""
 
 PRINTED: dict[tuple[str, str], tuple[float, ...]] = {
     ("ctc", "1"): (2.5642e-4, 0.0107, 0.0227, 0.8772, 0.9896, 0.0454),
@@ -38,5 +39,5 @@ PRINTED: dict[tuple[str, str], tuple[float, ...]] = {
 
 
 def printed(controller: str, case: str, column: str) -> float:
-    """One number of Table V."""
+    """Return one number of Table V."""
     return PRINTED[controller, case][COLUMNS.index(column)]

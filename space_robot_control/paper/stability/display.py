@@ -1,23 +1,23 @@
-"""A study as tables on a terminal: every condition with its two numbers and a verdict."""
+"""A study as tables: every condition with its two numbers and a verdict."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
-from ...flight.terminal import say, show
+from ...analysis.tables import Column, Row, Table, Verdict
+from ...analysis.terminal import print_table
+from ...flight.terminal import say
 from .check import Check
 from .study import Study
 from .super_twisting import SuperTwisting
 
-COLOURS = {"holds": "green", "fails": "red", "open": "yellow"}
+TONES = {"holds": "good", "fails": "bad", "open": "open"}
 
 
 def print_study(study: Study, console: Console) -> None:
-    """All tables and a closing sentence."""
+    """Print all tables and a closing sentence."""
     flight = study.flight
     what = flight.description
     say(
@@ -26,8 +26,8 @@ def print_study(study: Study, console: Console) -> None:
         f"{what['robot']}: {flight.ticks * flight.period:g} s, "
         f"joint friction {'on' if flight.has_friction else 'off'}",
     )
-    show(_lemma_1(study), console)
-    show(_time_delay_error(study), console)
+    print_table(_lemma_1(study), console)
+    print_table(_time_delay_error(study), console)
     twisting, names = study.super_twisting, study.axis_names
     if twisting is None:
         say(
@@ -37,103 +37,93 @@ def print_study(study: Study, console: Console) -> None:
         )
         return
     for table in (_gain_conditions, _circle_criterion, _paper_lmi, _lmi, _matrices, _reaching):
-        show(table(names, twisting), console)
+        print_table(table(names, twisting), console)
     say(console, _closing(study, twisting))
 
 
-def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold")
-    table.add_column("", no_wrap=True)
-    for column in columns:
-        table.add_column(column, justify="right")
-    return table
+def _table(title: str, heads: Sequence[str], rows: Iterable[Row]) -> Table:
+    columns = [Column(is_label=True), *(Column(head) for head in heads)]
+    return Table.of(title, columns, list(rows))
 
 
 def _number(value: float | None) -> str:
     return "none" if value is None or value != value else f"{value:.3g}"
 
 
-def _verdict(check: Check) -> tuple[str, str]:
-    return check.verdict, COLOURS[check.verdict]
+def _verdict(text: str, check: Check) -> Verdict:
+    return Verdict(text, check.verdict, TONES[check.verdict])
 
 
-def _below(check: Check) -> Text:
-    return Text.assemble(f"{_number(check.value)} < {_number(check.limit)} ", _verdict(check))
+def _below(check: Check) -> Verdict:
+    return _verdict(f"{_number(check.value)} < {_number(check.limit)}", check)
 
 
-def _above(check: Check) -> Text:
-    return Text.assemble(f"{_number(check.limit)} > {_number(check.value)} ", _verdict(check))
+def _above(check: Check) -> Verdict:
+    return _verdict(f"{_number(check.limit)} > {_number(check.value)}", check)
 
 
 def _lemma_1(study: Study) -> Table:
-    table = _table("Lemma 1: W = E - H_S^-1 h_bar (69)", "min", "max", "at t (s)", "below 1")
-    rows = (
-        ("spectral norm, as printed", study.lemma_1.norm, study.lemma_1.norm_below_one),
-        ("spectral radius", study.lemma_1.radius, study.lemma_1.radius_below_one),
-    )
-    for name, extremes, check in rows:
-        table.add_row(
+    rows = [
+        [
             name, f"{extremes.smallest:.4f}", f"{extremes.largest:.4f}",
-            f"{extremes.largest_at:.2f}",
-            Text.assemble(f"{check.value:.4f} < {check.limit:g} ", _verdict(check)),
-        )  # fmt: skip
-    return table
+            f"{extremes.largest_at:.2f}", _verdict(f"{check.value:.4f} < {check.limit:g}", check),
+        ]
+        for name, extremes, check in (
+            ("spectral norm, as printed", study.lemma_1.norm, study.lemma_1.norm_below_one),
+            ("spectral radius", study.lemma_1.radius, study.lemma_1.radius_below_one),
+        )
+    ]  # fmt: skip
+    title = "Lemma 1: W = E - H_S^-1 h_bar (69)"
+    return _table(title, ("min", "max", "at t (s)", "below 1"), rows)
 
 
 def _time_delay_error(study: Study) -> Table:
     flown, smooth = study.error, study.frictionless_error
-    table = _table(
-        "Time-delay error eps (65), beta = max |d eps/dt| (rad/s3; base 1/s3)",
-        "max |eps|", "beta", "at t (s)", "99.9 %", *(["frictionless", "99.9 %"] if smooth else []),
-    )  # fmt: skip
-    for i, name in enumerate(study.axis_names):
-        cells = [
-            _number(flown.error[i]), _number(flown.beta[i]), f"{flown.beta_at[i]:.4f}",
+    title = "Time-delay error eps (65), beta = max |d eps/dt| (rad/s3; base 1/s3)"
+    heads = ["max |eps|", "beta", "at t (s)", "99.9 %"]
+    rows = [
+        [
+            name, _number(flown.error[i]), _number(flown.beta[i]), f"{flown.beta_at[i]:.4f}",
             _number(flown.beta_robust[i]),
-        ]  # fmt: skip
-        if smooth:
-            cells += [_number(smooth.beta[i]), _number(smooth.beta_robust[i])]
-        table.add_row(name, *cells)
-    return table
+        ]
+        for i, name in enumerate(study.axis_names)
+    ]  # fmt: skip
+    if smooth:
+        heads += ["frictionless", "99.9 %"]
+        for i, row in enumerate(rows):
+            row += [_number(smooth.beta[i]), _number(smooth.beta_robust[i])]
+    return _table(title, heads, rows)
 
 
 def _gain_conditions(names: Sequence[str], twisting: SuperTwisting) -> Table:
-    table = _table("Gain conditions (46)", "K_2 > beta", "K_1^2 > 4 K_2")
-    rows = zip(names, twisting.k_2_above_beta, twisting.k_1_squared_above_4_k_2, strict=True)
-    for name, bounded, damped in rows:
-        table.add_row(name, _above(bounded), _above(damped))
-    return table
+    checks = zip(names, twisting.k_2_above_beta, twisting.k_1_squared_above_4_k_2, strict=True)
+    rows = [[name, _above(bounded), _above(damped)] for name, bounded, damped in checks]
+    return _table("Gain conditions (46)", ("K_2 > beta", "K_1^2 > 4 K_2"), rows)
 
 
 def _circle_criterion(names: Sequence[str], twisting: SuperTwisting) -> Table:
-    table = _table("Circle criterion (73)", "max |G| < 1 / beta (s3/rad)", "beta tolerated")
-    rows = zip(names, twisting.circle_criterion, twisting.tolerated_beta, strict=True)
-    for name, check, tolerated in rows:
-        table.add_row(name, _below(check), _number(tolerated))
-    return table
+    found = zip(names, twisting.circle_criterion, twisting.tolerated_beta, strict=True)
+    rows = [[name, _below(check), _number(tolerated)] for name, check, tolerated in found]
+    heads = "max |G| < 1 / beta (s3/rad)", "beta tolerated"
+    return _table("Circle criterion (73)", heads, rows)
 
 
 def _paper_lmi(names: Sequence[str], twisting: SuperTwisting) -> Table:
-    table = _table(
-        "LMI (51), M of (48), beta = gamma = 0",
-        "eigenvalues of M", "of the LMI, largest",
-    )  # fmt: skip
-    rows = zip(names, twisting.paper_m_eigenvalues, twisting.paper_m_residual, strict=True)
-    for name, (low, high), check in rows:
-        table.add_row(name, f"{_number(low)}, {_number(high)}", _below(check))
-    return table
+    found = zip(names, twisting.paper_m_eigenvalues, twisting.paper_m_residual, strict=True)
+    rows = [
+        [name, f"{_number(low)}, {_number(high)}", _below(check)]
+        for name, (low, high), check in found
+    ]
+    heads = "eigenvalues of M", "of the LMI, largest"
+    return _table("LMI (51), M of (48), beta = gamma = 0", heads, rows)
 
 
 def _lmi(names: Sequence[str], twisting: SuperTwisting) -> Table:
-    table = _table(
-        "LMI (51), M free: gamma for beta measured, and for half the beta tolerated",
-        "gamma at\nbeta measured", "half\nbeta", "gamma", "eigenvalues\nof M",
-        "of the LMI,\nlargest",
-    )  # fmt: skip
-    rows = zip(
+    rows = []
+    found = zip(
         names, twisting.measured_certificates, twisting.assumed_certificates, strict=True
     )  # fmt: skip
-    for name, measured, assumed in rows:
+    for name, measured, assumed in found:
         cells = ["none"] * 4
         if assumed:
             low, high = assumed.eigenvalues
@@ -141,33 +131,39 @@ def _lmi(names: Sequence[str], twisting: SuperTwisting) -> Table:
                 _number(assumed.beta), _number(assumed.gamma), f"{_number(low)}, {_number(high)}",
                 f"{assumed.residual:.1e}",
             ]  # fmt: skip
-        table.add_row(name, _number(measured.gamma if measured else None), *cells)
-    return table
+        rows.append([name, _number(measured.gamma if measured else None), *cells])
+    return _table(
+        "LMI (51), M free: gamma for beta measured, and for half the beta tolerated",
+        ("gamma at\nbeta measured", "half\nbeta", "gamma", "eigenvalues\nof M",
+         "of the LMI,\nlargest"),
+        rows,
+    )  # fmt: skip
 
 
 def _matrices(names: Sequence[str], twisting: SuperTwisting) -> Table:
-    table = _table("M of that solution, for half the beta tolerated", "M_11", "M_12", "M_22")
+    rows = []
     for name, certificate in zip(names, twisting.assumed_certificates, strict=True):
         entries = certificate.m[[0, 0, 1], [0, 1, 1]] if certificate else [None] * 3
-        table.add_row(name, *(_number(entry) for entry in entries))
-    return table
+        rows.append([name, *(_number(entry) for entry in entries)])
+    title = "M of that solution, for half the beta tolerated"
+    return _table(title, ("M_11", "M_12", "M_22"), rows)
 
 
 def _reaching(names: Sequence[str], twisting: SuperTwisting) -> Table:
-    table = _table(
-        f"Reaching time (56) from an error of {twisting.initial_error:g} on every axis",
-        "V(0)", "its beta", "beta flown", "|s| below", "measured < bound (s)",
-    )  # fmt: skip
-    rows = zip(
+    found = zip(
         names, twisting.initial_values, twisting.certificates, twisting.reaching_beta,
         twisting.reaching.threshold, twisting.reaching_time, strict=True,
     )  # fmt: skip
-    for name, value, certificate, flown, threshold, check in rows:
-        table.add_row(
+    rows = [
+        [
             name, _number(value), _number(certificate.beta if certificate else None),
             _number(flown), _number(threshold), _below(check),
-        )  # fmt: skip
-    return table
+        ]
+        for name, value, certificate, flown, threshold, check in found
+    ]  # fmt: skip
+    title = f"Reaching time (56) from an error of {twisting.initial_error:g} on every axis"
+    heads = "V(0)", "its beta", "beta flown", "|s| below", "measured < bound (s)"
+    return _table(title, heads, rows)
 
 
 def _closing(study: Study, twisting: SuperTwisting) -> str:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rich.table import Table
 
 from space_robot_control.analysis import analyze
-from space_robot_control.cli.report_display import print_comparison, print_figures, print_report
+from space_robot_control.cli.report_display import print_comparison, print_metrics, print_report
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_control.flight.terminal import say, show, terminal
@@ -40,7 +40,7 @@ def test_every_number_is_shown_whole_on_any_width(report: dict[str, Any], width:
         assert key in words
     text = shown(
         width,
-        lambda console: print_figures(report, console),
+        lambda console: print_metrics(report, console),
         lambda console: print_comparison({"one": report, "two": report}, console),
     )
     for value in report["maxima"].values():

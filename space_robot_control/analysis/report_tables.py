@@ -1,17 +1,18 @@
-"""A report, or several, as lines of text: what the terminal and the page both show."""
+"""The tables of a report, or of several: what the terminal and the page both show."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import groupby
 from typing import Any, NamedTuple
 
 from .pointing import ARCSEC
 from .settling import BAND
-from .words import Report
+from .tables import NONE, Column, Group, Table
+from .words import Report, flown, law_of, notes, remarks
 
 UNITS = {"attitude": "-", "joints": "rad", "base_torque": "N m", "torque": "N m"}
-NONE = "-"
 
 DEFINITIONS = {
     "RMS, mean of axes": "mean over a column's axes of each axis' root mean square: what Table V "
@@ -35,27 +36,72 @@ DEFINITIONS = {
     "base's drift": "of the base's centre of mass from where it began; nothing holds it",
     "recording": "what is missing of the flight or was found wrong with the bag",
 }
-"""What each group of figures means, for someone who sees it for the first time."""
+"""What each group of metrics means, for someone who sees it for the first time."""
 
 
 class Line(NamedTuple):
-    """One figure of each report."""
+    """One metric of each report."""
 
     group: str
     """A key of `DEFINITIONS`."""
     name: str
     unit: str
     texts: list[str]
-    """One a report; `NONE` where it does not have the figure."""
+    """One a report; `NONE` where it does not have the metric."""
+
+
+def rms_table(report: Report) -> Table:
+    """Tabulate RMS and chatter of a flight; its remarks stand below."""
+    title = f"{flown(report)}: {report['ticks']} ticks, {report['duration_s']:g} s"
+    columns = (
+        Column(is_label=True), Column("unit"), Column("RMS, mean of axes"),
+        Column("RMS, eq. (64)"), Column("variation per s", spec=".3g"),
+        Column("power > 100 Hz", spec=".2e"),
+    )  # fmt: skip
+    chatter = report["chatter"].values()
+    rows: list[list[Any]] = []
+    for key, value in report["rms"]["mean_axis"].items():
+        spec = ".4f" if "torque" in key else ".3e"
+        rms = f"{value:{spec}}", f"{report['rms']['eq64'][key]:{spec}}"
+        rows.append([key, unit_of(key), *rms, *(measure.get(key, "") for measure in chatter)])
+    return Table(title, columns, [Group(rows)], remarks(report))
+
+
+def metrics_table(report: Report) -> Table:
+    """Tabulate what `rms_table` leaves out; below stands why a metric is missing."""
+    columns = Column(is_label=True), Column()
+    return Table("further metrics", columns, _groups(lines([report], brief=True)), notes(report))
+
+
+def comparison_table(reports: Mapping[str, Report]) -> Table:
+    """Tabulate all metrics of several bags, a column each."""
+    each = list(reports.values())
+    flights: list[list[Any]] = [["controller", *map(law_of, each)]]
+    for key in ("case", "gains", "robot"):
+        flights.append([key, *(report[key] and str(report[key]) for report in each)])
+    flights.append(["time (s)", *(f"{r['from_s']:g} to {r['to_s']:g}" for r in each)])
+    columns = Column(is_label=True), *(Column(name) for name in reports)
+    return Table("", columns, [Group(flights, "flight"), *_groups(lines(each))])
+
+
+def _groups(shown: Sequence[Line]) -> list[Group]:
+    return [
+        Group(
+            [[f"{x.name} ({x.unit})" if x.unit else x.name, *x.texts] for x in found],
+            name,
+            DEFINITIONS[name],
+        )
+        for name, found in groupby(shown, key=lambda line: line.group)
+    ]
 
 
 def unit_of(column: str) -> str:
-    """The unit of a column of Table V."""
+    """Return the unit of a column of Table V."""
     return next(unit for prefix, unit in UNITS.items() if column.startswith(prefix))
 
 
 def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
-    """All figures of the reports, a line each.
+    """List all metrics of the reports, a line each.
 
     Args:
         reports: of `analyze`.
@@ -113,7 +159,7 @@ def _columns(
     text: Callable[[Any], str],
     label: Callable[[str], str] = str,
 ) -> list[Line]:
-    """A line for every key below ``path`` in any of the reports."""
+    """Make a line for every key below ``path`` in any of the reports."""
     below = [_at(report, path) for report in reports]
     keys = dict.fromkeys(key for values in below for key in values)
     return [
