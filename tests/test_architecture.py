@@ -13,7 +13,7 @@ ROOMS = {
         "errors", "topics", "compiled", "samples", "config", "wire", "bag", "ros", "recorder_node",
     ),
     "space_robot_sim": (
-        "dynamics", "robot", "environment", "faults", "actuators", "sensors", "plant",
+        "dynamics", "robot", "faults", "environment", "actuators", "sensors", "plant",
         "plant_node",
     ),
     "space_robot_control": (
@@ -97,7 +97,7 @@ def test_the_ground_floor_names_no_upper_one() -> None:
 
 
 def test_the_ground_floor_names_no_kind_of_fault() -> None:
-    from space_robot_sim.faults.catalogue import KINDS
+    from space_robot_control.flight.faults import KINDS
 
     kinds = set(KINDS)
     broken = [

@@ -13,7 +13,9 @@ from .options import OPTIONS, flight_options, plan_flight
 
 def _list_faults(context: click.Context, given: Sequence[str]) -> Sequence[str]:
     if list(given) == ["list"]:
-        from space_robot_sim.faults.catalogue import KINDS, help_lines
+        from space_robot_sim.faults.grammar import help_lines
+
+        from ..flight.faults import KINDS
 
         click.echo("\n".join(help_lines(KINDS)))
         context.exit()

@@ -13,8 +13,8 @@ from pydantic import ByteSize, Field
 from space_robot_msgs_py.bag.mcap_file import Compression
 from space_robot_msgs_py.config.validation import StrictModel, one_of, short
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.faults.catalogue import KINDS, parse_faults
-from space_robot_sim.plant.faults import PlantFaults
+from space_robot_sim.faults.grammar import Kinds, parse_faults
+from space_robot_sim.plant.faults import PLANT_KINDS, PlantFaults
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import MOST_TICKS
 
@@ -22,6 +22,7 @@ from ..controller.controller import Controller
 from ..controller.gains import build_laws
 from ..controller.swaps import parse_swaps
 from ..mission.mission import Mission
+from .faults import KINDS, PROCESS_KINDS
 from .node_settings import FlightSettings
 from .robots import Robots
 from .software import commit, versions
@@ -43,7 +44,7 @@ class FlightPlan(StrictModel):
     realtime: bool = False
     fifo_priority: int = 0
     faults: list[str] = Field(default_factory=list)
-    """What fails, each as ``KIND@T[-END][:ARGUMENT]``, see `space_robot_sim.faults.catalogue`."""
+    """What fails, each as ``KIND@T[-END][:ARGUMENT]``, see `space_robot_control.flight.faults`."""
     seed: Annotated[int, Field(ge=0)] = 0
     """Of the faults' random numbers."""
     swaps: list[str] = Field(default_factory=list)
@@ -61,13 +62,13 @@ class FlightPlan(StrictModel):
     parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """Further parameters by node, dotted names."""
 
-    def faults_of(self, where: str) -> list[str]:
-        """Those that ``where`` ("plant" or "orchestrator") brings about.
+    def faults_of(self, kinds: Kinds) -> list[str]:
+        """Return the texts of the faults that are of some ``kinds``.
 
         Raises:
             InputError: a fault that cannot be.
         """
-        return [str(f) for f in parse_faults(self.faults, KINDS) if KINDS[f.kind].where == where]
+        return [str(f) for f in parse_faults(self.faults, KINDS) if f.kind.name in kinds]
 
     def options(self) -> dict[str, dict[str, Any]]:
         """What the options, without ``parameters``, say to each node, by dotted name."""
@@ -79,7 +80,7 @@ class FlightPlan(StrictModel):
                 "realtime": self.realtime,
                 "command_latency_ticks": self.command_latency_ticks,
                 "fifo_priority": self.fifo_priority,
-                "faults": self.faults_of("plant"),
+                "faults": self.faults_of(PLANT_KINDS),
                 "fault_seed": self.seed,
                 **({} if self.friction else NO_FRICTION),
             },
@@ -133,7 +134,7 @@ class Flight:
         """Ticks and the laws in force from there on."""
         self.parameters = settings.parameters(laws)
         """What every node is given over its files, by dotted name."""
-        self.orchestrator_faults = parse_faults(plan.faults_of("orchestrator"), KINDS)
+        self.orchestrator_faults = parse_faults(plan.faults_of(PROCESS_KINDS), KINDS)
         self._check_composed()
         self.law = next(iter(laws.values()))
         """In force at the start."""
@@ -163,7 +164,7 @@ class Flight:
     def _check_composed(self) -> None:
         if not self.plan.composed:
             return
-        asked = [f"fault {fault}" for fault in self.plan.faults_of("orchestrator")]
+        asked = [f"fault {fault}" for fault in self.plan.faults_of(PROCESS_KINDS)]
         if self.plan.restart_controller:
             asked.append("restart_controller")
         if asked:
@@ -191,9 +192,9 @@ class Flight:
     def faults(self) -> list[str]:
         """All that will fail, as text."""
         in_plant = [text for text in self.plant_settings.faults if text.strip()]
-        if in_plant == self.plan.faults_of("plant"):
+        if in_plant == self.plan.faults_of(PLANT_KINDS):
             return self.plan.faults
-        return [*in_plant, *self.plan.faults_of("orchestrator")]
+        return [*in_plant, *self.plan.faults_of(PROCESS_KINDS)]
 
     @property
     def has_friction(self) -> bool:

@@ -1,1 +1,1 @@
-"""What turns commands into torques."""
+"""What turns commands into torques: delay, limits."""

@@ -1,1 +1,1 @@
-"""What acts on the robot besides its actuators."""
+"""What acts on the robot besides its actuators: friction, disturbances, payload."""

@@ -1,1 +1,4 @@
-"""Faults as text, and when each of them acts. Knows no ROS."""
+"""Faults as text, when each acts, and those of the messages between plant and controller.
+
+The faults of a sensor, an actuator or the environment stand beside it. Knows no ROS.
+"""

@@ -49,7 +49,7 @@ class FaultyPlantLoop(PlantLoop):
         for command in faults.commands.arrivals(plant.tick):
             guard.offered.tick, guard.offered.torque[:] = command.stamp, command.item
             guard.accept(plant.tick)
-        faults.actuators.apply(plant.tick, plant.torque_limit, plant.coulomb_friction)
+        faults.apply(plant)
         super()._end_tick()
 
     def _deliver(self) -> None:

@@ -11,7 +11,9 @@ from space_robot_msgs_py.compiled.records import Record, nested, shaped
 from ..dynamics.aba import aba
 from ..dynamics.attitude import quaternion_rate, rotate, rotation_matrix
 from ..dynamics.model import Data, Model
-from ..environment.environment import Environment, disturbance_torque, friction_torque
+from ..environment.disturbance import disturbance_torque
+from ..environment.environment import Environment
+from ..environment.friction import friction_torque
 
 Array = NDArray[np.float64]
 
@@ -30,7 +32,9 @@ class Stages(Record):
     force: Array = shaped(lambda n: (n + 6,))
     """Generalised force, base part on inertial axes."""
     disturbance: Array = shaped(lambda n: (n + 3,))
-    """f_d."""
+    """f_d of (61), N m."""
+    friction: Array = shaped(lambda n: (n,))
+    """f_f of each joint, N m."""
     data: Data = nested(Data)
 
 
@@ -42,19 +46,20 @@ def state_derivative(
     """Write xdot into ``out``: (27) with ``torque`` (n+3,) fixed in the *base* frame and f0 = 0."""
     n = model.mass.size - 1
     quaternion, theta = x[3:7], x[7 : 7 + n]
-    v0, w0, rate = x[7 + n : 10 + n], x[10 + n : 13 + n], x[13 + n :]
-    force = stages.force
+    v0, w0, joint_velocities = x[7 + n : 10 + n], x[10 + n : 13 + n], x[13 + n :]
+    force, friction = stages.force, stages.friction
     rotation_matrix(quaternion, stages.data.rotation)
     rotate(stages.data.rotation, torque[:3], force[3:6])
     for k in range(3):
         force[k] = 0.0
         force[3 + k] -= disturbance[k]
+    friction_torque(environment.friction, joint_velocities, friction)
     for i in range(n):
-        force[6 + i] = torque[3 + i] - disturbance[3 + i] - friction_torque(environment, i, rate[i])
+        force[6 + i] = torque[3 + i] - disturbance[3 + i] - friction[i]
     out[0:3] = v0
     quaternion_rate(quaternion, w0, out[3:7])
-    out[7 : 7 + n] = rate
-    aba(model, quaternion, theta, w0, rate, force, stages.data, out[7 + n :])
+    out[7 : 7 + n] = joint_velocities
+    aba(model, quaternion, theta, w0, joint_velocities, force, stages.data, out[7 + n :])
 
 
 @kernel
@@ -69,7 +74,7 @@ def rk4_step(
     for k in range(4):
         step = 0.0 if k == 0 else (period if k == 3 else 0.5 * period)
         if k != 2:  # the two stages in the middle are at one time
-            disturbance_torque(environment, time + step, disturbance)
+            disturbance_torque(environment.disturbance, time + step, disturbance)
         if k > 0:
             for i in range(size):
                 stage[i] = x[i] + step * slope[k - 1, i]

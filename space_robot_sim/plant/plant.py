@@ -10,20 +10,16 @@ from pydantic import Field
 
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
-from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import Command, RobotState, State
 
-from ..dynamics.attitude import rotate_back, rotation_matrix
+from ..actuators.actuators import Actuators, ActuatorSettings, actuate
+from ..actuators.command_delay import command_delay_buffer
 from ..dynamics.model import Model
-from ..environment.environment import (
-    DisturbanceSettings,
-    Environment,
-    FrictionSettings,
-    PayloadSettings,
-    with_payload,
-)
+from ..environment.environment import Environment, EnvironmentSettings
+from ..environment.payload import with_payload
 from ..robot import Robot
+from ..sensors.measurement import measure
 from .integrator import Stages, rk4_step
 
 Array = NDArray[np.float64]
@@ -33,21 +29,9 @@ RATE_LIMIT = 1e4
 """rad/s; a body that turns faster has left the physics (a diverged loop)."""
 
 
-class PlantSettings(StrictModel):
+class PlantSettings(ActuatorSettings, EnvironmentSettings):
     """What the plant is told about its world, beside the robot's own file."""
 
-    friction: FrictionSettings = FrictionSettings()
-    disturbance: DisturbanceSettings = DisturbanceSettings()
-    payload: PayloadSettings = PayloadSettings()
-    command_latency_ticks: Annotated[int, Field(ge=0, le=1000)] = Field(
-        0, description="ticks by which a command is applied late"
-    )
-    base_torque_limit: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
-        0.0, description="largest torque on each base axis, N m (0: none)"
-    )
-    joint_torque_limit: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
-        0.0, description="largest torque on each joint, N m (0: none)"
-    )
     initial_joints_deg: list[float] = Field(
         [0.0], description="joint angles at tick 0, degrees, one a joint"
     )
@@ -61,13 +45,10 @@ class PlantMemory(Record):
 
     model: Model = nested(Model)
     environment: Environment = nested(Environment)
+    actuators: Actuators = nested(Actuators)
     stages: Stages = nested(Stages)
     x: Array = shaped(lambda n: (2 * n + 13,))
     """The state, see `Stages`."""
-    limit: Array = shaped(lambda n: (n + 3,))
-    """Largest torque on each axis, N m."""
-    saturated_ticks: float = shaped(lambda n: ())
-    """Ticks so far in which a torque was at its limit."""
     rotation: Array = shaped(lambda n: (3, 3))
     """Scratch."""
     measured: State = nested(State)
@@ -100,15 +81,15 @@ class Plant:
         self.period = period
         self.block = PlantMemory.block(n)
         """The plant's `PlantMemory`, for compiled loops."""
-        self.command_delay_buffer = np.zeros((settings.command_latency_ticks, n + 3))
+        self.command_delay_buffer = command_delay_buffer(settings, n)
         """Ring of the commands that are still on their way."""
-        memory: PlantMemory = self.block[0]
-        environment = Environment.build(n, settings.friction, settings.disturbance)
-        assign(memory, model=self.robot.model, environment=environment)
+        memory = self.memory
+        assign(
+            memory, model=self.robot.model, environment=Environment.build(n, settings),
+            actuators=Actuators.build(n, settings),
+        )  # fmt: skip
         memory.x[3:7] = np.array(settings.initial_quaternion) / norm
         memory.x[7 : 7 + n] = np.radians(settings.initial_joints_deg)
-        memory.limit[:] = settings.joint_torque_limit or np.inf
-        memory.limit[:3] = settings.base_torque_limit or np.inf
         self.state = RobotState(0, self.block["measured"])
         # at rest: what `measure` would say, without waiting for compiled code
         self.state.quaternion[:] = memory.x[3:7]
@@ -120,22 +101,15 @@ class Plant:
         return self.state.tick
 
     @property
-    def torque_limit(self) -> Array:
-        """(n+3,) largest torque of each axis, N m; may be changed in flight."""
-        memory: PlantMemory = self.block[0]
-        return memory.limit
-
-    @property
-    def coulomb_friction(self) -> Array:
-        """(n,) Coulomb friction of each joint, N m; may be changed in flight."""
-        memory: PlantMemory = self.block[0]
-        return memory.environment.coulomb
+    def memory(self) -> PlantMemory:
+        """The record in `block`; its numbers may be changed in flight."""
+        record: PlantMemory = self.block[0]
+        return record
 
     @property
     def saturated_ticks(self) -> int:
         """Ticks so far in which a torque was at its limit."""
-        memory: PlantMemory = self.block[0]
-        return int(memory.saturated_ticks)
+        return int(self.memory.actuators.torque_limit.saturated_ticks)
 
     def step(self, command: Command) -> None:
         """Hold ``command`` (or the one due, if commands are delayed) over one tick.
@@ -168,41 +142,25 @@ def step(
 def advance(
     memory: PlantMemory, command_delay_buffer: Array, torque: Array, tick: int, period: float
 ) -> float:
-    """Apply ``torque`` (n+3,) from ``tick`` to the next, or the one due from the delay buffer.
+    """Fly from ``tick`` to the next under the command ``torque`` (n+3,), N m, given at ``tick``.
 
     Returns:
-        The fastest rate then, see `measure`.
+        The fastest rate then, see `fastest_rate`.
     """
-    applied, limit, saturated = memory.measured.applied_torque, memory.limit, 0.0
-    latency = command_delay_buffer.shape[0]
-    for i in range(applied.size):
-        due = torque[i]
-        if latency > 0:
-            due = command_delay_buffer[tick % latency, i]
-            command_delay_buffer[tick % latency, i] = torque[i]
-        applied[i] = min(max(due, -limit[i]), limit[i])
-        if applied[i] != due:
-            saturated = 1.0
-    memory.saturated_ticks += saturated
+    measured = memory.measured
+    actuate(memory.actuators, command_delay_buffer, torque, tick, measured.applied_torque)
     rk4_step(
-        memory.model, memory.environment, memory.x, applied, tick * period, period, memory.stages
-    )
-    fastest: float = measure(memory)
+        memory.model, memory.environment, memory.x, measured.applied_torque, tick * period,
+        period, memory.stages,
+    )  # fmt: skip
+    measure(memory.x, memory.rotation, measured)
+    fastest: float = fastest_rate(memory.x, measured.joint_positions.size)
     return fastest
 
 
 @kernel
-def measure(memory: PlantMemory) -> float:
-    """Write what the sensors see; returns the fastest rate, rad/s (NaN if any is)."""
-    x, measured = memory.x, memory.measured
-    n = measured.joint_positions.size
-    measured.base_position[:] = x[:3]
-    measured.quaternion[:] = x[3:7]
-    measured.joint_positions[:] = x[7 : 7 + n]
-    measured.base_velocity[:] = x[7 + n : 10 + n]
-    rotation_matrix(measured.quaternion, memory.rotation)
-    rotate_back(memory.rotation, x[10 + n : 13 + n], measured.omega_base)
-    measured.joint_velocities[:] = x[13 + n :]
+def fastest_rate(x: Array, n: int) -> float:
+    """Return the fastest angular velocity of base axes and joints, rad/s (NaN if any is)."""
     fastest = 0.0
     for i in range(10 + n, x.size):
         if not abs(x[i]) <= fastest:  # also true of NaN

@@ -11,7 +11,8 @@ from pydantic import AfterValidator, Field
 from space_robot_msgs_py.config.files import mission_file, named_file
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 
-from ..faults.catalogue import PLANT_KINDS, Fault, parse_faults
+from ..faults.grammar import Fault, parse_faults
+from .faults import PLANT_KINDS
 from .plant import PlantSettings
 
 MOST_TICKS = 10**10

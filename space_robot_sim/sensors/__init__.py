@@ -1,1 +1,1 @@
-"""What is measured of the true state."""
+"""What is measured of the true state, and how measurements go wrong."""

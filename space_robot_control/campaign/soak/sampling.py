@@ -5,8 +5,9 @@ from __future__ import annotations
 import random
 import shlex
 
-from space_robot_sim.faults.catalogue import KINDS, Argument, Kind, parse_faults
+from space_robot_sim.faults.grammar import Argument, Kind, parse_faults
 
+from ...flight.faults import KINDS, NODE_OF
 from ...flight.plan import FlightPlan
 from ...laws import laws
 
@@ -71,7 +72,9 @@ def sample_flight(seed: int, index: int, duration_s: float = 5.0) -> FlightPlan:
 def breaks_tracking(plan: FlightPlan) -> bool:
     """Whether a flight's faults take torque or reference away, so that errors must grow."""
     faults = parse_faults(plan.faults, KINDS)
-    return any(f.kind in BREAKING or (f.kind in SILENCING and f.value == 1.0) for f in faults)
+    return any(
+        f.kind.name in BREAKING or (f.kind.name in SILENCING and f.value == 1.0) for f in faults
+    )
 
 
 def command_line(plan: FlightPlan) -> str:
@@ -96,11 +99,11 @@ def _faults(chance: random.Random, duration_s: float) -> list[str]:
     kinds = [kind for kind in KINDS.values() if EARLIEST_S.get(kind.name, 0.0) < latest_s]
     texts, failed = [], set()
     for kind in chance.sample(kinds, chance.randint(1, MOST_FAULTS)):
-        _, _, process = kind.name.partition("_")
-        if kind.where == "orchestrator" and process != "controller":
-            if process in failed:
+        node = NODE_OF.get(kind)
+        if node and node != "controller":
+            if node in failed:
                 continue
-            failed.add(process)
+            failed.add(node)
         texts.append(_fault(chance, kind, duration_s))
     return texts
 

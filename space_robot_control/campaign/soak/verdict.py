@@ -16,9 +16,10 @@ from space_robot_msgs_py.errors import SpaceRobotError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
-from space_robot_sim.faults.catalogue import KINDS, parse_faults
+from space_robot_sim.faults.grammar import parse_faults
 
 from ...analysis.metrics import tracking_error
+from ...flight.faults import KINDS
 from ...flight.node_modules import MODULES
 from ...flight.plan import Flight
 
@@ -50,7 +51,7 @@ def judge(flight: Flight, report: dict[str, Any] | None, bag: Path) -> Outcome:
     read is told.
     """
     outcome = Outcome()
-    kinds = [fault.kind for fault in parse_faults(flight.faults, KINDS)]
+    kinds = [fault.kind.name for fault in parse_faults(flight.faults, KINDS)]
     if report is not None:
         outcome.restarts = report["graph"]["restarts"]
         outcome.wrong += unplanned_deaths(kinds, report["graph"]["events"])

@@ -9,6 +9,7 @@ from typing import Any
 
 from space_robot_msgs_py.errors import FlightError
 
+from ..faults import NODE_OF
 from ..interruption import exit_code
 from ..plan import Flight
 from ..progress import FlightProgress, flight_progress
@@ -74,13 +75,13 @@ class _Follower:
         self._last_clock_s = self.total_s - flight.plant_settings.clock_decimation * flight.period
         self._graph, self._monitor, self._stopped = graph, monitor, stopped
         self._foreign = ForeignNodes(monitor.node, NODE_NAMES)
-        self._fault_kinds = frozenset(fault.kind for fault in flight.orchestrator_faults)
+        self._fault_kinds = frozenset(fault.kind.name for fault in flight.orchestrator_faults)
         self._realtime = flight.plant_settings.realtime
         self._injector = Injector(flight.orchestrator_faults, graph)
         again = {**parameters["controller"], "wait_for": ["plant_node"]}
         self._watch = Watch(
             graph, monitor,
-            planned=frozenset(f.kind.partition("_")[2] for f in flight.orchestrator_faults),
+            planned=frozenset(NODE_OF[fault.kind] for fault in flight.orchestrator_faults),
             restart_command=(
                 node_command("controller", again) if flight.plan.restart_controller else None
             ),

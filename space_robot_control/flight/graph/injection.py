@@ -7,8 +7,9 @@ import signal
 import time
 from collections.abc import Sequence
 
-from space_robot_sim.faults.catalogue import Fault
+from space_robot_sim.faults.grammar import Fault
 
+from ..faults import KILLS, NODE_OF
 from .monitor import Event
 from .processes import Graph
 
@@ -39,8 +40,8 @@ class Injector:
         return events
 
     def _inject(self, fault: Fault, simulated_s: float) -> Event:
-        action, _, node = fault.kind.partition("_")
-        if action == "kill":
+        node = NODE_OF[fault.kind]
+        if fault.kind == KILLS[node]:
             self._graph.nodes[node].signal(signal.SIGKILL)
             return Event(simulated_s, f"{node}_node", "killed (SIGKILL)")
         self._graph.nodes[node].signal(signal.SIGSTOP)

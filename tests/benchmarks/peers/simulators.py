@@ -23,7 +23,8 @@ from oracles import (
 from random_robots import State
 
 from space_robot_sim.dynamics.attitude import quaternion_rate
-from space_robot_sim.environment.environment import DisturbanceSettings, FrictionSettings
+from space_robot_sim.environment.disturbance import DisturbanceSettings
+from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.robot import Robot
 

@@ -25,10 +25,11 @@ from space_robot_control.campaign.soak.sampling import (
 )
 from space_robot_control.campaign.soak.verdict import unplanned_deaths
 from space_robot_control.cli.main import cli
+from space_robot_control.flight.faults import KINDS
 from space_robot_control.flight.plan import Flight
 from space_robot_control.laws import laws
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.faults.catalogue import KINDS, Fault, parse_faults
+from space_robot_sim.faults.grammar import Fault, parse_faults
 
 SEEDS = st.integers(0, 2**63)
 NUMBERS = st.integers(0, 10**9)
@@ -53,7 +54,7 @@ def test_every_drawn_plan_is_a_flight(seed: int, number: int, duration_s: float)
     assert all(tick * flight.period < end_s for tick, _ in flight.swaps)
     for fault in parse_faults(plan.faults, KINDS):
         assert 0.0 < fault.start_s < end_s
-        assert not KINDS[fault.kind].lasts or fault.stop_s <= end_s + 0.001
+        assert not fault.kind.lasts or fault.stop_s <= end_s + 0.001
 
 
 @given(SEEDS, NUMBERS, DURATIONS)
@@ -67,7 +68,7 @@ def test_numbers_and_seeds_are_different_flights() -> None:
 
 
 def test_everything_is_drawn() -> None:
-    drawn = [fault.kind for number in range(len(MANY)) for fault in faults(number)]
+    drawn = [fault.kind.name for number in range(len(MANY)) for fault in faults(number)]
     assert set(drawn) == set(KINDS)
     assert {plan.controller for plan in MANY} == set(laws())
     assert {plan.case for plan in MANY} == set(CASES)
@@ -78,17 +79,17 @@ def test_everything_is_drawn() -> None:
 def test_faults_are_such_that_a_flight_can_end() -> None:
     for number in range(len(MANY)):
         for fault in faults(number):
-            argument, length_s = KINDS[fault.kind].argument, fault.stop_s - fault.start_s
+            argument, length_s = fault.kind.argument, fault.stop_s - fault.start_s
             symbol = argument.symbol if argument else ""
             if symbol == "P" and fault.value == 1.0:
-                assert fault.kind in SILENCING
+                assert fault.kind.name in SILENCING
                 assert length_s <= SILENCE_S + 1e-9
             elif symbol in ("P", "TICKS", "SECONDS"):
                 assert fault.value <= {"P": 0.1, "TICKS": 3.0, "SECONDS": 3.0}[symbol]
             elif symbol in ("SIGMA", "STEP"):
-                assert fault.value <= (1e-5 if fault.kind == "noise_joint_velocity" else 1e-6)
-            if fault.kind in LONGEST_S:
-                assert length_s <= LONGEST_S[fault.kind] + 1e-9
+                assert fault.value <= (1e-5 if fault.kind.name == "noise_joint_velocity" else 1e-6)
+            if fault.kind.name in LONGEST_S:
+                assert length_s <= LONGEST_S[fault.kind.name] + 1e-9
 
 
 def test_a_process_that_stays_dead_fails_once() -> None:

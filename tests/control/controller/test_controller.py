@@ -17,7 +17,7 @@ from space_robot_control.laws import find_law
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Reference, ReferenceChunk, RobotState
 from space_robot_sim import Robot, forward_dynamics
-from space_robot_sim.environment.environment import FrictionSettings
+from space_robot_sim.environment.friction import FrictionSettings
 
 NO_FRICTION = FrictionSettings(coulomb=0.0, viscous=0.0)
 

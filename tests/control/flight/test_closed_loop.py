@@ -12,11 +12,9 @@ from paths import CONFIG
 from space_robot_control.laws import ControlLaw, LawGains, Signals, find_law, per_axis
 from space_robot_msgs_py.errors import FlightError
 from space_robot_sim import Robot
-from space_robot_sim.environment.environment import (
-    DisturbanceSettings,
-    FrictionSettings,
-    PayloadSettings,
-)
+from space_robot_sim.environment.disturbance import DisturbanceSettings
+from space_robot_sim.environment.friction import FrictionSettings
+from space_robot_sim.environment.payload import PayloadSettings
 
 Array = NDArray[np.float64]
 

@@ -10,25 +10,32 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 from random_robots import random_robot
 
-from space_robot_sim.environment.environment import (
+from space_robot_sim.environment.disturbance import (
+    Disturbance,
     DisturbanceSettings,
-    Environment,
-    FrictionSettings,
-    PayloadSettings,
     disturbance_torque,
-    friction_torque,
-    with_payload,
 )
+from space_robot_sim.environment.friction import Friction, FrictionSettings, friction_torque
+from space_robot_sim.environment.payload import PayloadSettings, with_payload
 from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
 
 
 def disturbance(n: int, scale: float, time: float) -> Array:
-    environment = Environment.build(n, FrictionSettings(), DisturbanceSettings(scale=scale))
     out = np.full(n + 3, np.nan)
-    disturbance_torque(environment, time, out)
+    disturbance_torque(Disturbance.build(n, DisturbanceSettings(scale=scale)), time, out)
     return out
+
+
+def friction(joints: Friction, joint: int, rate: float) -> float:
+    """The friction of one joint that turns alone."""
+    velocities = np.zeros(joints.coulomb.size)
+    velocities[joint] = rate
+    out = np.full(velocities.size, np.nan)
+    friction_torque(joints, velocities, out)
+    assert not np.delete(out, joint).any()
+    return float(out[joint])
 
 
 def equation_61(n: int, k: float, t: float) -> Array:
@@ -51,8 +58,8 @@ def test_disturbance_is_equation_61(n: int, scale: float, time: float) -> None:
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
 def test_disturbance_writes_nothing_behind_a_short_robots_array(n: int) -> None:
     memory = np.full(n + 3 + 9, -7.0)
-    environment = Environment.build(n, FrictionSettings(), DisturbanceSettings(scale=1.0))
-    disturbance_torque(environment, 0.5, memory[: n + 3])
+    sines = Disturbance.build(n, DisturbanceSettings(scale=1.0))
+    disturbance_torque(sines, 0.5, memory[: n + 3])
     np.testing.assert_allclose(memory[: n + 3], equation_61(n, 1.0, 0.5), rtol=1e-12)
     np.testing.assert_array_equal(memory[n + 3 :], -7.0)
 
@@ -75,28 +82,26 @@ def test_without_a_scale_nothing_disturbs() -> None:
 @given(st.floats(-50.0, 50.0), st.integers(0, 3))
 def test_friction_opposes_the_motion(rate: float, joint: int) -> None:
     """(27): the torque it takes from the joint has the sign of the rate, so power is lost."""
-    environment = Environment.build(4, FrictionSettings(), DisturbanceSettings())
-    torque = friction_torque(environment, joint, rate)
+    torque = friction(Friction.build(4, FrictionSettings()), joint, rate)
     expected = 0.02 * (rate > 0) - 0.02 * (rate < 0) + 0.2 * rate
     assert torque == pytest.approx(expected, rel=1e-14)
     assert torque * rate >= 0.0
-    assert friction_torque(environment, joint, -rate) == -torque
+    assert friction(Friction.build(4, FrictionSettings()), joint, -rate) == -torque
 
 
 @given(st.lists(st.floats(0.0, 9.0), min_size=8, max_size=8), st.sampled_from([-0.5, 0.0, 0.25]))
 def test_each_joint_has_its_own_friction(coefficients: list[float], rate: float) -> None:
     """As a stuck joint has."""
-    environment = Environment.build(4, FrictionSettings(), DisturbanceSettings())
-    environment.coulomb[:], environment.viscous[:] = coefficients[:4], coefficients[4:]
+    joints = Friction.build(4, FrictionSettings())
+    joints.coulomb[:], joints.viscous[:] = coefficients[:4], coefficients[4:]
     for joint in range(4):
         coulomb, viscous = coefficients[joint], coefficients[4 + joint]
         expected = coulomb * np.sign(rate) + viscous * rate
-        assert friction_torque(environment, joint, rate) == expected
+        assert friction(joints, joint, rate) == expected
 
 
 def test_friction_at_rest_is_zero() -> None:
-    environment = Environment.build(2, FrictionSettings(coulomb=5.0), DisturbanceSettings())
-    assert friction_torque(environment, 1, 0.0) == 0.0
+    assert friction(Friction.build(2, FrictionSettings(coulomb=5.0)), 1, 0.0) == 0.0
 
 
 def test_payload_replaces_mass_and_inertia_of_the_last_link(paper_robot: Robot) -> None:

@@ -9,23 +9,31 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from space_robot_sim.faults.catalogue import KINDS, parse_faults
-from space_robot_sim.faults.link import DelayedMessage, Link, awaited_stamp
+from space_robot_sim.faults.grammar import parse_faults
+from space_robot_sim.faults.link import (
+    COMMAND_LINK,
+    STATE_LINK,
+    DelayedMessage,
+    Link,
+    awaited_stamp,
+)
 from space_robot_sim.faults.schedule import Schedule
+from space_robot_sim.plant.faults import PLANT_KINDS
 
 PERIOD = 5e-4
 TICKS = 200
 SEEDS = st.integers(0, 2**31 - 1)
-WHAT = st.sampled_from(["state", "command"])
+KINDS = {"state": STATE_LINK, "command": COMMAND_LINK}
+WHAT = st.sampled_from(list(KINDS))
 
 
 def link(*texts: str, what: str = "state", seed: int = 0) -> Link[int]:
-    return Link(Schedule(parse_faults(texts, KINDS), seed, PERIOD), what)
+    return Link(Schedule(parse_faults(texts, PLANT_KINDS), seed, PERIOD), KINDS[what])
 
 
 def fly(a_link: Link[int], ticks: int = TICKS) -> list[list[int]]:
     """What arrives, tick by tick, when each tick sends its own number."""
-    return [[parcel.item for parcel in a_link.push(tick, tick)] for tick in range(ticks)]
+    return [[message.item for message in a_link.push(tick, tick)] for tick in range(ticks)]
 
 
 PLAIN = [[tick] for tick in range(TICKS)]
@@ -115,13 +123,13 @@ def test_ticks_that_are_skipped_lose_nothing() -> None:
     slow = link("delay_command@0-0.001:2", what="command")
     for tick in range(4):
         slow.send(tick, tick)
-    assert [parcel.item for parcel in slow.arrivals(9)] == [0, 2, 1, 3]
+    assert [message.item for message in slow.arrivals(9)] == [0, 2, 1, 3]
     assert slow.arrivals(10) == []
 
 
-def test_parcels_carry_their_stamp_and_the_item_itself() -> None:
+def test_messages_carry_their_stamp_and_the_item_itself() -> None:
     item = np.zeros(3)
-    a_link: Link[object] = Link(Schedule([], 0, PERIOD), "state")
+    a_link: Link[object] = Link(Schedule([], 0, PERIOD), STATE_LINK)
     (plain,) = a_link.push(5, item)
     (stamped,) = a_link.push(6, item, 2)
     assert plain.item is item

@@ -15,11 +15,9 @@ from scipy.integrate import solve_ivp
 
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import Command, RobotState
-from space_robot_sim.environment.environment import (
-    DisturbanceSettings,
-    FrictionSettings,
-    PayloadSettings,
-)
+from space_robot_sim.environment.disturbance import DisturbanceSettings
+from space_robot_sim.environment.friction import FrictionSettings
+from space_robot_sim.environment.payload import PayloadSettings
 from space_robot_sim.plant.conservation import kinetic_energy, momentum
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.robot import Robot

@@ -11,11 +11,10 @@ from hypothesis import strategies as st
 
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import STATE_FIELDS, Command
-from space_robot_sim.actuators.faults import ActuatorFaults
-from space_robot_sim.faults.catalogue import KINDS, parse_fault, parse_faults
+from space_robot_sim.faults.grammar import Kind, by_name, parse_fault, parse_faults
 from space_robot_sim.faults.link import awaited_stamp
 from space_robot_sim.faults.schedule import Schedule, ScheduledFault
-from space_robot_sim.plant.faults import PlantFaults
+from space_robot_sim.plant.faults import PLANT_KINDS, PlantFaults
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.plant.settings import PlantNodeSettings
 from space_robot_sim.robot import Robot
@@ -25,11 +24,11 @@ TORQUE = np.array([5.0, -4.0, 3.0, 20.0, -30.0, 15.0, 4.0, -3.0, 2.0])
 
 
 def scheduled(text: str, period: float = PERIOD, seed: int = 0) -> ScheduledFault:
-    return ScheduledFault(parse_fault(text, KINDS), 0, seed, period)
+    return ScheduledFault(parse_fault(text, PLANT_KINDS), 0, seed, period)
 
 
 def plant_faults(robot: Robot, *texts: str, seed: int = 0) -> PlantFaults:
-    return PlantFaults(parse_faults(texts, KINDS), seed, robot, PERIOD)
+    return PlantFaults(parse_faults(texts, PLANT_KINDS), seed, robot, PERIOD)
 
 
 def plant_of(robot: Robot, **settings: float) -> Plant:
@@ -60,13 +59,14 @@ def test_draws_depend_on_seed_place_and_tick_alone(seed: int, tick: int) -> None
     early.choose(3, 10)
     assert early.choose(tick, 1000) == late.choose(tick, 1000)
     texts = ["noise_gyro@0:1", "noise_gyro@0:1"]
-    one, two = Schedule(parse_faults(texts, KINDS), seed, PERIOD).faults
+    one, two = Schedule(parse_faults(texts, PLANT_KINDS), seed, PERIOD).faults
     assert (one.noise(tick, 3) != two.noise(tick, 3)).all()
 
 
 def memory_of(plant: Plant) -> tuple[list[float], list[float]]:
     memory = plant.block[0]
-    return memory.limit.tolist(), memory.environment.coulomb.tolist()
+    limit, friction = memory.actuators.torque_limit.limit, memory.environment.friction
+    return limit.tolist(), friction.coulomb.tolist()
 
 
 def test_actuators_fail_in_time_and_are_restored_exactly(paper_robot: Robot) -> None:
@@ -78,9 +78,9 @@ def test_actuators_fail_in_time_and_are_restored_exactly(paper_robot: Robot) -> 
     plant = plant_of(paper_robot, joint_torque_limit=7.0)
     sound, coulomb = memory_of(plant)
     assert sound == [math.inf] * 3 + [7.0] * 6
-    faults = ActuatorFaults(Schedule(parse_faults(texts, KINDS), 0, PERIOD))
+    faults = plant_faults(paper_robot, *texts)
     for tick in range(40):
-        faults.apply(plant.tick, plant.torque_limit, plant.coulomb_friction)
+        faults.apply(plant)
         base = min(2.0 if 10 <= tick < 20 else math.inf, 1.0 if 15 <= tick < 30 else math.inf)
         joints = 3.0 if tick >= 20 else 7.0
         stuck = [coulomb[0], 20.0 if 10 <= tick < 20 else coulomb[1], *coulomb[2:]]
@@ -93,13 +93,13 @@ def test_actuators_fail_in_time_and_are_restored_exactly(paper_robot: Robot) -> 
 def test_a_fault_never_makes_an_actuator_stronger_nor_a_joint_freer(paper_robot: Robot) -> None:
     """Limits and friction that are worse than the fault's stay; 0 is the lowest limit of all."""
     plant = plant_of(paper_robot, base_torque_limit=0.5, joint_torque_limit=7.0)
-    plant.block[0].limit[4] = 0.0
-    plant.block[0].environment.coulomb[1] = 3.0
+    plant.block[0].actuators.torque_limit.limit[4] = 0.0
+    plant.block[0].environment.friction.coulomb[1] = 3.0
     worst = memory_of(plant)
     texts = ["saturate_base@0:2", "saturate_joints@0:9", "stuck_joint@0:2=1"]
-    faults = ActuatorFaults(Schedule(parse_faults(texts, KINDS), 0, PERIOD))
+    faults = plant_faults(paper_robot, *texts)
     for tick in range(3):
-        faults.apply(plant.tick, plant.torque_limit, plant.coulomb_friction)
+        faults.apply(plant)
         assert memory_of(plant) == worst
         plant.step(Command(tick, TORQUE))
 
@@ -108,11 +108,11 @@ def test_after_the_last_fault_the_plant_is_as_it_was(paper_robot: Robot) -> None
     plant = plant_of(paper_robot)
     sound = memory_of(plant)
     texts = ["saturate_base@0-0.005:0", "saturate_joints@0-0.005:1", "stuck_joint@0-0.005:1=9"]
-    faults = ActuatorFaults(Schedule(parse_faults(texts, KINDS), 0, PERIOD))
-    faults.apply(plant.tick, plant.torque_limit, plant.coulomb_friction)
+    faults = plant_faults(paper_robot, *texts)
+    faults.apply(plant)
     assert memory_of(plant) != sound
     for tick in range(11):
-        faults.apply(plant.tick, plant.torque_limit, plant.coulomb_friction)
+        faults.apply(plant)
         plant.step(Command(tick, TORQUE))
     assert memory_of(plant) == sound
 
@@ -127,10 +127,10 @@ def test_a_stuck_joint_stops_and_comes_free_again(paper_robot: Robot, joint: int
     plant, fresh = plant_of(paper_robot), plant_of(paper_robot)
     fresh.step(Command(0, friction * np.eye(9)[2 + joint]))
     of_one_tick = abs(fresh.state.joint_velocities[joint - 1])
-    faults = plant_faults(paper_robot, f"stuck_joint@0.25-1:{joint}={friction}").actuators
+    faults = plant_faults(paper_robot, f"stuck_joint@0.25-1:{joint}={friction}")
     angles, rates = np.empty((2500, 6)), np.empty((2500, 6))
     for tick in range(2500):
-        faults.apply(plant.tick, plant.torque_limit, plant.coulomb_friction)
+        faults.apply(plant)
         plant.step(Command(tick, np.where(np.arange(9) < 3, 0.0, 0.2 * TORQUE)))
         angles[tick], rates[tick] = plant.state.joint_positions, plant.state.joint_velocities
     before, held, after = slice(500), slice(1000, 1500), slice(2000, 2500)
@@ -158,7 +158,7 @@ def flight(robot: Robot, *texts: str, seed: int = 0, ticks: int = 400) -> list[l
         for parcel in faults.commands.arrivals(tick):
             if parcel.stamp > held.tick and np.isfinite(parcel.item.torque).all():
                 held = parcel.item
-        faults.actuators.apply(plant.tick, plant.torque_limit, plant.coulomb_friction)
+        faults.apply(plant)
         plant.step(held)
         log.append(plant.state.applied_torque.tolist())
     return log
@@ -207,8 +207,10 @@ def test_no_faults_are_false(paper_robot: Robot) -> None:
 def test_faults_must_fit_the_plant(paper_robot: Robot) -> None:
     with pytest.raises(InputError, match=r"'stuck_joint@1:7=2'.*'paper' has joints 1 to 6"):
         plant_faults(paper_robot, "stuck_joint@1:7=2")
+    kinds = by_name(Kind("kill_mission", None, None, "not of the plant", lasts=False))
+    of_another = parse_faults(["kill_mission@1"], kinds)
     with pytest.raises(InputError, match="unknown fault of the plant 'kill_mission'"):
-        plant_faults(paper_robot, "kill_mission@1")
+        PlantFaults(of_another, 0, paper_robot, PERIOD)
 
 
 def test_settings_take_faults_and_refuse_bad_ones() -> None:

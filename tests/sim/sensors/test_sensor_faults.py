@@ -14,9 +14,10 @@ from random_robots import random_quaternion
 from random_samples import assert_same, random_sample
 
 from space_robot_msgs_py.samples import STATE_FIELDS, Command, RobotState
-from space_robot_sim.faults.catalogue import KINDS, parse_faults
+from space_robot_sim.faults.corruption import STAMP_BACK_TICKS, STAMP_JUMP_TICKS, Corruption
+from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule
-from space_robot_sim.sensors.corruption import STAMP_BACK_TICKS, STAMP_JUMP_TICKS, Corruption
+from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.sensors.faults import SensorFaults, rotation_vector, turned
 
 Array = NDArray[np.float64]
@@ -32,7 +33,7 @@ FIELDS = {
 
 
 def schedule(*texts: str, seed: int = 0) -> Schedule:
-    return Schedule(parse_faults(texts, KINDS), seed, PERIOD)
+    return Schedule(parse_faults(texts, PLANT_KINDS), seed, PERIOD)
 
 
 def sensors(*texts: str, seed: int = 0) -> SensorFaults:

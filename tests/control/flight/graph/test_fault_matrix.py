@@ -14,10 +14,12 @@ import numpy as np
 import pytest
 from flights import Flown
 
+from space_robot_control.flight.faults import KINDS
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_sim.faults.catalogue import KINDS, PLANT_KINDS, parse_faults
+from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule, ScheduledFault
+from space_robot_sim.plant.faults import PLANT_KINDS
 
 pytest.importorskip("rclpy")
 
@@ -88,7 +90,7 @@ class Seen:
 def matters(fault: ScheduledFault, tick: int) -> bool:
     """Whether the controller uses what is spoilt: not the base's position and velocity."""
     place = fault.choose(tick, 25)
-    return fault.kind not in ("nan_state", "inf_state") or 3 <= place < 7 or place >= 10
+    return fault.kind.name not in ("nan_state", "inf_state") or 3 <= place < 7 or place >= 10
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +100,9 @@ def seen(fly: Fly) -> Callable[[str], Seen]:
         flown = fly(*OPTIONS, *(word for text in texts for word in ("--fault", text)))
         schedule = Schedule(parse_faults(texts, PLANT_KINDS), SEED, PERIOD)
         expected = {
-            fault.kind: sum(fault.happens_at(tick) and matters(fault, tick) for tick in range(2000))
+            fault.kind.name: sum(
+                fault.happens_at(tick) and matters(fault, tick) for tick in range(2000)
+            )
             for fault in schedule.faults
         }
         return Seen(flown.report["graph"], read_flight(flown.bag), expected)

@@ -10,17 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from paths import DOCS
 
+from space_robot_control.flight.faults import KINDS, PROCESS_KINDS
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.faults.catalogue import (
-    KINDS,
-    ORCHESTRATOR_KINDS,
-    PLANT_KINDS,
+from space_robot_sim.faults.grammar import (
     Fault,
     Kind,
+    by_name,
     help_lines,
     parse_fault,
     parse_faults,
 )
+from space_robot_sim.plant.faults import PLANT_KINDS
 
 PAGE = DOCS / "faults.md"
 
@@ -45,7 +45,7 @@ def faults(draw: st.DrawFn) -> Fault:
     kind = draw(st.sampled_from(list(KINDS.values())))
     start, stop = sorted(draw(st.lists(TIMES, min_size=2, max_size=2, unique=True)))
     lasting = not kind.lasts or draw(st.booleans())
-    return Fault(kind.name, start, math.inf if lasting else stop, draw(arguments(kind)))
+    return Fault(kind, start, math.inf if lasting else stop, draw(arguments(kind)))
 
 
 @given(faults())
@@ -58,14 +58,14 @@ def test_a_fault_is_its_text(fault: Fault) -> None:
 @pytest.mark.parametrize(
     ("text", "fault", "joint", "value"),
     [
-        ("drop_state@2.0:0.1", Fault("drop_state", 2.0, math.inf, "0.1"), 0, 0.1),
-        ("noise_gyro@1-3:1e-4", Fault("noise_gyro", 1.0, 3.0, "1e-4"), 0, 1e-4),
-        ("noise_gyro@1e-3-2e-3:0", Fault("noise_gyro", 0.001, 0.002, "0"), 0, 0.0),
-        ("stuck_joint@5:3=20", Fault("stuck_joint", 5.0, math.inf, "3=20"), 3, 20.0),
-        ("delay_state@0", Fault("delay_state", 0.0, math.inf, ""), 0, 1.0),
-        ("kill_controller@2", Fault("kill_controller", 2.0, math.inf, ""), 0, math.nan),
-        ("stop_controller@2:1.5", Fault("stop_controller", 2.0, math.inf, "1.5"), 0, 1.5),
-        (" stop_mission@.5 ", Fault("stop_mission", 0.5, math.inf, ""), 0, math.inf),
+        ("drop_state@2.0:0.1", Fault(KINDS["drop_state"], 2.0, math.inf, "0.1"), 0, 0.1),
+        ("noise_gyro@1-3:1e-4", Fault(KINDS["noise_gyro"], 1.0, 3.0, "1e-4"), 0, 1e-4),
+        ("noise_gyro@1e-3-2e-3:0", Fault(KINDS["noise_gyro"], 0.001, 0.002, "0"), 0, 0.0),
+        ("stuck_joint@5:3=20", Fault(KINDS["stuck_joint"], 5.0, math.inf, "3=20"), 3, 20.0),
+        ("delay_state@0", Fault(KINDS["delay_state"], 0.0, math.inf, ""), 0, 1.0),
+        ("kill_controller@2", Fault(KINDS["kill_controller"], 2.0, math.inf, ""), 0, math.nan),
+        ("stop_controller@2:1.5", Fault(KINDS["stop_controller"], 2.0, math.inf, "1.5"), 0, 1.5),
+        (" stop_mission@.5 ", Fault(KINDS["stop_mission"], 0.5, math.inf, ""), 0, math.inf),
     ],
 )
 def test_given_texts(text: str, fault: Fault, joint: int, value: float) -> None:
@@ -114,7 +114,12 @@ def test_a_kind_of_another_place_is_refused() -> None:
     with pytest.raises(InputError, match=r"'kill_mission'.*choose one of drop_state"):
         parse_fault("kill_mission@2", PLANT_KINDS)
     with pytest.raises(InputError, match=r"'drop_state'.*choose one of kill_controller"):
-        parse_fault("drop_state@2", ORCHESTRATOR_KINDS)
+        parse_fault("drop_state@2", PROCESS_KINDS)
+
+
+def test_two_kinds_of_one_name_are_a_mistake() -> None:
+    with pytest.raises(ValueError, match="one name"):
+        by_name(*KINDS.values(), KINDS["drop_state"])
 
 
 def test_empty_texts_are_no_faults() -> None:
@@ -158,4 +163,4 @@ def test_the_page_has_every_kind_as_it_is() -> None:
         else:
             assert default == ("for ever" if math.isinf(kind.default) else f"{kind.default:g}")
         assert description == kind.description
-        assert parse_fault(example.strip("`"), KINDS).kind == kind.name
+        assert parse_fault(example.strip("`"), KINDS).kind == kind
