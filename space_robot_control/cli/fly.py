@@ -63,12 +63,13 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
       space-robot fly --fault drop_state@2-4:0.1 --fault noise_gyro@0:1e-5 --seed 7
     """
     from ..analysis import analyze
+    from ..flight.bag_path import default_bag
     from ..flight.graph.orchestrator import fly as fly_graph
     from .failure import told_as_json
     from .report_display import show_report
 
     flight = plan_flight(**options)
-    bag = bag or flight.default_bag()
+    bag = bag or default_bag(flight)
     with told_as_json(flight, bag, as_json):
         report = fly_graph(flight, bag, analyze)
     show_report(report, as_json)

@@ -27,9 +27,9 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
     from space_robot_msgs_py.errors import FlightError
 
     from ..analysis import Analysis
+    from ..flight.bag_path import check_bag_path
     from ..flight.compilation import compile_kernels
     from ..flight.disk_space import room_remark
-    from ..flight.plan import check_bag_path
     from ..flight.progress import flight_progress
     from ..flight.simulate import fly_blocks
     from .failure import failed_report

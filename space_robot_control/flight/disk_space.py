@@ -1,4 +1,4 @@
-"""Whether the bag of a long flight has room on the disk."""
+"""The size of a long flight's bag, beside the room on the disk."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ SAMPLE_TICKS = 2000
 
 
 def largest_tick(joints: int) -> int:
-    """Bytes of a tick that no bag exceeds, uncompressed: what needs less needs no estimate."""
+    """Return the bytes of a tick that no bag exceeds, uncompressed: else an estimate is needed."""
     return 2000 + 200 * joints
 
 
 def bag_bytes(flight: Flight) -> float:
-    """About how large the bag of ``flight`` becomes, by its first second.
+    """Estimate the bytes of the bag of ``flight`` from its first second.
 
     Raises:
         FlightError: it diverges in that.
@@ -35,7 +35,7 @@ def bag_bytes(flight: Flight) -> float:
 
 
 def room_remark(flight: Flight, bag: Path) -> str:
-    """A line that says that ``bag`` will not have room; empty if it will, as far as is known."""
+    """Return a line that says that ``bag`` will not have room; empty if it will."""
     free = shutil.disk_usage(next(p for p in bag.absolute().parents if p.exists())).free
     if flight.ticks * largest_tick(flight.robot.n) <= free:
         return ""

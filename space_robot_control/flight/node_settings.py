@@ -39,20 +39,20 @@ Given = Mapping[str, Mapping[str, Any]]
 
 
 class FlightSettings(NamedTuple):
-    """Of every node, and the gains that were given by themselves."""
+    """The settings of every node, and the gains that were given by themselves."""
 
     plant: PlantNodeSettings
     controller: ControllerNodeSettings
     mission: MissionNodeSettings
     recorder: RecorderNodeSettings
     gains: dict[str, Tree]
-    """By law; they come over those of the gain set."""
+    """Gains by law; they come over those of the gain set."""
     given: dict[str, tuple[str, ...]]
-    """Dotted names of what was given to each node, over its files."""
+    """Dotted names of the settings given to each node, over its files."""
 
     @classmethod
     def resolve(cls, options: Given, parameters: Given) -> FlightSettings:
-        """Settings from the files, the options over them, and single parameters over all.
+        """Take settings from the files, the options over them, and single parameters over all.
 
         Raises:
             InputError: a parameter that is wrong, or that cannot be set so.
@@ -80,7 +80,7 @@ class FlightSettings(NamedTuple):
         return settings
 
     def parameters(self, laws: Mapping[str, ControlLaw]) -> dict[str, dict[str, Any]]:
-        """What was given to each node by dotted name: resolved values, of the declared types."""
+        """Return the resolved values of what was given to each node, by dotted name."""
         gains = {
             f"{name}.{gain}": values.tolist()
             for name, law in laws.items()

@@ -1,17 +1,15 @@
-"""What is to be flown, checked before anything starts."""
+"""The options of a flight, and the flight that they make, checked before anything starts."""
 
 from __future__ import annotations
 
 import math
-from datetime import datetime, timezone
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 from pydantic import ByteSize, Field
 
 from space_robot_msgs_py.bag.mcap_file import Compression
-from space_robot_msgs_py.config.validation import StrictModel, one_of, short
+from space_robot_msgs_py.config.validation import StrictModel, one_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.faults.grammar import Kinds, parse_faults
 from space_robot_sim.plant.faults import PLANT_KINDS, PlantFaults
@@ -44,19 +42,19 @@ class FlightPlan(StrictModel):
     realtime: bool = False
     fifo_priority: int = 0
     faults: list[str] = Field(default_factory=list)
-    """What fails, each as ``KIND@T[-END][:ARGUMENT]``, see `space_robot_control.flight.faults`."""
+    """The faults, each as ``KIND@T[-END][:ARGUMENT]``, see `space_robot_control.flight.faults`."""
     seed: Annotated[int, Field(ge=0)] = 0
-    """Of the faults' random numbers."""
+    """Seed of the faults' random numbers."""
     swaps: list[str] = Field(default_factory=list)
     """Laws to swap to in flight, each as ``T:LAW``."""
     restart_controller: bool = False
-    """Whether a controller that died or hangs is started again."""
+    """Start a controller again that died or hangs."""
     composed: bool = False
-    """Whether all nodes are in one process, stepped in turn."""
+    """Put all nodes into one process, stepped in turn."""
     domain: Annotated[int | None, Field(ge=0, le=232)] = None
     """ROS domain to fly in (None: ROS_DOMAIN_ID, or a free one)."""
     compression: Compression | None = None
-    """Of the bag (None: the recorder's own)."""
+    """Compression of the bag (None: the recorder's own)."""
     split_size: ByteSize | None = None
     """Bytes after which the bag goes on in another file (None: the recorder's own)."""
     parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
@@ -71,7 +69,7 @@ class FlightPlan(StrictModel):
         return [str(f) for f in parse_faults(self.faults, KINDS) if f.kind.name in kinds]
 
     def options(self) -> dict[str, dict[str, Any]]:
-        """What the options, without ``parameters``, say to each node, by dotted name."""
+        """Return what the options, without ``parameters``, say to each node, by dotted name."""
         return {
             "plant": {
                 "robot": self.robot,
@@ -99,7 +97,7 @@ class FlightPlan(StrictModel):
         }
 
     def with_parameters(self, node: str, values: dict[str, Any]) -> FlightPlan:
-        """The same plan with further parameters of a node, by dotted name."""
+        """Return the same plan with further parameters of a node, by dotted name."""
         parameters = {**self.parameters, node: {**self.parameters.get(node, {}), **values}}
         return self.model_copy(update={"parameters": parameters})
 
@@ -107,8 +105,7 @@ class FlightPlan(StrictModel):
 class Flight:
     """A checked plan: the settings of every node and the objects they make.
 
-    What is flown is in the settings, not in the options of the ``plan``: single parameters come
-    over them.
+    The settings count, not the options of the ``plan``: single parameters come over them.
 
     Raises:
         InputError: anything the plan names does not exist or does not fit together.
@@ -133,7 +130,7 @@ class Flight:
         ]
         """Ticks and the laws in force from there on."""
         self.parameters = settings.parameters(laws)
-        """What every node is given over its files, by dotted name."""
+        """The parameters of every node over its files, by dotted name."""
         self.orchestrator_faults = parse_faults(plan.faults_of(PROCESS_KINDS), KINDS)
         self._check_composed()
         self.law = next(iter(laws.values()))
@@ -190,7 +187,7 @@ class Flight:
 
     @property
     def faults(self) -> list[str]:
-        """All that will fail, as text."""
+        """The texts of all faults."""
         in_plant = [text for text in self.plant_settings.faults if text.strip()]
         if in_plant == self.plan.faults_of(PLANT_KINDS):
             return self.plan.faults
@@ -198,7 +195,7 @@ class Flight:
 
     @property
     def has_friction(self) -> bool:
-        """Whether the joints have any."""
+        """True if the joints have friction."""
         friction = self.plant_settings.friction
         return friction.coulomb > 0.0 or friction.viscous > 0.0
 
@@ -209,7 +206,7 @@ class Flight:
 
     @property
     def description(self) -> dict[str, Any]:
-        """What is flown, as it is stored in a bag; enough to fly it again.
+        """The flight as a bag tells it; enough to fly it again.
 
         The same plan with the same software gives the same one: it tells no time and no machine.
         """
@@ -238,30 +235,3 @@ class Flight:
             "versions": versions(),
             "commit": commit(),
         }
-
-    def default_bag(self) -> Path:
-        """``flights/<controller>_case<case>_<time>`` below the current folder."""
-        stamp = datetime.now(timezone.utc).strftime("%Y%m%d-%H%M%S")
-        case = Path(self.plant_settings.case).stem
-        return Path("flights") / f"{self.law.name}_case{case}_{stamp}"
-
-
-def check_bag_path(path: Path) -> None:
-    """See that a bag can be made there, without making anything.
-
-    Raises:
-        InputError: it exists, or its nearest existing folder cannot be written.
-    """
-    parent = path
-    try:
-        if path.exists():
-            raise InputError(f"{path}: exists already; a bag is never overwritten")
-        parent = next(p for p in path.absolute().parents if p.exists())
-        with TemporaryDirectory(dir=parent):
-            pass
-    except OSError as error:
-        raise InputError(
-            f"{path}: no bag can be written there ({parent}: {error.strerror})"
-        ) from None
-    except ValueError as error:
-        raise InputError(f"{short(str(path))}: no name of a folder ({error})") from None

@@ -1,4 +1,4 @@
-"""Which software flies: the commit it was started from, and the versions of what it uses."""
+"""The software that flies: the commit it was started from, and the versions of what it uses."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PACKAGES = (
 
 @cache
 def commit() -> str | None:
-    """Hash of the commit, with ``-dirty`` if a file was changed since; None outside a checkout."""
+    """Return the commit, with ``-dirty`` if a file was changed since; None outside a checkout."""
     root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists() or root != config_directory().parent:
         return None
@@ -35,7 +35,7 @@ def commit() -> str | None:
 
 @cache
 def versions() -> dict[str, str | None]:
-    """Versions of Python and the packages (None: not installed as a package)."""
+    """Return the versions of Python and the packages (None: not installed as a package)."""
     return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
 
 

@@ -14,7 +14,7 @@ GRAPH_FILE = "space_robot.yaml"
 
 
 def config_directory() -> Path:
-    """The ``config/`` folder: the source tree's, or the one installed under ``share/``.
+    """Return the ``config/`` folder: the source tree's, or the one installed under ``share/``.
 
     Raises:
         InputError: the installation is incomplete.
@@ -27,7 +27,7 @@ def config_directory() -> Path:
 
 
 def named_file(kind: str, name: str) -> Path:
-    """``config/<kind>/<name>.yaml``, or ``name`` itself if it is a path to a YAML file.
+    """Return ``config/<kind>/<name>.yaml``, or ``name`` itself if it is a path to a YAML file.
 
     Raises:
         InputError: there is no such file; names the ones there are.
@@ -47,7 +47,7 @@ def named_file(kind: str, name: str) -> Path:
 
 
 def mission_file(robot: str, mission: str) -> Path:
-    """The file of a mission, of the robot's own if it is empty.
+    """Return the file of a mission, of the robot's own if the name is empty.
 
     Raises:
         InputError: there is none, or no such robot; names those there are.
@@ -63,7 +63,7 @@ def mission_file(robot: str, mission: str) -> Path:
 
 
 def node_parameters(path: Path, node: str) -> Tree:
-    """What a ROS parameter file says to a node (keys ``/**``, then its ROS name), as a tree.
+    """Read what a ROS parameter file says to a node (keys ``/**``, then its ROS name), as a tree.
 
     Raises:
         InputError: the file cannot be read or is not a ROS parameter file.

@@ -25,10 +25,10 @@ Texts = Annotated[list[str], AfterValidator(lambda texts: texts or [""])]
 
 
 class NodeSettings(StrictModel):
-    """What every node of the graph is told; each node's schema derives from it."""
+    """Settings of every node of the graph; each node's schema derives from it."""
 
     node: ClassVar[str]
-    """What the node is: plant, controller, mission, recorder."""
+    """The node: plant, controller, mission, recorder."""
     selectors: ClassVar[tuple[str, ...]] = ("robot",)
     """Fields that choose configuration files."""
 
@@ -42,7 +42,7 @@ class NodeSettings(StrictModel):
 
     @classmethod
     def ros_name(cls) -> str:
-        """The node's name in ROS, key of its section in parameter files; also its executable."""
+        """Return the name of the node in ROS, of its executable, of its section in files."""
         return f"{cls.node}_node"
 
     @property
@@ -52,12 +52,12 @@ class NodeSettings(StrictModel):
 
     @classmethod
     def layers(cls, selected: Mapping[str, str]) -> list[Path]:
-        """The parameter files below the user's overrides, for the selectors' values."""
+        """Return the parameter files below the user's overrides, for the selectors' values."""
         return [config_directory() / GRAPH_FILE]
 
     @classmethod
     def resolve(cls, overrides: Mapping[str, Any]) -> Self:
-        """Settings from the files and the user's (dotted or nested) overrides.
+        """Read the settings from the files and the user's (dotted or nested) overrides.
 
         Raises:
             InputError: naming the file or override at fault.
@@ -75,7 +75,7 @@ class NodeSettings(StrictModel):
 
 
 def leaves(schema: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted name and pydantic field of every setting of a schema."""
+    """Yield dotted name and pydantic field of every setting of a schema."""
     for name, field in schema.model_fields.items():
         inner = field.annotation
         if get_origin(inner) is None and isclass(inner) and issubclass(inner, BaseModel):

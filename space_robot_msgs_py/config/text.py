@@ -1,8 +1,8 @@
-"""Words of others in words of ours."""
+"""Text from outside, made fit to be shown."""
 
 from __future__ import annotations
 
 
 def printable(text: str) -> str:
-    """One line, whatever a broken bag had for names."""
+    """Return a text as one line, whatever a broken bag had for names."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)

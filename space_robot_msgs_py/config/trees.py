@@ -11,7 +11,7 @@ Tree = dict[str, Any]
 
 
 def merge(below: Tree, above: Mapping[str, Any]) -> Tree:
-    """``below`` with the leaves of ``above`` put over it."""
+    """Return ``below`` with the leaves of ``above`` put over it."""
     merged = dict(below)
     for key, value in above.items():
         old = merged.get(key)
@@ -21,7 +21,7 @@ def merge(below: Tree, above: Mapping[str, Any]) -> Tree:
 
 
 def nest(flat: Mapping[Any, Any]) -> Tree:
-    """``{"a.b": 1}`` to ``{"a": {"b": 1}}``.
+    """Turn ``{"a.b": 1}`` into ``{"a": {"b": 1}}``.
 
     Raises:
         InputError: something is given as a value and as a group of values.
@@ -37,7 +37,7 @@ def nest(flat: Mapping[Any, Any]) -> Tree:
 
 
 def flatten(tree: Mapping[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """``{"a": {"b": 1}}`` to ``("a.b", 1)``, leaf by leaf; an empty mapping is one."""
+    """Turn ``{"a": {"b": 1}}`` into ``("a.b", 1)``, leaf by leaf; an empty mapping is one."""
     for key, value in tree.items():
         if isinstance(value, Mapping) and value:
             yield from flatten(value, f"{prefix}{key}.")

@@ -9,6 +9,7 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 
 from ..errors import InputError
+from .text import printable
 from .yaml_text import YamlTextError, parse_yaml, read_file
 
 
@@ -35,7 +36,7 @@ Schema = TypeVar("Schema", bound=BaseModel)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """The mapping in a YAML file.
+    """Read the mapping in a YAML file.
 
     Raises:
         InputError: the file is missing, unreadable, no file, not YAML, or not a mapping.
@@ -68,7 +69,7 @@ def _one_line(error: ValidationError, schema: type[BaseModel], where: str) -> st
         error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden"
     )
     first = faults[0]
-    key = ".".join(str(part) for part in first["loc"])
+    key = printable(".".join(str(part) for part in first["loc"]))
     given = "" if first["type"] == "missing" else f", got {short(first['input'])}"
     text = first["msg"].removeprefix("Value error, ")
     if first["type"] == "model_type":
@@ -81,7 +82,7 @@ def _one_line(error: ValidationError, schema: type[BaseModel], where: str) -> st
 
 
 def _allowed_keys(schema: Any, location: tuple[int | str, ...]) -> list[str]:
-    """Names of the fields of the model that stands at a location within ``schema``."""
+    """Return the names of the fields of the model at a location within ``schema``."""
     for step in location:
         if isinstance(step, str):
             schema = schema.model_fields[step].annotation
@@ -91,7 +92,7 @@ def _allowed_keys(schema: Any, location: tuple[int | str, ...]) -> list[str]:
 
 
 def short(value: Any) -> str:
-    """A value as an error shows it, in one line of at most 80 characters."""
+    """Show a value as an error does, in one line of at most 80 characters."""
     try:
         text = repr(value)
     except ValueError:  # a whole number of more digits than Python likes to print

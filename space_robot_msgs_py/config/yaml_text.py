@@ -42,7 +42,7 @@ class YamlTextError(InputError):
 
 
 def read_file(path: Path) -> str:
-    """The text in a file; pipes and devices, which may never end, are none.
+    """Read the text in a file; pipes and devices, which may never end, are none.
 
     Raises:
         InputError: there is no such file, or it cannot be read.
@@ -89,7 +89,7 @@ def _opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def is_folder(path: Path) -> bool:
-    """Whether a folder is there; False for what cannot be the name of one, too."""
+    """Return whether a folder is there; False for what cannot be the name of one, too."""
     try:
         return path.is_dir()
     except (OSError, ValueError):
@@ -97,7 +97,7 @@ def is_folder(path: Path) -> bool:
 
 
 def parse_yaml(text: str) -> Any:
-    """The value of a YAML text.
+    """Build the value of a YAML text.
 
     Raises:
         YamlTextError: it is not YAML, has a key twice, or is nested or repeated without measure.

@@ -1,4 +1,4 @@
-"""Flights back to back on the real graph, with faults drawn by chance, until a time is over."""
+"""Random flights with faults, back to back on the real graph, until a time is over."""
 
 from .run import soak
 from .sampling import sample_flight

@@ -12,7 +12,7 @@ from ...flight.terminal import say
 
 
 def print_soak(report: dict[str, Any], console: Console) -> None:
-    """Print the report of `run.Soak`."""
+    """Print the report of a `run.Soak`."""
     ended = ", interrupted" if report["interrupted"] else ""
     columns = Column(is_label=True), Column(), Column(is_label=True)
     print_table(Table.of(f"soak, seed {report['seed']}{ended}", columns, rows(report)), console)

@@ -14,7 +14,7 @@ from ...flight.node_modules import MODULES
 
 SAMPLE_S = 0.25
 GRACE_S = 2.0
-"""That processes have to go when a flight is over."""
+"""Processes have that long to go when a flight is over."""
 SHARED_MEMORY = Path("/dev/shm")
 
 
@@ -60,7 +60,7 @@ class ProcessMonitor:
 
 
 def node_of(command: Sequence[str]) -> str:
-    """The node that a command line runs, as a module or a script; empty if none."""
+    """Return the node that a command line runs, as a module or a script; empty if none."""
     for node in MODULES:
         if any(re.search(rf"(?:^|[./]){node}_node$", word) for word in command):
             return node
@@ -68,5 +68,5 @@ def node_of(command: Sequence[str]) -> str:
 
 
 def shared_memory_files() -> int:
-    """Files of Fast DDS in shared memory; killed processes leave theirs behind."""
+    """Count the files of Fast DDS in shared memory; killed processes leave theirs behind."""
     return sum(1 for _ in SHARED_MEMORY.glob("fastrtps_*"))

@@ -1,4 +1,4 @@
-"""Flying drawn flights one after the other, and what is told of them."""
+"""Random flights flown one after the other, and the report on them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from ...flight.interruption import Interrupted
 from ...flight.plan import Flight, FlightPlan
 from .process_monitor import ProcessMonitor, shared_memory_files
 from .sampling import breaks_tracking, command_line, sample_flight
-from .verdict import Outcome, judge
+from .verdict import Verdict, judge
 
 WARM_UP = 3
 """Flights after which this process should have what it needs."""
@@ -39,7 +39,7 @@ class Flown:
     plan: FlightPlan
     seconds: float
     """By the wall clock, start-up and judgement included."""
-    outcome: Outcome
+    verdict: Verdict
     memory_mb: dict[str, float]
     """Largest resident set of each node."""
     own_memory_mb: float
@@ -48,22 +48,22 @@ class Flown:
     """None: deleted."""
 
     def record(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the flight as JSON has it."""
         plan = self.plan
         return {
             "number": self.number,
             "controller": plan.controller, "case": plan.case, "swaps": plan.swaps,
             "faults": plan.faults, "seed": plan.seed, "command": command_line(plan),
             "breaks_tracking": breaks_tracking(plan),
-            "survived": self.outcome.survived, **asdict(self.outcome),
+            "survived": self.verdict.survived, **asdict(self.verdict),
             "seconds": self.seconds, "memory_mb": self.memory_mb,
             "own_memory_mb": self.own_memory_mb, "bag": str(self.bag) if self.bag else None,
         }  # fmt: skip
 
     def line(self) -> str:
-        """For people, while the soak goes on."""
-        why = "; ".join(wrong.splitlines()[0] for wrong in self.outcome.wrong)
-        how = "survived" if self.outcome.survived else f"FAILED: {why}"
+        """Return the line that people see while the soak goes on."""
+        why = "; ".join(wrong.splitlines()[0] for wrong in self.verdict.wrong)
+        how = "survived" if self.verdict.survived else f"FAILED: {why}"
         plan = self.plan
         events = " ".join([*(f"swap@{swap}" for swap in plan.swaps), *plan.faults])
         return (
@@ -74,7 +74,7 @@ class Flown:
 
 @dataclass
 class Soak:
-    """What was flown, and what it left."""
+    """The flights of a soak, and what they left behind."""
 
     seed: int
     flights: list[Flown] = field(default_factory=list)
@@ -84,7 +84,7 @@ class Soak:
     """Of Fast DDS, at the start and at the end."""
 
     def report(self) -> dict[str, Any]:
-        """Everything, for JSON and for the table."""
+        """Return everything, for JSON and for the table."""
         kinds = Counter(f.partition("@")[0] for flown in self.flights for f in flown.plan.faults)
         calm = [flown for flown in self.flights if not breaks_tracking(flown.plan)]
         disturbed = [flown for flown in self.flights if breaks_tracking(flown.plan)]
@@ -93,11 +93,11 @@ class Soak:
             "seed": self.seed,
             "interrupted": self.interrupted_by != 0,
             "flights": len(self.flights),
-            "survived": sum(flown.outcome.survived for flown in self.flights),
+            "survived": sum(flown.verdict.survived for flown in self.flights),
             "faults": kinds.total(),
             "faults_by_kind": dict(sorted(kinds.items())),
-            "restarts": sum(flown.outcome.restarts for flown in self.flights),
-            "messages_lost": sum(flown.outcome.lost for flown in self.flights),
+            "restarts": sum(flown.verdict.restarts for flown in self.flights),
+            "messages_lost": sum(flown.verdict.lost for flown in self.flights),
             "largest_error": {"tracking": _largest(calm), "disturbed": _largest(disturbed)},
             "memory_growth_mb": {
                 "soak": own[-1] - own[WARM_UP - 1] if len(own) > WARM_UP else None,
@@ -167,19 +167,19 @@ def _fly(number: int, plan: FlightPlan, bag: Path, keep: bool) -> Flown:
             wrong.append(str(error))
         except Exception as error:  # a bug in the flight software must not end the soak
             wrong.append(f"{type(error).__name__}: {error}")
-    outcome = judge(flight, report, bag)
-    outcome.wrong[:0] = wrong
-    outcome.wrong += [f"left behind: {process}" for process in process_monitor.left_behind]
-    if outcome.survived and not keep:
+    verdict = judge(flight, report, bag)
+    verdict.wrong[:0] = wrong
+    verdict.wrong += [f"left behind: {process}" for process in process_monitor.left_behind]
+    if verdict.survived and not keep:
         shutil.rmtree(bag)
     return Flown(
-        number, plan, time.monotonic() - begin, outcome, process_monitor.peak_mb,
+        number, plan, time.monotonic() - begin, verdict, process_monitor.peak_mb,
         psutil.Process().memory_info().rss / 1e6, bag if bag.exists() else None,
     )  # fmt: skip
 
 
 def _new_folder(path: Path) -> Path:
-    """An empty folder: bags are never overwritten."""
+    """Make an empty folder: bags are never overwritten."""
     try:
         path.mkdir(parents=True, exist_ok=True)
         if any(path.iterdir()):
@@ -190,13 +190,16 @@ def _new_folder(path: Path) -> Path:
 
 
 def _largest(flights: Sequence[Flown]) -> dict[str, dict[str, float] | None]:
-    """Largest attitude and joint error with the number of its flight; None without a bag."""
+    """Return the largest attitude and joint error, each with the number of its flight.
+
+    None stands for an error that no bag tells.
+    """
     found: dict[str, dict[str, float] | None] = {}
     for name in ("attitude", "joint"):
         errors = [
             (error, flown.number)
             for flown in flights
-            if (error := getattr(flown.outcome, f"{name}_error")) is not None
+            if (error := getattr(flown.verdict, f"{name}_error")) is not None
         ]
         error, number = max(errors, default=(None, 0))
         found[name] = None if error is None else {"value": error, "flight": number}
@@ -204,6 +207,6 @@ def _largest(flights: Sequence[Flown]) -> dict[str, dict[str, float] | None]:
 
 
 def _growth(peaks: Sequence[float]) -> float | None:
-    """From the first to the last quarter's largest; None: too few for quarters."""
+    """Return the growth from the first to the last quarter's largest; None: too few flights."""
     quarter = len(peaks) // 4
     return max(peaks[-quarter:]) - max(peaks[:quarter]) if quarter else None

@@ -1,4 +1,4 @@
-"""Whether a flight survived its faults: what went wrong that they do not explain."""
+"""The verdict on a flight with faults: what went wrong that they do not explain."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from ...flight.plan import Flight
 
 
 @dataclass
-class Outcome:
-    """What became of a flight."""
+class Verdict:
+    """The verdict on one flight."""
 
     wrong: list[str] = field(default_factory=list)
     """Why it did not survive, a line each."""
@@ -40,39 +40,42 @@ class Outcome:
 
     @property
     def survived(self) -> bool:
-        """Whether nothing went wrong."""
+        """True if nothing went wrong."""
         return not self.wrong
 
 
-def judge(flight: Flight, report: dict[str, Any] | None, bag: Path) -> Outcome:
-    """The outcome of a flight, by its report and its bag.
+def judge(flight: Flight, report: dict[str, Any] | None, bag: Path) -> Verdict:
+    """Judge a flight by its report and its bag.
 
     ``report`` is what `orchestrator.fly` returned; None if it raised, and then only what can be
     read is told.
     """
-    outcome = Outcome()
+    verdict = Verdict()
     kinds = [fault.kind.name for fault in parse_faults(flight.faults, KINDS)]
     if report is not None:
-        outcome.restarts = report["graph"]["restarts"]
-        outcome.wrong += unplanned_deaths(kinds, report["graph"]["events"])
+        verdict.restarts = report["graph"]["restarts"]
+        verdict.wrong += unplanned_deaths(kinds, report["graph"]["events"])
     try:
         log = read_flight(bag)
-        outcome.wrong += not_finite(bag, flight)
+        verdict.wrong += not_finite(bag, flight)
     except SpaceRobotError as error:
         if report is not None or bag.exists():
-            outcome.wrong.append(f"the bag cannot be read: {error}")
-        return outcome
-    outcome.lost = sum(log.lost.values())
-    outcome.attitude_error, outcome.joint_error = largest_errors(log)
-    if outcome.lost and report is not None:  # else `fly` has said so
-        outcome.wrong.append(f"messages lost: { {k: v for k, v in log.lost.items() if v} }")
+            verdict.wrong.append(f"the bag cannot be read: {error}")
+        return verdict
+    verdict.lost = sum(log.lost.values())
+    verdict.attitude_error, verdict.joint_error = largest_errors(log)
+    if verdict.lost and report is not None:  # else `fly` has said so
+        verdict.wrong.append(f"messages lost: { {k: v for k, v in log.lost.items() if v} }")
     if log.unfinished and "kill_recorder" not in kinds:
-        outcome.wrong.append(log.unfinished)
-    return outcome
+        verdict.wrong.append(log.unfinished)
+    return verdict
 
 
 def unplanned_deaths(kinds: list[str], events: list[dict[str, Any]]) -> list[str]:
-    """Nodes that died or hung, by a flight's events, more often than by the kinds of its faults."""
+    """Return the nodes that died or hung, by a flight's events, more often than its faults say.
+
+    ``kinds`` are the names of the faults' kinds.
+    """
     wrong = []
     for node in MODULES:
         said = [event["what"] for event in events if event["node"] == f"{node}_node"]
@@ -85,7 +88,7 @@ def unplanned_deaths(kinds: list[str], events: list[dict[str, Any]]) -> list[str
 
 
 def not_finite(bag: Path, flight: Flight) -> list[str]:
-    """Whether a command or an applied torque in a bag is not a finite number.
+    """Find a command or an applied torque in a bag that is not a finite number.
 
     Raises:
         MessageError: a message that does not fit the flight's robot.
@@ -114,6 +117,6 @@ def not_finite(bag: Path, flight: Flight) -> list[str]:
 
 
 def largest_errors(log: FlightLog) -> tuple[float, float]:
-    """Largest attitude error (a component of the vector part) and joint error (rad)."""
+    """Return the largest attitude error (a component of the vector part) and joint error (rad)."""
     error = np.abs(tracking_error(log))
     return float(error[:, :3].max()), float(error[:, 3:].max())

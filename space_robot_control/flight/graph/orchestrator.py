@@ -18,9 +18,10 @@ from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
+from ..bag_path import check_bag_path
 from ..compilation import compile_kernels
 from ..interruption import handled_signals
-from ..plan import Flight, check_bag_path
+from ..plan import Flight
 from .composed import NAME, composed_command
 from .domain import ros_domain
 from .following import follow

@@ -18,6 +18,7 @@ from space_robot_control.analysis import analyze
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import build_laws, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.flight.bag_path import default_bag
 from space_robot_control.flight.graph.orchestrator import flight_parameters
 from space_robot_control.flight.node_settings import NODES, NOT_TO_BE_SET, SCHEMAS
 from space_robot_control.flight.plan import Flight, FlightPlan
@@ -74,8 +75,7 @@ def test_a_parameter_is_the_same_as_its_option() -> None:
             other.description
         )
         assert (
-            one.default_bag().name.partition("_2")[0]
-            == (other.default_bag().name.partition("_2")[0])
+            default_bag(one).name.partition("_2")[0] == (default_bag(other).name.partition("_2")[0])
         )
 
 

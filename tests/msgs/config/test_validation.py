@@ -37,6 +37,12 @@ def test_unknown_key_in_a_list_lists_the_allowed_ones() -> None:
         validate(Outer, content, "file.yaml")
 
 
+def test_an_unknown_key_is_shown_in_letters_that_can_be_shown() -> None:
+    with pytest.raises(InputError, match=r"inner\.A9\?R: unknown key") as caught:
+        validate(Outer, {"inner": {"A9\U000feb58R": 1.0}}, "file.yaml")
+    assert str(caught.value).isprintable()
+
+
 def test_key_given_twice_is_an_error_with_its_line(tmp_path: Path) -> None:
     path = tmp_path / "twice.yaml"
     path.write_text("robot:\n  mass: 750.0\n  mass: 1.0\n")

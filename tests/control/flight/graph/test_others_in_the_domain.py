@@ -12,9 +12,10 @@ from pathlib import Path
 import pytest
 from flights import COMMAND, ros_environment, space_robot
 
+from space_robot_control.flight.bag_path import check_bag_path
 from space_robot_control.flight.graph import orchestrator
 from space_robot_control.flight.node_modules import MODULES
-from space_robot_control.flight.plan import Flight, FlightPlan, check_bag_path
+from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.ros.locks import nodes_in
