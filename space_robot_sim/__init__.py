@@ -16,7 +16,7 @@ __all__ = ["Robot", "bias_force", "forward_dynamics", "load_bag", "mass_matrix"]
 
 
 def load_bag(path: str | Path, remap: Mapping[str, str] | None = None) -> FlightLog:
-    """A recorded flight as NumPy arrays, one row a tick.
+    """Read a recorded flight as NumPy arrays, one row a tick.
 
     Some of its fields, for N ticks and n joints:
 

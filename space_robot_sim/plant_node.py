@@ -12,7 +12,7 @@ from .plant.settings import PlantNodeSettings
 
 
 def make_loop(node: ManagedNode[PlantNodeSettings], settings: PlantNodeSettings) -> PlantLoop:
-    """The loop that the settings ask for."""
+    """Return the loop that the settings ask for."""
     if any(settings.faults):
         from .plant.faulty_loop import FaultyPlantLoop
 

@@ -106,7 +106,7 @@ def aba(
 def solve_spatial(
     inertia: Symmetric, coupling: Matrix, mass: Symmetric, moment: Vector, force: Vector
 ) -> tuple[Vector, Vector]:
-    """Angular and linear acceleration of a body of this spatial inertia under a wrench."""
+    """Return angular and linear acceleration of a body of this spatial inertia under a wrench."""
     inverse_mass = inverse_symmetric(mass)
     g = coupling
     rows = (

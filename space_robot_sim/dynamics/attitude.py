@@ -34,7 +34,10 @@ def rotation_matrix(quaternion: Array, out: Array) -> None:
 
 @kernel
 def quaternion_rate(quaternion: Array, omega_inertial: Array, out: Array) -> None:
-    """Write into ``out`` (4,) the rate of ``quaternion``."""
+    """Write into ``out`` (4,) the rate of ``quaternion``, 1/s, by ``J0^T`` of (1).
+
+    ``omega_inertial`` (3,) rad/s is on inertial axes.
+    """
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     p, q, r = omega_inertial[0], omega_inertial[1], omega_inertial[2]
     out[0] = -0.5 * (x * p + y * q + z * r)
@@ -78,13 +81,13 @@ def attitude_jacobian_inverse(quaternion: Array, out: Array) -> None:
 
 @kernel
 def rotate(matrix: Array, vector: Array, out: Array) -> None:
-    """``out = matrix @ vector``, all of dimension three; ``out`` may not be ``vector``."""
+    """Write ``matrix @ vector`` into ``out`` (3,); ``out`` is not ``vector``."""
     for i in range(3):
         out[i] = matrix[i, 0] * vector[0] + matrix[i, 1] * vector[1] + matrix[i, 2] * vector[2]
 
 
 @kernel
 def rotate_back(matrix: Array, vector: Array, out: Array) -> None:
-    """``out = matrix.T @ vector``, all of dimension three; ``out`` may not be ``vector``."""
+    """Write ``matrix.T @ vector`` into ``out`` (3,); ``out`` is not ``vector``."""
     for i in range(3):
         out[i] = matrix[0, i] * vector[0] + matrix[1, i] * vector[1] + matrix[2, i] * vector[2]

@@ -1,4 +1,4 @@
-"""Where each body is and how it moves, on inertial axes with the base CoM as origin."""
+"""Positions and velocities of the bodies, on inertial axes with the base CoM as origin."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ Array = NDArray[np.float64]
 def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, data: Data) -> None:
     """Fill ``data.motion, first_moment, inertia`` (modified Denavit-Hartenberg).
 
-    ``T(i-1 -> i) = Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(theta_i) Tz(d_i)``.
+    ``T(i-1 -> i) = Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(theta_i) Tz(d_i)``; ``quaternion`` (4,) is the
+    base's attitude, ``joint_positions`` (n,) rad.
     """
     rotation_matrix(quaternion, data.rotation)
     r = data.rotation
@@ -60,7 +61,7 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
 
 @kernel
 def _place(model: Model, i: int, axes: Matrix, joint: Vector, data: Data) -> None:
-    """First moment and inertia of body i about the origin, from its axes and its joint."""
+    """Write first moment and inertia of body i about the origin, from its axes and its joint."""
     mass = model.mass[i]
     com = add(joint, transform(axes, vector(model.com[i], 0)))
     moment = scale(com, mass)
@@ -78,7 +79,7 @@ def _place(model: Model, i: int, axes: Matrix, joint: Vector, data: Data) -> Non
 
 @kernel
 def rotated_inertia(axes: Matrix, inertia: Symmetric) -> Symmetric:
-    """``R I R^T``."""
+    """Return ``R I R^T``, the inertia (kg m2) on the axes that ``axes`` turns into."""
     a = (axes[0], axes[1], axes[2])
     b = (axes[3], axes[4], axes[5])
     c = (axes[6], axes[7], axes[8])

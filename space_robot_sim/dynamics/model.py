@@ -1,4 +1,4 @@
-"""What the algorithms read (`Model`, constant) and where they write (`Data`, scratch).
+"""The memory of the algorithms: they read `Model` (constant) and write `Data` (scratch).
 
 All vectors of `Data` are on inertial axes with the base CoM as origin, so that bodies add up
 without a change of frame; spatial ones have their angular part first. Body 0 is the base,

@@ -37,7 +37,7 @@ class RhoSpaceModel(Record):
     to_force: Array = shaped(lambda n: (3, 3))
     """``J0^-T`` for inertial axes, the transpose of ``J0^-1``."""
     rotation: Array = shaped(lambda n: (3, 3))
-    """Base to inertial frame."""
+    """Rotation from the base frame to the inertial frame."""
     vectors: Array = shaped(lambda n: (3, 3))
     """Scratch."""
     data: Data = nested(Data)
@@ -50,7 +50,13 @@ def rho_space_into(
 ) -> None:  # fmt: skip
     """Fill ``out.inertia`` and ``out.bias`` with H_S and c_S of the floating robot.
 
-    ``omega_base`` is in the base frame, as measured. Singular at eta = 0.
+    Args:
+        model: the nominal robot.
+        quaternion: (4,) base attitude, unit; singular at eta = 0.
+        joint_positions: (n,) rad.
+        omega_base: (3,) base angular velocity in the base frame, as measured, rad/s.
+        joint_velocities: (n,) rad/s.
+        out: results and scratch.
     """
     inertia, bias, full = out.inertia, out.bias, out.full_inertia
     omega, convective, moved = out.vectors[0], out.vectors[1], out.vectors[2]
@@ -84,7 +90,7 @@ def rho_space_into(
 
 @kernel
 def _eliminate_translation(full: Array, full_bias: Array, inertia: Array, bias: Array) -> None:
-    """``H_r = H22 - H21 H12 / M``, ``c_r = c2 - H21 c1 / M``: no force on the base's CoM."""
+    """Write ``H_r = H22 - H21 H12 / M``, ``c_r = c2 - H21 c1 / M``: no force on the base's CoM."""
     total_mass = full[0, 0]
     for i in range(bias.size):
         bias[i] = full_bias[3 + i]

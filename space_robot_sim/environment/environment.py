@@ -20,7 +20,7 @@ class EnvironmentSettings(StrictModel):
 
 
 class Environment(Record):
-    """What acts on one robot, as the plant's kernels read it."""
+    """The environment of one robot, as the plant's kernels read it."""
 
     friction: Friction = nested(Friction)
     disturbance: Disturbance = nested(Disturbance)

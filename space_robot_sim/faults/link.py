@@ -86,7 +86,7 @@ class Link(Generic[Item]):
         return arrived
 
     def push(self, tick: int, item: Item, stamp: int | None = None) -> list[DelayedMessage[Item]]:
-        """`send`, then `arrivals`."""
+        """Call `send`, then `arrivals`."""
         self.send(tick, item, stamp)
         return self.arrivals(tick)
 

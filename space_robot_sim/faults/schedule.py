@@ -16,7 +16,7 @@ from .grammar import Fault, Kind
 Array = NDArray[np.float64]
 
 BLOCK_TICKS = 256
-"""Ticks whose random numbers are drawn at once."""
+"""Random numbers are drawn for that many ticks at once."""
 
 
 class ScheduledFault:
@@ -122,5 +122,5 @@ class TemporaryChange:
 
 
 def _tick_from(seconds: float, period: float) -> float:
-    """The first tick at or after a time; a millionth of a tick counts as rounding."""
+    """Return the first tick at or after a time; a millionth of a tick counts as rounding."""
     return math.ceil(seconds / period - 1e-6) if math.isfinite(seconds) else seconds

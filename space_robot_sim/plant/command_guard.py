@@ -1,4 +1,4 @@
-"""Which command acts on the robot: the newest good one, held for a while, then none."""
+"""The command that acts on the robot: the newest good one, held for a while, then none."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ class CommandGuard:
 
     @property
     def is_safe(self) -> bool:
-        """Whether commands have failed for so long that the torque is zero."""
+        """True if commands have failed for so long that the torque is zero."""
         return self.acting is self._none
 
     def held_ticks(self, now: int) -> int:
-        """Age at ``now`` of the state that the last good command answers, ticks."""
+        """Return the age at ``now`` of the state that the last good command answers, ticks."""
         return now - self._accepted.tick
 
     def accept(self, now: int) -> bool:
@@ -58,11 +58,11 @@ class CommandGuard:
         self.refused[reason] += 1
 
     def release(self) -> None:
-        """No torque until the next good command."""
+        """Let no torque act until the next good command."""
         self._accepted.torque[:] = 0.0
 
     def act(self, now: int) -> Command:
-        """The command for tick ``now``."""
+        """Return the command for tick ``now``."""
         held = self.answered >= 0 and self.held_ticks(now) <= self._hold_ticks
         self.acting = self._accepted if held else self._none
         return self.acting

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 def generalised_velocity(state: RobotState) -> Array:
-    """``[v0, w0, thetadot]`` (n+6,), base part on inertial axes."""
+    """Return ``[v0, w0, thetadot]`` (n+6,) m/s and rad/s, base part on inertial axes."""
     rotation = np.empty((3, 3))
     rotation_matrix(state.quaternion, rotation)
     return np.concatenate(
@@ -24,14 +24,14 @@ def generalised_velocity(state: RobotState) -> Array:
 
 
 def momentum(robot: Robot, state: RobotState) -> tuple[Array, Array]:
-    """Linear (N s) and angular momentum (N m s) about the inertial origin, inertial axes."""
+    """Return linear (N s) and angular momentum (N m s) about the inertial origin, inertial axes."""
     inertia = mass_matrix(robot, state.quaternion, state.joint_positions)
     base = inertia[:6] @ generalised_velocity(state)
     return base[:3], base[3:] + np.cross(state.base_position, base[:3])
 
 
 def kinetic_energy(robot: Robot, state: RobotState) -> float:
-    """T of (4), J."""
+    """Return the kinetic energy T of (4), J."""
     velocity = generalised_velocity(state)
     inertia = mass_matrix(robot, state.quaternion, state.joint_positions)
     return float(0.5 * velocity @ inertia @ velocity)

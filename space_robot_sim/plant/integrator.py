@@ -43,7 +43,17 @@ def state_derivative(
     model: Model, environment: Environment, x: Array, torque: Array, disturbance: Array,
     stages: Stages, out: Array,
 ) -> None:  # fmt: skip
-    """Write xdot into ``out``: (27) with ``torque`` (n+3,) fixed in the *base* frame and f0 = 0."""
+    """Write xdot (2n+13,) into ``out``: (27) with f0 = 0.
+
+    Args:
+        model: the plant's robot.
+        environment: its friction.
+        x: (2n+13,) the state, see `Stages`.
+        torque: (n+3,) N m, on the base's axes, which turn with it, then on the joints.
+        disturbance: (n+3,) f_d, N m, about inertial axes, then on the joints.
+        stages: scratch.
+        out: (2n+13,).
+    """
     n = model.mass.size - 1
     quaternion, theta = x[3:7], x[7 : 7 + n]
     v0, w0, joint_velocities = x[7 + n : 10 + n], x[10 + n : 13 + n], x[13 + n :]
@@ -67,7 +77,10 @@ def rk4_step(
     model: Model, environment: Environment, x: Array, torque: Array, time: float, period: float,
     stages: Stages,
 ) -> None:  # fmt: skip
-    """Advance ``x`` in place from ``time`` by ``period``; the quaternion is made unit again."""
+    """Advance ``x`` in place from ``time`` by ``period``, s; the quaternion is made unit again.
+
+    ``torque`` (n+3,) N m is held, see `state_derivative`.
+    """
     size = x.size
     slope, stage, disturbance = stages.slope, stages.stage, stages.disturbance
     stage[:] = x

@@ -30,7 +30,7 @@ RATE_LIMIT = 1e4
 
 
 class PlantSettings(ActuatorSettings, EnvironmentSettings):
-    """What the plant is told about its world, beside the robot's own file."""
+    """Settings of the plant's world, beside the robot's own file."""
 
     initial_joints_deg: list[float] = Field(
         [0.0], description="joint angles at tick 0, degrees, one a joint"
@@ -41,7 +41,7 @@ class PlantSettings(ActuatorSettings, EnvironmentSettings):
 
 
 class PlantMemory(Record):
-    """All that a step of the plant reads and writes."""
+    """The memory that a step of the plant reads and writes."""
 
     model: Model = nested(Model)
     environment: Environment = nested(Environment)
@@ -52,7 +52,7 @@ class PlantMemory(Record):
     rotation: Array = shaped(lambda n: (3, 3))
     """Scratch."""
     measured: State = nested(State)
-    """What the sensors report at the current tick."""
+    """The state as the sensors report it at the current tick."""
 
 
 class Plant:
@@ -124,7 +124,7 @@ class Plant:
             raise self.diverged(fastest)
 
     def diverged(self, fastest: float) -> DivergedError:
-        """What to raise when the fastest rate after a step is ``fastest``."""
+        """Return the error for a fastest rate after a step of ``fastest``, rad/s."""
         why = "the state is not finite" if np.isnan(fastest) else f"{fastest:.3g} rad/s"
         return DivergedError(self.tick, self.period, why)
 
@@ -133,7 +133,7 @@ class Plant:
 def step(
     block: Block, command_delay_buffer: Array, torque: Array, tick: int, period: float
 ) -> float:
-    """`advance` for callers from Python."""
+    """Call `advance` from Python."""
     fastest: float = advance(block[0], command_delay_buffer, torque, tick, period)
     return fastest
 

@@ -16,7 +16,7 @@ from .faults import PLANT_KINDS
 from .plant import PlantSettings
 
 MOST_TICKS = 10**10
-"""Of a flight."""
+"""No flight is longer."""
 
 
 def _readable(texts: list[str]) -> list[str]:
@@ -62,12 +62,12 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
 
     @property
     def parsed_faults(self) -> list[Fault]:
-        """``faults`` without the empty texts."""
+        """The faults, without the empty texts."""
         return parse_faults(self.faults, PLANT_KINDS)
 
     @classmethod
     def layers(cls, selected: Mapping[str, str]) -> list[Path]:
-        """The mission tells where the arm starts, the case what disturbs it."""
+        """Add the mission, which tells where the arm starts, and the case, which disturbs it."""
         return [
             *super().layers(selected),
             mission_file(selected["robot"], selected["mission"]),

@@ -1,4 +1,4 @@
-"""When the ticks of a flight are over by the wall clock."""
+"""The ends of a flight's ticks by the wall clock."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import math
 import time
 
 SLIP_S = 0.25
-"""Further behind the wall clock than this, nobody catches up."""
+"""A flight further behind the wall clock does not catch up."""
 REMARK_S = 5.0
-"""Between two remarks on time lost lies at least this."""
+"""Two remarks on lost time are at least this far apart."""
 
 
 class WallClock:
@@ -18,15 +18,15 @@ class WallClock:
         self._period = period
         self._begin = 0.0
         self.lost_time_s = 0.0
-        """How far the wall clock has run ahead for good."""
+        """Time by which the wall clock has run ahead for good."""
         self._remarked_s, self._remarked_at = 0.0, -math.inf
 
     def start(self, tick: int) -> None:
-        """``tick`` begins now."""
+        """Let ``tick`` begin now."""
         self._begin = time.monotonic() - tick * self._period
 
     def left(self, tick: int) -> float:
-        """Time until ``tick`` is over, s; negative if it is."""
+        """Return the time until ``tick`` is over, s; negative if it is."""
         return self._begin + (tick + 1) * self._period - time.monotonic()
 
     def slip(self, tick: int) -> float:
@@ -39,7 +39,7 @@ class WallClock:
         return behind
 
     def remark(self) -> str:
-        """What to say of the time lost since the last remark; empty if that was just now."""
+        """Return a remark on the time lost since the last one; empty if that was just now."""
         now = time.monotonic()
         lost, since = self.lost_time_s - self._remarked_s, now - self._remarked_at
         if since < REMARK_S or not lost:

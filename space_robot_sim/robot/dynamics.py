@@ -1,4 +1,4 @@
-"""Inertia matrix, bias force and accelerations of a `Robot`, in new arrays."""
+"""The inertia matrix, bias force and accelerations of a `Robot`, in new arrays."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _quaternion(value: ArrayLike) -> Array:
 
 
 def mass_matrix(robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike) -> Array:
-    """Inertia matrix H of (7)-(10).
+    """Return the inertia matrix H of (7)-(10).
 
     Args:
         robot: the robot's numbers.
@@ -64,7 +64,7 @@ def bias_force(
     w0_inertial: ArrayLike,
     joint_velocities: ArrayLike,
 ) -> Array:
-    """Velocity-dependent force c of (20): ``H qdd + c = F``.
+    """Return the velocity-dependent force c of (20): ``H qdd + c = F``.
 
     Args:
         robot: the robot's numbers.
@@ -97,7 +97,23 @@ def forward_dynamics(
     joint_velocities: ArrayLike,
     force: ArrayLike,
 ) -> Array:
-    """Acceleration ``qdd = H^-1 (F - c)``, arguments as in `bias_force`, ``force`` (n+6,)."""
+    """Return the acceleration ``qdd = H^-1 (F - c)`` of (7).
+
+    Args:
+        robot: the robot's numbers.
+        quaternion_wxyz: (4,) base attitude, unit.
+        joint_positions: (n,) rad.
+        w0_inertial: (3,) base angular velocity on inertial axes, rad/s.
+        joint_velocities: (n,) rad/s.
+        force: (n+6,) F: force (N), moment about the base CoM (N m) on inertial axes, joint
+            torques (N m).
+
+    Returns:
+        (n+6,) m/s2 and rad/s2, base part on inertial axes.
+
+    Raises:
+        ValueError: an argument has the wrong shape, or the quaternion is not unit.
+    """
     n = robot.n
     out = np.empty(n + 6)
     aba(

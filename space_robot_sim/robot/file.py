@@ -15,13 +15,13 @@ Array = NDArray[np.float64]
 
 
 def inertia_tensor(values: list[float]) -> Array:
-    """``[Ixx, Iyy, Izz, Ixy, Ixz, Iyz]`` as a symmetric (3, 3) matrix (tensor elements, kg m2)."""
+    """Return ``[Ixx, Iyy, Izz, Ixy, Ixz, Iyz]``, kg m2, as a symmetric (3, 3) tensor."""
     xx, yy, zz, xy, xz, yz = values
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def inertia_elements(tensors: Array) -> Array:
-    """The inverse of `inertia_tensor`, for (..., 3, 3) tensors."""
+    """Invert `inertia_tensor`, for (..., 3, 3) tensors."""
     t = tensors
     moments = [t[..., 0, 0], t[..., 1, 1], t[..., 2, 2]]
     return np.stack([*moments, t[..., 0, 1], t[..., 0, 2], t[..., 1, 2]], axis=-1)
@@ -49,14 +49,17 @@ Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
 class BaseFile(StrictModel):
-    """``robot.base``."""
+    """``robot.base``: mass in kg, inertia about the CoM in kg m2."""
 
     mass: Mass
     inertia: Inertia
 
 
 class LinkFile(StrictModel):
-    """One entry of ``robot.links``: the joint towards the base, and the body it moves."""
+    """One entry of ``robot.links``: the joint towards the base, and the body it moves.
+
+    Lengths in m, mass in kg, inertia about the CoM in kg m2 on the link's axes.
+    """
 
     name: Annotated[str, Field(min_length=1)]
     alpha_deg: float
@@ -68,7 +71,7 @@ class LinkFile(StrictModel):
 
 
 class ToolFile(StrictModel):
-    """``robot.tool``: from the last link's frame to the end effector's."""
+    """``robot.tool``: from the last link's frame to the end effector's; lengths in m."""
 
     alpha_deg: float = 0.0
     a: float = 0.0

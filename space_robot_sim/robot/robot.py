@@ -80,7 +80,12 @@ class Robot:
         )
 
     def with_last_link(self, mass: float, inertia: list[float]) -> Robot:
-        """The same robot with another mass and inertia of its last link (a payload), CoM kept."""
+        """Return the robot with a payload as its last link, CoM kept.
+
+        Args:
+            mass: mass of the last link, kg.
+            inertia: ``[Ixx, Iyy, Izz, Ixy, Ixz, Iyz]`` about its CoM on its axes, kg m2.
+        """
         masses, tensors = self.mass.copy(), self.inertia.copy()
         masses[-1], tensors[-1] = mass, inertia_tensor(inertia)
         return Robot(
@@ -102,6 +107,6 @@ class Robot:
 
 
 def _exact_at_right_angles(values: Array) -> Array:
-    """Cos and sin of multiples of 90 degrees without the rounding error of pi."""
+    """Rid sines and cosines of multiples of 90 degrees of the rounding error of pi."""
     rounded = np.round(values)
     return np.where(np.abs(values - rounded) < 1e-15, rounded, values)

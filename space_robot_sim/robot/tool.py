@@ -1,4 +1,4 @@
-"""Where the end effector is, for every tick of a flight at once."""
+"""The pose of the end effector, for every tick of a flight at once."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _BATCH = 8192
 
 
 def tool_pose(robot: Robot, quaternion: Array, joint_positions: Array) -> tuple[Array, Array]:
-    """Axes and position of the end effector's frame, the base's CoM as origin.
+    """Return axes and position of the end effector's frame, the base's CoM as origin.
 
     ``T(i-1 -> i) = Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(theta_i) Tz(d_i)`` (modified Denavit-Hartenberg),
     then the tool's, whose theta is 0.
@@ -47,7 +47,7 @@ def tool_pose(robot: Robot, quaternion: Array, joint_positions: Array) -> tuple[
 
 
 def _chain(robot: Robot, quaternion: Array, theta: Array) -> tuple[Array, Array, Array, Array]:
-    """The tool's axes and position, (3, N) each, from (4, N) and (n, N)."""
+    """Return the tool's axes and position (m), (3, N) each, from (4, N) and (n, N) rad."""
     w, x, y, z = quaternion
     axis_x = np.array([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)])
     axis_y = np.array([2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)])
