@@ -85,7 +85,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         (f"lib/{NAME}", EXECUTABLES),
-        (f"share/{NAME}/docs", ["docs/errata.md"]),  # part of the report of `reproduce`
+        (f"share/{NAME}/docs/explanation", ["docs/explanation/errata.md"]),  # `reproduce` shows it
         *CONFIG,
     ],
 )

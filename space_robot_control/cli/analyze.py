@@ -63,7 +63,7 @@ def analyze(
     """Figures of merit of recorded flights: one bag, or several side by side.
 
     RMS, maxima, settling, chatter, saturation, latency, the error of the time-delay estimate, and
-    where the end effector pointed. docs/analysis.md says what each means.
+    where the end effector pointed. docs/manual/analysis.md says what each means.
     Modules and files that a bag names are not opened without --trust.
 
     \b

@@ -54,7 +54,7 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         [""], description="names of nodes that must listen before the first tick"
     )
     faults: Annotated[Texts, AfterValidator(_readable)] = Field(
-        [""], description="faults to bring about, each KIND@T[-END][:ARGUMENT], see docs/faults.md"
+        [""], description="faults to bring about, each KIND@T[-END][:ARGUMENT], see docs/manual"
     )
     fault_seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(
         0, description="seed of the faults' random numbers"

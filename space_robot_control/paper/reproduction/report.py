@@ -33,5 +33,5 @@ def render(
 
 
 def errata() -> str:
-    """Read ``docs/errata.md`` from the source tree or where it was installed."""
-    return (config_directory().parent / "docs" / "errata.md").read_text("utf-8")
+    """Read ``docs/explanation/errata.md``, of the source tree or where it was installed."""
+    return (config_directory().parent / "docs/explanation/errata.md").read_text("utf-8")

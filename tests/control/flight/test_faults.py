@@ -1,4 +1,4 @@
-"""The grammar of faults, what is said of bad ones, and docs/faults.md against the registry."""
+"""The grammar of faults, what is said of bad ones, and the page of kinds against the catalogue."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from space_robot_sim.faults.grammar import (
 )
 from space_robot_sim.plant.faults import PLANT_KINDS
 
-PAGE = DOCS / "faults.md"
+PAGE = DOCS / "reference/faults.md"
 
 TIMES = st.floats(0.0, 1e9)
 

@@ -1,4 +1,6 @@
-"""Every kind of fault on the real graph, with the reaction that docs/fault_handling.md promises.
+"""Every kind of fault on the real graph, with the reaction that is promised
+
+in docs/explanation/fault_handling.md.
 
 Faults that do not disturb one another share a flight, each in a stretch of its own. How often a
 fault by chance happens is known beforehand, so counters are compared exactly.
