@@ -32,7 +32,7 @@ def cli() -> None:
       space-robot analyze flights/<bag>...          figures of merit of recorded flights
       space-robot replay flights/<bag>              its states to a live controller, compared
       space-robot reproduce                         the paper's Table V and figures, flown again
-      space-robot soak --minutes 5                  flights with faults drawn by chance
+      space-robot soak --minutes 5                  random flights with faults
     """
 
 

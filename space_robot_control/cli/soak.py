@@ -49,7 +49,7 @@ def soak(
     as_json: bool,
     output: Path | None,
 ) -> None:
-    """Fly missions back to back on the real graph, with faults drawn by chance.
+    """Fly random missions with faults back to back on the real graph.
 
     Law, case, swaps and one to four faults of each flight are drawn from the seed; killed and
     stopped processes are among them. A flight survives if it comes to its end, no node dies that
