@@ -119,7 +119,7 @@ def _range(field: Any) -> str:
 
 def _gains() -> Iterator[Sequence[str]]:
     for name, law in laws().items():
-        for gain, description in law.gain_descriptions.items():
+        for gain, description in law.gain_descriptions().items():
             yield f"`{name}.{gain}`", description.replace("|", "\\|")
 
 
