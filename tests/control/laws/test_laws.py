@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from paths import ROOT
 
+from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.flight.simulate import simulate
 from space_robot_control.laws import (
     CompiledLaw,
     ControlLaw,
@@ -290,3 +295,24 @@ def test_unknown_laws_are_errors_that_name_the_allowed_ones(name: str, why: str)
 def test_a_missing_gain_is_an_error() -> None:
     with pytest.raises(KeyError, match="k_d"):
         find_law("ctc")({"k_p": np.ones(9)}, PERIOD)
+
+
+def test_the_law_of_ones_own_in_the_manual_flies(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its two files to the letter."""
+    manual = (ROOT / "docs/control_laws.md").read_text("utf-8")
+    module, gains = (
+        re.search(rf"```{language}\n(# {name}.*?)```", manual, re.DOTALL)
+        for language, name in (("python", "my_laws.py"), ("yaml", "gains/tde.yaml"))
+    )
+    assert module
+    assert gains
+    (tmp_path / "my_laws.py").write_text(module[1])
+    (tmp_path / "gains").mkdir()
+    (tmp_path / "gains/tde.yaml").write_text(gains[1])
+    monkeypatch.syspath_prepend(tmp_path)
+    own = "my_laws:TimeDelayControl"
+    flight = Flight(FlightPlan(controller=own, gains=f"{tmp_path}/gains", duration=0.05))
+    errors = simulate(flight).telemetry[:, 3]  # type: ignore[index]
+    assert np.abs(errors).max() < 1e-6
