@@ -4,9 +4,9 @@ PYTHON ?= python3
 VENV := .venv
 PACKAGES := space_robot_control space_robot_msgs_py space_robot_sim
 PYTEST := $(VENV)/bin/python -m pytest --numprocesses 2 --dist loadfile
-# Tests of kernels that are short enough without compiler.
-INTERPRETED := tests/sim/dynamics tests/sim/environment tests/sim/robot tests/sim/sensors tests/sim/plant \
-  tests/control/laws tests/control/controller tests/msgs/compiled tests/msgs/wire
+# Tests of kernels that are short enough without a compiler.
+INTERPRETED := $(addprefix tests/,sim/dynamics sim/environment sim/robot sim/sensors sim/faults \
+  control/laws $(addprefix control/controller/test_,tracking.py time_delay_estimation.py controller.py))
 PIP_INSTALL := $(VENV)/bin/python -m pip install -qq --disable-pip-version-check
 
 # A ROS sourced in this terminal must not mix with the one in .venv.

@@ -9,7 +9,7 @@ before any module uses them; so it is a hundred times slower, and for short test
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,26 @@ class _RecordFunction:
         self._function(*records, last)
 
 
+class _PlainFunction:
+    """As `RecordFunction`: called with records, or with their addresses."""
+
+    def __init__(self, function: Any, layouts: Iterable[np.dtype[Any]], _: Any) -> None:
+        self._function, self._layouts = function, tuple(layouts)
+
+    def call(self, *arguments: Any) -> None:
+        *addresses, period = arguments
+        self._function(*map(_record_at, addresses, self._layouts), period)
+
+    def __call__(self, *arguments: Any) -> None:
+        *records, period = arguments
+        self.call(*(record.__array_interface__["data"][0] for record in records), period)
+
+
+def _record_at(address: int, layout: np.dtype[Any]) -> Any:
+    memory = (ctypes.c_char * layout.itemsize).from_address(address)
+    return np.ndarray((1,), layout, buffer=memory)[0]
+
+
 kernels.kernel = kernels.subroutine = _as_it_is  # type: ignore[assignment]
-kernels.RecordFunction = _RecordFunction  # type: ignore[misc, assignment]
+kernels.RecordFunction = _PlainFunction  # type: ignore[assignment,misc]
 np.record.__getattribute__ = _field_first  # type: ignore[method-assign]
