@@ -78,7 +78,7 @@ class RobotState:
     Each field of `State` is an attribute, a view of ``block``, which compiled code reads whole.
     """
 
-    __slots__ = ("block", "tick", *STATE_FIELDS)
+    __slots__ = ("block", "numbers", "tick", *STATE_FIELDS)
     base_position: Array
     quaternion: Array
     base_velocity: Array
@@ -90,6 +90,8 @@ class RobotState:
     def __init__(self, tick: int, block: Block) -> None:
         """``block``: (1,) array of a `State`."""
         self.tick, self.block = tick, block
+        self.numbers: Array = block.view(np.float64)
+        """All fields one behind the other, the same memory."""
         for name in STATE_FIELDS:
             setattr(self, name, block[0][name])
 

@@ -12,7 +12,8 @@ from space_robot_msgs_py.ros.health import Health, Level
 from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.wire.codecs import CommandCodec
-from space_robot_msgs_py.wire.plain_codecs import LawCodec, TelemetryCodec
+from space_robot_msgs_py.wire.controller_law import LawCodec
+from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
 from space_robot_msgs_py.wire.stamp_guard import StampGuard
 from space_robot_sim.robot import Robot
 

@@ -42,5 +42,6 @@ class ControllerNodeSettings(NodeSettings):
         2.0, description="s by the wall clock without a state until that is reported"
     )
     wait_for: Texts = Field(
-        [""], description="names of nodes that must listen before the first command"
+        [""],
+        description="who must listen before the first command: NODE:TOPIC, or NODE to all it sends",
     )

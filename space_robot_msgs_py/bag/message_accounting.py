@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 from .. import topics
 from ..samples import Timebase
 from ..wire.cdr import header_stamp_ns
-from ..wire.plain_codecs import TelemetryCodec
+from ..wire.controller_telemetry import TelemetryCodec
 from ..wire.stamp_guard import StampGuard
 
 
 def message_tick(topic: topics.Topic, data: bytes, timebase: Timebase) -> int:
     """The tick a serialized message is stamped with (of a chunk: its first)."""
-    if topic is topics.TELEMETRY:
-        return TelemetryCodec.decode(data)[0]
-    return timebase.tick(header_stamp_ns(data))
+    if topic.has_stamp:
+        return timebase.tick(header_stamp_ns(data))
+    return TelemetryCodec.decode(data)[0]
 
 
 LONGEST_JUMP = 20_000

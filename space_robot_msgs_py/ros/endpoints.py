@@ -78,12 +78,18 @@ class RawPublisher:
         return int(self._publisher.get_subscription_count())
 
     def missing_listeners(self, names: Sequence[str]) -> list[str]:
-        """Return those of the named nodes that listen to this topic and are not connected yet."""
-        wanted = [name for name in names if name in self.topic.listeners]
+        """Return the awaited nodes that do not listen to this topic yet.
+
+        Args:
+            names: ``NODE:TOPIC``, a node that must listen to that topic, or ``NODE``, one that must
+                listen to this one whatever it is.
+        """
+        awaited = [entry.partition(":") for entry in names if entry]
+        nodes = [node for node, _, topic in awaited if topic in ("", self.topic.name)]
         infos = self._node.get_subscriptions_info_by_topic(self.topic.name)
-        missing = [name for name in wanted if name not in {info.node_name for info in infos}]
-        if not missing and self.listener_count < len(wanted):
-            return wanted  # discovered, but not all matched with this publisher yet
+        missing = [name for name in nodes if name not in {info.node_name for info in infos}]
+        if not missing and self.listener_count < len(nodes):
+            return nodes  # discovered, but not all matched with this publisher yet
         return missing
 
     def flush(self, timeout_s: float) -> None:

@@ -32,7 +32,7 @@ class Loop(Protocol):
 
     @property
     def wait_for(self) -> Sequence[str]:
-        """Names of the nodes that must listen to ``outputs`` before the first step."""
+        """Who must listen before the first step: ``NODE:TOPIC``, or ``NODE`` to all ``outputs``."""
 
     @property
     def is_complete(self) -> bool:

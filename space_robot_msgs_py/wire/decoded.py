@@ -14,11 +14,6 @@ def stamp_of(message: Any) -> int:
     return int(stamp.sec * 1_000_000_000 + stamp.nanosec)
 
 
-def xyz(value: Any) -> tuple[float, float, float]:
-    """A Vector3 message's numbers (or a Quaternion's first three)."""
-    return value.x, value.y, value.z
-
-
 def name_order(given: Sequence[str], expected: Sequence[str], topic: str) -> list[int]:
     """Where each expected name stands among the given ones.
 

@@ -51,7 +51,8 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         description="s by the wall clock a tick waits for its command in lockstep (0: for ever)",
     )
     wait_for: Texts = Field(
-        [""], description="names of nodes that must listen before the first tick"
+        [""],
+        description="who must listen before the first tick: NODE:TOPIC, or NODE to all it sends",
     )
     faults: Annotated[Texts, AfterValidator(_readable)] = Field(
         [""], description="faults to bring about, each KIND@T[-END][:ARGUMENT], see docs/manual"

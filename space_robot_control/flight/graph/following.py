@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from typing import Any
 
+from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import FlightError
 
 from ..faults import NODE_OF
@@ -78,7 +79,7 @@ class _Follower:
         self._fault_kinds = frozenset(fault.kind.name for fault in flight.orchestrator_faults)
         self._realtime = flight.plant_settings.realtime
         self._injector = Injector(flight.orchestrator_faults, graph)
-        again = {**parameters["controller"], "wait_for": ["plant_node"]}
+        again = {**parameters["controller"], "wait_for": [f"plant_node:{topics.COMMAND.name}"]}
         self._watch = Watch(
             graph, monitor,
             planned=frozenset(NODE_OF[fault.kind] for fault in flight.orchestrator_faults),

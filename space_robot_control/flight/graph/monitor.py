@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
+from space_robot_msgs_py.wire.controller_telemetry import SIGNALS, TelemetryCodec
 from space_robot_msgs_py.wire.definitions import decode
-from space_robot_msgs_py.wire.plain_codecs import TelemetryCodec
 
 from .temporary_node import TemporaryNode
 
@@ -84,8 +84,8 @@ class Monitor:
 
     def _read_telemetry(self, data: bytes) -> list[Event]:
         _, rows = TelemetryCodec.decode(data)
-        if rows.ndim == 2 and len(rows) == len(TelemetryCodec.ROWS) and rows.shape[1] > 3:
-            error = abs(rows[TelemetryCodec.ROWS.index("e")])
+        if rows.ndim == 2 and len(rows) == len(SIGNALS) and rows.shape[1] > 3:
+            error = abs(rows[SIGNALS.index("e")])
             self.errors = float(error[:3].max()), float(error[3:].max())
         return []
 

@@ -25,6 +25,7 @@ from ..plan import Flight
 from .composed import NAME, composed_command
 from .domain import ros_domain
 from .following import follow
+from .listeners import wait_for
 from .processes import Graph, node_command, node_environment
 
 COMPOSED_DRAIN_S = 0.002
@@ -122,11 +123,8 @@ def require_ros() -> None:
 def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
     """The parameters of every node of a flight that is recorded to ``bag``."""
     parameters = {node: dict(given) for node, given in flight.parameters.items()}
-    parameters["plant"] |= {
-        "ticks": flight.ticks,
-        "wait_for": ["controller_node", "mission_node", "recorder_node"],
-    }
-    parameters["controller"] |= {"wait_for": ["plant_node", "recorder_node"]}
+    parameters["plant"] |= {"ticks": flight.ticks, "wait_for": wait_for("plant")}
+    parameters["controller"] |= {"wait_for": wait_for("controller")}
     parameters["recorder"] |= {
         "bag": str(bag.absolute()),
         "flight": json.dumps(flight.description),

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Timebase
-from space_robot_msgs_py.wire.codecs import JointStateMessage
-from space_robot_msgs_py.wire.compiled_cdr import FOREIGN, read_effort
+from space_robot_msgs_py.wire.command import Commands as CommandMessages
+from space_robot_msgs_py.wire.compiled_codec import FOREIGN, CompiledCodec
 from space_robot_msgs_py.wire.decoded import name_order, stamp_of
 from space_robot_msgs_py.wire.definitions import decode
 
@@ -58,10 +58,7 @@ class CommandList:
 
     def __init__(self, axis_names: tuple[str, ...], timebase: Timebase) -> None:
         self._names, self._timebase = axis_names, timebase
-        message = JointStateMessage(
-            topics.COMMAND, axis_names, topics.BASE_FRAME, fields=("effort",)
-        )
-        self._block = message.block
+        self._codec = CompiledCodec(CommandMessages(axis_names, timebase))
         self._torque = np.zeros(len(axis_names))
         usual = Form(topics.BASE_FRAME, str(list(axis_names)))
         self._forms: dict[Form, int] = {usual: 0}
@@ -72,7 +69,7 @@ class CommandList:
         """Take a message; the tick it answers, or None if it is not readable."""
         form = 0
         try:
-            stamp_ns = read_effort(self._block, data, self._torque)
+            stamp_ns = self._codec.read(data, self._torque)
             if stamp_ns == FOREIGN:
                 stamp_ns, form = self._read_foreign(data)
             tick = self._timebase.tick(stamp_ns)

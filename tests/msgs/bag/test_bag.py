@@ -20,9 +20,9 @@ from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Command, RobotState, Timebase
+from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.definitions import definition, jazzy
-from space_robot_msgs_py.wire.plain_codecs import ClockCodec
 
 SAMPLE = DATA / "rosbag2_sample"
 TIMEBASE = Timebase(500_000)

@@ -31,7 +31,7 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.wire.plain_codecs import ClockCodec
+from space_robot_msgs_py.wire.clock import ClockCodec
 
 METADATA = "metadata.yaml"
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 from flights import Start
 
+from space_robot_control.flight.graph.listeners import wait_for
 from space_robot_msgs_py.bag.reader import read_coverage, read_flight
 
 pytest.importorskip("rclpy")
@@ -31,9 +32,8 @@ def flying(start: Start, ground: Ground, bag: Path) -> Nodes:
     recorder = start("recorder", bag=bag)
     ground.until(lambda: "recorder_node" in ground.monitor.modes, "the recorder")
     nodes = {"recorder": recorder, "mission": start("mission")}
-    nodes["controller"] = start("controller", wait_for="[plant_node, recorder_node]")
-    others = "[controller_node, mission_node, recorder_node]"
-    nodes["plant"] = start("plant", wait_for=others, silence_timeout=0.2)
+    nodes["controller"] = start("controller", wait_for=wait_for("controller"))
+    nodes["plant"] = start("plant", wait_for=wait_for("plant"), silence_timeout=0.2)
     go_on(ground)
     return nodes
 

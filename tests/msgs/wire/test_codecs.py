@@ -25,8 +25,10 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Command, LawInForce, RobotState, Timebase
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
+from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
-from space_robot_msgs_py.wire.plain_codecs import ClockCodec, LawCodec, TelemetryCodec
+from space_robot_msgs_py.wire.controller_law import LawCodec
+from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
 
 Array = NDArray[np.float64]
 

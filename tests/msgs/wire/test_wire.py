@@ -20,7 +20,7 @@ from rosbags.typesys import Stores, get_typestore
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Command, ReferenceChunk, RobotState
-from space_robot_msgs_py.wire import codecs, reference_codec
+from space_robot_msgs_py.wire import message as general_way
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 
@@ -263,21 +263,20 @@ def test_our_own_layout_is_read_without_the_general_decoder(
     """It is slower by a hundred times: at 2 kHz that is the whole tick."""
     data, make, read, expect = TOPICS[topic]
     codec = make()
-    for module in (codecs, reference_codec):
-        monkeypatch.setattr(module, "decode", lambda *_: pytest.fail("the general decoder"))
+    monkeypatch.setattr(general_way, "decode", lambda *_: pytest.fail("the general decoder"))
     assert by_codec(read, codec, data + tail) == by_rosbags(expect, data)
 
 
 def test_a_foreign_frame_is_learnt_from_its_first_message(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its second one is read the fast way."""
     data, make, read, _ = TOPICS["joints"]
-    message = general(data, topics.JOINT_STATES.type)
-    message.header.frame_id = "somewhere"
-    foreign = bytes(STORE.serialize_cdr(message, topics.JOINT_STATES.type))
-    codec = make()
-    assert read(codec, foreign) == read(make(), data)
-    monkeypatch.setattr(codecs, "decode", lambda *_: pytest.fail("the general decoder"))
-    assert read(codec, foreign) == read(make(), data)
+    given = general(data, topics.JOINT_STATES.type)
+    given.header.frame_id = "somewhere"
+    foreign = bytes(STORE.serialize_cdr(given, topics.JOINT_STATES.type))
+    codec, expected = make(), read(make(), data)
+    assert read(codec, foreign) == expected
+    monkeypatch.setattr(general_way, "decode", lambda *_: pytest.fail("the general decoder"))
+    assert read(codec, foreign) == expected
 
 
 def renamed(names: list[str], topic: topics.Topic, data: bytes) -> bytes:

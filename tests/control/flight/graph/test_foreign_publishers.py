@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from flights import Start
 
+from space_robot_control.flight.graph.listeners import wait_for
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.process_environment import set_defaults
 from space_robot_msgs_py.samples import Command, ReferenceChunk, RobotState, Timebase
+from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
-from space_robot_msgs_py.wire.plain_codecs import ClockCodec
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 from space_robot_sim.robot import Robot
 
@@ -93,7 +94,8 @@ def test_a_flood_of_junk_on_every_topic_changes_nothing(
     """The flight goes on, its reference never held; what came is counted."""
     start("mission")
     start("controller")
-    plant = start("plant", wait_for="[controller_node, mission_node]")
+    others = [name for name in wait_for("plant") if not name.startswith("recorder")]
+    plant = start("plant", wait_for=others)
     until(monitor, lambda: monitor.simulated_s > 0.0, pause)
     outs = {topic.name: RawPublisher(monitor.node, topic) for topic in FLOODED}
     until(monitor, lambda: all(out.listener_count for out in outs.values()), pause)

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from flights import COMMAND, Start, ros_environment
 
+from space_robot_control.flight.graph.listeners import wait_for
 from space_robot_control.flight.node_modules import MODULES
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.ros.process_environment import set_defaults
@@ -28,9 +29,13 @@ def _end(process: subprocess.Popen[str], number: int = signal.SIGINT) -> int:
 
 def test_start_up_in_any_order(start: Start, tmp_path: Path) -> None:
     """Plant first and recorder last: nothing moves until all are there, nothing is lost."""
-    plant = start("plant", ticks=300, wait_for="[controller_node, recorder_node]")
+    plant = start(
+        "plant",
+        ticks=300,
+        wait_for=wait_for("plant"),
+    )
     time.sleep(2.0)
-    controller = start("controller", wait_for="[plant_node, recorder_node]")
+    controller = start("controller", wait_for=wait_for("controller"))
     time.sleep(1.0)
     mission = start("mission")
     recorder = start("recorder", bag=tmp_path / "bag")
@@ -47,7 +52,7 @@ def test_controller_can_be_replaced_in_flight(start: Start, tmp_path: Path) -> N
     recorder = start("recorder", bag=tmp_path / "bag")
     mission = start("mission")
     plant = start("plant", ticks=3000, wait_for="[recorder_node]")
-    first = start("controller", wait_for="[recorder_node, plant_node]")
+    first = start("controller", wait_for="[recorder_node, plant_node:/command]")
     file = tmp_path / "bag" / "bag_0.mcap"
     until = time.monotonic() + 60.0
     while time.monotonic() < until and not (file.exists() and file.stat().st_size > 50_000):

@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 from flights import Start, space_robot
 
+from space_robot_control.flight.graph.listeners import wait_for
 from space_robot_control.flight.graph.monitor import Monitor
 from space_robot_msgs_py.bag.reader import read_flight
 
@@ -41,8 +42,8 @@ def _start_graph(
         "mission": start("mission", **common),
     }
     _wait_for_size(bag / f"{bag.name}_0.mcap", REFERENCE)
-    nodes["controller"] = start("controller", wait_for="[plant_node, recorder_node]", **common)
-    others = "[controller_node, mission_node, recorder_node]"
+    nodes["controller"] = start("controller", wait_for=wait_for("controller"), **common)
+    others = wait_for("plant")
     nodes["plant"] = start("plant", ticks=ticks, wait_for=others, realtime=realtime, **common)
     return nodes
 
