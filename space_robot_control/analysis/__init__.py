@@ -1,6 +1,6 @@
-"""How well a flight was flown: the figures of merit of Table V, and of those who fly.
+"""Metrics, tables and figures of flights: those of Table V, and those that who flies asks for.
 
-| module | figures |
+| module | metrics |
 |---|---|
 | `metrics` | RMS in both definitions, maxima, chatter |
 | `spectrum` | power above 100 Hz |

@@ -41,7 +41,7 @@ def batches(log: FlightLog) -> Iterator[tuple[NDArray[np.int64], Array]]:
 
 
 def metadata(log: FlightLog) -> dict[str, Any]:
-    """What was flown, lost and found damaged, ready for JSON."""
+    """Describe what was flown, lost and found damaged, ready for JSON."""
     return {
         "flight": log.flight,
         "laws": as_data(laws_of(log), log.timebase),

@@ -1,4 +1,4 @@
-"""What a flight's description says beyond names: its robot, its actuators' limits, its h_bar.
+"""The robot, the actuators' limits and h_bar, from a flight's description.
 
 A bag carries the numbers. One that does not (an older one, or of another recorder) is taken at its
 names' word: the robot, case and gains of that name here and now. Files and modules that it names
@@ -31,11 +31,11 @@ Array = NDArray[np.float64]
 
 
 class NotDescribedError(InputError):
-    """The bag does not say what a figure needs; the message says what is missing."""
+    """The bag does not say what a metric needs; the message says what is missing."""
 
 
 def robot_of(log: FlightLog) -> Robot:
-    """The robot that was flown.
+    """Build the robot that was flown.
 
     Raises:
         InputError: it is not described, not here, or not that of the bag's joints.
@@ -57,7 +57,7 @@ def robot_of(log: FlightLog) -> Robot:
 
 
 def torque_limits(log: FlightLog) -> TorqueLimits:
-    """What the plant clipped the torques to.
+    """Find the limits that the plant clipped the torques to.
 
     Raises:
         InputError: not even the case is named, or it is not here.
@@ -77,7 +77,7 @@ def torque_limits(log: FlightLog) -> TorqueLimits:
 
 
 def estimator(log: FlightLog) -> tuple[HBar, float]:
-    """h_bar of the laws' time-delay estimate, and the weight of its low-pass (0: none).
+    """Find h_bar of the laws' time-delay estimate, and the weight of its low-pass (0: none).
 
     Raises:
         InputError: the law is not recorded, and has no estimate or is not described.
@@ -96,7 +96,7 @@ def estimator(log: FlightLog) -> tuple[HBar, float]:
 
 
 def recorded_h_bar(log: FlightLog) -> Array:
-    """Of the laws in force in the rows of ``log``, see `HBar`."""
+    """Return h_bar of the laws in force in the rows of ``log``, see `HBar`."""
     laws, none = laws_of(log), np.full(log.axes, np.nan)
     rows = [none]
     for law in laws:
@@ -110,7 +110,7 @@ def recorded_h_bar(log: FlightLog) -> Array:
 
 
 def _described_h_bar(log: FlightLog) -> Array:
-    """Of a bag without the laws in force, at its description's word."""
+    """Return h_bar of a bag without the laws in force, at its description's word."""
     flight = log.flight
     if flight.get("swaps"):
         raise NotDescribedError("laws were swapped in flight, so no one h_bar holds")

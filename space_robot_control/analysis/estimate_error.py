@@ -1,4 +1,4 @@
-"""How far the time-delay estimate N_hat was from N, from recorded motion and torque alone.
+"""The error of the time-delay estimate N_hat of N, from recorded motion and torque alone.
 
 ``N = F_S - h_bar rhodd`` (33) is all that the constant diagonal inertia h_bar (the gain ``h_bar``)
 leaves out; ``N_hat(t) = N(t - delta)`` (35), (36). The controller forms N_hat from the pair of
@@ -34,7 +34,7 @@ HBar = Callable[[FlightLog], Array]
 
 
 def neglected_force(log: FlightLog, h_bar: Array) -> Array:
-    """(N-1, m) ``N`` (33) over the interval that begins at each tick.
+    """Compute ``N`` (33), (N-1, m), over the interval that begins at each tick.
 
     N m on the joints; on the base the generalised force that belongs to eps, twice the torque
     where the attitude is small.
@@ -91,7 +91,7 @@ class EstimateErrors:
         self._side = 1.0
         """1 if Q continues from Q in these rows, -1 if from -Q."""
         self._measured = np.empty(0, np.bool_)
-        """Of these rows."""
+        """True for those of these rows that were measured."""
         self._pair: tuple[Array, ...] | None = None
         """Force and acceleration of the estimate at the last row, (1, m) each."""
 

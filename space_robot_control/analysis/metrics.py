@@ -1,4 +1,4 @@
-"""Figures of merit of a flight (Section IV-E), in both definitions, and chatter.
+"""Metrics of a flight (Section IV-E), in both definitions, and chatter.
 
 Equation (64) is ``sqrt(mean(x^2 + y^2 + z^2)) / 3``; Table V holds the mean of the three axes'
 RMS values instead. Both are given, named ``eq64`` and ``mean_axis``.
@@ -21,7 +21,7 @@ Table = dict[str, dict[str, float]]
 
 
 def axis_groups(n: int) -> dict[str, slice]:
-    """Base, inner (1 to 3) and outer joints of the n+3 axes, by the suffix of their keys."""
+    """Divide the n+3 axes into base, inner (1 to 3) and outer joints, by their keys' suffix."""
     groups = {"base": slice(0, 3), f"1_{min(n, 3)}": slice(3, 3 + min(n, 3))}
     if n > 3:
         groups[f"4_{n}"] = slice(6, 3 + n)
@@ -29,17 +29,17 @@ def axis_groups(n: int) -> dict[str, slice]:
 
 
 def error_columns(axes: int) -> dict[str, slice]:
-    """Which of the m = n+3 axes each error column of Table V is of."""
+    """Return which of the m = n+3 axes each error column of Table V is of."""
     return _columns(axis_groups(axes - 3), "attitude", "joints")
 
 
 def torque_columns(axes: int) -> dict[str, slice]:
-    """Which of the m = n+3 axes each torque column of Table V is of."""
+    """Return which of the m = n+3 axes each torque column of Table V is of."""
     return _columns(axis_groups(axes - 3), "base_torque", "torque")
 
 
 def tracking_error(log: FlightLog) -> Array:
-    """(N, n+3) ``e = rho_d - rho``: eps, then joints; of +-Q_d the one on Q's side."""
+    """Compute ``e = rho_d - rho`` (N, n+3): eps, then joints, rad; of +-Q_d the one on Q's side."""
     error = np.empty((log.ticks, log.axes))
     desired = log.reference_base[:, :4]
     side = np.where(_sum_of_columns(log.quaternion * desired) < 0.0, -1.0, 1.0)
@@ -50,7 +50,7 @@ def tracking_error(log: FlightLog) -> Array:
 
 
 def largest_of_columns(values: Array) -> Array:
-    """(N,) largest absolute value of each row; faster than NumPy's own over short rows."""
+    """Find the largest absolute value of each row, (N,), faster than NumPy over short rows."""
     return reduce(np.maximum, np.abs(values.T))
 
 
@@ -193,7 +193,7 @@ class Maxima(Metric):
 
 
 class Chatter(Metric):
-    """How rough the applied torques are, by measure and column of Table V."""
+    """Measures how rough the applied torques are, by measure and column of Table V."""
 
     def __init__(self, axes: int, period: float) -> None:
         self._period, self._columns = period, torque_columns(axes)

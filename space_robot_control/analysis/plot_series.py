@@ -1,4 +1,4 @@
-"""What figures of several flights plot of each, so that the flights need not stay in memory."""
+"""The series that figures of several flights plot of each; the flights need not stay in memory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the end effector points in the inertial frame: what the mission is flown for.
+"""The end effector's pointing in the inertial frame, which the mission is flown for.
 
 The tool's pose follows from base attitude and joint angles (`space_robot_sim.robot.tool`), once
 with the measured ones and once with the desired ones. The base's position is free in this mission
@@ -26,7 +26,7 @@ ARCSEC = np.pi / 180.0 / 3600.0
 
 
 class PointingError(NamedTuple):
-    """Of the end effector, tick by tick."""
+    """The end effector's error, tick by tick."""
 
     boresight: Array
     """(N,) rad, between the measured and the desired direction of the tool's z axis."""
@@ -39,7 +39,7 @@ class PointingError(NamedTuple):
 
 
 class Pointing(Metric):
-    """RMS, maximum and last value of each figure of a `PointingError`."""
+    """Takes RMS, maximum and last value of each number of a `PointingError`."""
 
     def __init__(self, log: FlightLog, robot: Robot) -> None:
         """``log``: the first rows; the base's drift counts from there."""

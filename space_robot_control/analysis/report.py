@@ -1,4 +1,4 @@
-"""All figures of merit of a flight in one dictionary, ready for JSON."""
+"""All metrics of a flight in one dictionary, ready for JSON."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from .pointing import Pointing
 from .settling import Settling
 
 DESCRIBED = ("controller", "case", "gains", "robot")
-"""What a report repeats of a flight's description."""
+"""Keys of a flight's description that a report repeats."""
 
 
 def analyze(log: FlightLog) -> dict[str, Any]:
-    """The flight's report, the same from a graph flight, an in-process one, or a bag.
+    """Compute the flight's report, the same from a graph flight, an in-process one, or a bag.
 
-    A figure that this flight does not have is None; ``unavailable`` says why, by its key. Of a
+    A metric that this flight does not have is None; ``unavailable`` says why, by its key. Of a
     flight with gaps (a broken bag) the longest stretch without one is analyzed; ``damage`` says so.
 
     Raises:
@@ -39,12 +39,12 @@ def analyze(log: FlightLog) -> dict[str, Any]:
 
 
 class Analysis:
-    """`analyze` of a flight that comes block by block, as `blocks_of` cuts it and without gaps."""
+    """Does what `analyze` does, of a flight without gaps in blocks, as `blocks_of` cuts it."""
 
     def __init__(self) -> None:
         self.ticks = 0
         """Rows so far."""
-        self._figures: dict[str, Metric] = {}
+        self._metrics: dict[str, Metric] = {}
         self._unavailable: dict[str, str] = {}
         self._head: dict[str, Any] = {}
         self._tail: dict[str, Any] = {}
@@ -54,8 +54,8 @@ class Analysis:
         if not self.ticks:
             self._begin(block)
         error = tracking_error(block)
-        for figure in self._figures.values():
-            figure.add(block, error)
+        for metric in self._metrics.values():
+            metric.add(block, error)
         self.ticks += block.ticks
         self._laws, self._timebase = block.laws, block.timebase
         self._tail = {
@@ -68,16 +68,16 @@ class Analysis:
         }
 
     def report(self) -> dict[str, Any]:
-        """The report of all blocks so far, at least one."""
+        """Return the report of all blocks so far, at least one."""
         unavailable: dict[str, str] = {}
-        figures: dict[str, Any] = {}
-        for name in _FIGURES:
-            figures[name] = None
-            if name not in self._figures:
+        metrics: dict[str, Any] = {}
+        for name in _METRICS:
+            metrics[name] = None
+            if name not in self._metrics:
                 unavailable[name] = self._unavailable[name]
                 continue
             try:
-                figures[name] = self._figures[name].result()
+                metrics[name] = self._metrics[name].result()
             except InputError as error:
                 unavailable[name] = str(error)
         stop, period_ns = self._first_tick + self.ticks, self._period_ns
@@ -90,7 +90,7 @@ class Analysis:
             "duration_s": self.ticks * period_ns / 1e9,
             "from_s": self._first_tick * period_ns / 1e9,
             "to_s": stop * period_ns / 1e9,
-            **figures,
+            **metrics,
             "unavailable": unavailable,
             **self._tail,
         }
@@ -98,9 +98,9 @@ class Analysis:
     def _begin(self, block: FlightLog) -> None:
         self._first_tick, self._period_ns = block.first_tick, block.timebase.period_ns
         self._head = {key: block.flight.get(key) for key in DESCRIBED}
-        for name, figure in _FIGURES.items():
+        for name, metric in _METRICS.items():
             try:
-                self._figures[name] = figure(block)
+                self._metrics[name] = metric(block)
             except InputError as error:
                 self._unavailable[name] = str(error)
 
@@ -124,7 +124,7 @@ def _missed_deadlines(log: FlightLog) -> MissedDeadlines:
     return MissedDeadlines(int(log.flight.get("command_latency_ticks", 0)), limits)
 
 
-_FIGURES: dict[str, Callable[[FlightLog], Metric]] = {
+_METRICS: dict[str, Callable[[FlightLog], Metric]] = {
     "rms": lambda log: Rms(log.axes),
     "maxima": lambda log: Maxima(log.axes),
     "chatter": lambda log: Chatter(log.axes, log.timebase.period),

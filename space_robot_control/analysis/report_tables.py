@@ -36,7 +36,7 @@ DEFINITIONS = {
     "base's drift": "of the base's centre of mass from where it began; nothing holds it",
     "recording": "what is missing of the flight or was found wrong with the bag",
 }
-"""What each group of metrics means, for someone who sees it for the first time."""
+"""The meaning of each group of metrics, for someone who sees it for the first time."""
 
 
 class Line(NamedTuple):

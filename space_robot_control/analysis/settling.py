@@ -1,4 +1,4 @@
-"""How soon after a motion's end the error has died away."""
+"""Settling time: from a motion's end until the error has died away."""
 
 from __future__ import annotations
 

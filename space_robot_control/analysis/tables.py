@@ -1,4 +1,4 @@
-"""One model for all tables, and what it becomes as text: Markdown, CSV, JSON.
+"""One model for all tables, and its forms as text: Markdown, CSV, JSON.
 
 `terminal.print_table` shows it on a terminal, ``templates/table.html.j2`` in a page.
 """
@@ -35,7 +35,7 @@ class Verdict(NamedTuple):
     """A cell that ends in a judgement."""
 
     text: str
-    """What is judged, as in ``1.03 < 1``; may be empty."""
+    """The number that is judged, as in ``1.03 < 1``; may be empty."""
     word: str
     tone: str
     """``good``, ``bad`` or ``open``."""
@@ -56,7 +56,7 @@ class Group(NamedTuple):
     rows: Sequence[Row]
     name: str = ""
     note: str = ""
-    """What the group means, for someone who sees it for the first time."""
+    """The group's meaning, for someone who sees it for the first time."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Where a mission's segments meet, found in the flight's reference: there the arm shall rest."""
+"""Waypoints, where a mission's segments meet and the arm shall rest, found in the reference."""
 
 from __future__ import annotations
 

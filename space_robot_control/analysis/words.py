@@ -1,4 +1,4 @@
-"""What was flown and what a report's numbers do not say, in words."""
+"""Sentences on what was flown, and on what a report's numbers do not say."""
 
 from __future__ import annotations
 

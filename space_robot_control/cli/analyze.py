@@ -21,7 +21,7 @@ from .options import REMAP, TRUST
     "--plot",
     type=click.Path(path_type=Path, file_okay=False),
     metavar="DIR",
-    help="Folder for the pictures, as PNG and SVG; several bags overlaid.",
+    help="Folder for the figures, as PNG and SVG; several bags overlaid.",
 )
 @click.option(
     "--csv",
@@ -39,7 +39,7 @@ from .options import REMAP, TRUST
     "--html",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE",
-    help="One page with tables and pictures, to send to a colleague.",
+    help="One page with tables and figures, to send to a colleague.",
 )
 @click.option("--from", "from_s", type=float, metavar="T", help="Begin at T simulated seconds.")
 @click.option("--to", "to_s", type=float, metavar="T", help="End before T simulated seconds.")
@@ -60,7 +60,7 @@ def analyze(
     trust: bool,
     as_json: bool,
 ) -> None:
-    """Figures of merit of recorded flights: one bag, or several side by side.
+    """Metrics of recorded flights: one bag, or several side by side.
 
     RMS, maxima, settling, chatter, saturation, latency, the error of the time-delay estimate, and
     where the end effector pointed. docs/manual/analysis.md says what each means.
@@ -149,7 +149,7 @@ def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
 
 
 def _names(bags: Sequence[Path]) -> list[str]:
-    """What the bags are called: their folders' names, with as much before them as tells apart."""
+    """Name the bags: by their folders' names, with as much before them as tells apart."""
     paths = [Path(printable(str(bag.absolute()))) for bag in bags]
     if len(set(paths)) < len(paths):
         raise click.BadParameter("the same bag was given twice", param_hint="BAG...")

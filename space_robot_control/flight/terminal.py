@@ -67,7 +67,7 @@ def show(table: Table, console: Console) -> None:
 
 
 def _has_room(table: Table, numbers: list[Column], console: Console) -> bool:
-    """Whether every word of the numbers is shown in one piece, and of the labels their starts."""
+    """Tell if every word of the numbers is shown in one piece, and the start of each label's."""
     shown = {
         word
         for line in console.render_lines(table)

@@ -145,7 +145,7 @@ def _draw_spectra(axes: Axes, spectra: Mapping[str, tuple[Array, Array]]) -> Non
 
 
 class _Stretch(NamedTuple):
-    """What the panels show of each flight."""
+    """The part of each flight that the panels show."""
 
     axes: slice
     """Axes of the base's torque."""

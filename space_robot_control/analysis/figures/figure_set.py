@@ -37,7 +37,7 @@ class FigureFolder(NamedTuple):
 
     path: Path
     png: bool
-    """Whether as PNG too; the report has the SVG."""
+    """True if they are written as PNG too; the report has the SVG."""
 
     def save(self, figure: Figure, stem: str) -> None:
         """Write a figure."""

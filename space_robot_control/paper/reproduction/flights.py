@@ -27,7 +27,7 @@ COMPARED_CASE = "1"
 
 @dataclass(frozen=True)
 class Variant:
-    """What Table V leaves open: the gain set, and whether the joints rub."""
+    """The choices that Table V leaves open: the gain set, and whether the joints rub."""
 
     gains: str
     friction: bool
@@ -83,7 +83,7 @@ class Planned(NamedTuple):
     row: Row
     variant: Variant
     shown: bool
-    """Whether it is drawn: the default gains, the printed friction."""
+    """True if it is drawn: the default gains, the printed friction."""
 
     @property
     def compared(self) -> bool:
@@ -118,7 +118,7 @@ class Result:
     chatter: dict[str, dict[str, float]] | None = None
     """By measure and column, of the compared case with friction."""
     base_torque: BaseTorque | None = None
-    """Of the flights that are compared."""
+    """Known of the flights that are compared."""
 
 
 def fly(planned: Planned, duration: float | None, figures: FigureFolder | None) -> Result:

@@ -1,4 +1,4 @@
-"""What exactly was flown: commit, versions, parameters."""
+"""The provenance of flights: commit, versions, parameters."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...flight.software import commit, versions
 
 
 def provenance() -> dict[str, Any]:
-    """Commit (None outside a checkout), versions, machine."""
+    """Return commit (None outside a checkout), versions, machine."""
     return {
         "commit": commit(),
         "versions": versions(),
@@ -19,7 +19,7 @@ def provenance() -> dict[str, Any]:
 
 
 def parameters(flight: Flight) -> dict[str, Any]:
-    """All that plant, controller and mission are told in a flight."""
+    """Return all that plant, controller and mission are told in a flight."""
     return {
         "period_s": flight.period,
         "plant": flight.plant_settings.model_dump(exclude={"mission", "wait_for"}),

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class Check(NamedTuple):
-    """Whether ``value`` stays below ``limit``; NaN stands for a number that is not known."""
+    """An inequality: ``value`` stays below ``limit``; NaN stands for a number that is not known."""
 
     value: float
     limit: float

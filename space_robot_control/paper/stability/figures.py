@@ -86,7 +86,7 @@ def lyapunov(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
     """V(t) of (47) in the flight from the initial error, each axis with its bound (55).
 
     V is shown against V(0): its own unit is that of beta^2 |s| / K_1, and tells nothing. Of each
-    step of the picture's time its largest value is drawn, so no peak above the bound is lost.
+    step of the figure's time its largest value is drawn, so no peak above the bound is lost.
     """
     figure, panels = _grid(len(names), 3, 46.0)
     reaching = twisting.reaching

@@ -36,7 +36,7 @@ class Extremes(NamedTuple):
 
     @classmethod
     def of(cls, values: Array, time: Array) -> Extremes:
-        """Of ``values`` (K,) at ``time`` (K,) s."""
+        """Find them in ``values`` (K,) at ``time`` (K,) s."""
         high, low = int(np.argmax(values)), int(np.argmin(values))
         return cls(float(values[high]), float(time[high]), float(values[low]), float(time[low]))
 
@@ -57,7 +57,7 @@ class Contraction:
 
     @property
     def radius_below_one(self) -> Check:
-        """What the recursion (68) needs at a fixed configuration."""
+        """The condition that the recursion (68) needs at a fixed configuration."""
         return Check(self.radius.largest, 1.0)
 
 

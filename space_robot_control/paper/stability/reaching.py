@@ -81,7 +81,7 @@ def arrival(s: Array, threshold: Array, period: float) -> Array:
 
 
 def reaching(log: FlightLog, k_1: Array, undisturbed: Array) -> Reaching:
-    """What a flight from an initial error did.
+    """Measure when a flight from an initial error arrives on the sliding surface.
 
     Args:
         log: that flight, with telemetry.

@@ -24,7 +24,7 @@ SHORTEST = 10
 
 @dataclass(frozen=True)
 class Study:
-    """What was found; `super_twisting` for laws with K_1 and K_2 only."""
+    """The findings; `super_twisting` for laws with K_1 and K_2 only."""
 
     flight: Flight
     lemma_1: Contraction
@@ -35,7 +35,7 @@ class Study:
 
     @property
     def axis_names(self) -> tuple[str, ...]:
-        """Of the m axes."""
+        """Names of the m axes."""
         return self.flight.robot.axis_names
 
 

@@ -29,7 +29,7 @@ ROBUST_PERCENTILE = 99.9
 
 @dataclass(frozen=True)
 class ErrorDerivative:
-    """How large eps and its derivative become, per axis (m,)."""
+    """The largest values of eps and its derivative, per axis (m,)."""
 
     error: Array
     """Largest |eps|, rad/s2 (eps: 1/s2)."""
