@@ -31,9 +31,10 @@ class Turns:
         self._nodes = nodes
         self._seats = [Seat(node) for node in nodes]
         self._upkeeps = [Upkeep(node) for node in nodes]
-        self._upkeep_at = self._spin_until = 0.0
+        self._upkeep_at = 0.0
         self._waiter = Waiter(nodes[0])
-        for seat in self._seats if len(nodes) > 1 else []:
+        self._is_alone = len(nodes) == 1
+        for seat in self._seats if not self._is_alone else []:
             seat.node.let_others_work = partial(self._step_others, seat)
 
     def take(self) -> bool:
@@ -49,11 +50,7 @@ class Turns:
                 is_idle = False
                 if seat.is_complete:
                     return False
-        if is_idle:
-            self._rest(now)
-        else:
-            self._spin_until = 0.0
-        return True
+        return self._rest(now) if is_idle else True
 
     def _serve_inactive(self) -> bool:
         """Wait for service calls, as there is nothing else to do; False when all are shut down."""
@@ -72,24 +69,21 @@ class Turns:
                     other.node.calls.forget_waiting()
         return due
 
-    def _rest(self, now: float) -> None:
-        """Wait until a node has something to do; where that is expected at once, for a moment."""
+    def _rest(self, now: float) -> bool:
+        """Wait until a node has something to do; False when the process has come to its end."""
+        if self._is_alone and self._seats[0].spins and self._seats[0].spin(now + SPIN_S):
+            return not self._seats[0].is_complete
         seats = [seat for seat in self._seats if seat.node.is_active]
-        if len(self._seats) == 1 and seats and seats[0].spins:
-            if not self._spin_until:
-                self._spin_until = now + SPIN_S
-            if now < self._spin_until:
-                os.sched_yield()
-                return
         until = min([seat.wake_at for seat in seats], default=self._upkeep_at)
         if (left := until - time.monotonic()) <= 0.0:
-            return
+            return True
         if inputs := [entry for seat in seats for entry in seat.wait.inputs]:
             self._waiter.wait(inputs, left)
             for seat in seats:
                 seat.glance_at = 0.0
         else:
             time.sleep(left)
+        return True
 
     def _step_others(self, seat: Seat) -> None:
         now = time.monotonic()
@@ -110,6 +104,9 @@ class Seat:
         """When it is to be stepped though no message has come, by the monotonic clock."""
         self.glance_at = 0.0
         """When it may be stepped at the earliest."""
+        self.spins = False
+        """Whether it is better to look for its next message than to sleep."""
+        self._may_spin = True
         self._loop: Loop | None = None
         """The loop while it is stepped."""
         self._remind_at = 0.0
@@ -119,16 +116,10 @@ class Seat:
         """Whether its loop has come to its end."""
         return self._loop is not None and self._loop.is_complete
 
-    @property
-    def spins(self) -> bool:
-        """Whether it is better to look for its next message than to sleep."""
-        settings = self.node.settings
-        return self.wait.is_brief and not (settings and settings.fifo_priority)
-
     def step(self, now: float) -> bool:
         """Step the node's loop, if it is active and need not wait; whether it did something."""
         if not self.node.is_active:
-            self._loop = None
+            self._loop, self.wait, self.glance_at, self.spins = None, NO_WAIT, 0.0, False
             return False
         if now < self.glance_at:
             return False
@@ -141,9 +132,23 @@ class Seat:
         self._wait(wait, now)
         return False
 
+    def spin(self, until: float) -> bool:
+        """Step the loop again and again, giving way between; whether it did something in time."""
+        assert self._loop is not None
+        step = self._loop.step
+        while True:
+            os.sched_yield()
+            wait = step()
+            if wait is None:
+                return True
+            if (now := time.monotonic()) >= until:
+                self._wait(wait, now)
+                return False
+
     def _wait(self, wait: Wait, now: float) -> None:
         self.wait = wait
         self.glance_at = self.wake_at = now + wait.seconds
+        self.spins = wait.is_brief and self._may_spin
         if wait.inputs:
             self.glance_at = 0.0 if wait.is_brief else min(now + GLANCE_S, self.wake_at)
 
@@ -163,6 +168,7 @@ class Seat:
         self._remind_at = 0.0
         gc.collect()
         gc.freeze()  # what lives until the end need not be looked through in the loop
+        self._may_spin = not (node.settings and node.settings.fifo_priority)
         if node.settings and node.settings.fifo_priority:
             node.log(ask_for_fifo(node.settings.fifo_priority))
         self._loop = loop
