@@ -10,7 +10,7 @@ from ..samples import LawInForce, Timebase
 from .cdr import MessageLayout
 from .definitions import decode
 
-NODE = "/controller_node"
+NODE = topics.LAW.name.rpartition("/")[0] + "_node"
 CONTROLLER = "controller"
 """The parameter that names the law."""
 STRING, DOUBLE_ARRAY = 4, 8
