@@ -28,7 +28,7 @@ def clean_environment() -> dict[str, str]:
 
 
 def _main() -> None:
-    root = os.path.dirname(HERE)
+    root = os.path.dirname(os.path.dirname(HERE))
     # a script's own folder is put first, and ours holds modules that are no top-level ones
     sys.path[:] = [path for path in sys.path if os.path.abspath(path) != HERE]
     if root not in sys.path:  # an uninstalled tree, found by its starter's current folder

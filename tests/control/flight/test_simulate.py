@@ -100,7 +100,7 @@ def test_simulate_prints_what_its_bag_says(tmp_path: Path) -> None:
 
 def test_a_law_of_ones_own_is_one_class_and_one_yaml(tmp_path: Path) -> None:
     """The example of docs/manual/control_laws.md."""
-    text = (DOCS / "control_laws.md").read_text()
+    text = (DOCS / "manual/control_laws.md").read_text()
     code, gains = (text.split(f"```{kind}\n")[1].split("```")[0] for kind in ("python", "yaml"))
     (tmp_path / "my_laws.py").write_text(code)
     (tmp_path / "gains").mkdir()

@@ -301,7 +301,7 @@ def test_the_law_of_ones_own_in_the_manual_flies(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its two files to the letter."""
-    manual = (ROOT / "docs/control_laws.md").read_text("utf-8")
+    manual = (ROOT / "docs/manual/control_laws.md").read_text("utf-8")
     module, gains = (
         re.search(rf"```{language}\n(# {name}.*?)```", manual, re.DOTALL)
         for language, name in (("python", "my_laws.py"), ("yaml", "gains/tde.yaml"))

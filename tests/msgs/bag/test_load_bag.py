@@ -16,7 +16,7 @@ from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim import load_bag
 
-DOCUMENT = DOCS / "bags.md"
+DOCUMENT = DOCS / "manual/bags.md"
 
 
 @pytest.fixture(scope="module")

@@ -25,7 +25,7 @@ time.sleep(60)
 """
 STARTER = """
 import os, subprocess, sys, time
-from space_robot_msgs_py import lifeline
+from space_robot_msgs_py.ros import lifeline
 child = subprocess.Popen(
     sys.argv[1:], stdin=subprocess.PIPE, env={**os.environ, **lifeline.held()},
     start_new_session=True,

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from flights import COMMAND, ros_environment, space_robot
 
+from space_robot_control.analysis import analyze
 from space_robot_control.flight.bag_path import check_bag_path
 from space_robot_control.flight.graph import orchestrator
 from space_robot_control.flight.node_modules import MODULES
@@ -112,5 +113,5 @@ def test_a_bag_that_another_flight_was_quicker_to_make_stays(
 
     monkeypatch.setattr(orchestrator, "check_bag_path", look)
     with pytest.raises(InputError, match="exists already"):
-        orchestrator.fly(Flight(FlightPlan(duration=0.2)), bag)
+        orchestrator.fly(Flight(FlightPlan(duration=0.2)), bag, analyze)
     assert other.exists()
