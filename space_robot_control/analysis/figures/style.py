@@ -12,11 +12,13 @@ import warnings
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, Any, NamedTuple
 
 import matplotlib.style
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure, FigureBase
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
@@ -27,6 +29,8 @@ from ..export import make_folder, whole_file
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
+RESOLUTION = 150
+"""dpi of a PNG."""
 PAGE_WIDTH = 180.0
 """mm; A4 less its margins."""
 GREY = "#707070"
@@ -63,7 +67,7 @@ class Look(NamedTuple):
 
 def page(height: float, title: str = "") -> Figure:
     """Make an empty page of ``height`` mm, with a title if there is one."""
-    figure = Figure(figsize=(PAGE_WIDTH / 25.4, height / 25.4))
+    figure = Figure(figsize=(PAGE_WIDTH / 25.4, height / 25.4), dpi=RESOLUTION)
     if title:
         figure.suptitle(plain(textwrap.fill(title, 95)))
     return figure
@@ -212,8 +216,19 @@ def save_figure(figure: Figure, stem: Path, *, png: bool = True) -> tuple[Path, 
         files = []
         for format in ("png", "svg") if png else ("svg",):
             path = stem.with_name(f"{stem.name}.{format}")
-            metadata = {"Software": None} if format == "png" else {"Date": None, "Creator": None}
             with whole_file(path, replace=True) as file:
-                figure.savefig(file, format=format, metadata=metadata)
+                _print(figure, file, format)
             files.append(path)
     return tuple(files)
+
+
+def _print(figure: Figure, file: IO[Any], format: str) -> None:
+    """Do what `Figure.savefig` does, which draws everything twice, in half the time."""
+    canvas: Any  # its methods have no types
+    if format == "png":
+        figure.dpi = RESOLUTION  # that of an SVG stays behind
+        canvas = FigureCanvasAgg(figure)
+        canvas.print_png(file, metadata={"Software": None})
+    else:
+        canvas = FigureCanvasSVG(figure)
+        canvas.print_svg(file, metadata={"Date": None, "Creator": None})
