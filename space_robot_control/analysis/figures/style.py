@@ -210,7 +210,8 @@ def save_figure(figure: Figure, stem: Path, *, png: bool = True) -> tuple[Path, 
     make_folder(stem.parent)
     with warnings.catch_warnings():  # of letters that the font does not have: drawn as boxes
         warnings.filterwarnings("ignore", "Glyph .* missing")
-        if engine := figure.get_layout_engine():
+        engine = figure.get_layout_engine()
+        if engine and figure.get_axes():
             engine.execute(figure)
             figure.set_layout_engine("none")  # else each file would lay it out again
         files = []
