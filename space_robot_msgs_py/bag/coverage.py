@@ -43,7 +43,7 @@ class Coverage:
     first: int = 0
     last: int = -1
     unit: int = 0
-    """Ticks from one message to the next: the smallest step seen."""
+    """Ticks from one message to the next: the smallest step seen (0: not known yet)."""
     _guard: StampGuard = field(default_factory=lambda: StampGuard(LONGEST_JUMP))
     _holes: set[int] = field(default_factory=set)
     """Ticks passed over, which may still come late."""
@@ -52,6 +52,10 @@ class Coverage:
     """Ticks from the last message before each pause, or from tick 0, to the first after it."""
     _pauses: int = 0
     """How many lie between messages."""
+
+    def __post_init__(self) -> None:
+        if self.topic.per_tick:
+            self.unit = 1
 
     def take(self, tick: int) -> bool:
         """Count a message; False if one of this tick has come already (events: never)."""
@@ -70,7 +74,7 @@ class Coverage:
             self.first = self.last = tick
         else:
             step = tick - self.last
-            self._pass_over(tick, self._usual_step)
+            self._pass_over(tick, self.unit)
             self.unit = min(self.unit, step) if self.unit else step
             self.last = tick
         self.received += 1
@@ -78,18 +82,12 @@ class Coverage:
 
     def take_all(self, ticks: NDArray[np.int64]) -> NDArray[np.bool_]:
         """`take` of many, in their order; those that come as usual are counted at once."""
-        step = self._usual_step
-        is_usual = step > 0 and np.all(np.diff(ticks, prepend=self.last) == step)
+        is_usual = self.unit and np.all(np.diff(ticks, prepend=self.last) == self.unit)
         if not is_usual or self.topic.is_event or self._is_resuming or not len(ticks):
             return np.fromiter((self.take(int(tick)) for tick in ticks), np.bool_, len(ticks))
         self.last = self._guard.last = int(ticks[-1])
         self.received += len(ticks)
         return np.ones(len(ticks), np.bool_)
-
-    @property
-    def _usual_step(self) -> int:
-        """Ticks to the next message; 0: not known yet."""
-        return 1 if self.topic.per_tick else self.unit
 
     def _pass_over(self, tick: int, step: int) -> None:
         """The next message is ``tick``: those between may still come, late, but for a pause."""
@@ -109,7 +107,7 @@ class Coverage:
     @property
     def gaps(self) -> int:
         """Places up to its own last message that none is of, for a topic that begins at tick 0."""
-        places = (self.last - self._left_out) // (self._usual_step or 1) + 1 + self._pauses
+        places = (self.last - self._left_out) // (self.unit or 1) + 1 + self._pauses
         return max(0, places - self.received)
 
     def pause(self) -> None:
