@@ -43,10 +43,19 @@ class MessageAccounting:
     first: int = 0
     last: int = -1
     unit: int = 0
-    """Ticks from one message to the next: the smallest step seen."""
+    """Ticks from one message to the next: the smallest step seen (0: not known yet)."""
     _guard: StampGuard = field(default_factory=lambda: StampGuard(LONGEST_JUMP))
     _holes: set[int] = field(default_factory=set)
     """Ticks passed over, which may still come late."""
+    _is_resuming: bool = False
+    _left_out: int = 0
+    """Ticks from the last message before each pause, or from tick 0, to the first after it."""
+    _pauses: int = 0
+    """How many lie between messages."""
+
+    def __post_init__(self) -> None:
+        if self.topic.per_tick:
+            self.unit = 1
 
     def take(self, tick: int) -> bool:
         """Count a message; False if one of this tick has come already (events: never)."""
@@ -56,57 +65,55 @@ class MessageAccounting:
             if tick not in self._holes:
                 self.repeated += 1
                 return False
-            self._holes.remove(tick)
+            self._take_late(tick)
         elif not self._guard.passes(tick):
             self.strange += 1
             return True
         elif self.received == 0:
+            self._pass_over(tick, 1)
             self.first = self.last = tick
-            self._expect_before(tick)
         else:
             step = tick - self.last
+            self._pass_over(tick, self.unit)
             self.unit = min(self.unit, step) if self.unit else step
-            if step != 1 and self.topic.per_tick and step <= LONGEST_JUMP:
-                self._holes.update(range(self.last + 1, tick))
             self.last = tick
         self.received += 1
         return True
 
     def take_all(self, ticks: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """`take` of many, in their order; those that only go forward are counted at once."""
-        steps = np.diff(ticks, prepend=[self.last] if self.received else [])
-        if self.topic.is_event or not len(ticks) or np.any((steps < 1) | (steps > LONGEST_JUMP)):
+        """`take` of many, in their order; those that come as usual are counted at once."""
+        is_usual = self.unit and np.all(np.diff(ticks, prepend=self.last) == self.unit)
+        if not is_usual or self.topic.is_event or self._is_resuming or not len(ticks):
             return np.fromiter((self.take(int(tick)) for tick in ticks), np.bool_, len(ticks))
-        self._guard.passes(int(ticks[0]))
-        if not self.received:
-            self.first = int(ticks[0])
-            self._expect_before(self.first)
-        if len(steps):
-            shortest = int(steps.min())
-            self.unit = min(self.unit, shortest) if self.unit else shortest
-        if self.topic.per_tick:
-            after = ticks[len(ticks) - len(steps) :]
-            for i in np.flatnonzero(steps != 1):
-                self._holes.update(range(int(after[i] - steps[i]) + 1, int(after[i])))
         self.last = self._guard.last = int(ticks[-1])
         self.received += len(ticks)
         return np.ones(len(ticks), np.bool_)
 
-    def _expect_before(self, tick: int) -> None:
-        """Ticks before the first message may still come, late."""
-        if self.topic.per_tick and tick <= LONGEST_JUMP:
-            self._holes.update(range(tick))
+    def _pass_over(self, tick: int, step: int) -> None:
+        """The next message is ``tick``: those between may still come, late, but for a pause."""
+        if self._is_resuming:
+            self._is_resuming = False
+            self._left_out += tick - max(0, self.last)
+            self._pauses += self.received > 0
+        if step < tick - self.last <= LONGEST_JUMP:
+            self._holes.update(range(self.last + 1, tick))
+
+    def _take_late(self, tick: int) -> None:
+        self._holes.remove(tick)
+        step = min(abs(tick - self.first), self.last - tick)
+        self.unit = min(self.unit, step) if self.unit else step
+        self.first = min(self.first, tick)
 
     @property
     def gaps(self) -> int:
         """Places up to its own last message that none is of, for a topic that begins at tick 0."""
-        return max(
-            0, self.last // (1 if self.topic.per_tick else self.unit or 1) + 1 - self.received
-        )
+        places = (self.last - self._left_out) // (self.unit or 1) + 1 + self._pauses
+        return max(0, places - self.received)
 
     def pause(self) -> None:
-        """The next message may be of any later tick."""
+        """The next message may be of any later tick; those between are left out on purpose."""
         self._guard = StampGuard(LONGEST_JUMP)
+        self._is_resuming = True
 
     @property
     def kept(self) -> int:

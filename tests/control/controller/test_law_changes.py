@@ -6,6 +6,7 @@ import subprocess
 import time
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 from flights import COMMAND, ros_environment, space_robot
@@ -54,15 +55,19 @@ class Pilot:
 
         parameters = [Parameter(k.replace("__", "."), value=v) for k, v in values.items()]
         request = self._types[0](parameters=[p.to_parameter_msg() for p in parameters])
-        future = self._set.call_async(request)
-        self._executor.spin_until_future_complete(future, 30.0)
-        return [result.successful for result in future.result().results]
+        return [result.successful for result in self._call(self._set, request).results]
 
     def law(self) -> str:
         """The parameter ``controller``."""
-        future = self._get.call_async(self._types[1](names=["controller"]))
+        answer = self._call(self._get, self._types[1](names=["controller"]))
+        return str(answer.values[0].string_value)
+
+    def _call(self, client: Any, request: Any) -> Any:
+        assert client.wait_for_service(30.0), client.srv_name
+        future = client.call_async(request)
         self._executor.spin_until_future_complete(future, 30.0)
-        return str(future.result().values[0].string_value)
+        assert future.done(), client.srv_name
+        return future.result()
 
     def close(self) -> None:
         self._executor.shutdown()

@@ -72,6 +72,39 @@ def test_messages_at_a_period_are_counted_as_a_set_has_them(period: int, places:
     assert coverage.received == len(sent)
 
 
+@given(st.integers(2, 30), st.integers(2, 12), st.integers(2, 5), st.integers(1, 9))
+def test_a_stream_said_again_from_its_start_is_whole(
+    period: int, start: int, ahead: int, more: int
+) -> None:
+    """Who joins late hears the end of what was sent before, and then all of it once more."""
+    coverage = MessageAccounting(topics.REFERENCE_JOINTS)
+    before = range(start, start + ahead)
+    again = range(start + ahead + more)
+    for place in before:
+        assert coverage.take(period * place)
+    for place in again:
+        assert coverage.take(period * place) == (place not in before)
+    assert (coverage.received, coverage.repeated) == (len(again), ahead)
+    assert coverage.missing(period * 100) == coverage.gaps == 0
+
+
+@pytest.mark.parametrize("topic", [topics.JOINT_STATES, topics.CLOCK], ids=lambda t: t.name)
+@given(st.integers(1, 30), st.integers(0, 12), st.integers(0, 100), st.integers(2, 12))
+def test_what_a_pause_passed_over_is_no_gap(
+    topic: topics.Topic, period: int, before: int, passed: int, after: int
+) -> None:
+    coverage, period = MessageAccounting(topic), 1 if topic.per_tick else period
+    places = [*range(before), *range(before + passed, before + passed + after)]
+    for i, place in enumerate(places):
+        if i == before:
+            coverage.pause()
+        assert coverage.take(period * place)
+    assert coverage.gaps == 0
+    lost = coverage.last + 3 * period
+    assert coverage.take(lost)
+    assert coverage.gaps == 2
+
+
 @given(st.lists(st.integers(0, 500), unique=True, min_size=1).map(sorted), st.data())
 def test_bad_stamps_between_good_ones_are_counted_apart(
     ticks: list[int], data: st.DataObject

@@ -100,12 +100,13 @@ def test_cleaned_up_in_flight(flying: Nodes, ground: Ground, node: str) -> None:
 def test_what_was_never_sent_is_not_lost(flying: Nodes, ground: Ground, bag: Path) -> None:
     """A controller that stood still, a plant that was ended before its last answer."""
     flying["controller"].send_signal(signal.SIGSTOP)
-    go_on(ground, 0.3)
+    ground.until(lambda: ground.value("plant", "missed_deadlines") > 200, "missed deadlines")
     flying["controller"].send_signal(signal.SIGCONT)
     go_on(ground, 0.1)
     for name in ("plant", "controller", "mission", "recorder"):
         flying[name].send_signal(signal.SIGTERM)
-        assert flying[name].wait(30) == 0
+        output, _ = flying[name].communicate(timeout=30)
+        assert flying[name].returncode == 0, output
     log, counts = read_flight(bag), read_coverage(bag)
     assert log.unanswered > 200
     assert not any(log.lost.values())
