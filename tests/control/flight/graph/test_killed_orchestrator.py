@@ -29,8 +29,15 @@ def _start(bag: Path, domain: int, *options: str) -> subprocess.Popen[bytes]:
 def _nodes(flight: subprocess.Popen[bytes]) -> list[psutil.Process]:
     return [
         child for child in psutil.Process(flight.pid).children(recursive=True)
-        if any(word.endswith("_node") for word in child.cmdline())
+        if any(word.endswith("_node") for word in _words(child))
     ]  # fmt: skip
+
+
+def _words(process: psutil.Process) -> list[str]:
+    try:
+        return process.cmdline()
+    except psutil.Error:  # it has just ended
+        return []
 
 
 def _has_ended(process: psutil.Process) -> bool:
@@ -106,7 +113,7 @@ def test_killed_while_landing(tmp_path: Path, free_domain: int) -> None:
     flight = _start(bag, free_domain, "--duration", "0.3")
     _wait_until(lambda: len(_nodes(flight)) == 4, flight)
     nodes = _nodes(flight)
-    (plant,) = (n for n in nodes if any(word.endswith("plant_node") for word in n.cmdline()))
+    (plant,) = (n for n in nodes if any(word.endswith("plant_node") for word in _words(n)))
     _wait_until(lambda: _has_ended(plant), flight)
     flight.kill()
     flight.wait()
