@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled.records import Block
-from ..samples import STATE_FIELDS, LawInForce, ReferenceChunk, RobotState, Timebase
+from ..samples import STATE_FIELDS, LawInForce, ReferenceChunk, RobotState, State, Timebase
 
 Array = NDArray[np.float64]
 
@@ -127,20 +127,18 @@ class FlightLog:
         """Controlled coordinates, n+3."""
         return int(self.applied_torque.shape[1])
 
-    def put(self, state: RobotState) -> None:
-        """Copy a state into its tick's row."""
-        k = state.tick - self.first_tick
+    def put(self, start: int, states: Block) -> None:
+        """Copy the `State` of each tick from ``start`` on into its row."""
+        k = start - self.first_tick
         for name in STATE_FIELDS:
-            getattr(self, name)[k] = getattr(state, name)
+            getattr(self, name)[k : k + len(states)] = states[name]
 
     def state(self, tick: int) -> RobotState:
         """The state of a tick, as the plant measured it."""
-        k = tick - self.first_tick
-        state = RobotState.allocate(len(self.joint_names))
-        state.tick = tick
+        block = State.block(len(self.joint_names))
         for name in STATE_FIELDS:
-            getattr(state, name)[:] = getattr(self, name)[k]
-        return state
+            block[name] = getattr(self, name)[tick - self.first_tick]
+        return RobotState(tick, block)
 
     def references(self, start: int, stop: int) -> Block:
         """(stop - start,) array of the ticks' `Reference` each, a copy."""
