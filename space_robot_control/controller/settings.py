@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
+from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 
 
@@ -13,6 +14,7 @@ class ControllerNodeSettings(NodeSettings):
     """Parameters of controller_node; the gains stand beside them as ``<law>.<gain>``."""
 
     node: ClassVar[str] = "controller"
+    sends: ClassVar[tuple[topics.Topic, ...]] = (topics.COMMAND, topics.TELEMETRY, topics.LAW)
 
     controller: str = Field(
         "tde_stc", description="control law in force, or module:Class of your own"

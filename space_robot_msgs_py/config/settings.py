@@ -12,13 +12,14 @@ from inspect import isclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, get_origin
 
-from pydantic import AfterValidator, BaseModel, Field
+from pydantic import AfterValidator, BaseModel, Field, field_validator
 from typing_extensions import Self
 
 from ..samples import Timebase
+from ..topics import Topic
 from .files import GRAPH_FILE, config_directory, node_parameters
 from .trees import Tree, merge, nest
-from .validation import StrictModel, validate
+from .validation import StrictModel, short, validate
 
 Texts = Annotated[list[str], AfterValidator(lambda texts: texts or [""])]
 """Texts of which empty ones count for nothing: ROS has no empty list of strings."""
@@ -31,6 +32,8 @@ class NodeSettings(StrictModel):
     """The node: plant, controller, mission, recorder."""
     selectors: ClassVar[tuple[str, ...]] = ("robot",)
     """Fields that choose configuration files."""
+    sends: ClassVar[tuple[Topic, ...]] = ()
+    """Topics whose listeners the node can be told to wait for (parameter ``wait_for``)."""
 
     robot: str = Field("paper", description="a robot of config/robots, or a path to its YAML")
     period: Annotated[float, Field(ge=1e-5, le=0.1)] = Field(
@@ -39,6 +42,16 @@ class NodeSettings(StrictModel):
     fifo_priority: Annotated[int, Field(ge=0, le=98)] = Field(
         0, description="SCHED_FIFO priority to ask for (0: the usual scheduling)"
     )
+
+    @field_validator("wait_for", check_fields=False)
+    @classmethod
+    def _can_be_waited_for(cls, entries: list[str]) -> list[str]:
+        names = [topic.name for topic in cls.sends]
+        for entry in entries:
+            _, colon, topic = entry.partition(":")
+            if colon and topic not in names:
+                raise ValueError(f"{short(entry)}: choose a topic it sends, {', '.join(names)}")
+        return entries
 
     @classmethod
     def ros_name(cls) -> str:

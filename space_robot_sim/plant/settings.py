@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import AfterValidator, Field
 
+from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.files import mission_file, named_file
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 
@@ -29,6 +30,9 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
 
     node: ClassVar[str] = "plant"
     selectors: ClassVar[tuple[str, ...]] = ("robot", "mission", "case")
+    sends: ClassVar[tuple[topics.Topic, ...]] = (
+        topics.JOINT_STATES, topics.BASE_STATE, topics.CLOCK,
+    )  # fmt: skip
 
     mission: str = Field(
         "", description="a mission of config/missions (empty: the robot's), or a path"

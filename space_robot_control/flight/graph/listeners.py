@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from space_robot_msgs_py import topics
 
+from ..node_settings import SCHEMAS
+
 _TO_CONTROLLER = ("controller_node", "recorder_node")
 
 LISTENERS = {
@@ -17,12 +19,9 @@ LISTENERS = {
     topics.CLOCK: ("mission_node", "recorder_node"),
 }
 """Nodes of the graph that subscribe to each topic."""
-_SENT = {
-    "plant": (topics.JOINT_STATES, topics.BASE_STATE, topics.CLOCK),
-    "controller": (topics.COMMAND, topics.TELEMETRY, topics.LAW),
-}
 
 
 def wait_for(node: str) -> list[str]:
-    """The parameter ``wait_for`` of the plant or the controller in a whole graph."""
-    return [f"{name}:{topic.name}" for topic in _SENT[node] for name in LISTENERS[topic]]
+    """Return the parameter ``wait_for`` of the plant or the controller in a whole graph."""
+    (sends,) = (schema.sends for schema in SCHEMAS if schema.node == node)
+    return [f"{name}:{topic.name}" for topic in sends for name in LISTENERS[topic]]

@@ -37,6 +37,20 @@ def test_every_shipped_parameter_file_is_one() -> None:
             assert node_parameters(path, node.strip("/").removesuffix("_node"))
 
 
+def test_a_node_waits_for_listeners_to_what_it_sends_alone() -> None:
+    assert PlantNodeSettings.resolve({"wait_for": ["a:/clock", "b", ""]}).wait_for[0] == "a:/clock"
+    for schema, entry, sent in (
+        (PlantNodeSettings, "recorder_node:/command", "/joint_states, /base/state, /clock"),
+        (ControllerNodeSettings, "plant_node:", "/command, /controller/telemetry, /controller/law"),
+    ):
+        with pytest.raises(InputError) as error:
+            schema.resolve({"wait_for": ["recorder_node", entry]})
+        assert str(error.value) == (
+            f"{schema.node} parameters: wait_for: {entry!r}: choose a topic it sends, {sent}, "
+            f"got ['recorder_node', {entry!r}]"
+        )
+
+
 def test_layers_and_overrides() -> None:
     settings = PlantNodeSettings.resolve({"case": "4-1", "friction.viscous": 0.5})
     assert settings.disturbance.scale == 2.0  # from the case
