@@ -6,7 +6,9 @@ RMS values instead. Both are given, named ``eq64`` and ``mean_axis``.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import reduce
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,10 +63,10 @@ class AxisRms:
         self.rows = 0
         self._squares = np.zeros(axes)
 
-    def add(self, squares: Array) -> None:
-        """Take the squares of further rows."""
-        self.rows += len(squares)
-        self._squares += np.sum(squares, axis=0)
+    def add(self, values: Array) -> None:
+        """Take further rows."""
+        self.rows += len(values)
+        self._squares += np.sum(values**2, axis=0)
 
     @property
     def value(self) -> Array:
@@ -85,36 +87,17 @@ class AxisMaximum:
         self.value = np.maximum(self.value, np.max(np.abs(values), axis=0, initial=0.0))
 
 
-class Eq64:
-    """(64): a third of the RMS of the vector (for other than three axes, that share of it)."""
+def eq64(each: Array) -> float:
+    """Compute (64) of the axes' RMS values (axes,): a third of the RMS of the vector.
 
-    def __init__(self) -> None:
-        self._sum, self._rows, self._axes = 0.0, 0, 1
-
-    def add(self, squares: Array) -> None:
-        """Take the squares of further rows (N, axes)."""
-        self._sum += float(np.sum(_sum_of_columns(squares)))
-        self._rows += len(squares)
-        self._axes = squares.shape[1]
-
-    @property
-    def value(self) -> float:
-        """In the unit of the axes."""
-        return float(np.sqrt(self._sum / self._rows) / self._axes)
+    Of other than three axes it is that share of it.
+    """
+    return float(np.linalg.norm(each)) / len(each)
 
 
 def mean_axis_rms(values: Array) -> float:
     """Mean over the axes of each axis' RMS; ``values`` (N, axes)."""
-    figure = AxisRms(values.shape[1])
-    figure.add(values**2)
-    return float(np.mean(figure.value))
-
-
-def eq64_rms(values: Array) -> float:
-    """`Eq64` of ``values`` (N, axes)."""
-    figure = Eq64()
-    figure.add(values**2)
-    return figure.value
+    return float(np.mean(np.sqrt(np.mean(values**2, axis=0))))
 
 
 class TotalVariation:
@@ -142,29 +125,19 @@ class Rms(Metric):
     """The RMS of errors and torques, by definition and column of Table V."""
 
     def __init__(self, axes: int) -> None:
-        self._each = AxisRms(axes), AxisRms(axes)
-        self._columns = error_columns(axes), torque_columns(axes)
-        self._eq64 = {name: Eq64() for columns in self._columns for name in columns}
+        self._error, self._torque = AxisRms(axes), AxisRms(axes)
 
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
-        for each, columns, values in zip(
-            self._each, self._columns, (error, log.applied_torque), strict=True
-        ):
-            squares = values**2
-            each.add(squares)
-            for name, axes in columns.items():
-                self._eq64[name].add(squares[:, axes])
+        self._error.add(error)
+        self._torque.add(log.applied_torque)
 
     def result(self) -> Table:
         """By definition and column."""
+        error, torque = self._error.value, self._torque.value
         return {
-            "mean_axis": {
-                name: float(np.mean(each.value[axes]))
-                for each, columns in zip(self._each, self._columns, strict=True)
-                for name, axes in columns.items()
-            },
-            "eq64": {name: eq64.value for name, eq64 in self._eq64.items()},
+            "mean_axis": _by_column(error, torque, np.mean),
+            "eq64": _by_column(error, torque, eq64),
         }
 
 
@@ -181,15 +154,7 @@ class Maxima(Metric):
 
     def result(self) -> dict[str, float]:
         """By column, in its unit."""
-        axes = len(self._error.value)
-        return {
-            name: float(np.max(each.value[columns]))
-            for each, names in (
-                (self._error, error_columns(axes)),
-                (self._torque, torque_columns(axes)),
-            )
-            for name, columns in names.items()
-        }
+        return _by_column(self._error.value, self._torque.value, np.max)
 
 
 class Chatter(Metric):
@@ -218,23 +183,23 @@ class Chatter(Metric):
         }
 
 
-def rms(log: FlightLog) -> Table:
-    """`Rms` of a whole log."""
-    metric = Rms(log.axes)
-    _add_all(metric, log)
-    return metric.result()
-
-
-def chatter(log: FlightLog) -> Table:
-    """`Chatter` of a whole log."""
-    metric = Chatter(log.axes, log.timebase.period)
-    _add_all(metric, log)
-    return metric.result()
-
-
-def _add_all(metric: Metric, log: FlightLog) -> None:
+def of_log(metric: Metric, log: FlightLog) -> Any:
+    """Return the result of a metric without rows, of a whole log."""
     for block in blocks_of(log):
         metric.add(block, tracking_error(block))
+    return metric.result()
+
+
+def _by_column(error: Array, torque: Array, figure: Callable[[Array], Any]) -> dict[str, float]:
+    """Sum up the numbers of the axes, (m,) each, in every column of Table V."""
+    return {
+        name: float(figure(values[axes]))
+        for values, columns in (
+            (error, error_columns(len(error))),
+            (torque, torque_columns(len(torque))),
+        )
+        for name, axes in columns.items()
+    }
 
 
 def _columns(groups: dict[str, slice], base: str, prefix: str) -> dict[str, slice]:

@@ -51,7 +51,7 @@ class Pointing(Metric):
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
         values = np.stack(pointing_error(log, self._robot, self._start)).T
-        self._rms.add(values**2)
+        self._rms.add(values)
         self._maximum.add(values)
         self._end = values[-1]
 

@@ -10,9 +10,9 @@ from space_robot_msgs_py.config.files import config_directory
 from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import DivergedError, InputError
 
-from ...analysis import metrics
 from ...analysis.figures import control_results
 from ...analysis.figures.figure_set import FigureFolder
+from ...analysis.metrics import Chatter, Rms, of_log
 from ...analysis.plot_series import BaseTorque
 from ...flight.plan import Flight, FlightPlan
 from ...flight.simulate import simulate
@@ -138,8 +138,9 @@ def fly(planned: Planned, duration: float | None, figures: FigureFolder | None) 
     if planned.shown and figures is not None:
         title = f"{row.controller}, case {row.case}: {variant.title}"
         figures.save(control_results(log, title), row.stem)
+    is_judged = row.case == COMPARED_CASE and variant.friction
     return Result(
-        row, variant, told, None, metrics.rms(log),
-        metrics.chatter(log) if row.case == COMPARED_CASE and variant.friction else None,
+        row, variant, told, None, of_log(Rms(log.axes), log),
+        of_log(Chatter(log.axes, log.timebase.period), log) if is_judged else None,
         BaseTorque.of(log) if planned.compared else None,
     )  # fmt: skip

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
-from ...analysis.generalised_motion import applied_force, mean_acceleration
+from ...analysis.generalised_motion import neglected_force
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,8 @@ def time_delay_error(log: FlightLog, h_bar: Array) -> Array:
     if log.telemetry is None:
         raise ValueError("the time-delay error needs a log with the controller's telemetry")
     n_hat = log.telemetry[:-1, 2]
-    return (applied_force(log) - n_hat) / h_bar - mean_acceleration(log)
+    error: Array = (neglected_force(log, h_bar) - n_hat) / h_bar
+    return error
 
 
 def error_derivative(error: Array, period: float) -> ErrorDerivative:

@@ -15,8 +15,8 @@ from space_robot_control.analysis.described import estimator
 from space_robot_control.analysis.estimate_error import (
     DelayedEstimate,
     EstimateErrors,
-    neglected_force,
 )
+from space_robot_control.analysis.generalised_motion import neglected_force
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog

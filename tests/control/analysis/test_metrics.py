@@ -16,9 +16,10 @@ from scipy.signal import periodogram, welch
 from space_robot_control.analysis import analyze, tracking_error
 from space_robot_control.analysis.metrics import (
     AxisMaximum,
+    AxisRms,
     TotalVariation,
     axis_groups,
-    eq64_rms,
+    eq64,
     error_columns,
     mean_axis_rms,
     torque_columns,
@@ -54,6 +55,12 @@ def power_above(values: np.ndarray, segment: int = 60_000, frequency: float = 10
 
 def root_mean_square(numbers: list[float]) -> float:
     return math.sqrt(math.fsum(x * x for x in numbers) / len(numbers))
+
+
+def eq64_rms(values: np.ndarray) -> float:
+    figure = AxisRms(values.shape[1])
+    figure.add(values)
+    return eq64(figure.value)
 
 
 def test_the_two_definitions_differ_as_the_paper_has_them() -> None:
