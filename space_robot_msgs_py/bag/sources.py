@@ -23,8 +23,8 @@ FOLLOWED, OTHERS = b"followed", b"others"
 class Claimed(NamedTuple):
     """Who has claimed a topic."""
 
-    publishers: frozenset[bytes] = frozenset()
-    """The GIDs noted last, of a node that may have ended since."""
+    publishers: tuple[bytes, ...] = ()
+    """The GIDs noted last, the newest last, of nodes that may have ended since."""
     is_held: bool = False
     """Whether that node still lives."""
 

@@ -81,7 +81,7 @@ class GraphPublishers:
         """Who has claimed a topic, on this machine."""
         domain = self._node.context.get_domain_id()
         is_held, notes = look(topic_lock(domain, self._node.resolve_topic_name(topic)))
-        return Claimed(frozenset(gid for text in notes if (gid := _gid(text))), is_held)
+        return Claimed(tuple(gid for text in notes if (gid := _gid(text))), is_held)
 
     def names(self, topic: str) -> dict[bytes, str]:
         """Full node name by GID of all that are listed now; empty of one without a name."""

@@ -19,6 +19,8 @@ from .lifeline import starter
 
 TRIES, PAUSE_S = 5, 0.01
 """A lock that is just being looked at is free a moment later."""
+MOST_NOTES = 16
+"""So many are kept, of earlier holders too: who looks late still finds a short-lived one."""
 
 
 class Holder(NamedTuple):
@@ -62,7 +64,7 @@ class FileLock:
     """A lock, until its process ends or lets go."""
 
     def __init__(self, path: Path, name: str, notes: Sequence[str] = ()) -> None:
-        """Take it as ``name``, and leave ``notes`` there, a word each, for those who `look`.
+        """Take it as ``name``, and add ``notes`` there, a word each, for those who `look`.
 
         Raises:
             HeldError: somebody else has it.
@@ -77,8 +79,9 @@ class FileLock:
             holder = _holder(self._descriptor)
             self.release()
             raise HeldError(path, holder)
+        noted = [*_lines(self._descriptor)[2].split(), *notes][-MOST_NOTES:]
         os.ftruncate(self._descriptor, 0)
-        lines = (f"{name} (pid {os.getpid()})", str(starter()), " ".join(notes))
+        lines = (f"{name} (pid {os.getpid()})", str(starter()), " ".join(noted))
         os.pwrite(self._descriptor, "\n".join(lines).encode(), 0)
 
     def release(self) -> None:
@@ -101,7 +104,7 @@ def nodes_in(domain: int) -> list[Holder]:
 
 
 def look(path: Path) -> tuple[bool, list[str]]:
-    """Whether somebody holds a lock, and the notes of who has taken it last."""
+    """Whether somebody holds a lock, and the notes of those who took it, the newest last."""
     try:
         descriptor = _open(path)
     except InputError:

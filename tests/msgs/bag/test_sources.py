@@ -30,7 +30,7 @@ class Graph:
     """What discovery and claims say, as the test sets it."""
 
     def __init__(self) -> None:
-        self.claim = Claimed(frozenset({OURS}), True)
+        self.claim = Claimed((OURS,), True)
         self.listed: dict[bytes, str] = {}
 
     def claimed(self, topic: str) -> Claimed:
@@ -81,13 +81,23 @@ def test_the_claim_decides_whoever_comes_first(graph: Graph, order: tuple[bytes,
 def test_a_node_that_was_started_again_is_ours(graph: Graph) -> None:
     sources = Sources(TOPIC, graph)
     assert sources.take(OURS, 1)
-    graph.claim = Claimed(frozenset({OURS}), False)  # killed
+    graph.claim = Claimed((OURS,), False)  # killed
     assert not sources.take(FOREIGN, 1)
-    graph.claim = Claimed(frozenset({AGAIN}), True)
+    graph.claim = Claimed((AGAIN,), True)
     assert sources.take(AGAIN, 3)
     assert sources.take(OURS, 2)  # was on its way
     assert not sources.take(OTHER, 1)
     assert (sources.holes, sources.foreign) == (2, 2)
+
+
+def test_one_that_had_ended_before_it_was_heard_is_ours(graph: Graph) -> None:
+    """The recorder was behind: the topic has been claimed anew before its first message came."""
+    graph.claim = Claimed((OURS, AGAIN), True)
+    sources = Sources(TOPIC, graph)
+    assert sources.take(OURS, 1)
+    assert sources.take(AGAIN, 1)
+    assert not sources.take(FOREIGN, 1)
+    assert sources.foreign == 1
 
 
 def test_a_topic_that_nobody_claims_is_its_first_publishers(graph: Graph) -> None:
@@ -104,7 +114,7 @@ def test_who_claims_it_takes_a_topic_over(graph: Graph) -> None:
     sources = Sources(TOPIC, graph)
     assert sources.take(FOREIGN, 1)
     assert not sources.begins_anew
-    graph.claim = Claimed(frozenset({OURS}), True)
+    graph.claim = Claimed((OURS,), True)
     assert sources.take(OURS, 1)
     assert sources.begins_anew
     assert not sources.take(FOREIGN, 2)
