@@ -25,7 +25,7 @@ XYZ, WXYZ = "xyz", "wxyz"
 
 def column_names(log: FlightLog) -> list[str]:
     """The names of all columns, in order; the first is ``tick``, the only one of integers."""
-    return ["tick", *_names(log)]
+    return ["tick", *(name for names, _ in _columns(log.rows(0, 0)) for name in names)]
 
 
 def batches(log: FlightLog) -> Iterator[tuple[NDArray[np.int64], Array]]:
@@ -33,68 +33,55 @@ def batches(log: FlightLog) -> Iterator[tuple[NDArray[np.int64], Array]]:
 
     NaN stands for a number that is not known.
     """
-    error = tracking_error(log)
     for start in range(0, log.ticks, BATCH):
-        rows = slice(start, min(start + BATCH, log.ticks))
-        ticks = np.arange(rows.start, rows.stop) + log.first_tick
-        yield ticks, np.hstack(_blocks(log, error, ticks, rows))
+        rows = log.rows(start, min(start + BATCH, log.ticks))
+        yield _ticks(rows), np.hstack([values for _, values in _columns(rows)])
 
 
 def metadata(log: FlightLog) -> dict[str, Any]:
     """Describe what was flown, lost and found damaged, ready for JSON."""
+    return {"flight": log.flight, "laws": as_data(laws_of(log), log.timebase), **recording(log)}
+
+
+def recording(log: FlightLog) -> dict[str, Any]:
+    """Describe what is missing of a flight or was found wrong with its bag."""
     return {
-        "flight": log.flight,
-        "laws": as_data(laws_of(log), log.timebase),
-        "lost": log.lost, "unanswered_ticks": log.unanswered,
-        "filled_ticks": log.filled, "unfinished": log.unfinished, "damage": list(log.damage),
+        "lost": log.lost,
+        "unanswered_ticks": log.unanswered,
+        "filled_ticks": log.filled,
+        "unfinished": log.unfinished,
+        "damage": list(log.damage),
         "foreign": list(log.foreign),
-    }  # fmt: skip
+    }
 
 
-def _names(log: FlightLog) -> list[str]:
+def _ticks(log: FlightLog) -> NDArray[np.int64]:
+    return np.arange(log.ticks) + log.first_tick
+
+
+def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
+    """Yield names and values (N, K) of columns that belong together."""
     joints, axes = log.joint_names, [*_each("base", XYZ), *log.joint_names]
-    names = [
-        "time_s",
-        *_each("base_position", XYZ, "m"),
-        *_each("q", WXYZ),
-        *_each("base_velocity", XYZ, "m_s"),
-        *_each("omega_base", XYZ, "rad_s"),
-        *(f"{joint}_position_rad" for joint in joints),
-        *(f"{joint}_velocity_rad_s" for joint in joints),
-        *_each("applied_torque", axes, "n_m"),
-    ]
+    error, q_d, joints_d = tracking_error(log), log.reference_base, log.reference_joints
+    yield ["time_s"], (_ticks(log) * log.timebase.period_ns / 1e9)[:, np.newaxis]
+    yield _each("base_position", XYZ, "m"), log.base_position
+    yield _each("q", WXYZ), log.quaternion
+    yield _each("base_velocity", XYZ, "m_s"), log.base_velocity
+    yield _each("omega_base", XYZ, "rad_s"), log.omega_base
+    yield [f"{joint}_position_rad" for joint in joints], log.joint_positions
+    yield [f"{joint}_velocity_rad_s" for joint in joints], log.joint_velocities
+    yield _each("applied_torque", axes, "n_m"), log.applied_torque
     if log.commanded_torque is not None:
-        names += _each("commanded_torque", axes, "n_m")
+        yield _each("commanded_torque", axes, "n_m"), log.commanded_torque
     if log.latency_s is not None:
-        names.append("latency_s")
-    return [
-        *names,
-        *_each("reference_q", WXYZ),
-        *_each("reference_omega_base", XYZ, "rad_s"),
-        *_each("reference_omega_base_rate", XYZ, "rad_s2"),
-        *(f"reference_{joint}_position_rad" for joint in joints),
-        *(f"reference_{joint}_velocity_rad_s" for joint in joints),
-        *(f"reference_{joint}_acceleration_rad_s2" for joint in joints),
-        *_each("error_q", XYZ),
-        *_each("error", joints, "rad"),
-    ]
-
-
-def _blocks(log: FlightLog, error: Array, ticks: NDArray[np.int64], rows: slice) -> list[Array]:
-    """Arrays (rows, columns) in the order of `_names`."""
-    count = len(ticks)
-    blocks = [
-        (ticks * log.timebase.period_ns / 1e9)[:, np.newaxis],
-        log.base_position[rows], log.quaternion[rows], log.base_velocity[rows],
-        log.omega_base[rows], log.joint_positions[rows], log.joint_velocities[rows],
-        log.applied_torque[rows],
-    ]  # fmt: skip
-    if log.commanded_torque is not None:
-        blocks.append(log.commanded_torque[rows])
-    if log.latency_s is not None:
-        blocks.append(log.latency_s[rows, np.newaxis])
-    joints = log.reference_joints[rows].reshape(count, -1)
-    return [*blocks, log.reference_base[rows], joints, error[rows]]
+        yield ["latency_s"], log.latency_s[:, np.newaxis]
+    yield _each("reference_q", WXYZ), q_d[:, :4]
+    yield _each("reference_omega_base", XYZ, "rad_s"), q_d[:, 4:7]
+    yield _each("reference_omega_base_rate", XYZ, "rad_s2"), q_d[:, 7:]
+    for k, number in enumerate(("position_rad", "velocity_rad_s", "acceleration_rad_s2")):
+        yield [f"reference_{joint}_{number}" for joint in joints], joints_d[:, k]
+    yield _each("error_q", XYZ), error[:, :3]
+    yield _each("error", joints, "rad"), error[:, 3:]
 
 
 def _each(what: str, axes: Sequence[str], unit: str = "") -> list[str]:

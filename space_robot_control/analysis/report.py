@@ -13,6 +13,7 @@ from space_robot_msgs_py.bag.law_history import as_data, within
 from space_robot_msgs_py.errors import InputError
 
 from .actuation import Latency, MissedDeadlines, Saturation, TorqueLimits
+from .columns import recording
 from .described import estimator, robot_of, torque_limits
 from .estimate_error import EstimateError
 from .metrics import Chatter, Maxima, Rms, tracking_error
@@ -58,14 +59,7 @@ class Analysis:
             metric.add(block, error)
         self.ticks += block.ticks
         self._laws, self._timebase = block.laws, block.timebase
-        self._tail = {
-            "lost": block.lost,
-            "unanswered_ticks": block.unanswered,
-            "filled_ticks": block.filled,
-            "unfinished": block.unfinished,
-            "damage": list(block.damage),
-            "foreign": list(block.foreign),
-        }
+        self._tail = recording(block)
 
     def report(self) -> dict[str, Any]:
         """Return the report of all blocks so far, at least one."""

@@ -77,13 +77,8 @@ def analyze(
     from space_robot_msgs_py.bag.reader import read_flight
 
     from ..analysis import analyze, excerpt
-    from ..analysis.export import (
-        check_free,
-        check_parquet,
-        write_csv,
-        write_parquet,
-        write_text,
-    )
+    from ..analysis.export import check_parquet, write_csv, write_parquet
+    from ..analysis.files import check_free, write_text
 
     if parquet:
         check_parquet()

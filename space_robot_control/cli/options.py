@@ -214,25 +214,6 @@ def plan_flight(**options: Any) -> Flight:
     return Flight(validate(FlightPlan, options, "options"))
 
 
-def check_writable(path: Path) -> None:
-    """See that a file can be written, before any work is done for it.
-
-    Raises:
-        InputError: it cannot.
-    """
-    from tempfile import TemporaryFile
-
-    from space_robot_msgs_py.errors import InputError
-
-    try:
-        if path.exists():
-            path.open("r+b", buffering=0).close()  # a folder, or one of others
-        with TemporaryFile(dir=path.parent):  # nothing is left if the work fails
-            pass
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from None
-
-
 OUTPUT = click.option(
     "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
     help="File to write the JSON to as well.",
@@ -243,7 +224,7 @@ def put_json(report: Any, as_json: bool, output: Path | None) -> None:
     """Write a report to ``output``, if given, and print it if JSON was asked for."""
     text = json.dumps(report, indent=1, allow_nan=False)
     if output:
-        from ..analysis.export import whole_file
+        from ..analysis.files import whole_file
 
         with whole_file(output, replace=True) as file:
             file.write(text.encode() + b"\n")

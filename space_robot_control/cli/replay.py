@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from .options import OPTIONS, REMAP, TRUST, check_writable
+from .options import OPTIONS, REMAP, TRUST
 
 
 @click.command()
@@ -80,6 +80,7 @@ def replay(
 
     from space_robot_msgs_py.errors import FlightError, InputError
 
+    from ..analysis.files import check_writable
     from ..flight.replay.outcome import Options
     from ..flight.replay.run import replay as run
     from ..flight.terminal import echo_json, terminal

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..analysis.export import whole_file
 from ..analysis.figures.style import (
     house_style,
     legend_above,
@@ -19,6 +16,7 @@ from ..analysis.figures.style import (
     plot_lines,
     save_figure,
 )
+from ..analysis.files import csv_rows, csv_writer
 from ..flight.replay.comparison import Comparison
 
 COLUMNS = 3
@@ -30,15 +28,10 @@ def write_csv(comparison: Comparison, period: float, path: Path) -> None:
     names = [
         f"{axis}_{which}" for which in ("recorded", "replayed") for axis in comparison.axis_names
     ]
-    with (
-        whole_file(path, replace=True) as raw,
-        io.TextIOWrapper(raw, encoding="utf-8", newline="") as file,
-    ):
-        writer = csv.writer(file)
+    numbers = np.column_stack([(ticks * period).round(9), recorded, replayed])
+    with csv_writer(path, replace=True) as writer:
         writer.writerow(["tick", "time_s", *names])
-        for tick, row in zip(ticks.tolist(), np.hstack([recorded, replayed]), strict=True):
-            torques = ["" if math.isnan(value) else value for value in row.tolist()]
-            writer.writerow([tick, round(tick * period, 9), *torques])
+        writer.writerows(csv_rows(ticks, numbers))
 
 
 def write_plot(comparison: Comparison, period: float, title: str, path: Path) -> tuple[Path, ...]:

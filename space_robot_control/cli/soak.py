@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from ..flight.interruption import Interrupted
-from .options import OUTPUT, check_writable, put_json
+from .options import OUTPUT, put_json
 
 
 @click.command()
@@ -66,6 +66,7 @@ def soak(
         from space_robot_msgs_py.errors import InputError
 
         raise InputError("soak needs psutil: pip install 'space_robot[soak]'")
+    from ..analysis.files import check_writable
     from ..campaign.soak import soak as run
     from ..campaign.soak.display import print_soak
     from ..flight.terminal import terminal

@@ -44,6 +44,7 @@ def stability(initial_error: float, as_json: bool, plot: Path | None, **options:
     """  # fmt: skip
     from space_robot_msgs_py.config.validation import validate
 
+    from ..analysis.files import make_folder
     from ..flight.compilation import compile_kernels
     from ..flight.plan import FlightPlan
     from ..flight.terminal import echo_json, terminal
@@ -52,7 +53,7 @@ def stability(initial_error: float, as_json: bool, plot: Path | None, **options:
 
     plan = validate(FlightPlan, options, "options")
     if plot:
-        _make_folder(plot)
+        make_folder(plot)
     compile_kernels()
     found = study(plan, initial_error, _fly)
     if plot:
@@ -65,15 +66,6 @@ def stability(initial_error: float, as_json: bool, plot: Path | None, **options:
         echo_json(report(found))
     else:
         print_study(found, terminal())
-
-
-def _make_folder(path: Path) -> None:
-    from space_robot_msgs_py.errors import InputError
-
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{path}: no folder can be made there ({error.strerror})") from None
 
 
 def _fly(flight: Flight, which: str) -> FlightLog:

@@ -12,7 +12,8 @@ from typing import Any
 
 import click
 
-from space_robot_control.cli.options import OUTPUT, check_writable, put_json
+from space_robot_control.analysis.files import check_writable
+from space_robot_control.cli.options import OUTPUT, put_json
 from space_robot_msgs_py.errors import SpaceRobotError
 
 SECTIONS = (

@@ -24,7 +24,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from ..export import make_folder, whole_file
+from ..files import make_folder, whole_file
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -18,6 +18,7 @@ import psutil
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
 from ...analysis import analyze
+from ...analysis.files import make_folder
 from ...flight.compilation import compile_kernels
 from ...flight.graph.following import InterruptedFlightError
 from ...flight.graph.orchestrator import fly, require_ros
@@ -129,7 +130,11 @@ def soak(
         FlightError: there is no ROS here.
     """
     require_ros()
-    folder = _new_folder(bags) if bags else Path(tempfile.mkdtemp(prefix="space_robot_soak_"))
+    if bags:
+        make_folder(bags)
+        if any(bags.iterdir()):
+            raise InputError(f"{bags}: is not empty; give a new folder for the bags")
+    folder = bags or Path(tempfile.mkdtemp(prefix="space_robot_soak_"))
     done = Soak(seed)
     at_start = shared_memory_files()
     until = time.monotonic() + seconds
@@ -176,17 +181,6 @@ def _fly(number: int, plan: FlightPlan, bag: Path, keep: bool) -> Flown:
         number, plan, time.monotonic() - begin, verdict, process_monitor.peak_mb,
         psutil.Process().memory_info().rss / 1e6, bag if bag.exists() else None,
     )  # fmt: skip
-
-
-def _new_folder(path: Path) -> Path:
-    """Make an empty folder: bags are never overwritten."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        if any(path.iterdir()):
-            raise InputError(f"{path}: is not empty; give a new folder for the bags")
-    except OSError as error:
-        raise InputError(f"{path}: no folder can be made there ({error.strerror})") from None
-    return path
 
 
 def _largest(flights: Sequence[Flown]) -> dict[str, dict[str, float] | None]:

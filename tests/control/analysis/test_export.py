@@ -12,7 +12,8 @@ from pyarrow import csv, parquet
 
 from space_robot_control.analysis import excerpt, tracking_error
 from space_robot_control.analysis.columns import BATCH, batches, column_names
-from space_robot_control.analysis.export import METADATA_KEY, whole_file, write_csv, write_parquet
+from space_robot_control.analysis.export import METADATA_KEY, write_csv, write_parquet
+from space_robot_control.analysis.files import whole_file
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog

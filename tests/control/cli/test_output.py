@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from space_robot_control.analysis.export import whole_file
+from space_robot_control.analysis.files import whole_file
 from space_robot_control.cli.main import main
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
