@@ -13,10 +13,19 @@ from paths import CONFIG, ROOT
 
 import space_robot_control.cli as room_of_commands
 import space_robot_control.laws as room_of_laws
+import space_robot_msgs_py.wire as room_of_messages
 from space_robot_control.cli.main import cli, commands
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_control.laws import laws
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.reader import read_coverage
+from space_robot_msgs_py.bag.recorder import BagRecorder
+from space_robot_msgs_py.wire.codec import Codec
+from space_robot_msgs_py.wire.definitions import decode
+from space_robot_msgs_py.wire.message import description
+from space_robot_sim import load_bag
 
 MODEL = "tde_stc"
 """The law that the new one is a copy of."""
@@ -53,6 +62,55 @@ def test_a_law_stands_in_one_file_of_its_name() -> None:
     for name, law in laws().items():
         assert law.__module__ == f"{room_of_laws.__name__}.{name}"
         assert importlib.import_module(law.__module__).__doc__
+
+
+NEWEST = '''"""/newest: how warm it is."""
+
+from .. import topics
+from .message import MessageDescription, Run
+
+
+class Newest(MessageDescription):
+    topic = topics.NEWEST
+
+    def content(self, rows=1):
+        return {"header": {"frame_id": "base"}}
+
+    def runs(self, message):
+        return (Run("temperature", (0,)),)
+'''
+
+
+def test_a_message_is_one_file_in_wire_and_one_line_in_topics(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is laid out, recorded, counted, and missed, as all others are."""
+    newest = topics.Topic("/newest", "sensor_msgs/msg/Temperature", 100, per_tick=True)
+    monkeypatch.setattr(topics, "NEWEST", newest, raising=False)
+    monkeypatch.setattr(topics, "ALL", (*topics.ALL, newest))
+    monkeypatch.setitem(topics.BY_NAME, newest.name, newest)
+    monkeypatch.setattr(room_of_messages, "__path__", [*room_of_messages.__path__, str(tmp_path)])
+    (tmp_path / "newest.py").write_text(NEWEST)
+    flight = Flight(FlightPlan(duration=0.01))
+    described = description(newest)
+    sys.modules.pop(f"{room_of_messages.__name__}.newest")
+    assert described is not None
+    codec = Codec(described.of_robot(flight.robot.joint_names, flight.timebase))
+    simulate(flight, tmp_path / "flown")
+    recorder = BagRecorder(tmp_path / "bag", flight.description, flight.timebase)
+    for name, data in open_bag(tmp_path / "flown").messages(*topics.ALL):
+        recorder.record(topics.BY_NAME[name], data)
+    for tick in range(20):
+        if tick != 9:
+            recorder.record(newest, codec.encode(flight.timebase.stamp_ns(tick), np.array([tick])))
+    recorder.close()
+    recorded = [data for _, data in open_bag(tmp_path / "bag").messages(newest)]
+    assert [decode(data, newest.type).temperature for data in recorded] == [
+        *range(9),
+        *range(10, 20),
+    ]
+    assert read_coverage(tmp_path / "bag")[newest.name]["missing"] == 1
+    assert load_bag(tmp_path / "bag").lost == {t.name: int(t is newest) for t in topics.ALL}
 
 
 def test_a_command_is_one_file_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -59,7 +59,11 @@ def read_stamps(data: Bytes, starts: Integers, lengths: Integers, stamps: Intege
     for i in range(len(starts)):
         stamps[i] = NO_STAMP
         if lengths[i] >= _ENCAPSULATION + 8:
-            stamps[i] = stamp_of(data[starts[i] : starts[i] + lengths[i]])
+            head = data[starts[i] : starts[i] + _ENCAPSULATION + 8]
+            if head[0] == 0 and head[1] == 0:  # written by a big-endian machine
+                stamps[i] = stamp_of(np.concatenate((head[:4], head[7:3:-1], head[:7:-1])))
+            else:
+                stamps[i] = stamp_of(head)
 
 
 @kernel

@@ -26,7 +26,10 @@ Bytes = NDArray[np.uint8]
 
 ENCAPSULATION = b"\x00\x01\x00\x00"
 BODY = len(ENCAPSULATION)
+BIG_ENDIAN = b"\x00\x00"
+"""The beginning of a message that a big-endian machine wrote."""
 STAMP = struct.Struct("<iI")
+_BIG_STAMP = struct.Struct(">iI")
 TIME = "builtin_interfaces/msg/Time"
 _PRIMITIVES = {
     name: struct.Struct(f"<{letter}")
@@ -156,13 +159,14 @@ def _value(content: Any, name: str) -> Any:
 
 
 def header_stamp_ns(data: bytes) -> int:
-    """Stamp of a serialized message that starts with a Header or is a Time, ns.
+    """Stamp of a serialized message that starts with a Header or is a Time, of either order, ns.
 
     Raises:
         MessageError: the message ends before that.
     """
     try:
-        sec, nanosec = STAMP.unpack_from(data, BODY)
+        form = _BIG_STAMP if data.startswith(BIG_ENDIAN) else STAMP
+        sec, nanosec = form.unpack_from(data, BODY)
     except struct.error:
         raise MessageError(f"a message of {len(data)} bytes has no stamp") from None
     return int(sec * 1_000_000_000 + nanosec)

@@ -33,7 +33,7 @@ from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import FLIGHT_KEY
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Timebase
-from space_robot_msgs_py.wire.definitions import decode
+from space_robot_msgs_py.wire.definitions import decode, jazzy
 
 SAMPLE = DATA / "rosbag2_sample"
 
@@ -118,6 +118,39 @@ def test_our_description_is_read_from_any_storage(
     log = read_flight(rosbags_bag(tmp_path / "sqlite", entries, describe))
     assert log.flight["controller"] == "ctc"
     assert_same_flight(log, recorded.log)
+
+
+def test_bag_of_a_big_endian_machine_is_the_same_flight(
+    recorded: Recorded, entries: list[Entry], tmp_path: Path
+) -> None:
+    swapped = [
+        (
+            topic,
+            kind,
+            log_ns,
+            bytes(jazzy().serialize_cdr(decode(data, kind), kind, little_endian=False)),
+        )
+        for topic, kind, log_ns, data in entries
+    ]
+    assert {data[:2] for *_, data in swapped} == {b"\0\0"}
+    assert_same_flight(read_flight(mcap_of(tmp_path / "x.mcap", swapped)), recorded.log)
+
+
+def test_a_trajectory_of_unequal_points_is_left_out_and_told(
+    recorded: Recorded, entries: list[Entry], tmp_path: Path
+) -> None:
+    """One of its points has one position less than there are joints."""
+    at = next(i for i, (topic, *_) in enumerate(entries) if topic == topics.REFERENCE_JOINTS.name)
+    topic, kind, log_ns, data = entries[at]
+    message = decode(data, kind)
+    message.points[1].positions = message.points[1].positions[:-1]
+    changed = (topic, kind, log_ns, bytes(jazzy().serialize_cdr(message, kind)))
+    log = read_flight(mcap_of(tmp_path / "x.mcap", [*entries[:at], changed, *entries[at + 1 :]]))
+    assert log.damage[0] == (
+        "1 messages on /reference/joints do not fit "
+        "(/reference/joints: a point lacks positions of some joint)"
+    )
+    assert np.flatnonzero(~log.whole).tolist() == list(range(len(message.points)))
 
 
 def test_split_bag_is_one_flight(recorded: Recorded, entries: list[Entry], tmp_path: Path) -> None:

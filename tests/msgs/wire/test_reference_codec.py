@@ -228,3 +228,17 @@ def test_incomplete_trajectories_are_message_errors(fault: str) -> None:
     }[fault]
     with pytest.raises(MessageError):
         decode(data)
+
+
+@pytest.mark.parametrize("short", range(3))
+@pytest.mark.parametrize("point", [0, 2])
+def test_points_of_unequal_length_are_a_message_error(short: int, point: int) -> None:
+    """The shorter array is named, and the next good message is read."""
+    names, chunk = joint_names(4), random_chunk(4, 3)
+    codec, rows = ReferenceCodec(names, TIMEBASE), [list(row) for row in chunk.joints]
+    rows[point][short] = rows[point][short][:-1]
+    field = ("positions", "velocities", "accelerations")[short]
+    with pytest.raises(MessageError, match=f"a point lacks {field} of some joint") as error:
+        codec.decode_joints(Foreign.joints(names, rows))
+    assert error.value.reason == "size"
+    assert_decodes_to(codec, codec.encode(chunk), chunk)
