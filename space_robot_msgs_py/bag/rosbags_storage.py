@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -24,8 +25,10 @@ class RosbagsStorage:
             InputError: it cannot be read.
         """
         self._path = path
-        self.fault = ""
-        """What went wrong when the messages were read."""
+        self.counts: Counter[str] | None = None
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.has_end = True
+        self._fault = ""
         self._strange = 0
         try:
             with Reader(path) as reader:
@@ -39,9 +42,19 @@ class RosbagsStorage:
         """Type by topic."""
         return self._types
 
+    @property
+    def incomplete(self) -> bool:
+        """True if the messages could not be read to their end."""
+        return bool(self._fault)
+
+    @property
+    def damage(self) -> list[str]:
+        """The sentence that says so."""
+        return [self._fault] if self._fault else []
+
     def batches(self) -> Iterator[Batch]:
         """All messages by log time; they end where they can no longer be read."""
-        self.fault, self._strange = "", 0
+        self._fault, self._strange = "", 0
         waiting: dict[str, list[tuple[int, bytes]]] = {name: [] for name in self._types}
         try:
             with Reader(self._path) as reader:
@@ -55,9 +68,9 @@ class RosbagsStorage:
                         yield self._batch(connection.topic, entries)
                         entries.clear()
         except Exception as error:  # likewise
-            self.fault = f"{self._path.name}: cannot be read to its end ({_line(error)})"
-        if self._strange and not self.fault:
-            self.fault = f"{self._path.name}: {self._strange} messages that are none"
+            self._fault = f"{self._path.name}: cannot be read to its end ({_line(error)})"
+        if self._strange and not self._fault:
+            self._fault = f"{self._path.name}: {self._strange} messages that are none"
         for name, entries in waiting.items():
             if entries:
                 yield self._batch(name, entries)
