@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import groupby
 from typing import Any, NamedTuple
@@ -107,65 +107,57 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
         reports: of `analyze`.
         brief: without RMS and chatter, which a table of their own shows.
     """
-    found = [] if brief else list(_rms_and_chatter(reports))
-    found += _columns("maximum", reports, ("maxima",), unit_of, _number)
-    found += _columns("settled after", reports, ("settling", "settled_s"), lambda _: "s", _settled)
-    found += [
-        _line("saturation", "ticks at a limit", "", reports, _saturated),
-        *(
-            _line("latency", name, "ms", reports, partial(_latency, name=name))
-            for name in ("p50", "p99", "max")
-        ),
-        _line("commands", "unanswered", "", reports, lambda r: str(r["unanswered_ticks"])),
-        _line("commands", "not as commanded", "", reports, _differing),
-    ]
+    each, one = partial(_each_key, reports), partial(_line, reports)
+    found: list[Line] = []
+    if not brief:
+        found += each("RMS, mean of axes", ("rms", "mean_axis"), unit_of)
+        found += each("RMS, eq. (64)", ("rms", "eq64"), unit_of)
+        found += each("variation per s", ("chatter", "total_variation_per_s"), "N m/s")
+        found += each("power > 100 Hz", ("chatter", "power_above_100_hz"))
+    found += each("maximum", ("maxima",), unit_of)
+    found += each("settled after", ("settling", "settled_s"), "s", text=_settled)
+    found.append(one("saturation", "ticks at a limit", "", _saturated))
+    for name in ("p50", "p99", "max"):
+        found.append(one("latency", name, "ms", partial(_latency, name=name)))
+    found.append(one("commands", "unanswered", "", lambda r: str(r["unanswered_ticks"])))
+    found.append(one("commands", "not as commanded", "", _differing))
     for kind in ("rms", "max"):
-        found += _columns(
-            "estimate error", reports, ("estimate_error", kind), lambda _: "N m", _number,
-            label=partial(_axes, kind=kind),
-        )  # fmt: skip
+        label = partial(_axes, kind=kind)
+        found += each("estimate error", ("estimate_error", kind), "N m", label=label)
     for group, key in (("pointing", "boresight_rad"), ("rotation", "rotation_rad")):
-        found += _columns(group, reports, ("pointing", key), lambda _: "", _angle, label=_upper)
+        found += each(group, ("pointing", key), text=_angle, label=_upper)
     for group, key in (("tool position", "tool_position_m"), ("base's drift", "base_drift_m")):
-        found += _columns(group, reports, ("pointing", key), lambda _: "m", _number, label=_upper)
-    found += [
-        _line("recording", "messages lost", "", reports, lambda r: str(sum(r["lost"].values()))),
-        _line("recording", "states filled in", "", reports, lambda r: str(r["filled_ticks"])),
-        _line("recording", "finished", "", reports, lambda r: "no" if r["unfinished"] else "yes"),
-        _line("recording", "damage found", "", reports, lambda r: str(len(r["damage"]))),
+        found += each(group, ("pointing", key), "m", label=_upper)
+    return [
+        *found,
+        one("recording", "messages lost", "", lambda r: str(sum(r["lost"].values()))),
+        one("recording", "states filled in", "", lambda r: str(r["filled_ticks"])),
+        one("recording", "finished", "", lambda r: "no" if r["unfinished"] else "yes"),
+        one("recording", "damage found", "", lambda r: str(len(r["damage"]))),
     ]
-    return found
 
 
-def _rms_and_chatter(reports: Sequence[Report]) -> Iterator[Line]:
-    for group, path in (
-        ("RMS, mean of axes", ("rms", "mean_axis")),
-        ("RMS, eq. (64)", ("rms", "eq64")),
-    ):
-        yield from _columns(group, reports, path, unit_of, _number)
-    yield from _columns(
-        "variation per s", reports, ("chatter", "total_variation_per_s"), lambda _: "N m/s", _number
-    )
-    yield from _columns(
-        "power > 100 Hz", reports, ("chatter", "power_above_100_hz"), lambda _: "", _number
-    )
+def _number(value: float) -> str:
+    return f"{value:.4g}"
 
 
-def _columns(
-    group: str,
+def _each_key(
     reports: Sequence[Report],
+    group: str,
     path: tuple[str, ...],
-    unit: Callable[[str], str],
-    text: Callable[[Any], str],
+    unit: str | Callable[[str], str] = "",
+    text: Callable[[Any], str] = _number,
     label: Callable[[str], str] = str,
 ) -> list[Line]:
     """Make a line for every key below ``path`` in any of the reports."""
     below = [_at(report, path) for report in reports]
-    keys = dict.fromkeys(key for values in below for key in values)
     return [
-        Line(group, label(key), unit(key), [text(v[key]) if key in v else NONE for v in below])
-        for key in keys
-    ]
+        Line(
+            group, label(key), unit if isinstance(unit, str) else unit(key),
+            [text(values[key]) if key in values else NONE for values in below],
+        )
+        for key in dict.fromkeys(key for values in below for key in values)
+    ]  # fmt: skip
 
 
 def _at(report: Report, path: tuple[str, ...]) -> dict[str, Any]:
@@ -176,21 +168,14 @@ def _at(report: Report, path: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _line(
-    group: str, name: str, unit: str, reports: Sequence[Report], text: Callable[[Report], str]
+    reports: Sequence[Report], group: str, name: str, unit: str, text: Callable[[Report], str]
 ) -> Line:
     return Line(group, name, unit, [text(report) for report in reports])
 
 
-def _number(value: float) -> str:
-    return f"{value:.4g}"
-
-
 def _angle(value: float) -> str:
-    readable = (
-        f"{value / ARCSEC:.3g} arcsec"
-        if value < 3600 * ARCSEC
-        else f"{value / ARCSEC / 3600:.3g} deg"
-    )
+    arcsec = value / ARCSEC
+    readable = f"{arcsec:.3g} arcsec" if arcsec < 3600 else f"{arcsec / 3600:.3g} deg"
     return f"{value:.3g} rad\n{readable}"
 
 
@@ -213,9 +198,8 @@ def _latency(report: Report, name: str) -> str:
 
 
 def _differing(report: Report) -> str:
-    return (
-        str(report["missed_deadlines"]["differing_ticks"]) if report["missed_deadlines"] else NONE
-    )
+    found = report["missed_deadlines"]
+    return str(found["differing_ticks"]) if found else NONE
 
 
 def _axes(key: str, kind: str) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..analysis.figures.style import (
+    grid,
     house_style,
     legend_above,
     page,
@@ -46,9 +47,8 @@ def torques(comparison: Comparison, period: float, title: str) -> Figure:
     time, names = ticks.astype(np.float64) * period, comparison.axis_names
     rows = math.ceil(len(names) / COLUMNS)
     figure = page(14.0 + 48.0 * rows, title)
-    cells = figure.add_gridspec(rows, COLUMNS)
-    for index, name in enumerate(names):
-        axes = figure.add_subplot(cells[divmod(index, COLUMNS)])
+    panels = grid(figure, len(names), COLUMNS, shared=False)
+    for index, (axes, name) in enumerate(zip(panels, names, strict=True)):
         both = np.column_stack([recorded[:, index], replayed[:, index]])
         plot_lines(axes, time, both, dashed=True)
         axes.set_title(plain(name))

@@ -181,16 +181,20 @@ def _columns(names: Sequence[str], width: float) -> int:
     return 1
 
 
-def grid(figure: FigureBase, count: int, columns: int) -> list[Axes]:
-    """Make ``count`` panels in rows of ``columns`` on common scales, numbered at the outer ones."""
-    cells = figure.add_gridspec(-(-count // columns), columns)
+def grid(figure: FigureBase, count: int, columns: int, *, shared: bool = True) -> list[Axes]:
+    """Make ``count`` panels in rows of ``columns``.
+
+    ``shared``: on common scales, with numbers at the outer panels only.
+    """
+    cells = figure.add_gridspec(max(1, -(-count // columns)), columns)
     panels: list[Axes] = []
     for number in range(count):
-        first = panels[0] if panels else None
+        first = panels[0] if panels and shared else None
         axes = figure.add_subplot(cells[divmod(number, columns)], sharex=first, sharey=first)
-        is_left, is_lowest = number % columns == 0, number + columns >= count
-        axes.tick_params(labelleft=is_left, labelbottom=is_lowest)
-        axes.yaxis.get_offset_text().set_visible(is_left)
+        if shared:
+            is_left, is_lowest = number % columns == 0, number + columns >= count
+            axes.tick_params(labelleft=is_left, labelbottom=is_lowest)
+            axes.yaxis.get_offset_text().set_visible(is_left)
         panels.append(axes)
     return panels
 

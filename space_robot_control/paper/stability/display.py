@@ -65,8 +65,8 @@ def _above(check: Check) -> Verdict:
 def _lemma_1(study: Study) -> Table:
     rows = [
         [
-            name, f"{extremes.smallest:.4f}", f"{extremes.largest:.4f}",
-            f"{extremes.largest_at:.2f}", _verdict(f"{check.value:.4f} < {check.limit:g}", check),
+            name, f"{extremes.min:.4f}", f"{extremes.max:.4f}", f"{extremes.max_at_s:.2f}",
+            _verdict(f"{check.value:.4f} < {check.limit:g}", check),
         ]
         for name, extremes, check in (
             ("spectral norm, as printed", study.lemma_1.norm, study.lemma_1.norm_below_one),
@@ -83,15 +83,15 @@ def _time_delay_error(study: Study) -> Table:
     heads = ["max |eps|", "beta", "at t (s)", "99.9 %"]
     rows = [
         [
-            name, _number(flown.error[i]), _number(flown.beta[i]), f"{flown.beta_at[i]:.4f}",
-            _number(flown.beta_robust[i]),
+            name, _number(flown.max_error[i]), _number(flown.beta[i]), f"{flown.beta_at_s[i]:.4f}",
+            _number(flown.beta_99_9_percentile[i]),
         ]
         for i, name in enumerate(study.axis_names)
     ]  # fmt: skip
     if smooth:
         heads += ["frictionless", "99.9 %"]
         for i, row in enumerate(rows):
-            row += [_number(smooth.beta[i]), _number(smooth.beta_robust[i])]
+            row += [_number(smooth.beta[i]), _number(smooth.beta_99_9_percentile[i])]
     return _table(title, heads, rows)
 
 
@@ -126,7 +126,7 @@ def _lmi(names: Sequence[str], twisting: SuperTwisting) -> Table:
     for name, measured, assumed in found:
         cells = ["none"] * 4
         if assumed:
-            low, high = assumed.eigenvalues
+            low, high = assumed.m_eigenvalues
             cells = [
                 _number(assumed.beta), _number(assumed.gamma), f"{_number(low)}, {_number(high)}",
                 f"{assumed.residual:.1e}",

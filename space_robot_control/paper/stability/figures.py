@@ -9,13 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...analysis.figures.style import GREY, house_style, page, plain, save_figure
+from ...analysis.figures.style import COLOURS, GREY, grid, house_style, page, plain, save_figure
 from .circle_criterion import transfer_function
 from .study import Study
 from .super_twisting import SuperTwisting
 
-BLACK, BLUE, ORANGE = "#000000", "#0072B2", "#D55E00"
-"""Colours of Okabe and Ito, told apart by the colour-blind and in grey print."""
+BLACK, BLUE, ORANGE = COLOURS[0], COLOURS[2], COLOURS[6]
 POINTS = 1500
 """Points of a line; more would only make the SVG larger."""
 
@@ -43,7 +42,9 @@ def nyquist(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
     for axis, gains in enumerate(twisting.gains):
         if min(gains) > 0.0:
             groups.setdefault(gains, []).append(axis)
-    figure, panels = _grid(len(groups), 2, 78.0)
+    columns = max(1, min(2, len(groups)))
+    figure = page(14.0 + 78.0 * max(1, math.ceil(len(groups) / columns)))
+    panels = grid(figure, len(groups), columns, shared=False)
     for panel, (gains, axes) in zip(panels, groups.items(), strict=True):
         tolerated, measured = twisting.tolerated_beta[axes[0]], np.min(twisting.beta[axes])
         _nyquist_panel(panel, gains, float(tolerated), float(measured))
@@ -88,7 +89,8 @@ def lyapunov(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
     V is shown against V(0): its own unit is that of beta^2 |s| / K_1, and tells nothing. Of each
     step of the figure's time its largest value is drawn, so no peak above the bound is lost.
     """
-    figure, panels = _grid(len(names), 3, 46.0)
+    figure = page(14.0 + 46.0 * math.ceil(len(names) / 3))
+    panels = grid(figure, len(names), 3, shared=False)
     reaching = twisting.reaching
     steps = np.unique(np.geomspace(1, len(reaching.time) - 1, POINTS).astype(int))
     rows = zip(
@@ -124,13 +126,6 @@ def lyapunov(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
     figure.supylabel("V(t) / V(0) (dimensionless)")
     _legend(figure, panels)
     return figure
-
-
-def _grid(panels: int, columns: int, height: float) -> tuple[Figure, list[Axes]]:
-    """Make a page of ``panels`` in ``columns``, ``height`` mm from one to the next below."""
-    columns, rows = max(1, min(columns, panels)), max(1, -(-panels // columns))
-    figure = page(height * rows + 14.0)
-    return figure, [figure.add_subplot(rows, columns, 1 + i) for i in range(panels)]
 
 
 def _legend(figure: Figure, panels: list[Axes]) -> None:

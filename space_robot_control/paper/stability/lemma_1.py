@@ -29,10 +29,10 @@ SAMPLING = 0.02
 class Extremes(NamedTuple):
     """The largest and the smallest value over a flight, and when."""
 
-    largest: float
-    largest_at: float
-    smallest: float
-    smallest_at: float
+    max: float
+    max_at_s: float
+    min: float
+    min_at_s: float
 
     @classmethod
     def of(cls, values: Array, time: Array) -> Extremes:
@@ -53,12 +53,12 @@ class Contraction:
     @property
     def norm_below_one(self) -> Check:
         """Lemma 1 as printed."""
-        return Check(self.norm.largest, 1.0)
+        return Check(self.norm.max, 1.0)
 
     @property
     def radius_below_one(self) -> Check:
         """The condition that the recursion (68) needs at a fixed configuration."""
-        return Check(self.radius.largest, 1.0)
+        return Check(self.radius.max, 1.0)
 
 
 def contraction_matrix(inertia: Array, h_bar: Array) -> Array:

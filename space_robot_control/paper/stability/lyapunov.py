@@ -47,13 +47,10 @@ class Certificate:
     """``Vdot <= -gamma V / |eta_1|``; in the unit of K_1."""
     m: Array
     """(2, 2) M."""
+    m_eigenvalues: Array
+    """(2,) of M, rising."""
     residual: float
     """Largest eigenvalue of the block matrix of (51)."""
-
-    @property
-    def eigenvalues(self) -> Array:
-        """(2,) of M, rising."""
-        return np.asarray(np.linalg.eigvalsh(self.m), dtype=np.float64)
 
     def value(self, eta: Array) -> Array:
         """(47): V of ``eta`` (..., 2)."""
@@ -62,7 +59,7 @@ class Certificate:
     @property
     def decay(self) -> float:
         """``Psi = gamma lambda_min(M)^1/2``: ``Vdot <= -Psi V^1/2`` (54)."""
-        return self.gamma * float(np.sqrt(self.eigenvalues[0]))
+        return self.gamma * float(np.sqrt(self.m_eigenvalues[0]))
 
     def reaching_time(self, initial_value: float) -> float:
         """(56): s after which V is zero, from ``initial_value`` of V."""
@@ -138,4 +135,6 @@ def certify(k_1: float, k_2: float, beta: float) -> Certificate | None:
         return None
     gamma = (1.0 - MARGIN) * largest
     m = lyapunov_matrix(k_1, k_2, beta, 0.5 * (gamma + largest))
-    return Certificate(beta, gamma, m, residual(m, k_1, k_2, beta, gamma))
+    left = residual(m, k_1, k_2, beta, gamma)
+    eigenvalues = np.asarray(np.linalg.eigvalsh(m), dtype=np.float64)
+    return Certificate(beta, gamma, m, eigenvalues, left)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from .check import Check
-from .lemma_1 import SAMPLING, Extremes
+from .lemma_1 import SAMPLING
 from .lyapunov import Certificate
 from .study import Study
 from .super_twisting import SuperTwisting
@@ -26,37 +27,19 @@ def report(study: Study) -> dict[str, Any]:
         "axes": study.axis_names,
         "lemma_1": {
             "sampled_every_s": SAMPLING,
-            "spectral_norm": _extremes(lemma_1.norm),
-            "spectral_radius": _extremes(lemma_1.radius),
+            "spectral_norm": lemma_1.norm._asdict(),
+            "spectral_radius": lemma_1.radius._asdict(),
             "spectral_norm_below_1": lemma_1.norm_below_one,
             "spectral_radius_below_1": lemma_1.radius_below_one,
         },
         "time_delay_error": {
-            "as_flown": _derivative(study.error),
-            "without_friction": study.frictionless_error and _derivative(study.frictionless_error),
+            "as_flown": study.error,
+            "without_friction": study.frictionless_error,
         },
         "super_twisting": study.super_twisting and _super_twisting(study.super_twisting),
     }
     plain: dict[str, Any] = _plain(found)
     return plain
-
-
-def _extremes(extremes: Extremes) -> dict[str, float]:
-    return {
-        "max": extremes.largest,
-        "max_at_s": extremes.largest_at,
-        "min": extremes.smallest,
-        "min_at_s": extremes.smallest_at,
-    }
-
-
-def _derivative(found: ErrorDerivative) -> dict[str, Any]:
-    return {
-        "max_error": found.error,
-        "beta": found.beta,
-        "beta_at_s": found.beta_at,
-        "beta_99_9_percentile": found.beta_robust,
-    }
 
 
 def _super_twisting(found: SuperTwisting) -> dict[str, Any]:
@@ -71,8 +54,8 @@ def _super_twisting(found: SuperTwisting) -> dict[str, Any]:
         "lmi": {
             "residual_of_paper_m_at_beta_0_gamma_0": found.paper_m_residual,
             "paper_m_eigenvalues": found.paper_m_eigenvalues,
-            "measured_beta": [_certificate(c) for c in found.measured_certificates],
-            "assumed_beta_half_of_tolerated": [_certificate(c) for c in found.assumed_certificates],
+            "measured_beta": found.measured_certificates,
+            "assumed_beta_half_of_tolerated": found.assumed_certificates,
         },
         "reaching": {
             "initial_error": found.initial_error,
@@ -85,21 +68,11 @@ def _super_twisting(found: SuperTwisting) -> dict[str, Any]:
     }
 
 
-def _certificate(certificate: Certificate | None) -> dict[str, Any] | None:
-    if certificate is None:
-        return None
-    return {
-        "beta": certificate.beta,
-        "gamma": certificate.gamma,
-        "m": certificate.m,
-        "m_eigenvalues": certificate.eigenvalues,
-        "residual": certificate.residual,
-    }
-
-
 def _plain(value: Any) -> Any:
     if isinstance(value, Check):
-        return _plain({"holds": value.holds, "value": value.value, "limit": value.limit})
+        return _plain({"holds": value.holds, **value._asdict()})
+    if isinstance(value, (Certificate, ErrorDerivative)):
+        return _plain(asdict(value))
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
     if isinstance(value, Mapping):

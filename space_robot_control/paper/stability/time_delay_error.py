@@ -23,22 +23,19 @@ from ...analysis.generalised_motion import neglected_force
 
 Array = NDArray[np.float64]
 
-ROBUST_PERCENTILE = 99.9
-"""%, of the figure that jumps in a thousandth of the ticks do not reach."""
-
 
 @dataclass(frozen=True)
 class ErrorDerivative:
     """The largest values of eps and its derivative, per axis (m,)."""
 
-    error: Array
+    max_error: Array
     """Largest |eps|, rad/s2 (eps: 1/s2)."""
     beta: Array
     """Largest |eps_k+1 - eps_k| / delta, rad/s3 (eps: 1/s3)."""
-    beta_at: Array
+    beta_at_s: Array
     """When that was, s."""
-    beta_robust: Array
-    """The `ROBUST_PERCENTILE` of the same."""
+    beta_99_9_percentile: Array
+    """Of the same: jumps in a thousandth of the ticks do not reach it."""
 
 
 def time_delay_error(log: FlightLog, h_bar: Array) -> Array:
@@ -58,8 +55,8 @@ def error_derivative(error: Array, period: float) -> ErrorDerivative:
     estimated = error[1:]
     derivative = np.abs(np.diff(estimated, axis=0)) / period
     return ErrorDerivative(
-        error=np.max(np.abs(estimated), axis=0),
+        max_error=np.max(np.abs(estimated), axis=0),
         beta=np.max(derivative, axis=0),
-        beta_at=(np.argmax(derivative, axis=0) + 2) * period,
-        beta_robust=np.percentile(derivative, ROBUST_PERCENTILE, axis=0),
+        beta_at_s=(np.argmax(derivative, axis=0) + 2) * period,
+        beta_99_9_percentile=np.percentile(derivative, 99.9, axis=0),
     )

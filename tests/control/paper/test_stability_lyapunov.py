@@ -122,7 +122,7 @@ def test_certificate_solves_the_lmi(pair: tuple[float, float], share: float) -> 
     certificate = certify(*pair, share * limit)
     assert certificate is not None
     assert certificate.gamma > 0.0
-    assert certificate.eigenvalues[0] > 0.0
+    assert certificate.m_eigenvalues[0] > 0.0
     assert certificate.residual <= 1e-14
     omega = np.sqrt(pair[1]) * np.linspace(0.0, 3.0, 20_001)
     a = state_matrix(*pair) + 0.51 * certificate.gamma * np.eye(2)

@@ -52,10 +52,10 @@ def test_lemma_1_with_table_iv() -> None:
     flight, log = desired(FlightPlan(), every=0.0125)  # 40 samples of these make 20 s
     h_bar = np.array(H_BAR)
     found = contraction(flight.plant.robot, h_bar, log)
-    assert found.norm.smallest == pytest.approx(1.026, abs=1e-3)
-    assert found.norm.largest == pytest.approx(1.029, abs=1e-3)
-    assert found.radius.smallest == pytest.approx(0.992, abs=1e-3)
-    assert found.radius.largest == pytest.approx(0.997, abs=1e-3)
+    assert found.norm.min == pytest.approx(1.026, abs=1e-3)
+    assert found.norm.max == pytest.approx(1.029, abs=1e-3)
+    assert found.radius.min == pytest.approx(0.992, abs=1e-3)
+    assert found.radius.max == pytest.approx(0.997, abs=1e-3)
     assert found.norm_below_one.holds is False
     assert found.radius_below_one.holds is True
     sampled = range(0, log.ticks, 40)
@@ -65,16 +65,16 @@ def test_lemma_1_with_table_iv() -> None:
     ]
     norms = [np.linalg.norm(x, 2) for x in w]
     radii = [max(abs(np.linalg.eigvals(x))) for x in w]
-    assert (found.norm.smallest, found.norm.largest) == pytest.approx((min(norms), max(norms)))
-    assert (found.radius.smallest, found.radius.largest) == pytest.approx((min(radii), max(radii)))
-    assert found.norm.largest_at == sampled[int(np.argmax(norms))] * flight.period
+    assert (found.norm.min, found.norm.max) == pytest.approx((min(norms), max(norms)))
+    assert (found.radius.min, found.radius.max) == pytest.approx((min(radii), max(radii)))
+    assert found.norm.max_at == sampled[int(np.argmax(norms))] * flight.period
 
 
 def test_lemma_1_is_about_the_robot_that_flies() -> None:
     """With the payload of its case."""
     flight, log = desired(FlightPlan(case="4-2", duration=0.1), every=0.02)
     heavy = contraction(flight.plant.robot, np.array(H_BAR), log)
-    assert heavy.radius.largest > contraction(flight.robot, np.array(H_BAR), log).radius.largest
+    assert heavy.radius.max > contraction(flight.robot, np.array(H_BAR), log).radius.max
 
 
 @settings(max_examples=30)
@@ -123,9 +123,9 @@ def test_derivative_of_a_known_error() -> None:
     error[3000:, 1] += 10.0
     found = error_derivative(error, period)
     np.testing.assert_allclose(found.beta, [0.25, 19.5])
-    assert found.beta_at[1] == 3000 * period
-    np.testing.assert_allclose(found.beta_robust, [0.25, 0.5])
-    np.testing.assert_allclose(found.error, np.abs(error[1:]).max(axis=0))
+    assert found.beta_at_s[1] == 3000 * period
+    np.testing.assert_allclose(found.beta_99_9_percentile, [0.25, 0.5])
+    np.testing.assert_allclose(found.max_error, np.abs(error[1:]).max(axis=0))
 
 
 def test_beta_grows_with_the_gains_it_is_to_be_compared_with(tmp_path: Path) -> None:
