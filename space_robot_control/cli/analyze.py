@@ -12,17 +12,12 @@ import click
 
 from space_robot_msgs_py.config.text import printable
 
-from .options import REMAP, TRUST
+from .options import REMAP, TRUST, file_option, folder_option
 
 
 @click.command()
 @click.argument("bags", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="BAG...")
-@click.option(
-    "--plot",
-    type=click.Path(path_type=Path, file_okay=False),
-    metavar="DIR",
-    help="Folder for the figures, as PNG and SVG; several bags overlaid.",
-)
+@folder_option("--plot", help="Folder for the figures, as PNG and SVG; several bags overlaid.")
 @click.option(
     "--csv",
     type=click.Path(path_type=Path),
@@ -35,12 +30,7 @@ from .options import REMAP, TRUST
     metavar="DIR-or-FILE",
     help="The same as Parquet, with the flight's description.",
 )
-@click.option(
-    "--html",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE",
-    help="One page with tables and figures, to send to a colleague.",
-)
+@file_option("--html", help="One page with tables and figures, to send to a colleague.")
 @click.option("--from", "from_s", type=float, metavar="T", help="Begin at T simulated seconds.")
 @click.option("--to", "to_s", type=float, metavar="T", help="End before T simulated seconds.")
 @REMAP

@@ -133,6 +133,18 @@ def _remap(context: click.Context, option: click.Parameter, given: Any) -> dict[
     return remap
 
 
+def folder_option(name: str, help: str) -> Decorator:
+    """Make an option that names a folder to write to."""
+    kind = click.Path(path_type=Path, file_okay=False)
+    return click.option(name, type=kind, metavar="DIR", help=help)
+
+
+def file_option(*names: str, help: str) -> Decorator:
+    """Make an option that names a file to write."""
+    kind = click.Path(path_type=Path, dir_okay=False)
+    return click.option(*names, type=kind, metavar="FILE", help=help)
+
+
 REMAP = click.option(
     "--remap", multiple=True, callback=_remap, metavar="THEIRS:=OURS",
     help="Take their topic for ours, as /arm/states:=/joint_states; may be repeated.",
@@ -214,10 +226,7 @@ def plan_flight(**options: Any) -> Flight:
     return Flight(validate(FlightPlan, options, "options"))
 
 
-OUTPUT = click.option(
-    "--output", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
-    help="File to write the JSON to as well.",
-)  # fmt: skip
+OUTPUT = file_option("--output", help="File to write the JSON to as well.")
 
 
 def put_json(report: Any, as_json: bool, output: Path | None) -> None:

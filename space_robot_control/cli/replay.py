@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from .options import OPTIONS, REMAP, TRUST
+from .options import OPTIONS, REMAP, TRUST, file_option
 
 
 @click.command()
@@ -31,14 +31,8 @@ from .options import OPTIONS, REMAP, TRUST
     "--end", type=click.FloatRange(0.0, min_open=True), metavar="T",
     help="Simulated time to end before, s.",
 )  # fmt: skip
-@click.option(
-    "--csv", "table", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
-    help="File for both torques of every tick.",
-)  # fmt: skip
-@click.option(
-    "--plot", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
-    help="Picture of both torques by axis, as PNG and SVG.",
-)  # fmt: skip
+@file_option("--csv", "table", help="File for both torques of every tick.")
+@file_option("--plot", help="Picture of both torques by axis, as PNG and SVG.")
 @REMAP
 @TRUST
 @click.option(

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from ..flight.interruption import Interrupted
-from .options import OUTPUT, put_json
+from .options import OUTPUT, folder_option, put_json
 
 
 @click.command()
@@ -33,11 +33,8 @@ from .options import OUTPUT, put_json
     show_default=True,
     help="Simulated seconds of each flight.",
 )
-@click.option(
-    "--bags",
-    type=click.Path(path_type=Path, file_okay=False),
-    metavar="DIR",
-    help="New or empty folder to keep all bags [default: those of failed flights are kept].",
+@folder_option(
+    "--bags", "New or empty folder to keep all bags [default: those of failed flights are kept]."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print everything, each flight, as JSON.")
 @OUTPUT

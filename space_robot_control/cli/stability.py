@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .options import flight_options
+from .options import flight_options, folder_option
 
 if TYPE_CHECKING:
     from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -24,12 +24,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="Error of every axis at the start of the reaching flight (joints: rad).",
 )
-@click.option(
-    "--plot",
-    type=click.Path(path_type=Path, file_okay=False),
-    metavar="DIR",
-    help="Folder for the Nyquist plot and V(t), as PNG and SVG.",
-)
+@folder_option("--plot", help="Folder for the Nyquist plot and V(t), as PNG and SVG.")
 def stability(initial_error: float, as_json: bool, plot: Path | None, **options: Any) -> None:
     """Check the paper's stability conditions on a flight: Section III-C, Appendices A and B.
 

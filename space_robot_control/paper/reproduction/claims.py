@@ -59,29 +59,20 @@ def claims(results: Sequence[Result], comparison: Sequence[Cell]) -> list[Claim]
 
 
 def _torques(cells: Iterable[Cell]) -> Iterator[Claim]:
-    ratios = [
-        cell.ratio
-        for cell in cells
-        if cell.controller == "tde_stc" and not cell.friction and cell.column in TORQUE
-    ]
-    if known := [ratio for ratio in ratios if ratio is not None]:
-        worst = max(abs(ratio - 1.0) for ratio in known)
+    flown = (c for c in cells if c.controller == "tde_stc" and not c.friction)
+    if ratios := [c.ratio for c in flown if c.column in TORQUE and c.ratio is not None]:
         yield Claim(
             "TDE-STC's torques are Table V's, friction-free: largest relative difference",
-            worst, "<=", 0.01,
+            max(abs(ratio - 1.0) for ratio in ratios), "<=", 0.01,
         )  # fmt: skip
 
 
 def _tracking(cells: Iterable[Cell]) -> Iterator[Claim]:
-    ratios = [
-        cell.ratio
-        for cell in cells
-        if cell.controller in TDE_LAWS and cell.friction and cell.column in TRACKING
-    ]
-    if known := [ratio for ratio in ratios if ratio is not None]:
+    flown = (c for c in cells if c.controller in TDE_LAWS and c.friction)
+    if ratios := [c.ratio for c in flown if c.column in TRACKING and c.ratio is not None]:
         yield Claim(
             "The TDE laws track closer than printed in every cell: largest measured / printed",
-            max(known), "<=", 1.0,
+            max(ratios), "<=", 1.0,
         )  # fmt: skip
 
 

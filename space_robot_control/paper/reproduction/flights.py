@@ -16,7 +16,6 @@ from ...analysis.metrics import Chatter, Rms, of_log
 from ...analysis.plot_series import BaseTorque
 from ...flight.plan import Flight, FlightPlan
 from ...flight.simulate import simulate
-from .provenance import parameters
 from .table_v import PRINTED
 
 ROBOT = "paper"
@@ -144,3 +143,16 @@ def fly(planned: Planned, duration: float | None, figures: FigureFolder | None) 
         of_log(Chatter(log.axes, log.timebase.period), log) if is_judged else None,
         BaseTorque.of(log) if planned.compared else None,
     )  # fmt: skip
+
+
+def parameters(flight: Flight) -> dict[str, Any]:
+    """Return all that plant, controller and mission are told in a flight."""
+    return {
+        "period_s": flight.period,
+        "plant": flight.plant_settings.model_dump(exclude={"mission", "wait_for"}),
+        "gains": flight.gains_used,
+        "mission": {
+            "waypoint_times_s": flight.mission_settings.waypoint_times,
+            "waypoints_deg": flight.mission_settings.waypoints_deg,
+        },
+    }

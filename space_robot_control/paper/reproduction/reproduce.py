@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import platform
 import shutil
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
@@ -14,14 +15,13 @@ from space_robot_msgs_py.errors import InputError
 
 from ...analysis.figures.figure_set import FigureFolder
 from ...analysis.tables import as_csv, as_markdown, as_records
-from .chatter import chatter, chatter_table
+from ...flight.software import commit, versions
 from .claims import claims, claims_table
 from .figures import figure_groups, start_comparisons
 from .flights import Planned, Result, Row, fly, plan
 from .processes import processes
-from .provenance import provenance
 from .report import render
-from .table import cells, cells_table, variant_tables
+from .table import cells, cells_table, chatter, chatter_table, variant_tables
 
 TABLE = "table_v"
 FULL_DURATION = 30.0
@@ -116,7 +116,13 @@ def _write(
     judged, chattering = claims(results, comparison), chatter(results)
     tables = [*variant_tables(comparison), chatter_table(chattering)]
     numbers = cells_table(comparison)
-    flown = {**provenance(), "duration_s": duration, "brief": brief}
+    provenance = {
+        "commit": commit(),
+        "versions": versions(),
+        "machine": f"{platform.system()} {platform.machine()}",
+        "duration_s": duration,
+        "brief": brief,
+    }
     told = {
         f"{r.row.controller}, case {r.row.case}, {r.variant.gains} gains": r.parameters
         for r in results
@@ -124,7 +130,7 @@ def _write(
     }
     claim_records = [claim.as_record() for claim in judged]
     record = {
-        "provenance": flown,
+        "provenance": provenance,
         "claims": claim_records,
         "cells": as_records(numbers),
         "chatter": [row._asdict() for row in chattering],
@@ -135,7 +141,7 @@ def _write(
     (folder / f"{TABLE}.csv").write_text(as_csv(numbers), "utf-8")
     (folder / f"{TABLE}.json").write_text(json.dumps(record, indent=1) + "\n", "utf-8")
     page = render(
-        flown, told, claims_table(claim_records), tables, list(figure_groups(rows, figures))
+        provenance, told, claims_table(claim_records), tables, list(figure_groups(rows, figures))
     )
     (folder / "report.html").write_text(page, "utf-8")
     return record

@@ -1,13 +1,14 @@
-"""Measured beside printed: one record a flight, definition and column, and tables of them."""
+"""The tables: measured beside printed, and the chatter of the laws beside one another."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import astuple
 from typing import NamedTuple
 
 from ...analysis.tables import Column, Table
 from .flights import DEFINITIONS, VARIANTS, Result, Variant
-from .table_v import COLUMNS, HEADINGS, printed
+from .table_v import COLUMNS, HEADINGS, TORQUE, printed
 
 COLUMN_HEADS = (
     Column("controller", is_label=True),
@@ -71,15 +72,10 @@ def variant_tables(comparison: Sequence[Cell]) -> list[Table]:
 def _rows(comparison: Sequence[Cell], variant: Variant, definition: str) -> list[list[str]]:
     rows: dict[tuple[str, str], list[str]] = {}
     for cell in comparison:
-        if (cell.gains, cell.friction, cell.definition) != (*_key(variant), definition):
-            continue
-        row = rows.setdefault((cell.controller, cell.case), [cell.controller, cell.case])
-        row.append(_text(cell))
+        if (cell.gains, cell.friction, cell.definition) == (*astuple(variant), definition):
+            row = rows.setdefault((cell.controller, cell.case), [cell.controller, cell.case])
+            row.append(_text(cell))
     return list(rows.values())
-
-
-def _key(variant: Variant) -> tuple[str, bool]:
-    return variant.gains, variant.friction
 
 
 def _text(cell: Cell) -> str:
@@ -88,3 +84,42 @@ def _text(cell: Cell) -> str:
     form = ".4f" if "torque" in cell.column else ".2e"
     ratio = f"{cell.ratio:.3f}" if cell.ratio > 0.01 else f"{cell.ratio:.1e}"
     return f"{cell.measured:{form}} / {cell.printed:{form}} ({ratio})"
+
+
+class LawChatter(NamedTuple):
+    """The chatter of a flight of case 1 with printed friction, by torque column of Table V."""
+
+    controller: str
+    gains: str
+    total_variation_per_s: dict[str, float]
+    """N m/s, mean of the axes."""
+    power_above_100_hz: dict[str, float]
+    """Share of the power, mean of the axes."""
+
+
+def chatter(results: Sequence[Result]) -> list[LawChatter]:
+    """Collect it of every flight that is compared so and did not diverge."""
+    return [
+        LawChatter(r.row.controller, r.variant.gains, **r.chatter)
+        for r in results
+        if r.chatter is not None
+    ]
+
+
+def chatter_table(found: Sequence[LawChatter]) -> Table:
+    """Tabulate the chatter of the laws."""
+    names = ("base", "joints 1-3", "joints 4-6")
+    columns = (
+        Column("controller", is_label=True), Column("gains", is_label=True),
+        *(Column(f"{name}: variation", "N m/s", ".3g") for name in names),
+        *(Column(f"{name}: power > 100 Hz", spec=".1e") for name in names),
+    )  # fmt: skip
+    rows = [
+        [
+            x.controller, x.gains,
+            *(x.total_variation_per_s[column] for column in TORQUE),
+            *(x.power_above_100_hz[column] for column in TORQUE),
+        ]
+        for x in found
+    ]  # fmt: skip
+    return Table.of("Chatter in case 1, printed friction", columns, rows)
