@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 def measured_rows(log: FlightLog, before: FlightLog | None = None) -> NDArray[np.bool_]:
-    """(N,) whether a tick's state was measured: one that was filled in repeats the one before.
+    """(N,) true where a tick's state was measured: one that was filled in repeats the one before.
 
     ``before``: rows before those of ``log`` (None: the flight begins with it).
     """

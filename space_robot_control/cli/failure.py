@@ -33,7 +33,7 @@ def told_as_json(flight: Flight, bag: Path | None, as_json: bool) -> Iterator[No
 def failed_report(
     flight: Flight, bag: Path | None, error: FlightError, figures: dict[str, Any]
 ) -> dict[str, Any]:
-    """What was to be flown, the ``figures`` of what was, and why it is no more."""
+    """Report what was to be flown, the ``figures`` of what was, and why it is no more."""
     planned = flight.description
     report = {key: planned[key] for key in FLOWN if key in planned}
     return {

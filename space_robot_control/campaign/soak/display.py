@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from rich.console import Console
@@ -36,28 +37,24 @@ def rows(report: dict[str, Any]) -> list[tuple[str, str, str]]:
         ("faults", str(report["faults"]), f"{len(report['faults_by_kind'])} kinds"),
         ("controllers restarted", str(report["restarts"]), ""),
         ("messages lost", str(report["messages_lost"]), ""),
-        *_errors(
-            report["largest_error"]["tracking"], "largest {} error", ", torque and reference whole"
-        ),
-        *_errors(
-            report["largest_error"]["disturbed"],
-            "largest {} error",
-            ", torque or reference taken away",
-        ),
+        *_errors(report["largest_error"]),
         ("memory growth, this process", _mb(growth["soak"]), "since the third flight"),
         ("memory growth, largest node", _mb(growth["largest_node"]), "first to last quarter"),
         ("shared memory files", f"{files['start']} to {files['end']}", "of Fast DDS"),
     ]
 
 
-def _errors(errors: dict[str, Any], name: str, remark: str) -> list[tuple[str, str, str]]:
-    found = []
-    for what, unit in (("attitude", ""), ("joint", " rad")):
-        largest = errors[what]
-        figure = f"{largest['value']:.2e}{unit}" if largest else "-"
-        where = f"flight {largest['flight']}{remark}" if largest else ""
-        found.append((name.format(what), figure, where))
-    return found
+def _errors(errors: dict[str, Any]) -> Iterator[tuple[str, str, str]]:
+    for key, remark in (
+        ("tracking", "torque and reference whole"), ("disturbed", "torque or reference taken away"),
+    ):  # fmt: skip
+        for what, unit in (("attitude", ""), ("joint", " rad")):
+            name, largest = f"largest {what} error", errors[key][what]
+            if largest:
+                number, flight = f"{largest['value']:.2e}{unit}", largest["flight"]
+                yield name, number, f"flight {flight}, {remark}"
+            else:
+                yield name, "-", ""
 
 
 def _mb(value: float | None) -> str:

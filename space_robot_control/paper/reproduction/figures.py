@@ -19,18 +19,11 @@ FIGURE_OF_CASE = {"1": "6", "2": "7", "3": "8", "4-1": "9a", "4-2": "9b"}
 MISSION = "figure5_desired_joints"
 
 
-class Comparison(NamedTuple):
-    """A figure of all laws."""
-
-    stem: str
-    caption: str
-    draw: Callable[[Mapping[str, BaseTorque]], Figure]
-
-
-COMPARISONS = (
-    Comparison("chatter", "Chatter of the base torque in case 1", chatter),
-    Comparison("junctions", "Base torque at the junction of the two motions, case 1", junctions),
-)
+COMPARISONS: dict[str, tuple[str, Callable[[Mapping[str, BaseTorque]], Figure]]] = {
+    "chatter": ("Chatter of the base torque in case 1", chatter),
+    "junctions": ("Base torque at the junction of the two motions, case 1", junctions),
+}
+"""Caption and drawing of the figures of all laws, by the name of their files."""
 
 
 class FigureGroup(NamedTuple):
@@ -47,8 +40,8 @@ def start_comparisons(
     flights = {r.row.controller: r.base_torque for r in results if r.base_torque is not None}
     if flights:
         yield pool.submit(_draw_mission, duration, folder)
-        for comparison in COMPARISONS:
-            yield pool.submit(_draw_comparison, comparison, flights, folder)
+        for stem in COMPARISONS:
+            yield pool.submit(_draw_comparison, stem, flights, folder)
 
 
 def _draw_mission(duration: float | None, folder: FigureFolder) -> None:
@@ -56,16 +49,15 @@ def _draw_mission(duration: float | None, folder: FigureFolder) -> None:
     folder.save(desired_joints(log), MISSION)
 
 
-def _draw_comparison(
-    comparison: Comparison, flights: Mapping[str, BaseTorque], folder: FigureFolder
-) -> None:
-    folder.save(comparison.draw(flights), comparison.stem)
+def _draw_comparison(stem: str, flights: Mapping[str, BaseTorque], folder: FigureFolder) -> None:
+    _, draw = COMPARISONS[stem]
+    folder.save(draw(flights), stem)
 
 
 def figure_groups(rows: Sequence[Row], folder: FigureFolder) -> Iterator[FigureGroup]:
     """Yield the figures that were drawn, the mission's first, then case by case."""
-    laws = [(MISSION, "Figure 5: desired joint angles"), *(c[:2] for c in COMPARISONS)]
-    if figures := folder.saved(laws):
+    laws = [(stem, caption) for stem, (caption, _) in COMPARISONS.items()]
+    if figures := folder.saved([(MISSION, "Figure 5: desired joint angles"), *laws]):
         yield FigureGroup("The mission, and the laws beside one another", figures)
     for case, number in FIGURE_OF_CASE.items():
         captions = [

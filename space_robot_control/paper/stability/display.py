@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Callable, Iterable, Sequence
 
 from rich.console import Console
 
-from ...analysis.tables import Column, Row, Table, Verdict
+from ...analysis.tables import Column, Table, Value, Verdict
 from ...analysis.terminal import print_table
 from ...flight.terminal import say
 from .check import Check
+from .lyapunov import Certificate
 from .study import Study
 from .super_twisting import SuperTwisting
 
@@ -41,13 +43,27 @@ def print_study(study: Study, console: Console) -> None:
     say(console, _closing(study, twisting))
 
 
-def _table(title: str, heads: Sequence[str], rows: Iterable[Row]) -> Table:
-    columns = [Column(is_label=True), *(Column(head) for head in heads)]
-    return Table.of(title, columns, list(rows))
+def _by_axis(
+    title: str, names: Sequence[str], columns: Iterable[tuple[str, Iterable[Value]]]
+) -> Table:
+    """Make a table with a row an axis from the heads and the cells of its columns."""
+    heads, cells = zip(*columns, strict=True)
+    rows = list(zip(names, *cells, strict=True))
+    return Table.of(title, [Column(is_label=True), *map(Column, heads)], rows)
 
 
-def _number(value: float | None) -> str:
-    return "none" if value is None or value != value else f"{value:.3g}"
+def _number(value: float) -> str:
+    return "none" if math.isnan(value) else f"{value:.3g}"
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return ", ".join(map(_number, values))
+
+
+def _of_each(
+    certificates: Iterable[Certificate | None], text: Callable[[Certificate], str]
+) -> list[str]:
+    return ["none" if certificate is None else text(certificate) for certificate in certificates]
 
 
 def _verdict(text: str, check: Check) -> Verdict:
@@ -73,97 +89,85 @@ def _lemma_1(study: Study) -> Table:
             ("spectral radius", study.lemma_1.radius, study.lemma_1.radius_below_one),
         )
     ]  # fmt: skip
-    title = "Lemma 1: W = E - H_S^-1 h_bar (69)"
-    return _table(title, ("min", "max", "at t (s)", "below 1"), rows)
+    heads = ("", "min", "max", "at t (s)", "below 1")
+    columns = [Column(head, is_label=not head) for head in heads]
+    return Table.of("Lemma 1: W = E - H_S^-1 h_bar (69)", columns, rows)
 
 
 def _time_delay_error(study: Study) -> Table:
     flown, smooth = study.error, study.frictionless_error
-    title = "Time-delay error eps (65), beta = max |d eps/dt| (rad/s3; base 1/s3)"
-    heads = ["max |eps|", "beta", "at t (s)", "99.9 %"]
-    rows = [
-        [
-            name, _number(flown.max_error[i]), _number(flown.beta[i]), f"{flown.beta_at_s[i]:.4f}",
-            _number(flown.beta_99_9_percentile[i]),
-        ]
-        for i, name in enumerate(study.axis_names)
-    ]  # fmt: skip
+    columns = [
+        ("max |eps|", map(_number, flown.max_error)),
+        ("beta", map(_number, flown.beta)),
+        ("at t (s)", map("{:.4f}".format, flown.beta_at_s)),
+        ("99.9 %", map(_number, flown.beta_99_9_percentile)),
+    ]
     if smooth:
-        heads += ["frictionless", "99.9 %"]
-        for i, row in enumerate(rows):
-            row += [_number(smooth.beta[i]), _number(smooth.beta_99_9_percentile[i])]
-    return _table(title, heads, rows)
+        columns += [
+            ("frictionless", map(_number, smooth.beta)),
+            ("99.9 %", map(_number, smooth.beta_99_9_percentile)),
+        ]
+    title = "Time-delay error eps (65), beta = max |d eps/dt| (rad/s3; base 1/s3)"
+    return _by_axis(title, study.axis_names, columns)
 
 
 def _gain_conditions(names: Sequence[str], twisting: SuperTwisting) -> Table:
-    checks = zip(names, twisting.k_2_above_beta, twisting.k_1_squared_above_4_k_2, strict=True)
-    rows = [[name, _above(bounded), _above(damped)] for name, bounded, damped in checks]
-    return _table("Gain conditions (46)", ("K_2 > beta", "K_1^2 > 4 K_2"), rows)
+    columns = (
+        ("K_2 > beta", map(_above, twisting.k_2_above_beta)),
+        ("K_1^2 > 4 K_2", map(_above, twisting.k_1_squared_above_4_k_2)),
+    )
+    return _by_axis("Gain conditions (46)", names, columns)
 
 
 def _circle_criterion(names: Sequence[str], twisting: SuperTwisting) -> Table:
-    found = zip(names, twisting.circle_criterion, twisting.tolerated_beta, strict=True)
-    rows = [[name, _below(check), _number(tolerated)] for name, check, tolerated in found]
-    heads = "max |G| < 1 / beta (s3/rad)", "beta tolerated"
-    return _table("Circle criterion (73)", heads, rows)
+    columns = (
+        ("max |G| < 1 / beta (s3/rad)", map(_below, twisting.circle_criterion)),
+        ("beta tolerated", map(_number, twisting.tolerated_beta)),
+    )
+    return _by_axis("Circle criterion (73)", names, columns)
 
 
 def _paper_lmi(names: Sequence[str], twisting: SuperTwisting) -> Table:
-    found = zip(names, twisting.paper_m_eigenvalues, twisting.paper_m_residual, strict=True)
-    rows = [
-        [name, f"{_number(low)}, {_number(high)}", _below(check)]
-        for name, (low, high), check in found
-    ]
-    heads = "eigenvalues of M", "of the LMI, largest"
-    return _table("LMI (51), M of (48), beta = gamma = 0", heads, rows)
+    columns = (
+        ("eigenvalues of M", map(_numbers, twisting.paper_m_eigenvalues)),
+        ("of the LMI, largest", map(_below, twisting.paper_m_residual)),
+    )
+    return _by_axis("LMI (51), M of (48), beta = gamma = 0", names, columns)
 
 
 def _lmi(names: Sequence[str], twisting: SuperTwisting) -> Table:
-    rows = []
-    found = zip(
-        names, twisting.measured_certificates, twisting.assumed_certificates, strict=True
-    )  # fmt: skip
-    for name, measured, assumed in found:
-        cells = ["none"] * 4
-        if assumed:
-            low, high = assumed.m_eigenvalues
-            cells = [
-                _number(assumed.beta), _number(assumed.gamma), f"{_number(low)}, {_number(high)}",
-                f"{assumed.residual:.1e}",
-            ]  # fmt: skip
-        rows.append([name, _number(measured.gamma if measured else None), *cells])
-    return _table(
-        "LMI (51), M free: gamma for beta measured, and for half the beta tolerated",
-        ("gamma at\nbeta measured", "half\nbeta", "gamma", "eigenvalues\nof M",
-         "of the LMI,\nlargest"),
-        rows,
-    )  # fmt: skip
+    measured, assumed = twisting.measured_certificates, twisting.assumed_certificates
+    columns = (
+        ("gamma at\nbeta measured", _of_each(measured, lambda c: _number(c.gamma))),
+        ("half\nbeta", _of_each(assumed, lambda c: _number(c.beta))),
+        ("gamma", _of_each(assumed, lambda c: _number(c.gamma))),
+        ("eigenvalues\nof M", _of_each(assumed, lambda c: _numbers(c.m_eigenvalues))),
+        ("of the LMI,\nlargest", _of_each(assumed, lambda c: f"{c.residual:.1e}")),
+    )
+    title = "LMI (51), M free: gamma for beta measured, and for half the beta tolerated"
+    return _by_axis(title, names, columns)
 
 
 def _matrices(names: Sequence[str], twisting: SuperTwisting) -> Table:
-    rows = []
-    for name, certificate in zip(names, twisting.assumed_certificates, strict=True):
-        entries = certificate.m[[0, 0, 1], [0, 1, 1]] if certificate else [None] * 3
-        rows.append([name, *(_number(entry) for entry in entries)])
-    title = "M of that solution, for half the beta tolerated"
-    return _table(title, ("M_11", "M_12", "M_22"), rows)
+    assumed = twisting.assumed_certificates
+    columns = (
+        ("M_11", _of_each(assumed, lambda c: _number(c.m[0, 0]))),
+        ("M_12", _of_each(assumed, lambda c: _number(c.m[0, 1]))),
+        ("M_22", _of_each(assumed, lambda c: _number(c.m[1, 1]))),
+    )
+    return _by_axis("M of that solution, for half the beta tolerated", names, columns)
 
 
 def _reaching(names: Sequence[str], twisting: SuperTwisting) -> Table:
-    found = zip(
-        names, twisting.initial_values, twisting.certificates, twisting.reaching_beta,
-        twisting.reaching.threshold, twisting.reaching_time, strict=True,
-    )  # fmt: skip
-    rows = [
-        [
-            name, _number(value), _number(certificate.beta if certificate else None),
-            _number(flown), _number(threshold), _below(check),
-        ]
-        for name, value, certificate, flown, threshold, check in found
-    ]  # fmt: skip
+    columns = (
+        ("V(0)", map(_number, twisting.initial_values)),
+        ("its beta", _of_each(twisting.certificates, lambda c: _number(c.beta))),
+        ("beta flown", map(_number, twisting.reaching_beta)),
+        ("|s| below", map(_number, twisting.reaching.threshold)),
+        ("measured < bound (s)", map(_below, twisting.reaching_time)),
+    )
     title = f"Reaching time (56) from an error of {twisting.initial_error:g} on every axis"
-    heads = "V(0)", "its beta", "beta flown", "|s| below", "measured < bound (s)"
-    return _table(title, heads, rows)
+    return _by_axis(title, names, columns)
 
 
 def _closing(study: Study, twisting: SuperTwisting) -> str:

@@ -33,9 +33,9 @@ class ErrorDerivative:
     beta: Array
     """Largest |eps_k+1 - eps_k| / delta, rad/s3 (eps: 1/s3)."""
     beta_at_s: Array
-    """When that was, s."""
+    """Its time, s."""
     beta_99_9_percentile: Array
-    """Of the same: jumps in a thousandth of the ticks do not reach it."""
+    """99.9th percentile of the same, which jumps in a thousandth of the ticks do not reach."""
 
 
 def time_delay_error(log: FlightLog, h_bar: Array) -> Array:

@@ -67,7 +67,7 @@ def test_lemma_1_with_table_iv() -> None:
     radii = [max(abs(np.linalg.eigvals(x))) for x in w]
     assert (found.norm.min, found.norm.max) == pytest.approx((min(norms), max(norms)))
     assert (found.radius.min, found.radius.max) == pytest.approx((min(radii), max(radii)))
-    assert found.norm.max_at == sampled[int(np.argmax(norms))] * flight.period
+    assert found.norm.max_at_s == sampled[int(np.argmax(norms))] * flight.period
 
 
 def test_lemma_1_is_about_the_robot_that_flies() -> None:
