@@ -8,8 +8,7 @@ from typing import Any
 from .. import topics
 from ..errors import MessageError
 from ..samples import Timebase
-from .decoded import name_order
-from .message import Column, MessageDescription, Run
+from .message import Column, MessageDescription, Run, name_order
 
 
 class JointStates(MessageDescription):

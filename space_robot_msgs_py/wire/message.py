@@ -16,6 +16,7 @@ from typing import Any, ClassVar, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import MessageError
 from ..samples import Timebase
 from ..topics import Topic
 from .cdr import BODY, Bytes, MessageLayout
@@ -113,6 +114,17 @@ class MessageDescription(ABC):
         layout = MessageLayout(self.topic.type, message)
         places = [layout.slots[path].offset + 8 * i for path, order in runs for i in order]
         return Numbers(layout, np.array(places, np.uint64))
+
+
+def name_order(given: Sequence[str], expected: Sequence[str], topic: str) -> list[int]:
+    """Find where each expected name stands among the given ones.
+
+    Raises:
+        MessageError: other names than expected.
+    """
+    if sorted(given) != sorted(expected):
+        raise MessageError(f"{topic}: names {list(given)}, expected {list(expected)}", "names")
+    return [list(given).index(name) for name in expected]
 
 
 def description(topic: Topic) -> type[MessageDescription] | None:

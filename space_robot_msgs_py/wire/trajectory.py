@@ -7,8 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ..errors import MessageError
-from .decoded import name_order
-from .message import MessageDescription, Run
+from .message import MessageDescription, Run, name_order
 
 
 class Trajectory(MessageDescription):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from contextlib import closing
 from typing import Any
 
 from space_robot_msgs_py import topics
@@ -17,8 +16,8 @@ from ..progress import FlightProgress, flight_progress
 from .degraded import degradation
 from .foreign import ForeignNodes
 from .injection import Injector
-from .lifecycle import LifecycleDriver
 from .monitor import Event, Monitor
+from .node_services import change_state
 from .processes import Graph, node_command
 from .watch import Watch
 
@@ -96,16 +95,15 @@ class _Follower:
     def bring_up(self, show: FlightProgress) -> None:
         """Configure all nodes, then activate them, the plant last."""
         show(0.0, "configuring the nodes")
-        with closing(LifecycleDriver(self._monitor.node)) as driver:
-            self._change(driver, NODE_NAMES, "configure")
-            self._foreign.wait(self._check_start)
-            for name in NODE_NAMES:
-                self._change(driver, [name], "activate")
+        self._change(NODE_NAMES, "configure")
+        self._foreign.wait(self._check_start)
+        for name in NODE_NAMES:
+            self._change([name], "activate")
         show.say(f"configured and active: {', '.join(ORDER)}")
         show(0.0, "waiting for the nodes")
 
-    def _change(self, driver: LifecycleDriver, names: Sequence[str], transition: str) -> None:
-        for name in driver.change(names, transition, self._check_start):
+    def _change(self, names: Sequence[str], transition: str) -> None:
+        for name in change_state(self._monitor.node, names, transition, self._check_start):
             output = self._graph.host_of(name.removesuffix("_node")).output_tail()
             raise FlightError(f"{name} refused to {transition}:\n{output}")
 

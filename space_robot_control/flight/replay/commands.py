@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.command import Commands as CommandMessages
 from space_robot_msgs_py.wire.compiled_codec import FOREIGN, CompiledCodec
-from space_robot_msgs_py.wire.decoded import name_order, stamp_of
 from space_robot_msgs_py.wire.definitions import decode
+from space_robot_msgs_py.wire.message import name_order
 
 Array = NDArray[np.float64]
 Ticks = NDArray[np.int64]
@@ -94,7 +95,7 @@ class CommandList:
         except (MessageError, IndexError):
             self._torque[:] = np.nan
             form = form._replace(effort=_text(efforts))
-        return stamp_of(message), self._forms.setdefault(form, len(self._forms))
+        return header_stamp_ns(data), self._forms.setdefault(form, len(self._forms))
 
     def commands(self) -> Commands:
         """What has come; of several commands of one tick the first."""

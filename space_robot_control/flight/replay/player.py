@@ -16,7 +16,7 @@ from space_robot_msgs_py.errors import FlightError, InputError
 
 from ..graph.temporary_node import TemporaryNode
 from .commands import CommandList, Ticks
-from .recording import Reference, State
+from .recording import ReferenceMessage, StateMessages
 
 CONTROLLER = "controller_node"
 STATES = (topics.JOINT_STATES, topics.BASE_STATE)
@@ -37,8 +37,8 @@ LAST_ANSWER_S = 1.0
 class _Stream(NamedTuple):
     """One topic's messages of the reference."""
 
-    messages: Iterator[Reference]
-    needed: deque[Reference]
+    messages: Iterator[ReferenceMessage]
+    needed: deque[ReferenceMessage]
     """Those sent that are needed from now on: the last one that has begun, and what is ahead."""
 
 
@@ -121,7 +121,7 @@ class Player:
                 self._outs[reference.topic.name].publish(reference.data)
 
     def lockstep(
-        self, states: Iterable[State], references: Iterable[Iterator[Reference]],
+        self, states: Iterable[StateMessages], references: Iterable[Iterator[ReferenceMessage]],
         before: Callable[[int], None], show: Callable[[int], None],
     ) -> None:  # fmt: skip
         """Send state after state, each when the one before has its answer.
@@ -154,7 +154,7 @@ class Player:
             state = following
 
     def by_the_clock(
-        self, states: Iterable[State], references: Iterable[Iterator[Reference]],
+        self, states: Iterable[StateMessages], references: Iterable[Iterator[ReferenceMessage]],
         before: Callable[[int], None], show: Callable[[int], None], period_s: float,
     ) -> None:  # fmt: skip
         """Send a tick's state every ``period_s`` of the wall clock, answered or not.
@@ -179,7 +179,7 @@ class Player:
             show(state.tick)
         self._take_until(time.perf_counter() + LAST_ANSWER_S)
 
-    def _send(self, state: State) -> None:
+    def _send(self, state: StateMessages) -> None:
         self._joints.publish(state.joints)
         self._base.publish(state.base)
         self._played.append(state.tick)
@@ -195,7 +195,7 @@ class Player:
                     needed.pop()
                 needed.append(reference)
 
-    def _is_answered(self, state: State) -> bool:
+    def _is_answered(self, state: StateMessages) -> bool:
         """Wait for the answer to the state just sent; whether it has come."""
         begin = time.monotonic()
         ask_again = begin + ASK_AGAIN_S
