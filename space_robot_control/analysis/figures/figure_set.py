@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -75,42 +75,36 @@ class FigureSet:
     def save(self, folder: Path) -> list[SavedFigure]:
         """Draw all figures into ``folder``, each as PNG and SVG; older ones are replaced.
 
+        Those without a panel are left out: these flights have nothing to show there.
+
         Raises:
             InputError: a figure cannot be written there.
         """
         return [
-            SavedFigure(caption, save_figure(draw(), folder / stem)[-1])
-            for stem, caption, draw in self._figures()
+            SavedFigure(caption, save_figure(figure, folder / stem)[-1])
+            for stem, caption, figure in self._figures()
+            if figure.axes
         ]
 
-    def _figures(self) -> Iterator[tuple[str, str, Callable[[], Figure]]]:
-        """Yield file name, caption and drawing of each figure that these flights have."""
+    def _figures(self) -> Iterator[tuple[str, str, Figure]]:
+        """Draw the figures one after the other; with name of the file and caption."""
         flights = self._flights
         torques = {name: series.base_torque for name, series in flights.items()}
         several = len(self._missions) > 1
         for number, (name, figure) in enumerate(self._missions.values(), start=1):
             suffix, of = (f"_{number}", f" of {name}") if several else ("", "")
-            yield f"desired_joints{suffix}", f"Desired joint angles{of} (Fig. 5)", _drawn(figure)
+            yield f"desired_joints{suffix}", f"Desired joint angles{of} (Fig. 5)", figure
         if len(flights) == 1 and self._first is not None:
             caption = "Errors and torques of base and joints (Figs. 6 to 9)"
-            yield "control_results", caption, _drawn(self._first)
+            yield "control_results", caption, self._first
         else:
             caption = "Errors and torques, norms over each group of axes (Figs. 6 to 9)"
-            yield "control_results", caption, lambda: errors_and_torques(flights)
-        if any(len(torque.junctions) for torque in torques.values()):
-            caption = "Base torque x where two motions meet"
-            yield "junctions", caption, lambda: junctions(torques)
-        yield "chatter", "A stretch of base torque, and its spectrum", lambda: chatter(torques)
-        if any(series.pointing for series in flights.values()):
-            caption = "The end effector's pointing error in the inertial frame"
-            yield "pointing", caption, lambda: pointing(flights)
-        if any(series.latency_ms is not None for series in flights.values()):
-            caption = "Time from a state's sending to its command's"
-            yield "latency", caption, lambda: latency_histogram(flights)
-
-
-def _drawn(figure: Figure) -> Callable[[], Figure]:
-    return lambda: figure
+            yield "control_results", caption, errors_and_torques(flights)
+        yield "junctions", "Base torque x where two motions meet", junctions(torques)
+        yield "chatter", "A stretch of base torque, and its spectrum", chatter(torques)
+        caption = "The end effector's pointing error in the inertial frame"
+        yield "pointing", caption, pointing(flights)
+        yield "latency", "Time from a state's sending to its command's", latency_histogram(flights)
 
 
 def title(name: str, log: FlightLog) -> str:

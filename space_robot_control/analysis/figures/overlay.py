@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -36,15 +36,13 @@ def errors_and_torques(flights: Mapping[str, PlotSeries]) -> Figure:
     Args:
         flights: by name.
     """
-    errors = [
-        _panel(flights, "errors", key, f"|{_words(key)} error|{unit}", True)
-        for key in _keys(flights, "errors")
-        for unit in ["" if key == "attitude" else " (rad)"]
-    ]
-    torques = [
-        _panel(flights, "torques", key, f"|{_words(key)}| (N m)", False)
-        for key in _keys(flights, "torques")
-    ]
+    errors = _panels(
+        flights, lambda series: series.errors,
+        lambda key: f"|{_words(key)} error|{'' if key == 'attitude' else ' (rad)'}", True,
+    )  # fmt: skip
+    torques = _panels(
+        flights, lambda series: series.torques, lambda key: f"|{_words(key)}| (N m)", False
+    )
     return _draw([errors, torques], list(flights))
 
 
@@ -132,19 +130,18 @@ def _roughness(values: Array) -> float:
     return float(np.nansum(np.abs(np.diff(values))))
 
 
-def _panel(
-    flights: Mapping[str, PlotSeries], field: str, key: str, label: str, is_logarithmic: bool
-) -> _Panel:
-    curves = {
-        name: (series.time, getattr(series, field)[key])
-        for name, series in flights.items()
-        if key in getattr(series, field)
-    }
-    return _Panel(curves, label, is_logarithmic)
-
-
-def _keys(flights: Mapping[str, PlotSeries], field: str) -> list[str]:
-    return list(dict.fromkeys(key for series in flights.values() for key in getattr(series, field)))
+def _panels(
+    flights: Mapping[str, PlotSeries],
+    values_of: Callable[[PlotSeries], dict[str, Array]],
+    label: Callable[[str], str],
+    is_logarithmic: bool,
+) -> list[_Panel]:
+    """Make a panel of every column that any of the flights has."""
+    curves: dict[str, dict[str, tuple[Array, Array]]] = {}
+    for name, series in flights.items():
+        for key, values in values_of(series).items():
+            curves.setdefault(key, {})[name] = series.time, values
+    return [_Panel(found, label(key), is_logarithmic) for key, found in curves.items()]
 
 
 def _words(key: str) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
-from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
@@ -24,13 +23,6 @@ COMPARISONS: dict[str, tuple[str, Callable[[Mapping[str, BaseTorque]], Figure]]]
     "junctions": ("Base torque at the junction of the two motions, case 1", junctions),
 }
 """Caption and drawing of the figures of all laws, by the name of their files."""
-
-
-class FigureGroup(NamedTuple):
-    """Figures under one heading."""
-
-    title: str
-    figures: list[SavedFigure]
 
 
 def start_comparisons(
@@ -54,16 +46,18 @@ def _draw_comparison(stem: str, flights: Mapping[str, BaseTorque], folder: Figur
     folder.save(draw(flights), stem)
 
 
-def figure_groups(rows: Sequence[Row], folder: FigureFolder) -> Iterator[FigureGroup]:
-    """Yield the figures that were drawn, the mission's first, then case by case."""
-    laws = [(stem, caption) for stem, (caption, _) in COMPARISONS.items()]
-    if figures := folder.saved([(MISSION, "Figure 5: desired joint angles"), *laws]):
-        yield FigureGroup("The mission, and the laws beside one another", figures)
+def figure_groups(rows: Sequence[Row], folder: FigureFolder) -> dict[str, list[SavedFigure]]:
+    """Return the figures that were drawn by their heading, the mission's first, then by case."""
+    groups = {
+        "The mission, and the laws beside one another": [
+            (MISSION, "Figure 5: desired joint angles"),
+            *((stem, caption) for stem, (caption, _) in COMPARISONS.items()),
+        ]
+    }
     for case, number in FIGURE_OF_CASE.items():
-        captions = [
+        groups[f"Case {case}"] = [
             (row.stem, f"Figure {number}: {row.controller}, {row.shown.title}")
             for row in rows
             if row.case == case
         ]
-        if figures := folder.saved(captions):
-            yield FigureGroup(f"Case {case}", figures)
+    return {title: found for title, g in groups.items() if (found := folder.saved(g))}

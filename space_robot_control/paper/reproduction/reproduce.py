@@ -11,19 +11,22 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from space_robot_msgs_py.config.files import config_directory
 from space_robot_msgs_py.errors import InputError
 
 from ...analysis.figures.figure_set import FigureFolder
 from ...analysis.tables import as_csv, as_markdown, as_records
+from ...analysis.template import template
 from ...flight.software import commit, versions
 from .claims import claims, claims_table
 from .figures import figure_groups, start_comparisons
 from .flights import Planned, Result, Row, fly, plan
 from .processes import processes
-from .report import render
 from .table import cells, cells_table, chatter, chatter_table, variant_tables
 
 TABLE = "table_v"
+ERRATA = "docs/explanation/errata.md"
+"""Stands beside ``config``, in the source tree and where it is installed."""
 FULL_DURATION = 30.0
 """s, of the mission that Table V is about."""
 
@@ -140,8 +143,13 @@ def _write(
     (folder / f"{TABLE}.md").write_text(as_markdown(title, tables), "utf-8")
     (folder / f"{TABLE}.csv").write_text(as_csv(numbers), "utf-8")
     (folder / f"{TABLE}.json").write_text(json.dumps(record, indent=1) + "\n", "utf-8")
-    page = render(
-        provenance, told, claims_table(claim_records), tables, list(figure_groups(rows, figures))
+    page = template("space_robot_control.paper.reproduction", "report.html.j2").render(
+        provenance=provenance,
+        parameters={name: json.dumps(value, indent=1) for name, value in told.items()},
+        claims=claims_table(claim_records),
+        tables=tables,
+        figure_groups=figure_groups(rows, figures),
+        errata=(config_directory().parent / ERRATA).read_text("utf-8"),
     )
     (folder / "report.html").write_text(page, "utf-8")
     return record

@@ -71,18 +71,15 @@ class SuperTwisting:
     @property
     def measured_certificates(self) -> tuple[Certificate | None, ...]:
         """(51) solved for the measured beta; None where that is too large."""
-        return tuple(
-            certify(*gains, beta)
-            for gains, beta in zip(self.gains, self.beta.tolist(), strict=True)
-        )
+        return self._certified(self.beta)
 
     @property
     def assumed_certificates(self) -> tuple[Certificate | None, ...]:
         """(51) solved for half of the tolerated beta: K_2 / 2 if ``K_1^2 >= 4 K_2``."""
-        return tuple(
-            certify(*gains, 0.5 * beta)
-            for gains, beta in zip(self.gains, self.tolerated_beta.tolist(), strict=True)
-        )
+        return self._certified(0.5 * self.tolerated_beta)
+
+    def _certified(self, beta: Array) -> tuple[Certificate | None, ...]:
+        return tuple(certify(*gains, b) for gains, b in zip(self.gains, beta.tolist(), strict=True))
 
     @property
     def certificates(self) -> tuple[Certificate | None, ...]:
