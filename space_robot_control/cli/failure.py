@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,19 +13,6 @@ if TYPE_CHECKING:
 
 FLOWN = ("controller", "case", "gains", "robot", "mission", "period", "swaps", "faults")
 _DIVERGED = re.compile(r"diverged at tick (\d+)")
-
-
-@contextmanager
-def told_as_json(flight: Flight, bag: Path | None, as_json: bool) -> Iterator[None]:
-    """Print the report of a flight that raises; with the figures of its bag, if it has any."""
-    try:
-        yield
-    except FlightError as error:
-        if as_json:
-            from ..flight.terminal import echo_json
-
-            echo_json(failed_report(flight, bag, error, _figures(bag)))
-        raise
 
 
 def failed_report(
@@ -46,16 +31,15 @@ def failed_report(
     }
 
 
-def _figures(bag: Path | None) -> dict[str, Any]:
+def report_of(bag: Path) -> dict[str, Any]:
+    """Report what a bag has of a flight that ended early; empty if it has not one whole tick."""
     from space_robot_msgs_py.bag.reader import read_flight
 
     from ..analysis import analyze
 
-    if bag is None or not bag.exists():
-        return {}
     try:
         return analyze(read_flight(bag, trust=True))
-    except InputError:  # it has not one whole tick
+    except InputError:
         return {}
 
 

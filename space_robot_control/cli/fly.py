@@ -62,18 +62,23 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
       space-robot fly --fault kill_controller@3 --restart-controller
       space-robot fly --fault drop_state@2-4:0.1 --fault noise_gyro@0:1e-5 --seed 7
     """
+    from space_robot_msgs_py.errors import FlightError
+
     from ..analysis import analyze
     from ..flight.bag_path import default_bag
     from ..flight.graph.orchestrator import fly as fly_graph
-    from .failure import told_as_json
+    from ..flight.terminal import echo_json
+    from .failure import failed_report, report_of
     from .report_display import show_report
 
     flight = plan_flight(**options)
     bag = bag or default_bag(flight)
-    with told_as_json(flight, bag, as_json):
+    try:
         report = fly_graph(flight, bag, analyze)
+    except FlightError as error:
+        if as_json:
+            echo_json(failed_report(flight, bag, error, report_of(bag)))
+        raise
     show_report(report, as_json)
     if failures := report["graph"]["failures"]:
-        from space_robot_msgs_py.errors import FlightError
-
         raise FlightError("; ".join(failures))
