@@ -94,18 +94,14 @@ def latency_histogram(flights: Mapping[str, PlotSeries]) -> Figure:
 
 
 def _draw(columns: list[list[_Panel]], names: list[str]) -> Figure:
-    """Plot columns of panels over time, under one legend of all flights."""
-    rows = max(map(len, columns))
+    """Plot columns of as many panels over time, under one legend of all flights."""
+    rows = len(columns[0])
     figure = page(18.0 + 38.0 * rows)
-    cells = figure.add_gridspec(rows, len(columns))
-    for column, panels in enumerate(columns):
-        above: Axes | None = None
-        for row, panel in enumerate(panels):
-            above = axes = figure.add_subplot(cells[row, column], sharex=above)
+    grid = figure.subplots(rows, len(columns), sharex="col", squeeze=False)
+    for panels, column in zip(columns, grid.T, strict=True):
+        for axes, panel in zip(column, panels, strict=True):
             _draw_panel(axes, panel, names)
-            is_last = row == len(panels) - 1
-            axes.tick_params(labelbottom=is_last)
-            axes.set_xlabel("time (s)" if is_last else "")
+        column[-1].set_xlabel("time (s)")
     figure.align_ylabels()
     legend_above(figure, names, dashed=True)
     return figure

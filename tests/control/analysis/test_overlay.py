@@ -33,7 +33,7 @@ def test_each_panel_has_a_line_a_flight_over_its_time(flights: dict[str, PlotSer
 
 
 def test_the_smoothest_line_is_in_front(flights: dict[str, PlotSeries]) -> None:
-    axes = errors_and_torques(flights).axes[3]  # base torque
+    axes = errors_and_torques(flights).axes[1]  # base torque
     rough = {
         line.get_color(): np.nansum(np.abs(np.diff(np.asarray(line.get_ydata(), dtype=float))))
         for line in axes.get_lines()
