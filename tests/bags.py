@@ -17,7 +17,9 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.accounts import noted_accounts
 from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
+from space_robot_msgs_py.bag.metadata import read_information
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import FLIGHT_KEY, BagRecorder
 from space_robot_msgs_py.samples import STATE_FIELDS, Timebase
@@ -134,6 +136,11 @@ def mcap_of(path: Path, entries: Iterable[Entry], **options: Any) -> Path:
             writer.add_message(channels[name], log_ns, data, log_ns)
         writer.finish()
     return path
+
+
+def read_accounts(bag: Path) -> dict[str, dict[str, Any]]:
+    """What our recorder counted of each topic of a finished bag: received, missing, ..."""
+    return {n: a.model_dump() for n, a in noted_accounts(read_information(bag).noted).items()}
 
 
 def redescribed(bag: Path, description: str | None) -> Path:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bags import read_accounts
 from paths import CONFIG, ROOT
 
 import space_robot_control.cli as room_of_commands
@@ -20,7 +21,6 @@ from space_robot_control.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
-from space_robot_msgs_py.bag.reader import read_coverage
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.wire.codec import Codec
 from space_robot_msgs_py.wire.definitions import decode
@@ -109,7 +109,7 @@ def test_a_message_is_one_file_in_wire_and_one_line_in_topics(
         *range(9),
         *range(10, 20),
     ]
-    assert read_coverage(tmp_path / "bag")[newest.name]["missing"] == 1
+    assert read_accounts(tmp_path / "bag")[newest.name]["missing"] == 1
     assert load_bag(tmp_path / "bag").lost == {t.name: int(t is newest) for t in topics.ALL}
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
-COVERAGE_KEY = "space_robot.coverage"
+ACCOUNTS_KEY = "space_robot.accounting"
 
 Count = Annotated[int, Field(ge=0, strict=True)]
 
@@ -22,7 +22,7 @@ class Account(BaseModel):
     """Sent, but neither received nor left out on purpose."""
     repeated: Count = 0
     """Left out, since they had come before."""
-    strange: Count = 0
+    invalid_stamps: Count = 0
     """In the bag, too, but their stamp cannot be right."""
     foreign: Count = 0
     """Left out, since a foreign publisher sent them."""
@@ -37,7 +37,7 @@ _ACCOUNTS = TypeAdapter(dict[str, Account])
 def noted_accounts(noted: Mapping[str, str]) -> dict[str, Account]:
     """The accounts in a bag's custom data, by topic; empty if there are none that make sense."""
     try:
-        return _ACCOUNTS.validate_python(json.loads(noted.get(COVERAGE_KEY, "{}")))
+        return _ACCOUNTS.validate_python(json.loads(noted.get(ACCOUNTS_KEY, "{}")))
     except (ValueError, RecursionError, ValidationError):
         return {}
 

@@ -52,15 +52,6 @@ def open_bag(path: Path) -> Bag:
     return _open_files(there, information, damage, closed)
 
 
-def custom_data(path: Path) -> dict[str, str]:
-    """The ``custom_data`` of a finished bag's metadata.
-
-    Raises:
-        InputError: there is no metadata, or it is no rosbag2 metadata.
-    """
-    return read_information(path).noted
-
-
 def _listed(
     path: Path, information: BagInformation, there: list[Path], damage: list[str]
 ) -> list[Path]:

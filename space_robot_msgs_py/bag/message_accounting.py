@@ -38,7 +38,7 @@ class MessageAccounting:
     received: int = 0
     repeated: int = 0
     """Messages of a tick that had come already."""
-    strange: int = 0
+    invalid_stamps: int = 0
     """Messages whose stamp cannot be right, or cannot be read."""
     first: int = 0
     last: int = -1
@@ -67,7 +67,7 @@ class MessageAccounting:
                 return False
             self._take_late(tick)
         elif not self._guard.passes(tick):
-            self.strange += 1
+            self.invalid_stamps += 1
             return True
         elif self.received == 0:
             self._pass_over(tick, 1)
@@ -118,7 +118,7 @@ class MessageAccounting:
     @property
     def kept(self) -> int:
         """Messages that belong into a bag."""
-        return self.received + self.strange
+        return self.received + self.invalid_stamps
 
     def missing(self, last_tick: int) -> int:
         """Messages that were sent but are not here, for a flight from tick 0 to ``last_tick``."""
@@ -132,7 +132,7 @@ class MessageAccounting:
 
 
 def lost_messages(
-    coverages: Mapping[str, MessageAccounting],
+    accounting: Mapping[str, MessageAccounting],
     excused: frozenset[str] = frozenset(),
     finished: bool = True,
 ) -> dict[str, int]:
@@ -142,8 +142,8 @@ def lost_messages(
     ``finished`` each topic counts up to its own last message: nobody knows what came after.
     """
     lost = {
-        name: coverage.missing(_last_tick(coverages) if finished else coverage.last)
-        for name, coverage in coverages.items()
+        name: counted.missing(_last_tick(accounting) if finished else counted.last)
+        for name, counted in accounting.items()
     }
     return lost | dict.fromkeys(excused & lost.keys(), 0)
 
@@ -162,11 +162,11 @@ def topics_with_allowed_gaps(flight: Mapping[str, Any]) -> frozenset[str]:
     return frozenset(topic.name for topic in excused)
 
 
-def unanswered_ticks(coverages: Mapping[str, MessageAccounting], finished: bool = True) -> int:
+def unanswered_ticks(accounting: Mapping[str, MessageAccounting], finished: bool = True) -> int:
     """Ticks without a command."""
-    command = coverages[topics.COMMAND.name]
-    return command.missing(_last_tick(coverages) if finished else command.last)
+    command = accounting[topics.COMMAND.name]
+    return command.missing(_last_tick(accounting) if finished else command.last)
 
 
-def _last_tick(coverages: Mapping[str, MessageAccounting]) -> int:
-    return max((c.last for c in coverages.values() if c.topic.per_tick), default=-1)
+def _last_tick(accounting: Mapping[str, MessageAccounting]) -> int:
+    return max((c.last for c in accounting.values() if c.topic.per_tick), default=-1)

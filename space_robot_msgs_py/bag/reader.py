@@ -20,7 +20,7 @@ from .contents import Bag
 from .description import read_description
 from .findings import missing_ticks, unread_messages
 from .flight_log import FlightLog
-from .folder import custom_data, open_bag
+from .folder import open_bag
 from .gaps import fill_gaps
 from .message_accounting import (
     LONGEST_JUMP,
@@ -67,17 +67,6 @@ def read_flight(
         raise InputError(text if str(path) in text else f"{path}: {text}") from None
     log.trusted = trust
     return log
-
-
-def read_coverage(path: Path) -> dict[str, dict[str, Any]]:
-    """How many messages of each topic the recorder counted: received, missing, repeated, ...
-
-    Empty for a bag of another recorder.
-
-    Raises:
-        InputError: there is no finished bag.
-    """
-    return {name: a.model_dump() for name, a in noted_accounts(custom_data(path)).items()}
 
 
 def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
@@ -208,17 +197,17 @@ def _count_lost(
     """`FlightLog.lost` and `FlightLog.unanswered`: what never came and what is gone since."""
     log = rows.log
     there = selection.topics()
-    coverages = {
-        topic.name: rows.coverages.get(topic.name, MessageAccounting(topic))
+    accounting = {
+        topic.name: rows.accounting.get(topic.name, MessageAccounting(topic))
         for topic in topics.ALL
-        if topic.name in rows.coverages or (bag.finished and topic in there)
+        if topic.name in rows.accounting or (bag.finished and topic in there)
     }
-    log.lost = lost_messages(coverages, topics_with_allowed_gaps(log.flight), bag.finished)
+    log.lost = lost_messages(accounting, topics_with_allowed_gaps(log.flight), bag.finished)
     for name in log.lost if bag.finished else ():
         account, unread = accounts.get(name), gone.get(name, 0)
-        if account and rows.counts[name] + unread == account.received + account.strange:
+        if account and rows.counts[name] + unread == account.received + account.invalid_stamps:
             log.lost[name] = account.missing + unread  # the bag is the one that was counted
         else:
             log.lost[name] = max(log.lost[name], unread)
-    if topics.COMMAND.name in coverages:
-        log.unanswered = unanswered_ticks(coverages, bag.finished)
+    if topics.COMMAND.name in accounting:
+        log.unanswered = unanswered_ticks(accounting, bag.finished)

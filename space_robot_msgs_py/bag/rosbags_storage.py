@@ -29,7 +29,7 @@ class RosbagsStorage:
         self.metadata: dict[str, dict[str, str]] = {}
         self.has_end = True
         self._fault = ""
-        self._strange = 0
+        self._not_messages = 0
         try:
             with Reader(path) as reader:
                 names = {c.topic: c.msgtype for c in reader.connections}
@@ -54,13 +54,13 @@ class RosbagsStorage:
 
     def batches(self) -> Iterator[Batch]:
         """All messages by log time; they end where they can no longer be read."""
-        self._fault, self._strange = "", 0
+        self._fault, self._not_messages = "", 0
         waiting: dict[str, list[tuple[int, bytes]]] = {name: [] for name in self._types}
         try:
             with Reader(self._path) as reader:
                 for connection, log_ns, data in reader.messages():
                     if connection.topic not in waiting or not isinstance(data, bytes):
-                        self._strange += 1
+                        self._not_messages += 1
                         continue
                     entries = waiting[connection.topic]
                     entries.append((int(log_ns), data))
@@ -69,8 +69,8 @@ class RosbagsStorage:
                         entries.clear()
         except Exception as error:  # likewise
             self._fault = f"{self._path.name}: cannot be read to its end ({_line(error)})"
-        if self._strange and not self._fault:
-            self._fault = f"{self._path.name}: {self._strange} messages that are none"
+        if self._not_messages and not self._fault:
+            self._fault = f"{self._path.name}: {self._not_messages} messages that are none"
         for name, entries in waiting.items():
             if entries:
                 yield self._batch(name, entries)

@@ -49,7 +49,7 @@ class Rows:
         n = len(joint_names)
         self.log = FlightLog.allocate(0, joint_names, timebase)
         self.log.commanded_torque = np.empty((0, n + 3))
-        self.coverages: dict[str, MessageAccounting] = {}
+        self.accounting: dict[str, MessageAccounting] = {}
         self.counts: Counter[str] = Counter()
         """Messages a topic, of every kind."""
         self._origin_ns = origin_ns
@@ -73,7 +73,7 @@ class Rows:
         self._law_faults: list[str] = []
 
     def oddities(self, excused: bool) -> list[str]:
-        """Messages that could not be used; strange stamps are no news if ``excused``."""
+        """Messages that could not be used; invalid stamps are no news if ``excused``."""
         found = [
             f"{reader.misfits} messages on {topic.name} do not fit ({reader.fault})"
             for topic, reader in self._readers.items()
@@ -81,29 +81,29 @@ class Rows:
         ]
         if faults := self._law_faults:
             found.append(f"{len(faults)} messages on {topics.LAW.name} do not fit ({faults[0]})")
-        for name, coverage in self.coverages.items():
-            if coverage.strange and not excused:
+        for name, counted in self.accounting.items():
+            if counted.invalid_stamps and not excused:
                 found.append(
-                    f"{coverage.strange} messages on {name} whose stamp is no whole tick "
+                    f"{counted.invalid_stamps} messages on {name} whose stamp is no whole tick "
                     "or out of all order"
                 )
         return found
 
     def take(self, topic: topics.Topic, batch: Batch) -> None:
         """Count the messages of a topic and put what they say into their ticks' rows."""
-        coverage = self.coverages.setdefault(topic.name, MessageAccounting(topic))
+        counted = self.accounting.setdefault(topic.name, MessageAccounting(topic))
         self.counts[topic.name] += len(batch)
         ticks, known = self._ticks(topic, batch)
         places = np.flatnonzero(known)
-        coverage.strange += len(batch) - len(places)
-        fresh = places[coverage.take_all(ticks[places])]
+        counted.invalid_stamps += len(batch) - len(places)
+        fresh = places[counted.take_all(ticks[places])]
         if len(fresh) < len(batch):
             batch, ticks = batch.select(fresh), ticks[fresh]
         self._believed += _TICKS_A_MESSAGE * len(batch)
         if topic is topics.LAW:
             self._note_laws(batch, ticks)
             return
-        self._grow(coverage.last + 1)
+        self._grow(counted.last + 1)
         reader = self._readers.get(topic)
         if reader and reader.columns:
             if topic.per_tick:
@@ -120,10 +120,10 @@ class Rows:
         log.laws = in_order(law for law in self._laws if law.tick < ticks)
         for column in self._columns():
             column.resize((ticks, *column.shape[1:]), refcheck=False)
-        if topics.COMMAND.name not in self.coverages:
+        if topics.COMMAND.name not in self.accounting:
             log.commanded_torque = None
         sent, answered = self._sent_ns[topics.BASE_STATE], self._sent_ns[topics.COMMAND]
-        if self._wall_clock and topics.COMMAND.name in self.coverages:
+        if self._wall_clock and topics.COMMAND.name in self.accounting:
             both = (answered != _NEVER) & (sent != _NEVER)
             log.latency_s = np.where(both, answered - sent, np.nan) * 1e-9
         return log

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 AGREEING = 5
-"""So many strange stamps in a row that fit one another are a new time, not a fault."""
+"""So many other stamps in a row that fit one another are a new time, not a fault."""
 
 
 class StampGuard:
@@ -20,16 +20,16 @@ class StampGuard:
         """The last tick believed; -1 before the first."""
         self.is_new_time = False
         """Whether the last tick believed did not follow the one before."""
-        self._strange = -1
+        self._other = -1
         self._agreeing = 0
 
     def passes(self, tick: int) -> bool:
         """Whether to believe a state of ``tick``, which is then the last one."""
         follows = 0 < tick - self.last <= self._longest_jump
         if not follows and self.last >= 0:
-            agrees = self._agreeing and 0 <= tick - self._strange <= self._longest_jump
+            agrees = self._agreeing and 0 <= tick - self._other <= self._longest_jump
             self._agreeing = self._agreeing + 1 if agrees else 1
-            self._strange = tick
+            self._other = tick
             if self._agreeing < AGREEING:
                 return False
         self.last, self._agreeing, self.is_new_time = tick, 0, not follows

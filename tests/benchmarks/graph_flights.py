@@ -19,7 +19,8 @@ from space_robot_control.flight.graph.orchestrator import flight_parameters, req
 from space_robot_control.flight.graph.processes import Graph, node_environment, ros_arguments
 from space_robot_control.flight.node_modules import MODULES
 from space_robot_control.flight.plan import Flight
-from space_robot_msgs_py.bag.reader import read_coverage
+from space_robot_msgs_py.bag.accounts import noted_accounts
+from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.ros.run_module import module_command
 
@@ -95,12 +96,12 @@ def fly_graph(flight: Flight, empty: bool = False, timed: bool = True) -> GraphR
         }
         with Graph(commands, _environment(domain)) as graph:
             use = _watch(graph)
-        coverage = read_coverage(bag)
+        accounts = noted_accounts(open_bag(bag).custom_data())
         return GraphRun(
             _times(files["plant"]) if timed else {},
             _times(files["controller"]) if timed else {},
-            {name: counts["missing"] for name, counts in coverage.items() if counts["missing"]},
-            sum(counts["received"] for counts in coverage.values()),
+            {name: counts.missing for name, counts in accounts.items() if counts.missing},
+            sum(counts.received for counts in accounts.values()),
             use,
         )
 

@@ -14,7 +14,7 @@ from space_robot_control.analysis import analyze
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.folder import custom_data
+from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 
 
@@ -58,7 +58,7 @@ def test_copied_by_rosbags_it_is_the_same_flight(bag: Path, tmp_path: Path) -> N
     store = _types_in(bag)
     copy = Writer(tmp_path / "copy", version=9, storage_plugin=StoragePlugin.MCAP)
     with Reader(bag) as reader, copy:
-        for key, value in custom_data(bag).items():
+        for key, value in open_bag(bag).custom_data().items():
             copy.set_custom_data(key, value)
         connections = {
             c.topic: copy.add_connection(c.topic, c.msgtype, typestore=store)

@@ -168,6 +168,6 @@ def test_bad_stamps_between_good_ones_are_kept_at_the_time_of_the_last_good_one(
     recorder.close()
     (batch,) = McapStorage(tmp_path / "bag" / "bag_0.mcap").batches()
     assert list(zip(stamps_of(batch).tolist(), batch.log_ns.tolist(), strict=True)) == expected
-    coverage = recorder.coverages[topics.CLOCK.name]
-    assert (coverage.received, coverage.strange) == (20, len(expected) - 20)
+    counted = recorder.accounting[topics.CLOCK.name]
+    assert (counted.received, counted.invalid_stamps) == (20, len(expected) - 20)
     assert recorder.lost[topics.CLOCK.name] == 0

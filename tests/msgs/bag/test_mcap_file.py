@@ -23,7 +23,7 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.chunk import OpenChunk
 from space_robot_msgs_py.bag.mcap_file import Compression
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.bag.recorder import COVERAGE_KEY, FLIGHT_KEY, BagRecorder
+from space_robot_msgs_py.bag.recorder import ACCOUNTS_KEY, FLIGHT_KEY, BagRecorder
 from space_robot_msgs_py.bag.writer import DESCRIPTION
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.samples import Timebase
@@ -193,11 +193,11 @@ def test_every_file_says_what_was_flown_and_the_last_what_was_lost(split: Path) 
     written = yaml.safe_load((split / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
     assert yaml.safe_load(rosbag2["serialized_metadata"]) == written
     assert own == written["custom_data"]
-    for name, counts in json.loads(own[COVERAGE_KEY]).items():
+    for name, counts in json.loads(own[ACCOUNTS_KEY]).items():
         with Reader(split) as reader:
             (connection,) = [c for c in reader.connections if c.topic == name]
         assert counts["received"] == counts["expected"] == connection.msgcount
-        assert counts["missing"] == counts["repeated"] == counts["strange"] == 0
+        assert counts["missing"] == counts["repeated"] == counts["invalid_stamps"] == 0
 
 
 def test_killed_after_a_split_all_before_is_whole(messages: Messages, tmp_path: Path) -> None:

@@ -34,12 +34,12 @@ def test_a_batch_counts_as_its_messages_one_by_one(
 
 def test_events_may_come_whenever_they_like() -> None:
     """Two of one tick are two, a long silence is no strange stamp, none at all is no loss."""
-    coverage = MessageAccounting(topics.LAW)
-    assert coverage.missing(1000) == 0
+    counted = MessageAccounting(topics.LAW)
+    assert counted.missing(1000) == 0
     for tick in (0, 7, 7, 3 * LONGEST_JUMP, 9):
-        assert coverage.take(tick)
-    assert (coverage.received, coverage.repeated, coverage.strange) == (5, 0, 0)
-    assert coverage.missing(4 * LONGEST_JUMP) == 0
+        assert counted.take(tick)
+    assert (counted.received, counted.repeated, counted.invalid_stamps) == (5, 0, 0)
+    assert counted.missing(4 * LONGEST_JUMP) == 0
 
 
 @pytest.mark.parametrize("topic", [topics.JOINT_STATES, topics.COMMAND], ids=lambda t: t.name)
@@ -48,28 +48,28 @@ def test_ticks_are_counted_as_a_set_has_them(
     topic: topics.Topic, ticks: list[int], more: int
 ) -> None:
     """Late, twice, late and twice, in any order: against sets, which know nothing of holes."""
-    coverage, came = MessageAccounting(topic), set[int]()
+    counted, came = MessageAccounting(topic), set[int]()
     for tick in ticks:
-        assert coverage.take(tick) == (tick not in came)
+        assert counted.take(tick) == (tick not in came)
         came.add(tick)
     last = max(came, default=-1)
-    assert coverage.received == len(came)
-    assert coverage.repeated == len(ticks) - len(came)
-    assert coverage.strange == 0
-    assert coverage.last == last
-    assert coverage.missing(last + more) == len(set(range(last + more + 1)) - came)
+    assert counted.received == len(came)
+    assert counted.repeated == len(ticks) - len(came)
+    assert counted.invalid_stamps == 0
+    assert counted.last == last
+    assert counted.missing(last + more) == len(set(range(last + more + 1)) - came)
 
 
 @given(st.integers(1, 30), st.sets(st.integers(0, 40), min_size=1))
 def test_messages_at_a_period_are_counted_as_a_set_has_them(period: int, places: set[int]) -> None:
     """Of a topic with a message every few ticks, the smallest step seen is its period."""
-    coverage, sent = MessageAccounting(topics.CLOCK), sorted(places)
+    counted, sent = MessageAccounting(topics.CLOCK), sorted(places)
     for place in sent:
-        coverage.take(period * place)
+        counted.take(period * place)
     smallest = min((b - a for a, b in itertools.pairwise(sent)), default=1)
     expected = set(range(sent[0], sent[-1] + 1, smallest))
-    assert coverage.missing(period * 41) == max(0, len(expected) - len(sent))
-    assert coverage.received == len(sent)
+    assert counted.missing(period * 41) == max(0, len(expected) - len(sent))
+    assert counted.received == len(sent)
 
 
 @given(st.integers(2, 30), st.integers(2, 12), st.integers(2, 5), st.integers(1, 9))
@@ -77,15 +77,15 @@ def test_a_stream_said_again_from_its_start_is_whole(
     period: int, start: int, ahead: int, more: int
 ) -> None:
     """Who joins late hears the end of what was sent before, and then all of it once more."""
-    coverage = MessageAccounting(topics.REFERENCE_JOINTS)
+    counted = MessageAccounting(topics.REFERENCE_JOINTS)
     before = range(start, start + ahead)
     again = range(start + ahead + more)
     for place in before:
-        assert coverage.take(period * place)
+        assert counted.take(period * place)
     for place in again:
-        assert coverage.take(period * place) == (place not in before)
-    assert (coverage.received, coverage.repeated) == (len(again), ahead)
-    assert coverage.missing(period * 100) == coverage.gaps == 0
+        assert counted.take(period * place) == (place not in before)
+    assert (counted.received, counted.repeated) == (len(again), ahead)
+    assert counted.missing(period * 100) == counted.gaps == 0
 
 
 @pytest.mark.parametrize("topic", [topics.JOINT_STATES, topics.CLOCK], ids=lambda t: t.name)
@@ -93,16 +93,16 @@ def test_a_stream_said_again_from_its_start_is_whole(
 def test_what_a_pause_passed_over_is_no_gap(
     topic: topics.Topic, period: int, before: int, passed: int, after: int
 ) -> None:
-    coverage, period = MessageAccounting(topic), 1 if topic.per_tick else period
+    counted, period = MessageAccounting(topic), 1 if topic.per_tick else period
     places = [*range(before), *range(before + passed, before + passed + after)]
     for i, place in enumerate(places):
         if i == before:
-            coverage.pause()
-        assert coverage.take(period * place)
-    assert coverage.gaps == 0
-    lost = coverage.last + 3 * period
-    assert coverage.take(lost)
-    assert coverage.gaps == 2
+            counted.pause()
+        assert counted.take(period * place)
+    assert counted.gaps == 0
+    lost = counted.last + 3 * period
+    assert counted.take(lost)
+    assert counted.gaps == 2
 
 
 @given(st.lists(st.integers(0, 500), unique=True, min_size=1).map(sorted), st.data())
@@ -110,11 +110,11 @@ def test_bad_stamps_between_good_ones_are_counted_apart(
     ticks: list[int], data: st.DataObject
 ) -> None:
     """They are strange, and the good ones are neither lost nor taken for repeated."""
-    coverage, bad = MessageAccounting(topics.COMMAND), 0
+    counted, bad = MessageAccounting(topics.COMMAND), 0
     for i, tick in enumerate(ticks):
         for jump in data.draw(st.lists(st.sampled_from([10**6, 10**9]), max_size=3)) if i else ():
-            assert coverage.take(tick + jump)
+            assert counted.take(tick + jump)
             bad += 1
-        assert coverage.take(tick)
-    assert (coverage.received, coverage.strange) == (len(ticks), bad)
-    assert coverage.missing(500) == len(set(range(501)) - set(ticks))
+        assert counted.take(tick)
+    assert (counted.received, counted.invalid_stamps) == (len(ticks), bad)
+    assert counted.missing(500) == len(set(range(501)) - set(ticks))

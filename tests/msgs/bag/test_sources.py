@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bags import read_accounts
 from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.accounts import foreign, noted_accounts
 from space_robot_msgs_py.bag.mcap_storage import McapStorage
-from space_robot_msgs_py.bag.reader import read_coverage
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.bag.rows import stamps_of
 from space_robot_msgs_py.bag.sources import PARTICIPANT_BYTES, Claimed, Sources
@@ -165,8 +165,8 @@ def test_foreign_messages_displace_nothing(tmp_path: Path, graph: Graph, stamps:
         assert not recorder.record(topics.COMMAND, b"junk", 1, FOREIGN, 2 * tick + 2)
         assert recorder.record(topics.COMMAND, _command(tick, 1.0), 1, OURS, tick + 1)
     recorder.close()
-    counts = read_coverage(tmp_path / "bag")[TOPIC]
-    assert (counts["received"], counts["missing"], counts["strange"]) == (10, 0, 0)
+    counts = read_accounts(tmp_path / "bag")[TOPIC]
+    assert (counts["received"], counts["missing"], counts["invalid_stamps"]) == (10, 0, 0)
     assert (counts["foreign"], counts["repeated"]) == (20, 0)
     (batch,) = McapStorage(tmp_path / "bag" / "bag_0.mcap").batches()
     assert stamps_of(batch).tolist() == [TIMEBASE.stamp_ns(tick) for tick in range(10)]
@@ -197,10 +197,10 @@ def test_what_the_recorder_noted_is_read_back_with_care() -> None:
     whole = (
         '{"/command": {"received": 3, "missing": 0, "foreign": 2, "foreign_publishers": ["/a"]}}'
     )
-    accounts = noted_accounts({"space_robot.coverage": whole})
+    accounts = noted_accounts({"space_robot.accounting": whole})
     assert foreign(accounts) == ["2 messages on /command were left out: they are from /a"]
     for text in ("[", "[]", '{"/a": null}', '{"/a": {"received": -1, "missing": 0}}', "NaN"):
-        assert noted_accounts({"space_robot.coverage": text}) == {}
+        assert noted_accounts({"space_robot.accounting": text}) == {}
     assert noted_accounts({}) == {}
 
 
@@ -220,6 +220,6 @@ def test_where_messages_tell_no_publisher_numbers_do(tmp_path: Path) -> None:
     assert not recorder.is_behind
     assert not any(recorder.lost[name] for name in (TOPIC, topics.LAW.name))
     recorder.close()
-    counts = read_coverage(tmp_path / "bag")[TOPIC]
-    assert (counts["received"], counts["foreign"], counts["strange"]) == (100, 200, 0)
+    counts = read_accounts(tmp_path / "bag")[TOPIC]
+    assert (counts["received"], counts["foreign"], counts["invalid_stamps"]) == (100, 200, 0)
     assert counts["foreign_publishers"] == ["1 publisher without a name"]

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from bags import COLUMNS, messages_of
+from bags import COLUMNS, messages_of, read_accounts
 from flights import Start, ros_environment
 from paths import TESTS
 
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.reader import read_coverage, read_flight
+from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.ros.process_environment import set_defaults
 
 set_defaults()
@@ -110,7 +110,7 @@ def test_the_bag_is_the_flight_and_nothing_else(
     recorder.terminate()  # and the flood goes on
     output, _ = recorder.communicate(timeout=PATIENCE_S)
     assert recorder.returncode == 0, output
-    log, counts = read_flight(bag), read_coverage(bag)
+    log, counts = read_flight(bag), read_accounts(bag)
     assert not log.unfinished
     assert not any(log.lost.values())
     assert log.whole.all()

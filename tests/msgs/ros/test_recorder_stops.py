@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from bags import read_accounts
 from flights import Start
 
 from space_robot_control.flight.graph.listeners import wait_for
-from space_robot_msgs_py.bag.reader import read_coverage, read_flight
+from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")
 
@@ -58,7 +59,7 @@ def test_a_signal_ends_it_in_flight(
     output, _ = recorder.communicate(timeout=30)
     assert recorder.returncode == 0, output
     assert flying["plant"].poll() is None
-    counts = read_coverage(bag)  # of a finished bag only
+    counts = read_accounts(bag)  # of a finished bag only
     assert counts["/joint_states"]["received"] > 100
     assert {name: count["missing"] for name, count in counts.items() if count["missing"]} == {}
 
@@ -107,7 +108,7 @@ def test_what_was_never_sent_is_not_lost(flying: Nodes, ground: Ground, bag: Pat
         flying[name].send_signal(signal.SIGTERM)
         output, _ = flying[name].communicate(timeout=30)
         assert flying[name].returncode == 0, output
-    log, counts = read_flight(bag), read_coverage(bag)
+    log, counts = read_flight(bag), read_accounts(bag)
     assert log.unanswered > 200
     assert not any(log.lost.values())
     assert {name: count["missing"] for name, count in counts.items() if count["missing"]} == {}
