@@ -24,12 +24,12 @@ XYZ, WXYZ = "xyz", "wxyz"
 
 
 def column_names(log: FlightLog) -> list[str]:
-    """The names of all columns, in order; the first is ``tick``, the only one of integers."""
+    """Return the columns' names in order; the first is ``tick``, the only one of integers."""
     return ["tick", *(name for names, _ in _columns(log.rows(0, 0)) for name in names)]
 
 
 def batches(log: FlightLog) -> Iterator[tuple[NDArray[np.int64], Array]]:
-    """The rows of `column_names`, `BATCH` ticks at a time: ticks (K,) and all other columns (K, C).
+    """Yield the rows, `BATCH` ticks at a time: ticks (K,) and all other columns (K, C).
 
     NaN stands for a number that is not known.
     """

@@ -14,7 +14,7 @@ ROUNDING = 1e-6
 
 
 def excerpt(log: FlightLog, from_s: float | None, to_s: float | None) -> FlightLog:
-    """The ticks with ``from_s <= t < to_s``, views into the arrays of ``log``.
+    """Return the ticks with ``from_s <= t < to_s``, views into the arrays of ``log``.
 
     What was lost or filled is not known by time: these counts stay those of the whole flight.
     Unanswered ticks are counted anew where the commands are known.

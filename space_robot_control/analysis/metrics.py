@@ -203,7 +203,7 @@ def _by_column(error: Array, torque: Array, figure: Callable[[Array], Any]) -> d
 
 
 def _columns(groups: dict[str, slice], base: str, prefix: str) -> dict[str, slice]:
-    """The axes of each column, ``base`` or the suffix of the group after ``prefix``."""
+    """Return the axes of each column, ``base`` or the suffix of the group after ``prefix``."""
     return {base if key == "base" else f"{prefix}_{key}": axes for key, axes in groups.items()}
 
 

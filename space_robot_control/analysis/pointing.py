@@ -66,7 +66,7 @@ class Pointing(Metric):
 
 
 def pointing_error(log: FlightLog, robot: Robot, start: Array | None = None) -> PointingError:
-    """The error of the tool's pose at every tick of a flight of ``robot``.
+    """Compute the error of the tool's pose at every tick of a flight of ``robot``.
 
     ``start``: (1, 3) m, where the base was when the flight began (None: at the first tick here).
     """

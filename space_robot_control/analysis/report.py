@@ -63,18 +63,13 @@ class Analysis:
 
     def report(self) -> dict[str, Any]:
         """Return the report of all blocks so far, at least one."""
-        unavailable: dict[str, str] = {}
-        metrics: dict[str, Any] = {}
-        for name in _METRICS:
-            metrics[name] = None
-            if name not in self._metrics:
-                unavailable[name] = self._unavailable[name]
-                continue
+        metrics, unavailable = dict[str, Any].fromkeys(_METRICS), dict(self._unavailable)
+        for name, metric in self._metrics.items():
             try:
-                metrics[name] = self._metrics[name].result()
+                metrics[name] = metric.result()
             except InputError as error:
                 unavailable[name] = str(error)
-        stop, period_ns = self._first_tick + self.ticks, self._period_ns
+        stop, period_ns = self._first_tick + self.ticks, self._timebase.period_ns
         laws = within(self._laws, self._first_tick, stop)
         return {
             **self._head,
@@ -85,12 +80,12 @@ class Analysis:
             "from_s": self._first_tick * period_ns / 1e9,
             "to_s": stop * period_ns / 1e9,
             **metrics,
-            "unavailable": unavailable,
+            "unavailable": {name: unavailable[name] for name in _METRICS if name in unavailable},
             **self._tail,
         }
 
     def _begin(self, block: FlightLog) -> None:
-        self._first_tick, self._period_ns = block.first_tick, block.timebase.period_ns
+        self._first_tick = block.first_tick
         self._head = {key: block.flight.get(key) for key in DESCRIBED}
         for name, metric in _METRICS.items():
             try:

@@ -47,7 +47,7 @@ class Settling(Metric):
         self._waypoints.forget_before(self._last_watched)
 
     def result(self) -> dict[str, Any]:
-        """The band, the time counted from, and s by column: None if outside at the end."""
+        """Return the band, the time counted from, and s by column: None if outside at the end."""
         start = self.last_waypoint
         if start is None:
             raise InputError("the arm does not come to rest with flight left after it")

@@ -122,15 +122,17 @@ def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
         found = list(reports.values())
         echo_json(found[0] if len(found) == 1 else found)
         return
-    from .report_display import print_comparison, print_metrics, print_report
+    from ..analysis.report_tables import metrics_table, rms_table
+    from ..analysis.terminal import print_table
+    from .report_display import print_comparison
 
     console = terminal()
     if len(reports) > 1:
         print_comparison(reports, console)
         return
     for report in reports.values():
-        print_report(report, console)
-        print_metrics(report, console)
+        print_table(rms_table(report), console)
+        print_table(metrics_table(report), console)
 
 
 def _names(bags: Sequence[Path]) -> list[str]:
@@ -146,7 +148,7 @@ def _names(bags: Sequence[Path]) -> list[str]:
 
 
 def _files(where: Path, names: Sequence[str], suffix: str) -> list[Path]:
-    """The file of each bag: ``where`` itself if it is a file's name, else one below it."""
+    """Name the file of each bag: ``where`` itself if it is a file's name, else one below it."""
     if where.suffix != suffix or where.is_dir():
         return [where / f"{name}{suffix}" for name in names]
     if len(names) > 1:

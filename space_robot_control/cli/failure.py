@@ -44,7 +44,7 @@ def report_of(bag: Path) -> dict[str, Any]:
 
 
 def _divergence(error: FlightError, period: float) -> dict[str, Any] | None:
-    """Tick and time; of a graph's flight they are in the words of the node that saw it."""
+    """Return tick and time; of a graph's flight they are in the words of the node that saw it."""
     found = _DIVERGED.search(str(error))
     tick = error.tick if isinstance(error, DivergedError) else int(found[1]) if found else None
     return None if tick is None else {"tick": tick, "time_s": round(tick * period, 9)}

@@ -37,7 +37,7 @@ def cli() -> None:
 
 
 def commands() -> Iterator[click.Command]:
-    """The commands of this folder: each has its file's name, without an underscore."""
+    """Yield the commands of this folder: each has its file's name, without an underscore."""
     folder = import_module(__package__)
     for module in pkgutil.iter_modules(folder.__path__):
         if "_" not in module.name and module.name != "main":
@@ -66,12 +66,12 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 
 def _node_module(word: str) -> str | None:
-    """The module of the node that is called so, if there is one."""
+    """Return the module of the node that is called so, if there is one."""
     return MODULES.get(word.removesuffix(SUFFIX)) if word.endswith(SUFFIX) else None
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    """The exit code of a command."""
+    """Run a command; return its exit code."""
     try:
         cli.main(args=arguments, prog_name="space-robot", standalone_mode=False)
         sys.stdout.flush()
@@ -93,7 +93,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _lost(error: OSError) -> int:
-    """The exit code when something could not be written or read; says what, unless nobody reads."""
+    """Say what could not be written or read, unless nobody reads; return the exit code."""
     if not is_of_output(error):
         _complain(f"{error.filename or 'the system'}: {error.strerror or error}")
     elif not isinstance(error, BrokenPipeError):

@@ -90,7 +90,7 @@ def _scenario_parameters(given: Any, where: str) -> dict[str, dict[str, Any]]:
 
 
 def _scenario_value(option: click.Parameter, value: Any, where: str) -> Any:
-    """A scenario's value, if it is of the type that its option takes.
+    """Return a scenario's value, if it is of the type that its option takes.
 
     Raises:
         InputError: it is of another.
@@ -214,7 +214,7 @@ def flight_options(*names: str) -> Decorator:
 
 
 def plan_flight(**options: Any) -> Flight:
-    """The flight that a command's options ask for.
+    """Return the flight that a command's options ask for.
 
     Raises:
         InputError: they do not fit together, or name what there is not.

@@ -1,4 +1,4 @@
-"""Reports on a terminal: the table of a flight, its further metrics, several bags side by side."""
+"""Reports on a terminal: the table of a flight, or of several bags side by side."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.console import Console
 
-from ..analysis.report_tables import comparison_table, metrics_table, rms_table
+from ..analysis.report_tables import comparison_table, rms_table
 from ..analysis.terminal import print_table
 from ..analysis.words import notes, remarks
 from ..flight.terminal import echo_json, say, terminal
@@ -23,17 +23,7 @@ def show_report(report: dict[str, Any], as_json: bool) -> None:
     if as_json:
         echo_json(report)
     else:
-        print_report(report, terminal())
-
-
-def print_report(report: dict[str, Any], console: Console) -> None:
-    """Print the RMS and chatter table of a flight."""
-    print_table(rms_table(report), console)
-
-
-def print_metrics(report: dict[str, Any], console: Console) -> None:
-    """Print what `print_report` leaves out: every other metric, and why one is missing."""
-    print_table(metrics_table(report), console)
+        print_table(rms_table(report), terminal())
 
 
 def print_comparison(reports: dict[str, dict[str, Any]], console: Console) -> None:

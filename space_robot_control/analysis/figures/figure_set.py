@@ -28,7 +28,7 @@ class SavedFigure(NamedTuple):
 
     @property
     def data_uri(self) -> str:
-        """The SVG as a data URI, for a page that refers to nothing outside itself."""
+        """Return the SVG as a data URI, for a page that refers to nothing outside itself."""
         return "data:image/svg+xml;base64," + base64.b64encode(self.svg.read_bytes()).decode()
 
 

@@ -91,7 +91,7 @@ class Planned(NamedTuple):
 
 
 def plan(rows: Iterable[Row], brief: bool = False) -> Iterator[Planned]:
-    """The flights of ``rows``: all four variants of each, or (``brief``) what Table V asks for.
+    """Yield the flights of ``rows``: all four variants, or (``brief``) what Table V asks for.
 
     That is the default gains with friction and without and, where the default ones are others,
     the printed gains with the printed friction: what the paper says was flown.

@@ -15,7 +15,7 @@ from space_robot_msgs_py.ros.lifeline import hold_to
 
 @contextmanager
 def processes(jobs: int) -> Iterator[ProcessPoolExecutor]:
-    """A pool of ``jobs`` forked processes, none of which outlives the context or this process.
+    """Fork a pool of ``jobs`` processes, none of which outlives the context or this process.
 
     If anything fails, or the user ends the command, what they are at is dropped.
     """

@@ -93,7 +93,7 @@ def _fly_and_draw(
     figures: FigureFolder,
     progress: Callable[[int], Callable[[], None]],
 ) -> list[Result]:
-    """The results in the order of ``planned``."""
+    """Return the results in the order of ``planned``."""
     # first those the comparisons wait for, last those that take the shortest
     order = sorted(planned, key=lambda flight: (not flight.compared, not flight.shown))
     futures = {flight: pool.submit(fly, flight, duration, figures) for flight in order}

@@ -27,7 +27,7 @@ class Check(NamedTuple):
 
 
 def checks(values: Iterable[float], limits: Iterable[float]) -> tuple[Check, ...]:
-    """One check an axis."""
+    """Make a check an axis."""
     return tuple(
         Check(float(value), float(limit)) for value, limit in zip(values, limits, strict=True)
     )

@@ -30,7 +30,7 @@ def peak_gain(k_1: float, k_2: float) -> float:
 
 
 def largest_tolerated_beta(k_1: float, k_2: float) -> float:
-    """The beta up to which (73) holds, ``1 / max |G|``: K_2 itself if ``K_1^2 >= 4 K_2``."""
+    """Return the beta up to which (73) holds, ``1 / max |G|``: K_2 itself if ``K_1^2 >= 4 K_2``."""
     if k_1 <= 0.0 or k_2 <= 0.0:
         return 0.0
     if k_1**2 >= 4.0 * k_2:

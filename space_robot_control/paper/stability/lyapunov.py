@@ -99,7 +99,7 @@ def shifted_gains(k_1: float, k_2: float, gamma: float) -> tuple[float, float]:
 
 
 def largest_gamma(k_1: float, k_2: float, beta: float) -> float | None:
-    """The largest gamma for which (51) has a solution M, or None if there is none above 0."""
+    """Return the largest gamma for which (51) has a solution M; None: there is none above 0."""
     if beta >= largest_tolerated_beta(k_1, k_2):
         return None
     # where A_gamma stops being stable: twice the slowest decay of A

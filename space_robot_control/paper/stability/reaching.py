@@ -43,7 +43,7 @@ class Reaching:
 
 
 def off_mission_plan(flight: Flight, initial_error: float) -> FlightPlan:
-    """The plan of ``flight``, started with ``e = initial_error`` on every axis, at rest."""
+    """Return the plan of ``flight``, started with ``e = initial_error`` on every axis, at rest."""
     start = flight.mission.chunk(0, 1)
     eps = start.base[0, 1:4] - initial_error
     eta = np.copysign(np.sqrt(1.0 - eps @ eps), start.base[0, 0])

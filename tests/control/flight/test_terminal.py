@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from rich.table import Table
 
 from space_robot_control.analysis import analyze
-from space_robot_control.cli.report_display import print_comparison, print_metrics, print_report
+from space_robot_control.analysis.report_tables import metrics_table, rms_table
+from space_robot_control.analysis.terminal import print_table
+from space_robot_control.cli.report_display import print_comparison
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_control.flight.terminal import say, show, terminal
@@ -33,14 +35,14 @@ def shown(width: int, *prints: Any) -> str:
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_every_number_is_shown_whole_on_any_width(report: dict[str, Any], width: int) -> None:
-    text = shown(width, lambda console: print_report(report, console))
+    text = shown(width, lambda console: print_table(rms_table(report), console))
     words = text.split()
     for key, value in report["rms"]["mean_axis"].items():
         assert f"{value:{'.4f' if 'torque' in key else '.3e'}}" in words
         assert key in words
     text = shown(
         width,
-        lambda console: print_metrics(report, console),
+        lambda console: print_table(metrics_table(report), console),
         lambda console: print_comparison({"one": report, "two": report}, console),
     )
     for value in report["maxima"].values():
@@ -88,6 +90,6 @@ def test_a_bag_that_does_not_say_what_flew_has_a_title_without_none(
 ) -> None:
     unknown = dict.fromkeys(("controller", "case", "gains", "robot"))
     foreign = {**report, **unknown, "laws": []}
-    text = shown(100, lambda console: print_report(foreign, console))
+    text = shown(100, lambda console: print_table(rms_table(foreign), console))
     assert text.startswith("unknown law: 100 ticks, 0.05 s")
     assert "None" not in text

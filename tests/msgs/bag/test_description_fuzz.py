@@ -21,7 +21,9 @@ from hypothesis import strategies as st
 
 from space_robot_control.analysis import analyze
 from space_robot_control.analysis.figures.figure_set import FigureSet
-from space_robot_control.cli.report_display import print_comparison, print_metrics, print_report
+from space_robot_control.analysis.report_tables import metrics_table, rms_table
+from space_robot_control.analysis.terminal import print_table
+from space_robot_control.cli.report_display import print_comparison
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.replay.choice import ControllerChoice
 from space_robot_control.flight.replay.recording import Recording
@@ -126,8 +128,8 @@ def test_an_edited_description_is_told_or_followed(
     assert all(text.isprintable() for text in log.damage)
     report = analyze(log)
     for console in (terminal(file=io.StringIO(), width=width) for width in (20, 100)):
-        print_report(report, console)
-        print_metrics(report, console)
+        print_table(rms_table(report), console)
+        print_table(metrics_table(report), console)
         print_comparison({"[/red]": report, r"$\frac": report}, console)
     try_replay(bag)
     assert MODULE not in sys.modules

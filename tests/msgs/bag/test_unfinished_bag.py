@@ -20,7 +20,8 @@ from mcap.reader import make_reader
 from rich.console import Console
 
 from space_robot_control.analysis import analyze
-from space_robot_control.cli.report_display import print_report
+from space_robot_control.analysis.report_tables import rms_table
+from space_robot_control.analysis.terminal import print_table
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py import topics
@@ -138,7 +139,7 @@ def test_report_says_that_the_bag_was_not_finished(recorded: Recorded, tmp_path:
     report = analyze(read_flight(tmp_path))
     console = Console(width=120)
     with console.capture() as shown:
-        print_report(report, console)
+        print_table(rms_table(report), console)
     assert report["unfinished"] == "the bag was not finished: read up to t = 0.0995 s"
     assert report["unfinished"] in shown.get()
     assert analyze(recorded.log)["unfinished"] == ""
