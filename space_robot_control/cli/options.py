@@ -99,8 +99,7 @@ def _scenario_value(option: click.Parameter, value: Any, where: str) -> Any:
     from space_robot_msgs_py.errors import InputError
 
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    is_text = isinstance(value, str)
-    if option.multiple if isinstance(option, click.Option) else False:
+    if getattr(option, "multiple", False):
         wanted = "a list of texts"
         fits = isinstance(value, list) and all(isinstance(text, str) for text in value)
     elif isinstance(option.type, click.types.BoolParamType):
@@ -110,7 +109,7 @@ def _scenario_value(option: click.Parameter, value: Any, where: str) -> Any:
     elif isinstance(option.type, click.types.FloatParamType):
         wanted, fits = "a number", is_number
     else:  # a number may stand for a name
-        wanted, fits = "a text", (is_text and "\0" not in value) or is_number
+        wanted, fits = "a text", is_number or (isinstance(value, str) and "\0" not in value)
         value = str(value) if is_number else value
     if not fits:
         raise InputError(f"{where}: {wanted} was expected, got {short(value)}")

@@ -6,6 +6,7 @@ All are sufficient ones: where one fails nothing is proven, neither stability no
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,12 +69,12 @@ class SuperTwisting:
         """(m, 2) eigenvalues of the M of (48)."""
         return np.array([np.linalg.eigvalsh(paper_m(*gains)) for gains in self.gains])
 
-    @property
+    @cached_property
     def measured_certificates(self) -> tuple[Certificate | None, ...]:
         """(51) solved for the measured beta; None where that is too large."""
         return self._certified(self.beta)
 
-    @property
+    @cached_property
     def assumed_certificates(self) -> tuple[Certificate | None, ...]:
         """(51) solved for half of the tolerated beta: K_2 / 2 if ``K_1^2 >= 4 K_2``."""
         return self._certified(0.5 * self.tolerated_beta)
@@ -81,7 +82,7 @@ class SuperTwisting:
     def _certified(self, beta: Array) -> tuple[Certificate | None, ...]:
         return tuple(certify(*gains, b) for gains, b in zip(self.gains, beta.tolist(), strict=True))
 
-    @property
+    @cached_property
     def certificates(self) -> tuple[Certificate | None, ...]:
         """Those of the measured beta, where there is none those of the assumed one."""
         pairs = zip(self.measured_certificates, self.assumed_certificates, strict=True)
