@@ -79,17 +79,13 @@ def _enlarge(
 ) -> Axes:
     """Plot the torque round the junctions, beside one another on one scale; the first panel."""
     below = cells[2, column].subgridspec(1, len(moments))
-    first: Axes | None = None
-    for place, moment in enumerate(moments):
-        axes = figure.add_subplot(below[place], sharey=first)
+    panels = below.subplots(sharey=True, squeeze=False)[0].tolist()
+    for axes, moment in zip(panels, moments, strict=True):
         near = np.abs(time - moment) < JUNCTION_HALF_WIDTH + 1e-9
         plot_lines(axes, 1e3 * (time[near] - moment), torque[near])
         mark_moments(axes, np.zeros(1))
         axes.set_xlabel(f"time from {moment:g} s (ms)" if len(moments) < MOST_JUNCTIONS
                         else f"from {moment:g} s (ms)")  # fmt: skip
-        axes.tick_params(labelleft=first is None)
-        axes.yaxis.get_offset_text().set_visible(first is None)
         axes.locator_params(axis="x", nbins=7 if len(moments) == 1 else 3)
-        first = first or axes
-    assert first is not None
+    first: Axes = panels[0]
     return first
