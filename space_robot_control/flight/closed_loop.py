@@ -49,7 +49,7 @@ def close_loop(plant: Plant, controller: Controller, log: FlightLog, start: int,
 
 
 def measured_ticks(plant: Plant, error: Exception) -> int:
-    """How many states ``plant`` had sent when `close_loop` raised ``error``.
+    """Count the states ``plant`` had sent when `close_loop` raised ``error``.
 
     A state that the law could not answer was sent; one that the plant itself found to be beyond
     all physics was not. `Plant.tick` is how many of them were answered.

@@ -23,7 +23,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 def exit_code(number: int) -> int:
-    """Of a command ended by a signal, as shells tell it: 130 for SIGINT, 143 for SIGTERM."""
+    """Return a command's exit code after a signal, as shells tell it: 130 for SIGINT."""
     return 128 + number
 
 

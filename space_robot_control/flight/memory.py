@@ -1,4 +1,4 @@
-"""How much memory is left."""
+"""The memory that is left."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class Messages:
         self._law = LawCodec(timebase)
 
     def stretch(self, log: FlightLog, start: int, stop: int, answered: int) -> None:
-        """What mission, plant and controller send in the ticks ``start`` to ``stop``.
+        """Write what mission, plant and controller send in the ticks ``start`` to ``stop``.
 
         All of them are in ``log``; the controller answers those before ``answered``.
         """

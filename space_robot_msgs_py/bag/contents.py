@@ -19,9 +19,9 @@ class Storage(Protocol):
     counts: Counter[str] | None
     """Messages a topic, as it has noted itself; None: it has not."""
     metadata: dict[str, dict[str, str]]
-    """What is noted in it, by name."""
+    """The metadata records in it, by name."""
     has_end: bool
-    """Whether its writer closed it, as far as it can tell."""
+    """True if its writer closed it, as far as it can tell."""
 
     def topics(self) -> dict[str, str]:
         """Return the type by topic."""
@@ -56,7 +56,7 @@ class Bag:
         """
         self._files, self._found = files, damage
         self.finished = closed and all(file.has_end for file in files)
-        """Whether its recorder closed it."""
+        """True if its recorder closed it."""
         self._information, self._lacks_files = information, lacks_files
         self._counts: Counter[str] = Counter()
         self._span_ns: tuple[int, int] | None = None

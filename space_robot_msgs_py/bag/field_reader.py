@@ -26,12 +26,12 @@ class FieldReader:
     def __init__(self, description: MessageDescription) -> None:
         self._description = description
         self.columns = description.columns
-        """What the numbers of a row are."""
+        """The columns that the numbers of a row belong to."""
         self._known: Numbers | None = None
         self.misfits = 0
         """Messages that could not be read."""
         self.fault = ""
-        """Why the first of them could not."""
+        """The reason of the first of them."""
 
     def read(self, batch: Batch) -> Iterator[tuple[Places, Array]]:
         """For each layout, the messages' places in the batch and their (M, width) numbers."""
@@ -53,7 +53,7 @@ class FieldReader:
 
 
 def _take(numbers: Numbers, batch: Batch, left: Places) -> tuple[NDArray[np.bool_], Array]:
-    """Which of the messages ``left`` are laid out so, and a row of numbers for each."""
+    """Tell which of the messages ``left`` are laid out so, with a row of numbers for each."""
     found = np.empty((len(left), len(numbers.offsets)))
     fits = np.empty(len(left), np.bool_)
     gather(

@@ -43,7 +43,7 @@ class FlightLog:
     reference_base: Array
     """(N, 10) desired quaternion, angular velocity, acceleration (base frame)."""
     flight: dict[str, Any] = field(default_factory=dict)
-    """What was flown: controller, case, ..., as recorded."""
+    """The flight as recorded: controller, case, ..."""
     lost: dict[str, int] = field(default_factory=dict)
     """Missing messages a topic."""
     unanswered: int = 0
@@ -51,11 +51,11 @@ class FlightLog:
     filled: int = 0
     """Ticks without a usable state, which have the one before."""
     unfinished: str = ""
-    """What is known of a bag that nobody finished; empty for a whole one."""
+    """The end of a bag that nobody finished, as far as it is known; empty for a whole one."""
     damage: tuple[str, ...] = ()
-    """What was found wrong with the bag, a sentence each."""
+    """The faults found in the bag, a sentence each."""
     foreign: tuple[str, ...] = ()
-    """Whose messages the recorder left out, since they are not of the flight, a sentence each."""
+    """The messages left out since their publishers are not of the flight, a sentence each."""
     commanded_torque: Array | None = None
     """(N, n+3) N m, the controller's answer to the tick (NaN: none); None: not recorded."""
     latency_s: Array | None = None
@@ -67,7 +67,7 @@ class FlightLog:
     first_tick: int = 0
     """Tick of row 0; not 0 in a part of a flight."""
     trusted: bool = True
-    """Whether ``flight`` is the user's own word, so that files and modules it names may be opened.
+    """True if ``flight`` is the user's own word: files and modules it names may be opened.
 
     A bag may be anybody's: of one it is so only if the user says so.
     """
@@ -98,7 +98,7 @@ class FlightLog:
 
     @property
     def description(self) -> dict[str, Any]:
-        """What was flown, as recorded; the same as ``flight``. Empty for a bag of others."""
+        """The flight as recorded; the same as ``flight``. Empty for a bag of others."""
         return self.flight
 
     @property

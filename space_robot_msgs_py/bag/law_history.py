@@ -32,7 +32,7 @@ class LawChange(NamedTuple):
 
 
 def same(one: LawInForce, other: LawInForce) -> bool:
-    """Whether two laws are the same with the same gains, to the last bit."""
+    """Tell if two laws are the same with the same gains, to the last bit."""
     return (
         one.name == other.name
         and one.gains.keys() == other.gains.keys()

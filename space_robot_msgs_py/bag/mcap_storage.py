@@ -95,12 +95,12 @@ class McapStorage:
 
     @property
     def incomplete(self) -> bool:
-        """Whether something was passed over."""
+        """True if something was passed over."""
         return bool(self._faults or self._of_no_topic)
 
     @property
     def damage(self) -> list[str]:
-        """What was found broken; all of it is known when `batches` is through."""
+        """The things found broken; all are known when `batches` is through."""
         found = [self._index_fault] if self._index_fault else []
         if self._faults:
             at, why = self._faults[0]

@@ -51,7 +51,7 @@ class MessageAccounting:
     _left_out: int = 0
     """Ticks from the last message before each pause, or from tick 0, to the first after it."""
     _pauses: int = 0
-    """How many lie between messages."""
+    """The number of pauses that lie between messages."""
 
     def __post_init__(self) -> None:
         if self.topic.per_tick:

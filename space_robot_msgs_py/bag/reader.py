@@ -36,7 +36,7 @@ REQUIRED = (
     topics.JOINT_STATES, topics.BASE_STATE, topics.REFERENCE_JOINTS, topics.REFERENCE_BASE,
 )  # fmt: skip
 DEFAULT_PERIOD = 0.0005
-"""Of a bag that does not tell its period, s."""
+"""The period of a bag that does not tell it, s."""
 _STAMPS_LOOKED_AT = 200
 
 
@@ -103,7 +103,7 @@ def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
 
 
 def _description(bag: Bag) -> tuple[dict[str, Any], list[str]]:
-    """What was flown, as recorded, and what is wrong with that."""
+    """Read what was flown, and tell what is wrong with that."""
     try:
         return read_description(bag.custom_data()), []
     except InputError as error:
@@ -171,7 +171,7 @@ def timebase_of(
 
 
 def missing(topic: topics.Topic, bag: Bag, selection: Selection) -> InputError:
-    """Why a bag without a topic's messages cannot be read."""
+    """Tell why a bag without a topic's messages cannot be read."""
     selection.topics()  # a topic to remap that is not there comes first
     if topic.name in selection.wrong:
         return InputError(f"{topic.name} is {selection.wrong[topic.name]}")

@@ -67,7 +67,7 @@ class BagRecorder:
             topic.name: Sources(topic.name, publishers or Unknown()) for topic in topics.ALL
         }
         self.failure = ""
-        """Why nothing is written any more (empty: all is well)."""
+        """The reason why nothing is written any more (empty: all is well)."""
         self.kept_tick = -1
         """The last tick whose state is in the file for good; -1: none."""
         self._kept = 0
@@ -129,7 +129,7 @@ class BagRecorder:
 
     @property
     def is_behind(self) -> bool:
-        """Whether a node has sent more than has come."""
+        """True if a node has sent more than has come."""
         return any(sources.is_behind for sources in self.sources.values())
 
     @property
@@ -146,7 +146,7 @@ class BagRecorder:
         return sorted(found)
 
     def pause(self) -> None:
-        """What is sent until the next message recorded is left out on purpose."""
+        """Leave out on purpose what is sent until the next message recorded."""
         for name, sources in self.sources.items():
             sources.pause()
             self.accounting[name].pause()

@@ -1,4 +1,4 @@
-"""What is not plain MCAP, read with rosbags, in the batches of plain MCAP."""
+"""Bags that are not plain MCAP, read with rosbags, in the batches of plain MCAP."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class Rows:
         self._sent_ns = {
             topic: np.empty(0, np.int64) for topic in (topics.BASE_STATE, topics.COMMAND)
         }
-        """When a state was whole and when its answer was sent, by tick."""
+        """The times when a state was whole and when its answer was sent, by tick."""
         self._wall_clock = False
         self._rows = self._believed = 0
         described = {topic: description(topic) for topic in topics.ALL}
@@ -198,7 +198,7 @@ class Rows:
 def _by_place(
     ticks: NDArray[np.int64], rows: Array, stop: int
 ) -> tuple[slice | NDArray[np.int64], Array]:
-    """Where the (M, k, width) rows of messages go in a log of ``stop`` rows, and those that do.
+    """Find where (M, k, width) rows of messages go in a log of ``stop`` rows, and those that do.
 
     Of several for one place the last one stays.
     """

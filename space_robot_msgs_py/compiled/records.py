@@ -50,7 +50,7 @@ class Record:
     """
 
     address: int
-    """Of a `view`: where its block lies."""
+    """The place in memory of a `view`'s block."""
 
     @classmethod
     def fields(cls) -> dict[str, Field | type[Record]]:

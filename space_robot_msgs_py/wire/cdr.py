@@ -44,7 +44,7 @@ _NUMBER = (Nodetype.BASE, ("float64", 0))
 
 
 class Slot(NamedTuple):
-    """Where a run of float64 stands in a message."""
+    """The place of a run of float64 in a message."""
 
     offset: int
     """Bytes from the message's beginning."""

@@ -14,7 +14,7 @@ NODE = topics.LAW.name.rpartition("/")[0] + "_node"
 CONTROLLER = "controller"
 """The parameter that names the law."""
 STRING, DOUBLE_ARRAY = 4, 8
-"""Of rcl_interfaces/ParameterType."""
+"""Members of rcl_interfaces/ParameterType."""
 
 
 class LawCodec:

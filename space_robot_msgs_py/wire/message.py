@@ -1,4 +1,4 @@
-"""How a message of a topic is described: once, for all who write and read it.
+"""The description of a topic's messages: one, for all who write and read them.
 
 A topic's description stands in the module that is named after it (`description`). It says what
 our own message is made of, and where in a decoded one, ours or another's, the numbers of a sample
@@ -27,7 +27,7 @@ Offsets = NDArray[np.uint64]
 
 
 class Column(NamedTuple):
-    """Where some of a sample's numbers belong: in a `State`, and in the rows of a flight log."""
+    """The place of some of a sample's numbers: in a `State`, and in the rows of a flight log."""
 
     name: str
     first: int
@@ -49,7 +49,7 @@ def body(message: Bytes) -> Array:
 
 
 class Numbers(NamedTuple):
-    """Where a sample's numbers stand in all messages of a layout."""
+    """The places of a sample's numbers in all messages of a layout."""
 
     layout: MessageLayout
     offsets: Offsets
@@ -71,7 +71,7 @@ class MessageDescription(ABC):
 
     topic: ClassVar[Topic]
     columns: tuple[Column, ...] = ()
-    """Of one row, in the order of its numbers; a message may have several, one a tick."""
+    """The columns of one row, in the order of its numbers; of several rows each is a tick."""
 
     def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
         """Describe the messages of a robot.
@@ -128,7 +128,7 @@ def name_order(given: Sequence[str], expected: Sequence[str], topic: str) -> lis
 
 
 def description(topic: Topic) -> type[MessageDescription] | None:
-    """How a topic's messages are described: in the module of this folder with its name.
+    """Find the description of a topic's messages in the module of this folder with its name.
 
     None of one whose messages are no columns of numbers.
     """

@@ -1,4 +1,4 @@
-"""Which messages of a topic come from the publisher that is followed."""
+"""The messages of a topic that come from the publisher that is followed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class SourceGuard:
         self.others_messages = 0
         """Messages of others that came while somebody was followed."""
         self.is_sure = False
-        """Whether the message that passed last came from the followed publisher without doubt."""
+        """True if the message that passed last came from the followed publisher without doubt."""
         self._next = 0
         """The followed publisher's next number; 0: nobody is followed."""
         self._heard_ns = 0
@@ -39,16 +39,16 @@ class SourceGuard:
 
     @property
     def is_followed(self) -> bool:
-        """Whether a publisher is followed."""
+        """True if a publisher is followed."""
         return self._next > 0
 
     @property
     def is_contested(self) -> bool:
-        """Whether it may be the followed publisher's or another's, by its number."""
+        """True if it may be the followed publisher's or another's, by its number."""
         return self._contested and not self.is_sure
 
     def passes(self, sequence: int, received_ns: int) -> bool:
-        """Whether to look at a message, by its sequence number and when it was received."""
+        """Tell if a message is to be looked at, by its sequence number and when it was received."""
         if sequence == self._next and sequence not in self._others:
             self._next = sequence + 1
             self._heard_ns = received_ns

@@ -1,4 +1,4 @@
-"""Which stamps of states to believe."""
+"""Stamps of states, believed or not."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ class StampGuard:
         self.last = -1
         """The last tick believed; -1 before the first."""
         self.is_new_time = False
-        """Whether the last tick believed did not follow the one before."""
+        """True if the last tick believed did not follow the one before."""
         self._other = -1
         self._agreeing = 0
 
     def passes(self, tick: int) -> bool:
-        """Whether to believe a state of ``tick``, which is then the last one."""
+        """Tell if a state of ``tick`` is to be believed, which is then the last one."""
         follows = 0 < tick - self.last <= self._longest_jump
         if not follows and self.last >= 0:
             agrees = self._agreeing and 0 <= tick - self._other <= self._longest_jump

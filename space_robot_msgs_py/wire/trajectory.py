@@ -1,4 +1,4 @@
-"""What both halves of the reference have in common: points one tick apart."""
+"""The common part of both halves of the reference: points one tick apart."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a flight lacked though it was flown to its end, by its nodes' last reports."""
+"""The shortcomings of a flight that was flown to its end, by its nodes' last reports."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ class Degradation(NamedTuple):
     """In words, each a line."""
 
     failures: list[str]
-    """What keeps the flight from being the one that was asked for."""
+    """Reasons why the flight is not the one that was asked for."""
     warnings: list[str]
-    """What was seen and did no harm."""
+    """Things that were seen and did no harm."""
 
 
 def degradation(

@@ -89,7 +89,7 @@ def _refusal(domain: int, holder: Holder) -> InputError:
 
 
 def _is_alive(pid: int) -> bool:
-    """Whether a process runs; one that has ended and is only waited for (state Z) does not."""
+    """Tell if a process runs; one that has ended and is only waited for (state Z) does not."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text("utf-8", errors="replace")
     except OSError:
@@ -98,7 +98,7 @@ def _is_alive(pid: int) -> bool:
 
 
 def _in_use(domain: int) -> bool:
-    """Whether some participant has the domain's first unicast port (DDS-RTPS 9.6.2)."""
+    """Tell if some participant has the domain's first unicast port (DDS-RTPS 9.6.2)."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.bind(("", 7410 + 250 * domain))

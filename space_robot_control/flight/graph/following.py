@@ -89,7 +89,7 @@ class _Follower:
         )  # fmt: skip
         self._events: list[Event] = []
         self._begun_at = 0.0
-        """When the first tick was seen; 0 before."""
+        """The time when the first tick was seen; 0 before."""
         self._last_s, self._moved_at = 0.0, time.monotonic()
 
     def bring_up(self, show: FlightProgress) -> None:

@@ -24,7 +24,7 @@ class Injector:
 
     @property
     def is_busy(self) -> bool:
-        """Whether something is still to be done."""
+        """True if something is still to be done."""
         return bool(self._waiting or self._stopped)
 
     def poll(self, simulated_s: float) -> list[Event]:

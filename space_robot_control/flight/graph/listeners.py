@@ -1,4 +1,4 @@
-"""Who listens to what in a flight, and whom the nodes wait for."""
+"""The listeners to each topic in a flight, for whom the nodes wait."""
 
 from __future__ import annotations
 

@@ -48,16 +48,16 @@ class Monitor:
         self._diagnostics = RawSubscription(self.node, topics.DIAGNOSTICS, group)
         self.simulated_s = 0.0
         self.has_begun = False
-        """Whether the plant has sent a tick."""
+        """True if the plant has sent a tick."""
         self.errors: tuple[float, float] | None = None
         """Largest current attitude error (eps) and joint error (rad)."""
         self.modes: dict[str, str] = {}
-        """What each node does, by ROS name."""
+        """The mode of each node, by ROS name."""
         self._levels: dict[str, int] = {}
         self.values: dict[str, dict[str, str]] = {}
-        """What each node last reported."""
+        """The values that each node reported last."""
         self.heard_at: dict[str, float] = {}
-        """When, by the monotonic clock."""
+        """The time of each node's last report, by the monotonic clock."""
 
     def poll(self) -> list[Event]:
         """Take the newest messages; the nodes' changes of mode that are worth a word."""

@@ -98,7 +98,7 @@ def _claim(bag: Path) -> None:
 
 
 def _has_states(bag: Path) -> bool:
-    """Whether a tick was flown."""
+    """Tell if a tick was flown."""
     try:
         return next(open_bag(bag).messages(topics.JOINT_STATES), None) is not None
     except (InputError, OSError):

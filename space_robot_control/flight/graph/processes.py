@@ -26,7 +26,7 @@ TAIL_LINES = 5
 
 
 def has_ros2_run() -> bool:
-    """Whether the ``ros2`` command is there and knows this package's executables."""
+    """Tell if the ``ros2`` command is there and knows this package's executables."""
     prefixes = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
     return shutil.which("ros2") is not None and any(
         (Path(prefix) / "share/ament_index/resource_index/packages" / PACKAGE).exists()
@@ -37,7 +37,7 @@ def has_ros2_run() -> bool:
 
 
 def node_environment(domain: int) -> dict[str, str]:
-    """What a node's process is started with: the project's defaults unless the user set others."""
+    """Return a node's environment: the project's defaults unless the user set others."""
     return {
         **DEFAULTS, **clean_environment(), **lifeline.held(), "ROS_DOMAIN_ID": str(domain),
     }  # fmt: skip
@@ -192,7 +192,7 @@ class Graph:
         self.nodes[name] = NodeProcess(name, command, self._environment)
 
     def check(self) -> bool:
-        """Whether the plant has flown to its end.
+        """Tell if the plant has flown to its end.
 
         Raises:
             FlightError: a process has ended too early; with the end of its output.

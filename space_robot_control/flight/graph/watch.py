@@ -44,7 +44,7 @@ class Watch:
         self._has_flown = False
         self.restarts = 0
         self.failures: list[str] = []
-        """What keeps the flight from being whole."""
+        """Reasons why the flight is not whole."""
 
     def poll(self, simulated_s: float) -> list[Event]:
         """Look after all processes.
@@ -80,7 +80,7 @@ class Watch:
 
     @property
     def is_complete(self) -> bool:
-        """Whether the plant has flown to its end."""
+        """True if the plant has flown to its end."""
         return self._graph.leader.exit_code == 0 or self._has_flown
 
     def _hangs(self, name: str) -> bool:

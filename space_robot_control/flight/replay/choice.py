@@ -1,4 +1,4 @@
-"""Which controller answers the replay: the one that flew, or another."""
+"""The controller that answers the replay: the one that flew, or another."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class ControllerChoice:
         self.law_name = law.name
         is_same_law = law.name == flight.get("controller", law.name)
         self.parameters: dict[str, Any] = {**flown, **self._robot(flown)}
-        """Of the node, by dotted name."""
+        """The node's parameters, by dotted name."""
         recorded_gains = flight.get("gains_used", {})
         if recorded_gains and is_same_law and not gains:
             self.parameters["gains"] = self._gains_folder(law, recorded_gains)
@@ -96,12 +96,12 @@ class ControllerChoice:
         self.is_as_flown = is_same_law and (
             not gains or gains == flown.get("gains") or _same(now.gain_values, recorded_gains)
         )
-        """Whether law and gains are those that flew; what was ``given`` is not looked at."""
+        """True if law and gains are those that flew; what was ``given`` is not looked at."""
         self.follows_flight = is_same_law and "swaps" not in given
-        """Whether laws and gains change as they did in flight."""
+        """True if laws and gains change as they did in flight."""
 
     def law_parameters(self, law: LawInForce) -> dict[str, str | list[float]]:
-        """What to set to have a law of the flight in force; what the user gave stays."""
+        """Return what to set to have a law of the flight in force; what the user gave stays."""
         gains = {f"{law.name}.{gain}": list(values) for gain, values in law.gains.items()}
         kept = {name: gains[name] for name in gains if name not in self._said}
         return {"controller": law.name, **(kept if self.is_as_flown else {})}
@@ -159,7 +159,7 @@ class ControllerChoice:
 
 
 def recorded_parameters(flight: Mapping[str, Any]) -> dict[str, Any]:
-    """What the flown controller was given; older bags have names only."""
+    """Return what the flown controller was given; older bags have names only."""
     recorded = flight.get("parameters", {}).get(NODE)
     if recorded is None:
         names = ("controller", "gains", "robot", "swaps", "period")

@@ -98,7 +98,7 @@ class CommandList:
         return header_stamp_ns(data), self._forms.setdefault(form, len(self._forms))
 
     def commands(self) -> Commands:
-        """What has come; of several commands of one tick the first."""
+        """Return what has come; of several commands of one tick the first."""
         ticks, first = np.unique(np.frombuffer(self._ticks, np.int64), return_index=True)
         torques = np.frombuffer(self._torques, np.float64).reshape(-1, len(self._names))
         form = np.frombuffer(self._form, np.uint32).astype(np.intp)

@@ -1,4 +1,4 @@
-"""What is to be replayed, and what came of it."""
+"""The options of a replay, and its outcome."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .recording import Recording
 
 @dataclass(frozen=True)
 class Options:
-    """What to replay, and how."""
+    """A choice of what to replay, and how."""
 
     bag: Path
     controller: str = ""
@@ -38,12 +38,12 @@ class Options:
     """Our topic by the bag's."""
     domain: int | None = None
     trust: bool = False
-    """Whether modules and files that the bag names may be opened."""
+    """True if modules and files that the bag names may be opened."""
 
 
 @dataclass(frozen=True)
 class Replay:
-    """What came of it."""
+    """The outcome of a replay."""
 
     options: Options
     choice: ControllerChoice
@@ -55,16 +55,16 @@ class Replay:
     """States that the controller did not answer in flight, and was not sent now."""
     elapsed_s: float
     error: FlightError | None
-    """What ended it before its time."""
+    """The error that ended it before its time."""
 
     @property
     def is_judged(self) -> bool:
-        """Whether the commands are to be the recorded ones."""
+        """True if the commands are to be the recorded ones."""
         return self.choice.is_as_flown and self.recording.has_commands
 
     @property
     def has_passed(self) -> bool:
-        """Whether nothing is other than expected; another law is not expected to agree."""
+        """True if nothing is other than expected; another law is not expected to agree."""
         return self.error is None and (self.comparison.is_identical or not self.is_judged)
 
     def report(self) -> dict[str, Any]:

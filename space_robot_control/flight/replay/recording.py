@@ -36,7 +36,7 @@ class ReferenceMessage(NamedTuple):
     """A message of the reference."""
 
     tick: int
-    """Of its first point."""
+    """The tick of its first point."""
     topic: Topic
     data: bytes
 
@@ -66,7 +66,7 @@ class Recording:
             if doubts:
                 raise InputError(doubts[0])
         self.flight: dict[str, Any] = flight
-        """What was flown, as recorded; empty for a bag of another recorder."""
+        """The flight as recorded; empty for a bag of another recorder."""
         self.states_count = counts[topics.JOINT_STATES]
         """Ticks, about."""
         self.has_commands = bool(counts[topics.COMMAND])
@@ -74,7 +74,7 @@ class Recording:
         self.answers_are_complete = bool(
             flight
         ) and topics.COMMAND.name not in topics_with_allowed_gaps(flight)
-        """Whether the controller has answered every state, so that no answer means a loss."""
+        """True if the controller has answered every state, so that no answer means a loss."""
 
     def commands(self, axis_names: tuple[str, ...]) -> Commands:
         """The recorded answers."""

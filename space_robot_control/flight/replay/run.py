@@ -110,7 +110,7 @@ class _Run:
         )  # fmt: skip
 
     def _recorded_until(self, played: Ticks, error: FlightError | None) -> Commands:
-        """Of a replay that ended early, or a bag that did, only what came until then."""
+        """Take of a replay, or a bag, that ended early only what came until then."""
         if error is None and self._recording.is_finished:
             return self._recorded
         return self._recorded.within(self._start, int(played.max()) + 1)
@@ -193,7 +193,7 @@ def _check(controller: NodeProcess, stopped: list[int]) -> None:
 
 @contextmanager
 def _frozen() -> Iterator[None]:
-    """What lives now need not be looked through while the replay lasts."""
+    """Keep the garbage collector from what lives now while the replay lasts."""
     gc.collect()
     gc.freeze()
     try:
