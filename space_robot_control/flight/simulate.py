@@ -30,7 +30,7 @@ from ..controller.law_changes import LawChanges
 from .closed_loop import close_loop, measured_ticks
 from .plan import Flight
 
-STRETCH_TICKS = 2000
+STRETCH_TICKS = 10_000
 """Ticks flown between two looks at the world outside."""
 
 
