@@ -23,7 +23,8 @@ from .sources import PARTICIPANT_BYTES, Publishers, Sources, Unknown
 from .writer import BagWriter
 
 FLIGHT_KEY = "space_robot.flight"
-CHUNK_BYTES = 1 << 20
+CHUNK_BYTES = 1 << 18
+"""Written in less time than a tick leaves free, and read as fast as longer ones."""
 CHUNK_AGE_S = 0.25
 """A killed recorder loses the open chunk, so none stays open for longer."""
 

@@ -18,6 +18,8 @@ from .waiting import SPIN_S, Waiter
 LISTENER_PERIOD_S = 0.02
 REMIND_S = 5.0
 LONG_CALL_S = 0.1
+UPKEEP_GAP_S = 2e-3
+"""Between one node's upkeep and another's, so that all of them together delay no tick."""
 GLANCE_S = 1e-3
 """A node among several looks so often whether a message has come that is not expected at once."""
 NO_WAIT = Wait(0.0)
@@ -31,6 +33,8 @@ class Turns:
         self._nodes = nodes
         self._seats = [Seat(node) for node in nodes]
         self._upkeeps = [Upkeep(node) for node in nodes]
+        self._due = [0.0] * len(nodes)
+        """When each node's upkeep is due, by the monotonic clock."""
         self._upkeep_at = 0.0
         self._waiter = Waiter(nodes[0])
         self._is_alone = len(nodes) == 1
@@ -43,7 +47,7 @@ class Turns:
         if now >= self._upkeep_at:
             if not any(node.is_active for node in self._nodes):
                 return self._serve_inactive()
-            self._upkeep_at = min([self._serve(upkeep) for upkeep in self._upkeeps])
+            self._serve_one()
         is_idle = True
         for seat in self._seats:
             if seat.step(now):
@@ -58,6 +62,12 @@ class Turns:
         for upkeep in self._upkeeps:
             self._serve(upkeep, timeout_s)
         return not all(node.is_shut_down for node in self._nodes)
+
+    def _serve_one(self) -> None:
+        """Run the upkeep that is due first."""
+        first = self._due.index(min(self._due))
+        self._due[first] = self._serve(self._upkeeps[first])
+        self._upkeep_at = max(min(self._due), time.monotonic() + UPKEEP_GAP_S)
 
     def _serve(self, upkeep: Upkeep, timeout_s: float = 0.0) -> float:
         """Run a node's upkeep; when to run it again."""
