@@ -29,35 +29,27 @@ class FlightProgress:
 @contextmanager
 def flight_progress(total_s: float, what: str) -> Iterator[FlightProgress]:
     """A progress line for a flight of ``total_s``."""
-    console = terminal(stderr=True)
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(bar_width=24),
-        TextColumn("{task.completed:.1f}/{task.total:.1f} s simulated"),
-        TimeElapsedColumn(),
-        TextColumn("{task.fields[remark]}", markup=False),
-    )
-    with Progress(*columns, console=console, refresh_per_second=5) as progress:
+    remark = TextColumn("{task.fields[remark]}", markup=False)
+    with _bar("{task.completed:.1f}/{task.total:.1f} s simulated", remark) as progress:
         yield FlightProgress(progress, total_s, what)
 
 
 @contextmanager
 def counting_progress(what: str) -> Iterator[Callable[[int], Callable[[], None]]]:
     """A progress line for things that are done one by one; see `reproduce` for its use."""
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(bar_width=24),
-        TextColumn("{task.completed:.0f}/{task.total:.0f}"),
-        TimeElapsedColumn(),
-    )
     with ExitStack() as stack:
 
         def begin(total: int) -> Callable[[], None]:
-            console = terminal(stderr=True)
-            progress = stack.enter_context(
-                Progress(*columns, console=console, refresh_per_second=5)
-            )
+            progress = stack.enter_context(_bar("{task.completed:.0f}/{task.total:.0f}"))
             task = progress.add_task(what, total=total)
             return lambda: progress.advance(task)
 
         yield begin
+
+
+def _bar(done: str, *more: TextColumn) -> Progress:
+    """Make a line with a bar; ``done`` beside it tells how far things are."""
+    return Progress(
+        TextColumn("{task.description}", markup=False), BarColumn(bar_width=24), TextColumn(done),
+        TimeElapsedColumn(), *more, console=terminal(stderr=True), refresh_per_second=5,
+    )  # fmt: skip

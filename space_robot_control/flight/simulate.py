@@ -9,7 +9,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -170,7 +169,7 @@ def simulate(
             flown += block.ticks
             log.unanswered, log.laws = block.unanswered, block.laws
     except FlightError as error:
-        error.log = log.truncated(flown)
+        error.log = log.rows(0, flown)
         raise
     return log
 
@@ -206,7 +205,7 @@ def _ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:
     block.telemetry[answered:] = np.nan
     block.unanswered = measured - answered
     block.laws = tuple(law for law in block.laws if law.tick < block.first_tick + answered)
-    return block.truncated(measured)
+    return block.rows(0, measured)
 
 
 def _check_memory(flight: Flight) -> None:
@@ -217,9 +216,8 @@ def _check_memory(flight: Flight) -> None:
     """
     from .memory import available_bytes
 
-    row = unflown(flight, 0, 1)
-    columns = (value for f in fields(row) if isinstance(value := getattr(row, f.name), np.ndarray))
-    needed, free = flight.ticks * sum(c.nbytes for c in columns), available_bytes()
+    columns = unflown(flight, 0, 1).columns.values()
+    needed, free = flight.ticks * sum(column.nbytes for column in columns), available_bytes()
     if needed > free:
         raise InputError(
             f"duration {flight.ticks * flight.period:g} s: the whole flight in memory needs "

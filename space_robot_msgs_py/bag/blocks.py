@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -53,8 +53,7 @@ def blocks_of(log: FlightLog) -> Iterator[FlightLog]:
 def last_rows(log: FlightLog, count: int) -> FlightLog:
     """Copy the last ``count`` rows, or all if there are fewer."""
     rows = log.rows(max(0, log.ticks - count), log.ticks)
-    columns: dict[str, Any] = {name: c.copy() for name, c in _columns(rows).items()}
-    return replace(rows, **columns)
+    return replace(rows, **{name: column.copy() for name, column in rows.columns.items()})
 
 
 def joined(before: FlightLog | None, log: FlightLog) -> FlightLog:
@@ -63,11 +62,6 @@ def joined(before: FlightLog | None, log: FlightLog) -> FlightLog:
         return log
     columns: dict[str, Any] = {
         name: np.concatenate([getattr(before, name), column])
-        for name, column in _columns(log).items()
+        for name, column in log.columns.items()
     }
     return replace(log, **columns, first_tick=before.first_tick)
-
-
-def _columns(log: FlightLog) -> dict[str, Any]:
-    values = {f.name: getattr(log, f.name) for f in fields(log)}
-    return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}

@@ -118,7 +118,7 @@ class FlightLog:
         edges = np.diff(np.concatenate(([False], self.whole, [False])).astype(np.int8))
         starts, stops = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
         if not len(starts):
-            return self.truncated(0)
+            return self.rows(0, 0)
         longest = int(np.argmax(stops - starts))
         return self.rows(int(starts[longest]), int(stops[longest]))
 
@@ -146,14 +146,13 @@ class FlightLog:
         chunk = ReferenceChunk(start, self.reference_joints[rows], self.reference_base[rows])
         return chunk.references()
 
-    def truncated(self, ticks: int) -> FlightLog:
-        """The first ``ticks`` rows."""
-        return self.rows(0, ticks)
+    @property
+    def columns(self) -> dict[str, Any]:
+        """All arrays that have a row a tick, by name."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
 
     def rows(self, start: int, stop: int) -> FlightLog:
         """The rows ``start`` to ``stop``: views, not copies. Counts stay those of the whole log."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
-        rows: dict[str, Any] = {
-            k: v[start:stop] for k, v in values.items() if isinstance(v, np.ndarray)
-        }
+        rows = {name: column[start:stop] for name, column in self.columns.items()}
         return replace(self, **rows, first_tick=self.first_tick + start)
