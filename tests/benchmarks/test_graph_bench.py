@@ -17,7 +17,7 @@ pytestmark = pytest.mark.ros
 @pytest.fixture(scope="module")
 def sections() -> dict[str, list[dict[str, Any]]]:
     pytest.importorskip("rclpy")
-    sections = ("graph", "clock", "recorder", "start-up")
+    sections = ("graph", "composed", "clock", "recorder", "start-up")
     result = subprocess.run(
         [sys.executable, str(TESTS / "benchmarks"), *sections, "--short", "--repetitions", "1",
          "--json"],
@@ -48,6 +48,14 @@ def test_the_breakdown_of_a_tick_adds_up(sections: dict[str, list[dict[str, Any]
     assert {"plant: step plant", "controller: update controller"} <= set(parts)
     total = sum(row(rows, name)["median"] for name in parts)
     assert total == pytest.approx(row(rows, "a tick")["median"])
+
+
+def test_the_composed_graph_stands_beside_four_processes(
+    sections: dict[str, list[dict[str, Any]]],
+) -> None:
+    rows = sections["composed"]
+    assert [row["beside"] for row in rows] == [None, "four processes", None, None]
+    assert all(0.0 < row["median"] <= 100.0 for row in rows[2:])
 
 
 def test_the_clock_section_counts_answers(sections: dict[str, list[dict[str, Any]]]) -> None:
