@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 from ..errors import InputError
@@ -13,6 +14,7 @@ GRAPH_FILE = "space_robot.yaml"
 """The file of the graph's defaults in the config folder."""
 
 
+@cache
 def config_directory() -> Path:
     """Return the ``config/`` folder: the source tree's, or the one installed under ``share/``.
 
