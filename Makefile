@@ -3,6 +3,10 @@
 PYTHON ?= python3
 VENV := .venv
 PACKAGES := space_robot_control space_robot_msgs_py space_robot_sim
+PYTEST := $(VENV)/bin/python -m pytest --numprocesses 2 --dist loadfile
+# Tests of kernels that are short enough without a compiler.
+INTERPRETED := $(addprefix tests/,sim/dynamics sim/environment sim/robot sim/sensors sim/faults \
+  control/laws $(addprefix control/controller/test_,tracking.py time_delay_estimation.py controller.py))
 PIP_INSTALL := $(VENV)/bin/python -m pip install -qq --disable-pip-version-check
 
 # A ROS sourced in this terminal must not mix with the one in .venv.
@@ -15,13 +19,17 @@ export PYTHONPYCACHEPREFIX := $(CURDIR)/$(VENV)/pycache
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
 
-.PHONY: help setup fly test lint mutation clean
+.PHONY: help setup fly test quick coverage hooks lint bench mutation clean
 
 help:
 	@echo "make setup               .venv with the package and ROS 2 Jazzy"
 	@echo "make fly [ARGS=...]      fly case 1 under TDE-STC, e.g. make fly ARGS='--controller ctc'"
 	@echo "make test [ARGS=...]     style, types and tests; ARGS go to pytest"
+	@echo "make quick [ARGS=...]    the tests that start no ROS and take little time"
+	@echo "make coverage            which lines the tests run; twice as long as make test"
+	@echo "make hooks               from then on a commit passes style, types and the quick tests"
 	@echo "make lint                style and types only"
+	@echo "make bench [ARGS=...]    how fast it is, e.g. make bench ARGS='plant laws'; --help tells more"
 	@echo "make mutation [ARGS=...] small faults put in, one at a time: do the tests notice?"
 	@echo "make clean               delete .venv and what was built or cached here"
 	@echo "PYTHON=python3.12 chooses the Python (3.10 to 3.13) of a new .venv."
@@ -32,25 +40,42 @@ fly: $(VENV)/.flies
 	@$(VENV)/bin/space-robot fly --controller tde_stc --case 1 $(ARGS)
 
 test: lint
-	$(VENV)/bin/python -m pytest --numprocesses 2 --dist loadfile $(ARGS)
+	$(PYTEST) $(ARGS)
+
+quick: $(VENV)/.tests
+	$(PYTEST) -m "not ros and not slow" $(ARGS)
+
+# The kernels' lines are seen where they run as plain Python: tests/interpreted_kernels.py.
+coverage: $(VENV)/.tests
+	rm -f .coverage .coverage.*
+	$(PYTEST) --cov --cov-report= $(ARGS)
+	PYTHONPATH=tests $(PYTEST) --cov --cov-append --cov-report= -p interpreted_kernels \
+	  -m "not ros" $(INTERPRETED)
+	$(VENV)/bin/coverage report
+
+hooks: $(VENV)/.tests
+	$(VENV)/bin/pre-commit install
 
 lint: $(VENV)/.tests
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
 
+bench: $(VENV)/.tests
+	@$(VENV)/bin/python tests/benchmarks $(ARGS)
+
 mutation: $(VENV)/.tests
 	@$(PIP_INSTALL) --editable '.[ros,test,mutation]'
 	$(VENV)/bin/python tests/mutation $(ARGS)
 
 clean:
-	rm -rf $(VENV) build install log *.egg-info .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) build install log *.egg-info .coverage .coverage.* .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find $(PACKAGES) tests -name __pycache__ -prune -exec rm -rf {} +
 
 # Stamps: what is installed in .venv, renewed when the packaging changes.
 $(VENV)/.flies: setup.py pyproject.toml | $(VENV)/.made
 	@echo "installing space_robot and ROS 2 into $(VENV): a minute or two, once"
-	@$(PIP_INSTALL) --editable '.[ros]'
+	@$(PIP_INSTALL) --editable '.[ros,soak]'
 	@touch $@
 
 $(VENV)/.tests: setup.py pyproject.toml | $(VENV)/.made

@@ -24,7 +24,8 @@ setup(
     packages=find_packages(include=[f"{NAME}_*"]),
     package_data={
         "space_robot_control.analysis": ["templates/*.j2"],
-        "space_robot_control.reproduction": ["templates/*.j2"],
+        "space_robot_control.analysis.figures": ["*.mplstyle"],
+        "space_robot_control.paper.reproduction": ["templates/*.j2"],
         "space_robot_msgs_py.ros": ["*.xml"],
     },
     python_requires=">=3.10,<3.14",
@@ -32,13 +33,10 @@ setup(
         "click>=8.1",
         "jinja2>=3.1",
         "lz4>=4",
-        "markdown-it-py>=3",
         "matplotlib>=3.8",
         "mcap>=1.5",
         "numba>=0.58.1",
         "numpy>=1.26,<3",
-        "psutil>=5.9",
-        "pyarrow>=14",
         "pydantic>=2.5",
         "pyyaml>=6",
         "rich>=13",
@@ -52,14 +50,16 @@ setup(
         # pyarrow 26 does not work
         "apt": ["colcon-common-extensions", "numpy<2", "pyarrow<26"],
         # tests/benchmarks; bsk (Basilisk) holds back numpy and matplotlib, so a venv of its own
-        "bench": ["bsk", "hypothesis", "mujoco", "pin"],
+        "bench": ["bsk", "hypothesis", "mujoco", "pin", "psutil>=5.9"],
         "mutation": ["cosmic-ray"],  # tests/mutation
+        "parquet": ["pyarrow>=14"],  # `analyze --parquet`
         # ROS 2 Jazzy from wheels; never a requirement, for apt's ROS must stay untouched
         "ros": [
             "ros-jazzy-common-interfaces",
             "ros-jazzy-rclpy",
             "ros-rmw-fastrtps-cpp==8.4.3",  # Jazzy's: newer ones belong to other distributions
         ],
+        "soak": ["psutil>=5.9"],  # `soak`
         "test": [
             "cvxpy",
             "hypothesis",
@@ -67,7 +67,12 @@ setup(
             "mypy",
             "pandas",
             "pin",
+            "pre-commit",
+            "psutil>=5.9",
+            "pyarrow>=14",
             "pytest",
+            "pytest-cov",
+            "pytest-timeout",
             "pytest-xdist",
             "ruff",
             "scipy-stubs",
@@ -75,12 +80,12 @@ setup(
             "types-psutil",
         ],
     },
-    entry_points={"console_scripts": ["space-robot = space_robot_control.cli:main"]},
+    entry_points={"console_scripts": ["space-robot = space_robot_control.cli.main:main"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         (f"lib/{NAME}", EXECUTABLES),
-        (f"share/{NAME}/docs", ["docs/errata.md"]),  # part of the report of `reproduce`
+        (f"share/{NAME}/docs/explanation", ["docs/explanation/errata.md"]),  # `reproduce` shows it
         *CONFIG,
     ],
 )

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from .flight_log import FlightLog
+from typing import Any
 
 
 class SpaceRobotError(Exception):
@@ -14,7 +11,7 @@ class SpaceRobotError(Exception):
     exit_code = 1
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """For another process: by what it holds; its constructor may want other arguments."""
+        """Pickle by what the error holds: its constructor may want other arguments."""
         return _remade, (type(self), self.args), self.__dict__
 
 
@@ -32,7 +29,7 @@ class MessageError(SpaceRobotError, ValueError):
     """A message came that does not fit: other names, lengths or stamps than this graph's."""
 
     def __init__(self, text: str, reason: str = "malformed") -> None:
-        """``reason``: the kind of misfit in a word."""
+        """Take the text, and in ``reason`` the kind of misfit in a word."""
         super().__init__(text)
         self.reason = reason
 
@@ -40,8 +37,8 @@ class MessageError(SpaceRobotError, ValueError):
 class FlightError(SpaceRobotError):
     """A flight ended before its time."""
 
-    log: FlightLog | None = None
-    """What was flown until then, where somebody kept it."""
+    log: Any = None
+    """The `FlightLog` of what was flown until then, where somebody kept it."""
 
 
 class DivergedError(FlightError):
@@ -56,7 +53,7 @@ class UnusableStateError(FlightError):
     """A measured state that no command can be computed from."""
 
     def __init__(self, tick: int, why: str, kind: str) -> None:
-        """``kind``: what is wrong in a word or two."""
+        """Take the tick, the reason, and in ``kind`` what is wrong in a word or two."""
         super().__init__(f"at tick {tick} {why}")
         self.tick, self.why, self.kind = tick, why, kind
 

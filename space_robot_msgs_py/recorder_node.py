@@ -6,19 +6,22 @@ import json
 import os
 import time
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
 from . import topics
 from .bag.recorder import BagRecorder
-from .definitions import decode
+from .bag.recorder_settings import RecorderNodeSettings
 from .errors import InputError, MessageError
-from .health import SENT, Health, Level
-from .recorder_settings import RecorderNodeSettings
-from .ros.endpoints import In, Out, TakenByLoop
+from .ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription
 from .ros.exclusive import GraphPublishers
+from .ros.health import SENT, Health, Level
+from .ros.loop import Wait
+from .ros.managed_node import ManagedNode
+from .ros.node_host import NodeKind, run_nodes
 from .ros.serialized_take import serialized_take, take_by_rclpy
-from .ros.shell import Shell, run_node
+from .wire.definitions import decode
 
 SILENCE_S = 0.3
 """Told to stop, the recorder leaves when nothing sent before has come for this long."""
@@ -33,14 +36,31 @@ AHEAD_OF_NEED = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
 """What was said of them while nothing was recorded is of the time after it, too."""
 NEVER_NS = 1 << 63
 NICENESS = 5
-"""The loop goes first where cores are short; the queues hold seconds of traffic."""
+"""Of the recorder's process: plant and controller go first where cores are short; the queues hold
+seconds of traffic."""
 
 
 class RecorderLoop:
     """Empties the queues of all topics in turn; deep queues bridge the time between rounds."""
 
-    def __init__(self, shell: Shell, settings: RecorderNodeSettings) -> None:
-        self._shell, self._settings = shell, settings
+    wait_for = ()
+    is_complete = False
+
+    def __init__(
+        self, node: ManagedNode[RecorderNodeSettings], settings: RecorderNodeSettings,
+        gives_way: bool = False,
+    ) -> None:  # fmt: skip
+        """Open the bag and listen to all topics.
+
+        Args:
+            node: its node.
+            settings: its parameters.
+            gives_way: whether other processes go first.
+
+        Raises:
+            InputError: the flight is no JSON, or the bag cannot be made.
+        """
+        self._node, self._settings, self._gives_way = node, settings, gives_way
         try:
             flight = json.loads(settings.flight)
         except json.JSONDecodeError as error:
@@ -48,38 +68,37 @@ class RecorderLoop:
         path = Path(settings.bag or time.strftime("bag_%Y%m%d-%H%M%S"))
         self._recorder = BagRecorder(
             path, {"period": settings.period, **flight}, settings.timebase,
-            settings.compression, settings.split_size, GraphPublishers(shell.node),
+            settings.compression, settings.split_size, GraphPublishers(node),
         )  # fmt: skip
-        self.outputs: tuple[Out, ...] = ()
-        group = TakenByLoop()
-        self._inputs = [In(shell.node, topic, group, QUEUE_DEPTH) for topic in topics.ALL]
-        self._diagnostics = In(shell.node, topics.DIAGNOSTICS, group)
+        self.outputs: tuple[RawPublisher, ...] = ()
+        group = PolledCallbackGroup()
+        self._inputs = [RawSubscription(node, topic, group, QUEUE_DEPTH) for topic in topics.ALL]
+        self._pause = Wait(settings.drain_period)
+        self._diagnostics = RawSubscription(node, topics.DIAGNOSTICS, group)
         self._told = False
         self._from_ns = 0
         """When recording was taken up again, by the senders' clock; 0: it never paused."""
         self._until_ns: int | None = None
         """When this recorder was told to stop; None while it records."""
-        shell.log(f"recording to {path}")
+        node.log(f"recording to {path}")
         if serialized_take() is take_by_rclpy:
-            shell.log("this rclpy does not tell publishers: they are told apart by their numbers")
+            node.log("this rclpy does not tell publishers: they are told apart by their numbers")
 
     @property
     def failure(self) -> str:
-        """Why the bag is no longer written (empty: all is well)."""
+        """Reason why the bag is no longer written (empty: all is well)."""
         return self._recorder.failure
 
-    def run(self) -> None:
-        """Record until told to stop."""
-        os.nice(max(0, NICENESS - os.nice(0)))
+    def begin(self) -> None:
+        """Record from now on."""
         if self._until_ns is not None:  # active again
             self._from_ns, self._until_ns = time.time_ns(), None
             self._recorder.pause()
-        while not self._shell.stopping:
-            _, busy = self._take_round()
-            self._shell.serve()
-            if not busy:
-                time.sleep(self._settings.drain_period)
-        self.stand_down()
+
+    def step(self) -> Wait | None:
+        """Take what has come."""
+        _, is_busy = self._take_round()
+        return None if is_busy else self._pause
 
     def stand_down(self) -> None:
         """Take what was sent until now, and no more: an inactive recorder's file does not grow."""
@@ -96,7 +115,7 @@ class RecorderLoop:
         self._recorder.flush()
 
     def health(self) -> Health:
-        """What has come, and whether it is kept."""
+        """Tell what has come, and whether it is kept."""
         recorder = self._recorder
         foreign = {f"foreign {name}": count for name, count in recorder.foreign.items()}
         values = {"received": recorder.received, **foreign}
@@ -114,10 +133,10 @@ class RecorderLoop:
             FlightError: the bag could not be written to its end.
         """
         lost = {name: count for name, count in self._recorder.lost.items() if count}
-        self._shell.log(f"{self._recorder.received} messages received, missing: {lost or 0}")
+        self._node.log(f"{self._recorder.received} messages received, missing: {lost or 0}")
         if foreign := self._recorder.foreign:
             names = ", ".join(self._recorder.foreign_names())
-            self._shell.log(f"messages of {names} were left out: {foreign}")
+            self._node.log(f"messages of {names} were left out: {foreign}")
         self._recorder.close()
 
     def _take_round(self) -> tuple[bool, bool]:
@@ -134,8 +153,8 @@ class RecorderLoop:
         self._tell_failure()
         return is_timely, waiting
 
-    def _take_some(self, entry: In) -> tuple[int, int]:
-        """How many messages were taken, and how many of them were sent before the end.
+    def _take_some(self, entry: RawSubscription) -> tuple[int, int]:
+        """Take one topic's turn: messages taken, and those of them that were sent before the end.
 
         Those of a pause count, too: behind them in the queue are some to be recorded.
         """
@@ -149,7 +168,7 @@ class RecorderLoop:
                 timely += 1
                 if taken.sent_ns >= begin_ns:
                     self._recorder.record(entry.topic, *taken)
-            if self._until_ns is None:  # once told to stop, it is in a hurry
+            if self._gives_way and self._until_ns is None:  # once told to stop, it is in a hurry
                 os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
         return TURN, timely
 
@@ -169,18 +188,22 @@ class RecorderLoop:
 
     @property
     def _end_ns(self) -> int:
-        """What is sent later is not recorded."""
+        """Time by the senders' clocks after which nothing is recorded."""
         return NEVER_NS if self._until_ns is None else self._until_ns
 
     def _tell_failure(self) -> None:
         if self.failure and not self._told:
             self._told = True
-            self._shell.log(f"the bag is no longer written: {self.failure}; the flight goes on")
+            self._node.log(f"the bag is no longer written: {self.failure}; the flight goes on")
+
+
+NODE = NodeKind(RecorderNodeSettings, RecorderLoop)
 
 
 def main() -> NoReturn:
     """Entry point of recorder_node."""
-    run_node(RecorderNodeSettings, RecorderLoop)
+    os.nice(max(0, NICENESS - os.nice(0)))
+    run_nodes(NodeKind(RecorderNodeSettings, partial(RecorderLoop, gives_way=True)))
 
 
 if __name__ == "__main__":

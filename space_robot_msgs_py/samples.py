@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .compiled.records import Block, Record, shaped
 from .errors import MessageError
 
 Array = NDArray[np.float64]
@@ -48,34 +49,93 @@ class Timebase(NamedTuple):
         return tick
 
 
-@dataclass(slots=True)
-class RobotState:
-    """What the plant measures at a tick, and what it applied over the interval just ended."""
+class State(Record):
+    """The numbers of a `RobotState`, in one block for compiled code."""
 
-    tick: int
+    base_position: Array = shaped(lambda n: (3,))
+    """Position of the base's CoM in the inertial frame, m."""
+    quaternion: Array = shaped(lambda n: (4,))
+    """Base attitude ``[w, x, y, z]``, from the base frame to the inertial frame."""
+    base_velocity: Array = shaped(lambda n: (3,))
+    """Velocity of the base's CoM on inertial axes, m/s."""
+    omega_base: Array = shaped(lambda n: (3,))
+    """Base angular velocity in the *base* frame, as a gyro measures it, rad/s."""
+    joint_positions: Array = shaped(lambda n: (n,))
+    """Joint angles, rad."""
+    joint_velocities: Array = shaped(lambda n: (n,))
+    """Joint velocities, rad/s."""
+    applied_torque: Array = shaped(lambda n: (n + 3,))
+    """Torque applied over the last interval, N m: base x, y, z in the base frame, then joints."""
+
+
+STATE_FIELDS = tuple(State.__annotations__)
+"""Names of the numbers of a state, in their order in memory."""
+
+
+class RobotState:
+    """What the plant measures at a tick, and what it applied over the interval just ended.
+
+    Each field of `State` is an attribute, a view of ``block``, which compiled code reads whole.
+    """
+
+    __slots__ = ("block", "numbers", "tick", *STATE_FIELDS)
     base_position: Array
-    """(3,) m, base CoM in the inertial frame."""
     quaternion: Array
-    """(4,) ``[w, x, y, z]``, base attitude."""
     base_velocity: Array
-    """(3,) m/s, base CoM, inertial frame."""
     omega_base: Array
-    """(3,) rad/s, base angular velocity in the *base* frame, as a gyro measures it."""
     joint_positions: Array
-    """(n,) rad."""
     joint_velocities: Array
-    """(n,) rad/s."""
     applied_torque: Array
-    """(n+3,) N m applied over the last interval: base x, y, z (base frame), then joints."""
+
+    def __init__(self, tick: int, block: Block) -> None:
+        """``block``: (1,) array of a `State`."""
+        self.tick, self.block = tick, block
+        self.numbers: Array = block.view(np.float64)
+        """All fields one behind the other, the same memory."""
+        for name in STATE_FIELDS:
+            setattr(self, name, block[0][name])
 
     @classmethod
     def allocate(cls, n: int) -> RobotState:
         """A state for ``n`` joints, at rest at the origin."""
-        quaternion = np.array([1.0, 0.0, 0.0, 0.0])
-        return cls(
-            0, np.zeros(3), quaternion, np.zeros(3), np.zeros(3), np.zeros(n), np.zeros(n),
-            np.zeros(n + 3),
-        )  # fmt: skip
+        state = cls(0, State.block(n))
+        state.quaternion[0] = 1.0
+        return state
+
+    def copy(self) -> RobotState:
+        """The same state in memory of its own."""
+        return RobotState(self.tick, self.block.copy())
+
+
+class Reference(Record):
+    """The desired motion at a tick, laid out as the two parts of a `ReferenceChunk`'s row."""
+
+    joint_positions: Array = shaped(lambda n: (n,))
+    """rad."""
+    joint_velocities: Array = shaped(lambda n: (n,))
+    """rad/s."""
+    joint_accelerations: Array = shaped(lambda n: (n,))
+    """rad/s2."""
+    quaternion: Array = shaped(lambda n: (4,))
+    """Base attitude ``[w, x, y, z]``, from the base frame to the inertial frame."""
+    omega_base: Array = shaped(lambda n: (3,))
+    """Angular velocity of the base in the base frame, rad/s."""
+    alpha_base: Array = shaped(lambda n: (3,))
+    """Angular acceleration of the base in the base frame, rad/s2."""
+
+    @staticmethod
+    def parts(references: Block) -> tuple[Array, Array]:
+        """Views (k, 3, n) and (k, 10) of the joints' and the base's part of k references."""
+        k, size = len(references), references.itemsize // 8
+        numbers = references.view(np.float64).reshape(k, size)
+        return numbers[:, :-10].reshape(k, 3, (size - 10) // 3), numbers[:, -10:]
+
+    @classmethod
+    def at_rest(cls, n: int) -> Block:
+        """A block of one that asks for rest at zero."""
+        block = cls.block(n)
+        block[0].quaternion[0] = 1.0
+        return block
 
 
 @dataclass(slots=True)
@@ -103,6 +163,13 @@ class ReferenceChunk:
     def stop(self) -> int:
         """Tick after the last row."""
         return self.start + len(self.joints)
+
+    def references(self) -> Block:
+        """(k,) array of a `Reference` each, a copy."""
+        found: Block = np.empty(len(self.joints), Reference.dtype(self.joints.shape[2]))
+        joints, base = Reference.parts(found)
+        joints[:], base[:] = self.joints, self.base
+        return found
 
 
 class LawInForce(NamedTuple):

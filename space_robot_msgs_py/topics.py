@@ -11,56 +11,40 @@ BASE_AXES = ("base_x", "base_y", "base_z")
 
 
 class Topic(NamedTuple):
-    """One topic of the graph."""
+    """One topic of the graph. What its messages say stands in the module of `wire` of its name."""
 
     name: str
     type: str
     depth: int
     """History kept, in messages. Shallow queues lose data at 2 kHz (keep seconds of traffic)."""
-    listeners: tuple[str, ...]
-    """Nodes of the graph that subscribe to it."""
     per_tick: bool = False
     """One message a tick, so a gap in its stamps is a loss."""
     transient_local: bool = False
     """Late joiners get the last ``depth`` messages."""
     is_event: bool = False
     """A message whenever something happens, so a gap in its stamps is no loss."""
+    has_stamp: bool = True
+    """Its messages begin with a stamp; of others the first number is the tick."""
 
 
-TO_CONTROLLER = ("controller_node", "recorder_node")
-TO_PLANT = ("plant_node", "recorder_node")
-TO_MISSION = ("mission_node", "recorder_node")
-
-JOINT_STATES = Topic(
-    "/joint_states", "sensor_msgs/msg/JointState", 10_000, TO_CONTROLLER,
-    per_tick=True,
-)  # fmt: skip
-BASE_STATE = Topic(
-    "/base/state", "sensor_msgs/msg/MultiDOFJointState", 10_000, TO_CONTROLLER,
-    per_tick=True,
-)  # fmt: skip
-COMMAND = Topic("/command", "sensor_msgs/msg/JointState", 10_000, TO_PLANT, per_tick=True)
+JOINT_STATES = Topic("/joint_states", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
+BASE_STATE = Topic("/base/state", "sensor_msgs/msg/MultiDOFJointState", 10_000, per_tick=True)
+COMMAND = Topic("/command", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
 # Reference and clock are not transient local: a late joiner would be told the past, and that a
 # message was lost if one is pushed out meanwhile; at depth 1 a slow one would lose some. The
 # mission says again what is still needed when somebody joins, a plant that waits its time.
-REFERENCE_JOINTS = Topic(
-    "/reference/joints", "trajectory_msgs/msg/JointTrajectory", 200, TO_CONTROLLER
-)
-REFERENCE_BASE = Topic(
-    "/reference/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 200, TO_CONTROLLER
-)
-TELEMETRY = Topic(
-    "/controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, ("recorder_node",)
-)
+REFERENCE_JOINTS = Topic("/reference/joints", "trajectory_msgs/msg/JointTrajectory", 200)
+REFERENCE_BASE = Topic("/reference/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 200)
+TELEMETRY = Topic("/controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, has_stamp=False)
 LAW = Topic(
-    "/controller/law", "rcl_interfaces/msg/ParameterEvent", 100, ("recorder_node",),
+    "/controller/law", "rcl_interfaces/msg/ParameterEvent", 100,
     transient_local=True, is_event=True,
 )  # fmt: skip
-CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock", 1_000, TO_MISSION)
+CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock", 1_000)
 
 ALL = (
     JOINT_STATES, BASE_STATE, COMMAND, REFERENCE_JOINTS, REFERENCE_BASE, TELEMETRY, LAW, CLOCK,
 )  # fmt: skip
 """All that are recorded."""
 BY_NAME = {topic.name: topic for topic in ALL}
-DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100, ())
+DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100)

@@ -6,17 +6,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .dynamics import bias_force, forward_dynamics, mass_matrix
 from .robot import Robot
+from .robot.dynamics import bias_force, forward_dynamics, mass_matrix
 
 if TYPE_CHECKING:
-    from space_robot_msgs_py.flight_log import FlightLog
+    from space_robot_msgs_py.bag.flight_log import FlightLog
 
 __all__ = ["Robot", "bias_force", "forward_dynamics", "load_bag", "mass_matrix"]
 
 
 def load_bag(path: str | Path, remap: Mapping[str, str] | None = None) -> FlightLog:
-    """A recorded flight as NumPy arrays, one row a tick.
+    """Read a recorded flight as NumPy arrays, one row a tick.
 
     Some of its fields, for N ticks and n joints:
 
@@ -43,6 +43,6 @@ def load_bag(path: str | Path, remap: Mapping[str, str] | None = None) -> Flight
     Raises:
         InputError: no bag is there, or no flight in it; one line says why.
     """
-    from space_robot_msgs_py.bag.reader import read_flight  # the nodes start without it
+    from space_robot_msgs_py.bag.reader import read_flight
 
     return read_flight(Path(path), remap)

@@ -17,15 +17,17 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.accounts import noted_accounts
+from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
+from space_robot_msgs_py.bag.metadata import read_information
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import FLIGHT_KEY, BagRecorder
-from space_robot_msgs_py.definitions import definition, jazzy
-from space_robot_msgs_py.flight_log import REFERENCE, STATE, FlightLog
-from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.samples import STATE_FIELDS, Timebase
+from space_robot_msgs_py.wire.definitions import definition, jazzy
 
 TIMEBASE = Timebase(500_000)
 FLIGHT = {"controller": "tde_stc", "case": "1", "period": 0.0005}
-COLUMNS = (*STATE, *REFERENCE, "commanded_torque")
+COLUMNS = (*STATE_FIELDS, *REFERENCE, "commanded_torque")
 
 Entry = tuple[str, str, int, bytes]
 """Topic, type, log time, message."""
@@ -134,6 +136,11 @@ def mcap_of(path: Path, entries: Iterable[Entry], **options: Any) -> Path:
             writer.add_message(channels[name], log_ns, data, log_ns)
         writer.finish()
     return path
+
+
+def read_accounts(bag: Path) -> dict[str, dict[str, Any]]:
+    """What our recorder counted of each topic of a finished bag: received, missing, ..."""
+    return {n: a.model_dump() for n, a in noted_accounts(read_information(bag).noted).items()}
 
 
 def redescribed(bag: Path, description: str | None) -> Path:

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller import Controller
+from space_robot_control.controller.controller import Controller
+from space_robot_control.controller.reference_buffer import ReferenceBuffer
 from space_robot_control.laws import ControlLaw, find_law
-from space_robot_control.mission import Mission, MissionSettings
-from space_robot_control.reference import ReferenceBuffer
+from space_robot_control.mission.mission import Mission, MissionSettings
 from space_robot_sim import Robot
-from space_robot_sim.plant import Plant, PlantSettings
+from space_robot_sim.plant.plant import Plant, PlantSettings
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ class Loop:
                 state.applied_torque[:] = self._last
             if self.flipped:
                 state.quaternion *= -1.0
-            command = self.controller.update(state, *self.references.at(tick))
+            command = self.controller.update(state, self.references.at(tick))
             assert command.tick == tick
             self._last[:] = command.torque
             errors.append(self.controller.signals.error.copy())

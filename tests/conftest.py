@@ -1,10 +1,12 @@
-"""Fixtures for all tests; the hypothesis profile: the same examples on every run; what may lack."""
+"""Fixtures and marks for all tests; the same examples of hypothesis on every run; what may lack."""
 
 from __future__ import annotations
 
+import json
+import subprocess
 import sys
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -18,12 +20,19 @@ else:
     )
     settings.load_profile("ci")
 
-from space_robot_control.flight.domain import ros_domain
+from flights import Flown, Start, ros_environment, space_robot
+from paths import CONFIG, TESTS
+
+from space_robot_control.flight.graph.domain import ros_domain
+from space_robot_control.flight.node_modules import MODULES
 from space_robot_sim.robot import Robot
 
-ROBOTS = Path(__file__).resolve().parent.parent / "config" / "robots"
+if TYPE_CHECKING:
+    from ground import Ground
 
-TOOLS = ("cvxpy", "hypothesis", "mujoco", "pinocchio")
+ROBOTS = CONFIG / "robots"
+
+TOOLS = ("cvxpy", "hypothesis", "mujoco", "pinocchio", "psutil", "pyarrow")
 """Of the tests only. Where `colcon test` finds one missing, the modules that use it are skipped,
 whichever of their helpers imports it."""
 
@@ -38,6 +47,45 @@ class _MissingTool:
 
 
 sys.meta_path.append(_MissingTool())
+
+OF_ROS = {"domain", "free_domain", "fly", "start", "ground"}
+"""Fixtures of tests that start ROS processes, or are a node of their own."""
+WITH_ROS = ("control/flight/graph/", "control/flight/replay/")
+SLOW = (
+    "benchmarks/", "control/campaign/", "control/paper/", "control/cli/test_output.py",
+    "control/cli/test_stability_command.py", "control/flight/test_interruption.py",
+    "control/flight/test_long_flights.py", "msgs/bag/test_bag_fuzz.py",
+    "msgs/bag/test_description_fuzz.py", "test_packaging.py", "test_shown_outputs.py",
+)  # fmt: skip
+"""Folders and files whose tests take seconds each."""
+TIMEOUT_S = 600
+"""Of each test, its fixtures included: kernels may have to be compiled first."""
+
+
+def marks(where: str, fixtures: Iterable[str]) -> Iterator[str]:
+    """The marks of a test in the file ``where``, relative to tests/, that uses ``fixtures``."""
+    if where.startswith(WITH_ROS) or OF_ROS.intersection(fixtures):
+        yield "ros"
+    if where.startswith(SLOW):
+        yield "slow"
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Tell of the marks."""
+    config.addinivalue_line("markers", "ros: starts ROS processes; given by fixture and folder")
+    config.addinivalue_line("markers", "slow: takes seconds; given by folder, or by the test")
+    if not config.pluginmanager.hasplugin("timeout"):  # where `colcon test` runs, perhaps
+        config.addinivalue_line("markers", "timeout(seconds): needs pytest-timeout")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark by fixture and by folder; limit every test's time."""
+    for item in items:
+        where = item.path.relative_to(TESTS).as_posix()
+        for mark in marks(where, getattr(item, "fixturenames", ())):
+            item.add_marker(mark)
+        if not item.get_closest_marker("timeout"):
+            item.add_marker(pytest.mark.timeout(TIMEOUT_S))
 
 
 @pytest.fixture(scope="session")
@@ -58,3 +106,63 @@ def domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
     with ros_domain() as number:
         yield number
+
+
+@pytest.fixture(scope="session")
+def fly(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Flown]:
+    """Fly a graph with the given options; each set of options flies once a session."""
+    pytest.importorskip("rclpy")
+    flown: dict[tuple[str, ...], Flown] = {}
+
+    def run(*options: str) -> Flown:
+        if options not in flown:
+            bag = tmp_path_factory.mktemp("flights") / "bag"
+            result = space_robot("fly", *options, "--bag", str(bag), "--json")
+            assert result.returncode == 0, result.stderr
+            flown[options] = Flown(json.loads(result.stdout), bag, result.stderr)
+        return flown[options]
+
+    return run
+
+
+@pytest.fixture
+def free_domain() -> int:
+    """Of nobody: a flight will take it."""
+    with ros_domain() as domain:
+        return domain
+
+
+@pytest.fixture
+def start(domain: int) -> Iterator[Start]:
+    """Start nodes in a domain of their own; what still runs at the end is stopped."""
+    running: list[subprocess.Popen[str]] = []
+
+    def run(node: str, **parameters: object) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", MODULES[node]]
+        if parameters:
+            command.append("--ros-args")
+        for name, value in parameters.items():
+            command += ["-p", f"{name.replace('__', '.')}:={value}"]
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            env={**ros_environment(), "ROS_DOMAIN_ID": str(domain)},
+        )  # fmt: skip
+        running.append(process)
+        return process
+
+    yield run
+    for process in running:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+@pytest.fixture
+def ground(domain: int) -> Iterator[Ground]:
+    """A node of the test in the same domain."""
+    pytest.importorskip("rclpy")
+    from ground import Ground
+
+    it = Ground(domain)
+    yield it
+    it.close()

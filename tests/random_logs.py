@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 
 TIMEBASE = Timebase(500_000)

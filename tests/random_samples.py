@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from space_robot_msgs_py.samples import RobotState, Timebase
+from space_robot_msgs_py.samples import STATE_FIELDS, RobotState, Timebase
 
 TIMEBASE = Timebase(500_000)
 BASE_AXES = ["base_x", "base_y", "base_z"]
@@ -22,13 +22,13 @@ def random_sample(n: int, seed: int, tick: int = 4001) -> RobotState:
     rng = np.random.default_rng(seed)
     state = RobotState.allocate(n)
     state.tick = tick
-    for name in RobotState.__slots__[1:]:
+    for name in STATE_FIELDS:
         getattr(state, name)[:] = rng.normal(size=getattr(state, name).shape)
     return state
 
 
 def assert_same(actual: RobotState, expected: RobotState) -> None:
-    for name in RobotState.__slots__[1:]:
+    for name in STATE_FIELDS:
         np.testing.assert_array_equal(getattr(actual, name), getattr(expected, name), name)
 
 

@@ -11,11 +11,12 @@ from xml.etree import ElementTree
 import click
 import pytest
 
-from space_robot_control.cli import cli
+from space_robot_control.cli.main import cli
+from space_robot_control.flight.graph.listeners import LISTENERS
 from space_robot_msgs_py import topics
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 PREFIXES = (
     "", "space_robot_control.", "space_robot_msgs_py.", "space_robot_sim.",
     "space_robot_sim.dynamics.",
@@ -47,7 +48,7 @@ def resolve(name: str) -> object:
 
 
 def test_functions_named_in_the_theory_exist() -> None:
-    names = sorted(set(DOTTED.findall((ROOT / "docs/theory.md").read_text("utf-8"))))
+    names = sorted(set(DOTTED.findall((ROOT / "docs/explanation/theory.md").read_text("utf-8"))))
     assert len(names) > 20
     for name in names:
         resolve(name)
@@ -55,7 +56,7 @@ def test_functions_named_in_the_theory_exist() -> None:
 
 def test_snippets_of_the_errata_run(capsys: pytest.CaptureFixture[str]) -> None:
     """And print the numbers that stand below them."""
-    text = (ROOT / "docs/errata.md").read_text("utf-8")
+    text = (ROOT / "docs/explanation/errata.md").read_text("utf-8")
     for snippet in re.findall(r"```python\n(.*?)```", text, re.DOTALL):
         exec(snippet, {})
     printed = capsys.readouterr().out
@@ -68,6 +69,16 @@ def test_links_lead_to_files(document: Path) -> None:
     for target in re.findall(r"\]\(([^)]+)\)", document.read_text("utf-8")):
         if "://" not in target:
             assert (document.parent / target.split("#")[0]).exists(), target
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda p: p.name)
+def test_files_of_the_source_tree_exist(document: Path) -> None:
+    """Those that are named with their folder."""
+    named = re.findall(
+        r"`((?:space_robot_\w+|tests|config|docs)/[\w./]+)`", document.read_text("utf-8")
+    )
+    for name in named:
+        assert (ROOT / name).exists(), name
 
 
 def commands(text: str) -> Iterator[list[str]]:
@@ -92,7 +103,7 @@ def test_commands_and_options_exist(document: Path) -> None:
 
 
 def test_security_policy_has_one_publisher_a_topic_and_all_listeners() -> None:
-    text = (ROOT / "docs/security.md").read_text("utf-8")
+    text = (ROOT / "docs/manual/security.md").read_text("utf-8")
     block = re.search(r"```xml\n(.*?)```", text, re.DOTALL)
     assert block is not None
     policy = ElementTree.fromstring(block.group(1))
@@ -106,4 +117,4 @@ def test_security_policy_has_one_publisher_a_topic_and_all_listeners() -> None:
 
     for topic in topics.ALL:
         assert len(nodes("publish", topic.name)) == 1, topic.name
-        assert nodes("subscribe", topic.name) == list(topic.listeners), topic.name
+        assert nodes("subscribe", topic.name) == list(LISTENERS[topic]), topic.name

@@ -12,14 +12,19 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+from import_graph import PACKAGES, modules
 
-from space_robot_control.cli import cli
-from space_robot_control.node_modules import MODULES
+from space_robot_control.cli.main import cli
+from space_robot_control.flight.node_modules import MODULES
 from space_robot_msgs_py import topics
 
 ROOT = Path(__file__).resolve().parents[1]
 EXECUTABLES = sorted((ROOT / "resource/executables").iterdir())
-TOOLS = ("mujoco", "cvxpy", "hypothesis", "pinocchio")
+TOOLS = ("mujoco", "cvxpy", "hypothesis", "pinocchio", "psutil", "pyarrow")
+PYPI = {"yaml": "pyyaml", "typing_extensions": "typing-extensions", "pinocchio": "pin"}
+"""Names on PyPI of modules that are not called as their package."""
+OF_EXTRAS = {"psutil": "soak", "pyarrow": "parquet"}
+"""Packages that one command needs, and their extra."""
 ROSDEP = {"pyyaml": "yaml"}
 """Names of rosdep's keys, behind python3-, where they are not the package's."""
 
@@ -49,6 +54,84 @@ def from_pip() -> set[str]:
     match = re.search(r"<!-- From pip.*?:\s(.*?)\. -->", text, re.DOTALL)
     assert match is not None
     return set(match.group(1).replace(",", " ").split())
+
+
+def test_the_version_is_that_of_setup_py_everywhere() -> None:
+    """In package.xml, CITATION.cff and the changelog's newest entry, which has its date or none."""
+    version = setup_keyword("version")
+    assert dependencies("version") == {version}
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text("utf-8")
+    heads = re.findall(r"^## (.*)$", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE)
+    entries = [re.fullmatch(r"(\d+\.\d+\.\d+) \((unreleased|\d{4}-\d\d-\d\d)\)", h) for h in heads]
+    assert all(entries), heads
+    found = [entry.groups() for entry in entries if entry]
+    assert found[0][0] == version
+    assert all(date != "unreleased" for _, date in found[1:])
+    assert found == sorted(found, key=lambda e: [int(n) for n in e[0].split(".")], reverse=True)
+
+
+def test_a_released_version_has_its_date_in_the_citation() -> None:
+    changelog = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    dated = re.search(r"^## \S+ \((\d{4}-\d\d-\d\d)\)$", changelog.split("\n\n")[1], re.MULTILINE)
+    released = re.search(
+        r"^date-released: (\S+)$", (ROOT / "CITATION.cff").read_text("utf-8"), re.MULTILINE
+    )
+    assert (released and released[1]) == (dated and dated[1])
+
+
+def test_setup_py_and_the_imports_name_the_same_packages() -> None:
+    """What is imported is required, or of an extra and looked for before; nothing else is."""
+    found = third_party_imports()
+    required = packages(setup_keyword("install_requires"))
+    assert found - set(OF_EXTRAS) - dependencies("exec_depend") == required
+    extras = setup_keyword("extras_require")
+    for name, extra in OF_EXTRAS.items():
+        assert name in found
+        assert name in packages(extras[extra])
+        assert name in packages(extras["test"])
+
+
+def third_party_imports() -> set[str]:
+    """Packages that the three packages import anywhere, by their names on PyPI."""
+    names = set()
+    for file in modules().values():
+        for node in ast.walk(ast.parse((ROOT / file).read_text("utf-8"))):
+            if isinstance(node, ast.Import):
+                names |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
+                names.add(node.module.split(".")[0])
+    names -= {*sys.stdlib_module_names, *PACKAGES}
+    return {PYPI.get(name, name) for name in names}
+
+
+def test_the_docs_name_every_extra_that_a_command_needs() -> None:
+    """By the line that its error shows; and no extra that is not there."""
+    extras = setup_keyword("extras_require")
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    text = "\n".join(page.read_text("utf-8") for page in pages)
+    for extra in OF_EXTRAS.values():
+        assert f"pip install 'space_robot[{extra}]'" in text, extra
+    named = {name for group in re.findall(r"install [^\n]*\[([\w,]+)\]", text)
+             for name in group.split(",")}  # fmt: skip
+    assert named <= set(extras)
+
+
+def test_the_makefile_installs_extras_of_setup_py() -> None:
+    text = (ROOT / "Makefile").read_text("utf-8")
+    named = {name for group in re.findall(r"'\.\[([\w,]+)\]'", text) for name in group.split(",")}
+    assert {"ros", "test", "mutation"} <= named <= set(setup_keyword("extras_require"))
+
+
+def test_types_of_untyped_libraries_are_told_of_libraries_that_are_used() -> None:
+    """The list in pyproject.toml, of modules that mypy need not find."""
+    text = (ROOT / "pyproject.toml").read_text("utf-8")
+    (listed,) = re.findall(r"module = \[\n(.*?)\]\nignore_missing_imports", text, re.DOTALL)
+    untyped = {PYPI.get(name, name) for name in re.findall(r'"(\w+)\.\*"', listed)}
+    messages = {topic.type.split("/")[0] for topic in (*topics.ALL, topics.DIAGNOSTICS)}
+    assert untyped - messages <= third_party_imports() | dependencies("exec_depend") | {
+        "mujoco",
+        "pin",
+    }
 
 
 def test_package_xml_has_what_setup_py_requires() -> None:

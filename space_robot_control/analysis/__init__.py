@@ -1,6 +1,6 @@
-"""How well a flight was flown: the figures of merit of Table V, and of those who fly.
+"""Metrics, tables and figures of flights: those of Table V, and those that who flies asks for.
 
-| module | figures |
+| module | metrics |
 |---|---|
 | `metrics` | RMS in both definitions, maxima, chatter |
 | `spectrum` | power above 100 Hz |
@@ -15,6 +15,6 @@ All are summed up over blocks of a flight (`blocks`), so that it may be longer t
 
 from .excerpt import excerpt
 from .metrics import tracking_error
-from .report import Analysis, analyse
+from .report import Analysis, analyze
 
-__all__ = ["Analysis", "analyse", "excerpt", "tracking_error"]
+__all__ = ["Analysis", "analyze", "excerpt", "tracking_error"]

@@ -1,4 +1,4 @@
-"""What became of the commands: limits reached, answers late, torques that were not commanded."""
+"""Metrics of the commands: limits reached, latency, deadlines missed."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.bag.blocks import Metric, last_rows
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
 
-from .blocks import Figure, last_rows
 from .generalised_motion import measured_rows
 
 Array = NDArray[np.float64]
@@ -19,18 +19,18 @@ PERCENTILES = {"p50": 50.0, "p99": 99.0, "max": 100.0}
 
 
 class TorqueLimits(NamedTuple):
-    """Of the actuators, N m; infinite: none."""
+    """Largest torque of each actuator of base and joints, N m; infinite where there is no limit."""
 
     base: float
     joint: float
 
     def of_axes(self, axes: int) -> Array:
-        """(m,) each axis'."""
+        """Return the limit of each axis, (m,) N m."""
         return np.array([self.base] * 3 + [self.joint] * (axes - 3))
 
 
-class Saturation(Figure):
-    """Ticks at which the torque applied on some axis was at its limit.
+class Saturation(Metric):
+    """Counts the ticks at which the torque applied on some axis was at its limit.
 
     The plant clips to the limit, so "at" is exact but for the rounding of whoever recorded.
     """
@@ -47,7 +47,7 @@ class Saturation(Figure):
         self._rows += log.ticks
 
     def result(self) -> dict[str, Any]:
-        """Limits (None: none), ticks, and their share."""
+        """Return the limits (None: none), the ticks at one, and their share of all ticks."""
         base, joint = self._limits
         return {
             "base_torque_limit_n_m": base if np.isfinite(base) else None,
@@ -57,11 +57,11 @@ class Saturation(Figure):
         }
 
 
-class Latency(Figure):
-    """Percentiles of the time from a state's sending to its answer's, by the wall clock."""
+class Latency(Metric):
+    """Takes percentiles of the wall-clock time from a state's sending to its command's."""
 
     def __init__(self, period: float) -> None:
-        """``period``: s, of a tick."""
+        """Begin without rows; ``period`` is that of a tick, s."""
         self._period = period
         self._known: list[Array] = []
 
@@ -71,7 +71,7 @@ class Latency(Figure):
             self._known.append(log.latency_s[np.isfinite(log.latency_s)])
 
     def result(self) -> dict[str, float]:
-        """``p50_ms``, ``p99_ms``, ``max_ms``, as ``..._ticks``, and how many ``answers``."""
+        """Return ``p50``, ``p99``, ``max`` as ``..._ms`` and ``..._ticks``, and ``answers``."""
         known = np.concatenate([np.empty(0), *self._known])
         if not len(known):
             raise InputError("no wall-clock times of states and commands: not flown as a graph")
@@ -84,8 +84,12 @@ class Latency(Figure):
         }
 
 
-class Misses(Figure):
-    """Ticks after which the plant applied something else than what was commanded for them.
+class MissedDeadlines(Metric):
+    """Counts the ticks that did not get their own command, one that came too late included.
+
+    The plant's diagnostics count them all as they happen (``missed_deadlines``); a recording tells
+    two kinds apart: ticks that no command was ever recorded for (``unanswered_ticks``), and ticks
+    with a command other than the torque that was applied (``differing_ticks``), since it was late.
 
     The torque applied over the interval that begins at tick k is reported with the state of tick
     k+1; commanded for it was the answer to tick ``k - latency_ticks``, clipped to the limits. In
@@ -124,7 +128,7 @@ class Misses(Figure):
         self._due = commands[-self._delay :].copy()
 
     def result(self) -> dict[str, int]:
-        """Unanswered, compared and differing ticks."""
+        """Return the unanswered, compared and differing ticks."""
         if not self._known:
             raise InputError("the commands were not recorded")
         return {

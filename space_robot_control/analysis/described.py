@@ -1,4 +1,4 @@
-"""What a flight's description says beyond names: its robot, its actuators' limits, its Mbar.
+"""The robot, the actuators' limits and h_bar, from a flight's description.
 
 A bag carries the numbers. One that does not (an older one, or of another recorder) is taken at its
 names' word: the robot, case and gains of that name here and now. Files and modules that it names
@@ -13,16 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.configuration import named_file
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.law_history import laws_of
+from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
-from space_robot_sim.plant_settings import PlantNodeSettings
+from space_robot_sim.plant.settings import PlantNodeSettings
 from space_robot_sim.robot import Robot
 
-from ..law_history import laws_of
-from ..settings import ControllerNodeSettings, build_law
-from ..time_delay_estimation import low_pass_weight
-from ..trust import check_file, check_law
+from ..controller.gains import build_law
+from ..controller.settings import ControllerNodeSettings
+from ..controller.time_delay_estimation import low_pass_weight
+from ..laws.trust import check_file, check_law
 from .actuation import TorqueLimits
 from .estimate_error import HBar
 
@@ -30,11 +31,11 @@ Array = NDArray[np.float64]
 
 
 class NotDescribedError(InputError):
-    """The bag does not say what a figure needs; the message says what is missing."""
+    """The bag does not say what a metric needs; the message says what is missing."""
 
 
 def robot_of(log: FlightLog) -> Robot:
-    """The robot that was flown.
+    """Build the robot that was flown.
 
     Raises:
         InputError: it is not described, not here, or not that of the bag's joints.
@@ -56,7 +57,7 @@ def robot_of(log: FlightLog) -> Robot:
 
 
 def torque_limits(log: FlightLog) -> TorqueLimits:
-    """What the plant clipped the torques to.
+    """Find the limits that the plant clipped the torques to.
 
     Raises:
         InputError: not even the case is named, or it is not here.
@@ -76,7 +77,7 @@ def torque_limits(log: FlightLog) -> TorqueLimits:
 
 
 def estimator(log: FlightLog) -> tuple[HBar, float]:
-    """Hbar of the laws' time-delay estimate, and the weight of its low-pass (0: none).
+    """Find h_bar of the laws' time-delay estimate, and the weight of its low-pass (0: none).
 
     Raises:
         InputError: the law is not recorded, and has no estimate or is not described.
@@ -95,7 +96,7 @@ def estimator(log: FlightLog) -> tuple[HBar, float]:
 
 
 def recorded_h_bar(log: FlightLog) -> Array:
-    """Of the laws in force in the rows of ``log``, see `HBar`."""
+    """Return h_bar of the laws in force in the rows of ``log``, see `HBar`."""
     laws, none = laws_of(log), np.full(log.axes, np.nan)
     rows = [none]
     for law in laws:
@@ -109,10 +110,10 @@ def recorded_h_bar(log: FlightLog) -> Array:
 
 
 def _described_h_bar(log: FlightLog) -> Array:
-    """Of a bag without the laws in force, at its description's word."""
+    """Return h_bar of a bag without the laws in force, at its description's word."""
     flight = log.flight
     if flight.get("swaps"):
-        raise NotDescribedError("laws were swapped in flight, so no one Hbar holds")
+        raise NotDescribedError("laws were swapped in flight, so no one h_bar holds")
     if not (name := flight.get("controller")):
         raise NotDescribedError("the bag does not say which law was flown")
     if isinstance(gains := flight.get("gains_used"), dict):

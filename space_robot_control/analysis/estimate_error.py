@@ -1,9 +1,10 @@
-"""How far the time-delay estimate N_hat was from N, from recorded motion and torque alone.
+"""The error of the time-delay estimate N_hat of N, from recorded motion and torque alone.
 
-``N = F_S - Mbar rhodd`` (33) is all that the constant diagonal inertia Mbar (the gain ``h_bar``)
-leaves out; ``N_hat(t) = N(t - delta)`` (35), (36). The controller forms N_hat from the pair that
-`space_robot_control.time_delay_estimation` keeps: the torque *applied* over the last interval and
-the mean acceleration over it. Both are in a bag, so N_hat follows without the telemetry.
+``N = F_S - h_bar rhodd`` (33) is all that the constant diagonal inertia h_bar (the gain ``h_bar``)
+leaves out; ``N_hat(t) = N(t - delta)`` (35), (36). The controller forms N_hat from the pair of
+`space_robot_control.controller.time_delay_estimation`: the torque *applied* over the last
+interval and the mean acceleration over it. Both are in a bag, so N_hat follows without the
+telemetry.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.bag.blocks import Metric, joined, last_rows
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.law_history import laws_of
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
 
-from ..law_history import laws_of
-from .blocks import Figure, joined, last_rows
 from .generalised_motion import (
     applied_force,
     continuous_quaternion,
@@ -29,20 +30,14 @@ from .metrics import AxisMaximum, AxisRms, Table, axis_groups
 
 Array = NDArray[np.float64]
 HBar = Callable[[FlightLog], Array]
-"""Hbar in force in the rows of a log: (m,), or (N, m) with NaN under a law without an estimate."""
-
-
-def neglected_force(log: FlightLog, h_bar: Array) -> Array:
-    """(N-1, m) ``N`` (33) over the interval that begins at each tick.
-
-    N m on the joints; on the base the generalised force that belongs to eps, twice the torque
-    where the attitude is small.
-    """
-    return applied_force(log) - h_bar * mean_acceleration(log)
+"""h_bar in force in the rows of a log: (m,), or (N, m) with NaN under a law without an estimate."""
 
 
 class DelayedEstimate:
-    """``N_hat`` as the controller forms it, from `neglected_force` in parts."""
+    """``N_hat`` as the controller forms it, from `generalised_motion.neglected_force` in parts.
+
+    It is linear, so that it may be formed of force and acceleration before h_bar is known.
+    """
 
     def __init__(self, smoothing: float = 0.0, rest: bool = True) -> None:
         """Begin without rows.
@@ -57,7 +52,7 @@ class DelayedEstimate:
         self._state: Array | None = None
 
     def of(self, neglected: Array) -> Array:
-        """(K, m) ``N_hat`` at the ends of the intervals of ``neglected`` (K, m)."""
+        """(K, ...) ``N_hat`` at the ends of the intervals of ``neglected`` (K, ...)."""
         smoothing = self._smoothing
         if not (0.0 < smoothing < 1.0 and len(neglected)):
             return neglected
@@ -74,7 +69,7 @@ class DelayedEstimate:
 
 
 class EstimateErrors:
-    """``N - N_hat`` of a flight in parts, in the units of `neglected_force`.
+    """``N - N_hat`` of a flight in parts, in the units of `generalised_motion.neglected_force`.
 
     It is known from the third row on, at the tick before. Ticks whose state was filled in
     (`FlightLog.filled`), and their neighbours, are left out: what stands there was not measured.
@@ -84,15 +79,15 @@ class EstimateErrors:
     def __init__(self, h_bar: HBar, smoothing: float = 0.0, rest: bool = True) -> None:
         """``h_bar``: as `described.estimator` has it; the others as in `DelayedEstimate`."""
         self._h_bar = h_bar
-        self._forces, self._accelerations = (DelayedEstimate(smoothing, rest) for _ in range(2))
+        self._estimate = DelayedEstimate(smoothing, rest)
         self._before: FlightLog | None = None
         """The last two rows, or the only one."""
         self._side = 1.0
         """1 if Q continues from Q in these rows, -1 if from -Q."""
         self._measured = np.empty(0, np.bool_)
-        """Of these rows."""
-        self._pair: tuple[Array, ...] | None = None
-        """Force and acceleration of the estimate at the last row, (1, m) each."""
+        """True for those of these rows that were measured."""
+        self._last: Array | None = None
+        """(1, 2, m) force and acceleration of the estimate at the last row."""
 
     def of(self, log: FlightLog) -> Array:
         """(K, m) those that become known with the rows of ``log``."""
@@ -105,15 +100,15 @@ class EstimateErrors:
         part = rows.rows(seen, rows.ticks)
         with np.errstate(divide="ignore", invalid="ignore"):  # J0 may be singular
             force, acceleration = applied_force(part), mean_acceleration(part)
-        pair: tuple[Array, ...] = self._forces.of(force), self._accelerations.of(acceleration)
-        if self._pair is not None:
-            pair = tuple(np.concatenate(both) for both in zip(self._pair, pair, strict=True))
-        known = slice(len(force) - len(pair[0]) + 1, len(force))
+        estimates = self._estimate.of(np.stack([force, acceleration], axis=1))
+        if self._last is not None:
+            estimates = np.concatenate([self._last, estimates])
+        known = slice(len(force) - len(estimates) + 1, len(force))
         h_bar = self._h_bar(part)
         if h_bar.ndim == 2:
             h_bar = h_bar[known]
-        # the pair outlasts a change of law or gains, its Hbar does not
-        estimate = pair[0][:-1] - h_bar * pair[1][:-1]
+        # force and acceleration outlast a change of law or gains, their h_bar does not
+        estimate = estimates[:-1, 0] - h_bar * estimates[:-1, 1]
         error: Array = force[known] - h_bar * acceleration[known] - estimate
         there = np.broadcast_to(np.isfinite(h_bar).all(axis=-1), len(error))
         if log.filled:
@@ -123,11 +118,11 @@ class EstimateErrors:
             measured[-2:],
         )
         self._side = 1.0 if np.array_equal(rows.quaternion[-2:][0], recorded[-2:][0]) else -1.0
-        self._pair = tuple(half[-1:].copy() for half in pair)
+        self._last = estimates[-1:].copy()
         return error if there.all() else error[there]
 
 
-class EstimateError(Figure):
+class EstimateError(Metric):
     """RMS and largest absolute value of `EstimateErrors`, by group of axes."""
 
     def __init__(self, log: FlightLog, h_bar: HBar, smoothing: float) -> None:
@@ -143,7 +138,7 @@ class EstimateError(Figure):
         for law in laws_of(log):
             self._laws.add(law.name)
             self._has_estimate |= "h_bar" in law.gains
-        self._rms.add(errors**2)
+        self._rms.add(errors)
         self._maximum.add(errors)
 
     def result(self) -> Table:

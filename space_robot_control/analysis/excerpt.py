@@ -6,15 +6,15 @@ import math
 
 import numpy as np
 
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
 
 ROUNDING = 1e-6
 """Ticks by which a time may miss the tick it means."""
 
 
 def excerpt(log: FlightLog, from_s: float | None, to_s: float | None) -> FlightLog:
-    """The ticks with ``from_s <= t < to_s``, views into the arrays of ``log``.
+    """Return the ticks with ``from_s <= t < to_s``, views into the arrays of ``log``.
 
     What was lost or filled is not known by time: these counts stay those of the whole flight.
     Unanswered ticks are counted anew where the commands are known.

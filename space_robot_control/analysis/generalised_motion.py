@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog
 
 Array = NDArray[np.float64]
 
 
 def measured_rows(log: FlightLog, before: FlightLog | None = None) -> NDArray[np.bool_]:
-    """(N,) whether a tick's state was measured: one that was filled in repeats the one before.
+    """(N,) true where a tick's state was measured: one that was filled in repeats the one before.
 
     ``before``: rows before those of ``log`` (None: the flight begins with it).
     """
@@ -62,3 +62,12 @@ def applied_force(log: FlightLog) -> Array:
     along = np.einsum("ij,ij->i", eps, torque)[:, np.newaxis]
     force[:, :3] = 2.0 * (eta * torque + np.cross(eps, torque) + eps * along / eta)
     return force
+
+
+def neglected_force(log: FlightLog, h_bar: Array) -> Array:
+    """Compute ``N = F_S - h_bar rhodd`` (33), (N-1, m), over the interval of each tick.
+
+    N m on the joints; on the base the generalised force that belongs to eps, twice the torque
+    where the attitude is small.
+    """
+    return applied_force(log) - h_bar * mean_acceleration(log)

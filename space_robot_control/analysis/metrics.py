@@ -1,4 +1,4 @@
-"""Figures of merit of a flight (Section IV-E), in both definitions, and chatter.
+"""Metrics of a flight (Section IV-E), in both definitions, and chatter.
 
 Equation (64) is ``sqrt(mean(x^2 + y^2 + z^2)) / 3``; Table V holds the mean of the three axes'
 RMS values instead. Both are given, named ``eq64`` and ``mean_axis``.
@@ -6,14 +6,16 @@ RMS values instead. Both are given, named ``eq64`` and ``mean_axis``.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import reduce
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.blocks import Metric, blocks_of
+from space_robot_msgs_py.bag.flight_log import FlightLog
 
-from .blocks import Figure, blocks_of
 from .spectrum import PowerAbove
 
 Array = NDArray[np.float64]
@@ -21,7 +23,7 @@ Table = dict[str, dict[str, float]]
 
 
 def axis_groups(n: int) -> dict[str, slice]:
-    """Base, inner (1 to 3) and outer joints of the n+3 axes, by the suffix of their keys."""
+    """Divide the n+3 axes into base, inner (1 to 3) and outer joints, by their keys' suffix."""
     groups = {"base": slice(0, 3), f"1_{min(n, 3)}": slice(3, 3 + min(n, 3))}
     if n > 3:
         groups[f"4_{n}"] = slice(6, 3 + n)
@@ -29,17 +31,17 @@ def axis_groups(n: int) -> dict[str, slice]:
 
 
 def error_columns(axes: int) -> dict[str, slice]:
-    """Which of the m = n+3 axes each error column of Table V is of."""
+    """Return which of the m = n+3 axes each error column of Table V is of."""
     return _columns(axis_groups(axes - 3), "attitude", "joints")
 
 
 def torque_columns(axes: int) -> dict[str, slice]:
-    """Which of the m = n+3 axes each torque column of Table V is of."""
+    """Return which of the m = n+3 axes each torque column of Table V is of."""
     return _columns(axis_groups(axes - 3), "base_torque", "torque")
 
 
 def tracking_error(log: FlightLog) -> Array:
-    """(N, n+3) ``e = rho_d - rho``: eps, then joints; of +-Q_d the one on Q's side."""
+    """Compute ``e = rho_d - rho`` (N, n+3): eps, then joints, rad; of +-Q_d the one on Q's side."""
     error = np.empty((log.ticks, log.axes))
     desired = log.reference_base[:, :4]
     side = np.where(_sum_of_columns(log.quaternion * desired) < 0.0, -1.0, 1.0)
@@ -50,7 +52,7 @@ def tracking_error(log: FlightLog) -> Array:
 
 
 def largest_of_columns(values: Array) -> Array:
-    """(N,) largest absolute value of each row; faster than NumPy's own over short rows."""
+    """Find the largest absolute value of each row, (N,), faster than NumPy over short rows."""
     return reduce(np.maximum, np.abs(values.T))
 
 
@@ -61,10 +63,10 @@ class AxisRms:
         self.rows = 0
         self._squares = np.zeros(axes)
 
-    def add(self, squares: Array) -> None:
-        """Take the squares of further rows."""
-        self.rows += len(squares)
-        self._squares += np.sum(squares, axis=0)
+    def add(self, values: Array) -> None:
+        """Take further rows."""
+        self.rows += len(values)
+        self._squares += np.sum(values**2, axis=0)
 
     @property
     def value(self) -> Array:
@@ -85,36 +87,17 @@ class AxisMaximum:
         self.value = np.maximum(self.value, np.max(np.abs(values), axis=0, initial=0.0))
 
 
-class Eq64:
-    """(64): a third of the RMS of the vector (for other than three axes, that share of it)."""
+def eq64(each: Array) -> float:
+    """Compute (64) of the axes' RMS values (axes,): a third of the RMS of the vector.
 
-    def __init__(self) -> None:
-        self._sum, self._rows, self._axes = 0.0, 0, 1
-
-    def add(self, squares: Array) -> None:
-        """Take the squares of further rows (N, axes)."""
-        self._sum += float(np.sum(_sum_of_columns(squares)))
-        self._rows += len(squares)
-        self._axes = squares.shape[1]
-
-    @property
-    def value(self) -> float:
-        """In the unit of the axes."""
-        return float(np.sqrt(self._sum / self._rows) / self._axes)
+    Of other than three axes it is that share of it.
+    """
+    return float(np.linalg.norm(each)) / len(each)
 
 
 def mean_axis_rms(values: Array) -> float:
     """Mean over the axes of each axis' RMS; ``values`` (N, axes)."""
-    figure = AxisRms(values.shape[1])
-    figure.add(values**2)
-    return float(np.mean(figure.value))
-
-
-def eq64_rms(values: Array) -> float:
-    """`Eq64` of ``values`` (N, axes)."""
-    figure = Eq64()
-    figure.add(values**2)
-    return figure.value
+    return float(np.mean(np.sqrt(np.mean(values**2, axis=0))))
 
 
 class TotalVariation:
@@ -138,37 +121,27 @@ class TotalVariation:
         return float(np.mean(self._variation[axes]) / ((self._rows - 1) * period))
 
 
-class Rms(Figure):
+class Rms(Metric):
     """The RMS of errors and torques, by definition and column of Table V."""
 
     def __init__(self, axes: int) -> None:
-        self._each = AxisRms(axes), AxisRms(axes)
-        self._columns = error_columns(axes), torque_columns(axes)
-        self._eq64 = {name: Eq64() for columns in self._columns for name in columns}
+        self._error, self._torque = AxisRms(axes), AxisRms(axes)
 
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
-        for each, columns, values in zip(
-            self._each, self._columns, (error, log.applied_torque), strict=True
-        ):
-            squares = values**2
-            each.add(squares)
-            for name, axes in columns.items():
-                self._eq64[name].add(squares[:, axes])
+        self._error.add(error)
+        self._torque.add(log.applied_torque)
 
     def result(self) -> Table:
         """By definition and column."""
+        error, torque = self._error.value, self._torque.value
         return {
-            "mean_axis": {
-                name: float(np.mean(each.value[axes]))
-                for each, columns in zip(self._each, self._columns, strict=True)
-                for name, axes in columns.items()
-            },
-            "eq64": {name: eq64.value for name, eq64 in self._eq64.items()},
+            "mean_axis": _by_column(error, torque, np.mean),
+            "eq64": _by_column(error, torque, eq64),
         }
 
 
-class Maxima(Figure):
+class Maxima(Metric):
     """Largest |error| and |torque| on any axis, by column of Table V."""
 
     def __init__(self, axes: int) -> None:
@@ -181,19 +154,11 @@ class Maxima(Figure):
 
     def result(self) -> dict[str, float]:
         """By column, in its unit."""
-        axes = len(self._error.value)
-        return {
-            name: float(np.max(each.value[columns]))
-            for each, names in (
-                (self._error, error_columns(axes)),
-                (self._torque, torque_columns(axes)),
-            )
-            for name, columns in names.items()
-        }
+        return _by_column(self._error.value, self._torque.value, np.max)
 
 
-class Chatter(Figure):
-    """How rough the applied torques are, by measure and column of Table V."""
+class Chatter(Metric):
+    """Measures how rough the applied torques are, by measure and column of Table V."""
 
     def __init__(self, axes: int, period: float) -> None:
         self._period, self._columns = period, torque_columns(axes)
@@ -218,27 +183,27 @@ class Chatter(Figure):
         }
 
 
-def rms(log: FlightLog) -> Table:
-    """`Rms` of a whole log."""
-    figure = Rms(log.axes)
-    _add_all(figure, log)
-    return figure.result()
-
-
-def chatter(log: FlightLog) -> Table:
-    """`Chatter` of a whole log."""
-    figure = Chatter(log.axes, log.timebase.period)
-    _add_all(figure, log)
-    return figure.result()
-
-
-def _add_all(figure: Figure, log: FlightLog) -> None:
+def of_log(metric: Metric, log: FlightLog) -> Any:
+    """Return the result of a metric without rows, of a whole log."""
     for block in blocks_of(log):
-        figure.add(block, tracking_error(block))
+        metric.add(block, tracking_error(block))
+    return metric.result()
+
+
+def _by_column(error: Array, torque: Array, figure: Callable[[Array], Any]) -> dict[str, float]:
+    """Sum up the numbers of the axes, (m,) each, in every column of Table V."""
+    return {
+        name: float(figure(values[axes]))
+        for values, columns in (
+            (error, error_columns(len(error))),
+            (torque, torque_columns(len(torque))),
+        )
+        for name, axes in columns.items()
+    }
 
 
 def _columns(groups: dict[str, slice], base: str, prefix: str) -> dict[str, slice]:
-    """The axes of each column, ``base`` or the suffix of the group after ``prefix``."""
+    """Return the axes of each column, ``base`` or the suffix of the group after ``prefix``."""
     return {base if key == "base" else f"{prefix}_{key}": axes for key, axes in groups.items()}
 
 

@@ -2,47 +2,53 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .pictures import Picture
-from .table import DEFINITIONS, Report, law_of, lines, notes, remarks
+from .report_tables import comparison_table
+from .tables import Column, Table, Verdict
 from .template import template
+from .words import Report, law_of, notes, remarks
 
 
 def render(
     reports: Mapping[str, Report],
     descriptions: Mapping[str, dict[str, Any]],
-    pictures: Sequence[Picture],
+    figures: Sequence[tuple[str, str]],
 ) -> str:
-    """The page, without references to anything outside itself.
+    """Render the page, without references to anything outside itself.
 
     Args:
-        reports: of `analyse`, by name of the bag.
+        reports: of `analyze`, by name of the bag.
         descriptions: what was flown, as the bags have it.
-        pictures: of all of them.
+        figures: caption and data URI of each.
     """
-    shown = lines(list(reports.values()))
-    groups = {group: [line for line in shown if line.group == group] for group in DEFINITIONS}
     return template("space_robot_control.analysis", "flights.html.j2").render(
-        reports=reports,
-        laws={name: law_of(report) for name, report in reports.items()},
-        groups={group: found for group, found in groups.items() if found},
-        definitions=DEFINITIONS,
+        names=list(reports),
+        recorded=_recorded(reports),
+        metrics=comparison_table(reports),
         notes={name: [*remarks(r), *notes(r)] for name, r in reports.items()},
-        whole={name: _whole(report) for name, report in reports.items()},
         descriptions={name: json.dumps(d, indent=1) for name, d in descriptions.items()},
-        pictures=[(picture.caption, _data(picture)) for picture in pictures],
+        figures=figures,
     )
 
 
+def _recorded(reports: Mapping[str, Report]) -> Table:
+    names = ("bag", "law", "case", "gains", "robot", "time analysed", "ticks", "recording")
+    rows = [
+        [
+            name, law_of(report) or "not said",
+            *(report[key] or "not said" for key in ("case", "gains", "robot")),
+            f"{report['from_s']:g} to {report['to_s']:g} s", report["ticks"],
+            Verdict("", "whole", "good") if _whole(report) else Verdict("", "not whole", "bad"),
+        ]
+        for name, report in reports.items()
+    ]  # fmt: skip
+    return Table.of("", [Column(name) for name in names], rows)
+
+
 def _whole(report: Report) -> bool:
-    """Whether the bag holds the flight without loss, gap or damage."""
+    """Tell whether the bag holds the flight without loss, gap or damage."""
     missing = any(report["lost"].values()) or report["filled_ticks"]
     return not (missing or report["unfinished"] or report["damage"])
-
-
-def _data(picture: Picture) -> str:
-    return "data:image/svg+xml;base64," + base64.b64encode(picture.svg.read_bytes()).decode()

@@ -1,6 +1,6 @@
-"""Where the end effector points in the inertial frame: what the mission is flown for.
+"""The end effector's pointing in the inertial frame, which the mission is flown for.
 
-The tool's pose follows from base attitude and joint angles (`space_robot_sim.tool.tool_pose`), once
+The tool's pose follows from base attitude and joint angles (`space_robot_sim.robot.tool`), once
 with the measured ones and once with the desired ones. The base's position is free in this mission
 ("semi-floating"), so both poses share it and its drift is given separately.
 """
@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.blocks import Metric
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.robot import Robot
-from space_robot_sim.tool import tool_pose
+from space_robot_sim.robot.tool import tool_pose
 
-from .blocks import Figure
 from .metrics import AxisMaximum, AxisRms, Table
 
 Array = NDArray[np.float64]
@@ -26,7 +26,7 @@ ARCSEC = np.pi / 180.0 / 3600.0
 
 
 class PointingError(NamedTuple):
-    """Of the end effector, tick by tick."""
+    """The end effector's error, tick by tick."""
 
     boresight: Array
     """(N,) rad, between the measured and the desired direction of the tool's z axis."""
@@ -38,8 +38,8 @@ class PointingError(NamedTuple):
     """(N,) m, of the base's CoM from where it was at the first tick."""
 
 
-class Pointing(Figure):
-    """RMS, maximum and last value of each figure of a `PointingError`."""
+class Pointing(Metric):
+    """Takes RMS, maximum and last value of each number of a `PointingError`."""
 
     def __init__(self, log: FlightLog, robot: Robot) -> None:
         """``log``: the first rows; the base's drift counts from there."""
@@ -51,7 +51,7 @@ class Pointing(Figure):
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
         values = np.stack(pointing_error(log, self._robot, self._start)).T
-        self._rms.add(values**2)
+        self._rms.add(values)
         self._maximum.add(values)
         self._end = values[-1]
 
@@ -66,7 +66,7 @@ class Pointing(Figure):
 
 
 def pointing_error(log: FlightLog, robot: Robot, start: Array | None = None) -> PointingError:
-    """The error of the tool's pose at every tick of a flight of ``robot``.
+    """Compute the error of the tool's pose at every tick of a flight of ``robot``.
 
     ``start``: (1, 3) m, where the base was when the flight began (None: at the first tick here).
     """

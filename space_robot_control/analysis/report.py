@@ -1,4 +1,4 @@
-"""All figures of merit of a flight in one dictionary, ready for JSON."""
+"""All metrics of a flight in one dictionary, ready for JSON."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from space_robot_msgs_py.bag.blocks import Metric, blocks_of
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.law_history import as_data, within
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
 
-from ..law_history import as_data, within
-from .actuation import Latency, Misses, Saturation, TorqueLimits
-from .blocks import Figure, blocks_of
+from .actuation import Latency, MissedDeadlines, Saturation, TorqueLimits
+from .columns import recording
 from .described import estimator, robot_of, torque_limits
 from .estimate_error import EstimateError
 from .metrics import Chatter, Maxima, Rms, tracking_error
@@ -20,14 +21,14 @@ from .pointing import Pointing
 from .settling import Settling
 
 DESCRIBED = ("controller", "case", "gains", "robot")
-"""What a report repeats of a flight's description."""
+"""Keys of a flight's description that a report repeats."""
 
 
-def analyse(log: FlightLog) -> dict[str, Any]:
-    """The flight's report, the same from a graph flight, an in-process one, or a bag.
+def analyze(log: FlightLog) -> dict[str, Any]:
+    """Compute the flight's report, the same from a graph flight, an in-process one, or a bag.
 
-    A figure that this flight does not have is None; ``unavailable`` says why, by its key. Of a
-    flight with gaps (a broken bag) the longest stretch without one is analysed; ``damage`` says so.
+    A metric that this flight does not have is None; ``unavailable`` says why, by its key. Of a
+    flight with gaps (a broken bag) the longest stretch without one is analyzed; ``damage`` says so.
 
     Raises:
         InputError: no tick has both a state and a reference.
@@ -39,12 +40,12 @@ def analyse(log: FlightLog) -> dict[str, Any]:
 
 
 class Analysis:
-    """`analyse` of a flight that comes block by block, as `blocks_of` cuts it and without gaps."""
+    """Does what `analyze` does, of a flight without gaps in blocks, as `blocks_of` cuts it."""
 
     def __init__(self) -> None:
         self.ticks = 0
         """Rows so far."""
-        self._figures: dict[str, Figure] = {}
+        self._metrics: dict[str, Metric] = {}
         self._unavailable: dict[str, str] = {}
         self._head: dict[str, Any] = {}
         self._tail: dict[str, Any] = {}
@@ -54,33 +55,21 @@ class Analysis:
         if not self.ticks:
             self._begin(block)
         error = tracking_error(block)
-        for figure in self._figures.values():
-            figure.add(block, error)
+        for metric in self._metrics.values():
+            metric.add(block, error)
         self.ticks += block.ticks
         self._laws, self._timebase = block.laws, block.timebase
-        self._tail = {
-            "lost": block.lost,
-            "unanswered_ticks": block.unanswered,
-            "filled_ticks": block.filled,
-            "unfinished": block.unfinished,
-            "damage": list(block.damage),
-            "foreign": list(block.foreign),
-        }
+        self._tail = recording(block)
 
     def report(self) -> dict[str, Any]:
-        """The report of all blocks so far, at least one."""
-        unavailable: dict[str, str] = {}
-        figures: dict[str, Any] = {}
-        for name in _FIGURES:
-            figures[name] = None
-            if name not in self._figures:
-                unavailable[name] = self._unavailable[name]
-                continue
+        """Return the report of all blocks so far, at least one."""
+        metrics, unavailable = dict[str, Any].fromkeys(_METRICS), dict(self._unavailable)
+        for name, metric in self._metrics.items():
             try:
-                figures[name] = self._figures[name].result()
+                metrics[name] = metric.result()
             except InputError as error:
                 unavailable[name] = str(error)
-        stop, period_ns = self._first_tick + self.ticks, self._period_ns
+        stop, period_ns = self._first_tick + self.ticks, self._timebase.period_ns
         laws = within(self._laws, self._first_tick, stop)
         return {
             **self._head,
@@ -90,17 +79,17 @@ class Analysis:
             "duration_s": self.ticks * period_ns / 1e9,
             "from_s": self._first_tick * period_ns / 1e9,
             "to_s": stop * period_ns / 1e9,
-            **figures,
-            "unavailable": unavailable,
+            **metrics,
+            "unavailable": {name: unavailable[name] for name in _METRICS if name in unavailable},
             **self._tail,
         }
 
     def _begin(self, block: FlightLog) -> None:
-        self._first_tick, self._period_ns = block.first_tick, block.timebase.period_ns
+        self._first_tick = block.first_tick
         self._head = {key: block.flight.get(key) for key in DESCRIBED}
-        for name, figure in _FIGURES.items():
+        for name, metric in _METRICS.items():
             try:
-                self._figures[name] = figure(block)
+                self._metrics[name] = metric(block)
             except InputError as error:
                 self._unavailable[name] = str(error)
 
@@ -111,27 +100,27 @@ def _without_gaps(log: FlightLog) -> FlightLog:
         raise InputError("no tick has both a state and a reference")
     if found.ticks < log.ticks:
         start, stop = found.time[0], found.time[-1]
-        said = f"analysed from t = {start:.4f} to {stop:.4f} s, the longest stretch without a gap"
+        said = f"analyzed from t = {start:.4f} to {stop:.4f} s, the longest stretch without a gap"
         found.damage += (said,)
     return found
 
 
-def _misses(log: FlightLog) -> Misses:
+def _missed_deadlines(log: FlightLog) -> MissedDeadlines:
     try:
         limits = torque_limits(log)
     except InputError:
         limits = TorqueLimits(np.inf, np.inf)
-    return Misses(int(log.flight.get("command_latency_ticks", 0)), limits)
+    return MissedDeadlines(int(log.flight.get("command_latency_ticks", 0)), limits)
 
 
-_FIGURES: dict[str, Callable[[FlightLog], Figure]] = {
+_METRICS: dict[str, Callable[[FlightLog], Metric]] = {
     "rms": lambda log: Rms(log.axes),
     "maxima": lambda log: Maxima(log.axes),
     "chatter": lambda log: Chatter(log.axes, log.timebase.period),
     "settling": Settling,
     "saturation": lambda log: Saturation(torque_limits(log)),
     "latency": lambda log: Latency(log.timebase.period),
-    "misses": _misses,
+    "missed_deadlines": _missed_deadlines,
     "estimate_error": lambda log: EstimateError(log, *estimator(log)),
     "pointing": lambda log: Pointing(log, robot_of(log)),
 }

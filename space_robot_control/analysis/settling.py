@@ -1,4 +1,4 @@
-"""How soon after a motion's end the error has died away."""
+"""Settling time: from a motion's end until the error has died away."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.bag.blocks import Metric
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.flight_log import FlightLog
 
-from .blocks import Figure
 from .metrics import error_columns, largest_of_columns
 from .waypoints import Waypoints
 
@@ -22,7 +22,7 @@ SHORTEST_WATCH = 0.1
 """s of flight after a waypoint without which nothing can be said of settling there."""
 
 
-class Settling(Figure):
+class Settling(Metric):
     """The shortest time after the last waypoint from which each error column stays in `BAND`.
 
     As in control engineering (e.g. Ogata, Modern Control Engineering, 5-3), with a band in
@@ -47,7 +47,7 @@ class Settling(Figure):
         self._waypoints.forget_before(self._last_watched)
 
     def result(self) -> dict[str, Any]:
-        """The band, the time counted from, and s by column: None if outside at the end."""
+        """Return the band, the time counted from, and s by column: None if outside at the end."""
         start = self.last_waypoint
         if start is None:
             raise InputError("the arm does not come to rest with flight left after it")

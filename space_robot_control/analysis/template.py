@@ -6,12 +6,21 @@ import jinja2
 
 
 def template(package: str, name: str) -> jinja2.Template:
-    """The template ``name`` in the folder ``templates`` of ``package``; it escapes."""
+    """Load the template ``name`` from the folder ``templates`` of ``package``; it escapes.
+
+    It may import ``table.html.j2``, which draws a `tables.Table`.
+    """
     environment = jinja2.Environment(
-        loader=jinja2.PackageLoader(package, "templates"),
+        loader=jinja2.ChoiceLoader(
+            [
+                jinja2.PackageLoader(package, "templates"),
+                jinja2.PackageLoader("space_robot_control.analysis", "templates"),
+            ]
+        ),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
+    environment.filters["zip"] = zip
     return environment.get_template(name)

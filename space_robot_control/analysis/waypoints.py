@@ -1,4 +1,4 @@
-"""Where a mission's segments meet, found in the flight's reference: there the arm shall rest."""
+"""Waypoints, where a mission's segments meet and the arm shall rest, found in the reference."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog
 
 Array = NDArray[np.float64]
 

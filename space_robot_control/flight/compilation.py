@@ -7,15 +7,15 @@ import subprocess
 import click
 import numpy as np
 
-from space_robot_msgs_py.codecs import CommandCodec, StateCodec
-from space_robot_msgs_py.compiled import cache_directory
-from space_robot_msgs_py.lifeline import hold_to_standard_input
-from space_robot_msgs_py.run_module import module_command
-from space_robot_msgs_py.samples import Command, RobotState
+from space_robot_msgs_py.compiled.cache import cache_directory
+from space_robot_msgs_py.ros.lifeline import hold_to_standard_input
+from space_robot_msgs_py.ros.run_module import module_command
+from space_robot_msgs_py.samples import Command, Reference, RobotState
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 
 from ..laws import laws
+from .child_process import child_process
 from .plan import Flight, FlightPlan
-from .processes import child_process
 from .simulate import simulate
 
 MARK = "complete"
@@ -56,7 +56,7 @@ def _answer_and_exchange() -> None:
         joints, base = states.encode(state)
         states.decode_joints(joints, state)
         states.decode_base(base, state)
-        command = flight.controller.update(state, np.zeros((3, flight.robot.n)), np.eye(10)[0])
+        command = flight.controller.update(state, Reference.at_rest(flight.robot.n))
         commands.decode(commands.encode(command), command)
 
 

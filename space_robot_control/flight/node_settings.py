@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from space_robot_msgs_py.configuration import NodeSettings, Tree, flatten, nest
+from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.config.settings import NodeSettings
+from space_robot_msgs_py.config.trees import Tree, flatten, nest
+from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.recorder_settings import RecorderNodeSettings
-from space_robot_msgs_py.validation import one_of
-from space_robot_sim.plant_settings import PlantNodeSettings
+from space_robot_sim.plant.settings import PlantNodeSettings
 
+from ..controller.gains import gains_as_path, split_gains
+from ..controller.settings import ControllerNodeSettings
 from ..laws import ControlLaw
-from ..settings import ControllerNodeSettings, MissionNodeSettings, gains_as_path, split_gains
+from ..mission.settings import MissionNodeSettings
 
 SCHEMAS: tuple[type[NodeSettings], ...] = (
     PlantNodeSettings, ControllerNodeSettings, MissionNodeSettings, RecorderNodeSettings,
@@ -36,20 +39,20 @@ Given = Mapping[str, Mapping[str, Any]]
 
 
 class FlightSettings(NamedTuple):
-    """Of every node, and the gains that were given by themselves."""
+    """The settings of every node, and the gains that were given by themselves."""
 
     plant: PlantNodeSettings
     controller: ControllerNodeSettings
     mission: MissionNodeSettings
     recorder: RecorderNodeSettings
     gains: dict[str, Tree]
-    """By law; they come over those of the gain set."""
+    """Gains by law; they come over those of the gain set."""
     given: dict[str, tuple[str, ...]]
-    """Dotted names of what was given to each node, over its files."""
+    """Dotted names of the settings given to each node, over its files."""
 
     @classmethod
     def resolve(cls, options: Given, parameters: Given) -> FlightSettings:
-        """Settings from the files, the options over them, and single parameters over all.
+        """Take settings from the files, the options over them, and single parameters over all.
 
         Raises:
             InputError: a parameter that is wrong, or that cannot be set so.
@@ -77,11 +80,11 @@ class FlightSettings(NamedTuple):
         return settings
 
     def parameters(self, laws: Mapping[str, ControlLaw]) -> dict[str, dict[str, Any]]:
-        """What was given to each node by dotted name: resolved values, of the declared types."""
+        """Return the resolved values of what was given to each node, by dotted name."""
         gains = {
             f"{name}.{gain}": values.tolist()
             for name, law in laws.items()
-            for gain, values in law.gains.items()
+            for gain, values in law.gain_values.items()
         }
         found = {}
         for node, names in self.given.items():

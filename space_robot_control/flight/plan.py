@@ -1,35 +1,34 @@
-"""What is to be flown, checked before anything starts."""
+"""The options of a flight, and the flight that they make, checked before anything starts."""
 
 from __future__ import annotations
 
 import math
-from datetime import datetime, timezone
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 from pydantic import ByteSize, Field
 
 from space_robot_msgs_py.bag.mcap_file import Compression
+from space_robot_msgs_py.config.validation import StrictModel, one_of
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.fault import KINDS, parse_faults
-from space_robot_msgs_py.validation import Strict, one_of, short
-from space_robot_sim.faults import PlantFaults
-from space_robot_sim.plant import Plant
-from space_robot_sim.plant_settings import MOST_TICKS
+from space_robot_sim.faults.grammar import Kinds, parse_faults
+from space_robot_sim.plant.faults import PLANT_KINDS, PlantFaults
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import MOST_TICKS
 
-from ..controller import Controller
-from ..mission import Mission
-from ..settings import build_laws
-from ..software import commit, versions
-from ..swaps import parse_swaps
+from ..controller.controller import Controller
+from ..controller.gains import build_laws
+from ..controller.swaps import parse_swaps
+from ..mission.mission import Mission
+from .faults import KINDS, PROCESS_KINDS
 from .node_settings import FlightSettings
 from .robots import Robots
+from .software import commit, versions
 
 NO_FRICTION = {"friction.coulomb": 0.0, "friction.viscous": 0.0}
 
 
-class FlightPlan(Strict):
+class FlightPlan(StrictModel):
     """The options of ``fly`` and ``simulate``."""
 
     controller: str = "tde_stc"
@@ -43,32 +42,34 @@ class FlightPlan(Strict):
     realtime: bool = False
     fifo_priority: int = 0
     faults: list[str] = Field(default_factory=list)
-    """What fails, each as ``KIND@T[-END][:ARGUMENT]``, see `space_robot_msgs_py.fault`."""
+    """The faults, each as ``KIND@T[-END][:ARGUMENT]``, see `space_robot_control.flight.faults`."""
     seed: Annotated[int, Field(ge=0)] = 0
-    """Of the faults' random numbers."""
+    """Seed of the faults' random numbers."""
     swaps: list[str] = Field(default_factory=list)
     """Laws to swap to in flight, each as ``T:LAW``."""
     restart_controller: bool = False
-    """Whether a controller that died or hangs is started again."""
+    """Start a controller again that died or hangs."""
+    composed: bool = False
+    """Put all nodes into one process, stepped in turn."""
     domain: Annotated[int | None, Field(ge=0, le=232)] = None
     """ROS domain to fly in (None: ROS_DOMAIN_ID, or a free one)."""
     compression: Compression | None = None
-    """Of the bag (None: the recorder's own)."""
+    """Compression of the bag (None: the recorder's own)."""
     split_size: ByteSize | None = None
     """Bytes after which the bag goes on in another file (None: the recorder's own)."""
     parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """Further parameters by node, dotted names."""
 
-    def faults_of(self, where: str) -> list[str]:
-        """Those that ``where`` ("plant" or "orchestrator") brings about.
+    def faults_of(self, kinds: Kinds) -> list[str]:
+        """Return the texts of the faults that are of some ``kinds``.
 
         Raises:
             InputError: a fault that cannot be.
         """
-        return [str(f) for f in parse_faults(self.faults, KINDS) if KINDS[f.kind].where == where]
+        return [str(f) for f in parse_faults(self.faults, KINDS) if f.kind.name in kinds]
 
     def options(self) -> dict[str, dict[str, Any]]:
-        """What the options, without ``parameters``, say to each node, by dotted name."""
+        """Return what the options, without ``parameters``, say to each node, by dotted name."""
         return {
             "plant": {
                 "robot": self.robot,
@@ -77,7 +78,7 @@ class FlightPlan(Strict):
                 "realtime": self.realtime,
                 "command_latency_ticks": self.command_latency_ticks,
                 "fifo_priority": self.fifo_priority,
-                "faults": self.faults_of("plant"),
+                "faults": self.faults_of(PLANT_KINDS),
                 "fault_seed": self.seed,
                 **({} if self.friction else NO_FRICTION),
             },
@@ -96,7 +97,7 @@ class FlightPlan(Strict):
         }
 
     def with_parameters(self, node: str, values: dict[str, Any]) -> FlightPlan:
-        """The same plan with further parameters of a node, by dotted name."""
+        """Return the same plan with further parameters of a node, by dotted name."""
         parameters = {**self.parameters, node: {**self.parameters.get(node, {}), **values}}
         return self.model_copy(update={"parameters": parameters})
 
@@ -104,8 +105,7 @@ class FlightPlan(Strict):
 class Flight:
     """A checked plan: the settings of every node and the objects they make.
 
-    What is flown is in the settings, not in the options of the ``plan``: single parameters come
-    over them.
+    The settings count, not the options of the ``plan``: single parameters come over them.
 
     Raises:
         InputError: anything the plan names does not exist or does not fit together.
@@ -130,8 +130,9 @@ class Flight:
         ]
         """Ticks and the laws in force from there on."""
         self.parameters = settings.parameters(laws)
-        """What every node is given over its files, by dotted name."""
-        self.orchestrator_faults = parse_faults(plan.faults_of("orchestrator"), KINDS)
+        """The parameters of every node over its files, by dotted name."""
+        self.orchestrator_faults = parse_faults(plan.faults_of(PROCESS_KINDS), KINDS)
+        self._check_composed()
         self.law = next(iter(laws.values()))
         """In force at the start."""
         self.plant = Plant(self.robot, settings.plant, self.period)
@@ -157,6 +158,17 @@ class Flight:
             )
         return ticks
 
+    def _check_composed(self) -> None:
+        if not self.plan.composed:
+            return
+        asked = [f"fault {fault}" for fault in self.plan.faults_of(PROCESS_KINDS)]
+        if self.plan.restart_controller:
+            asked.append("restart_controller")
+        if asked:
+            raise InputError(
+                f"{', '.join(asked)}: that needs a process for each node: fly without --composed"
+            )
+
     def check_in_process(self) -> None:
         """See that the flight does without a graph of nodes.
 
@@ -175,26 +187,26 @@ class Flight:
 
     @property
     def faults(self) -> list[str]:
-        """All that will fail, as text."""
+        """The texts of all faults."""
         in_plant = [text for text in self.plant_settings.faults if text.strip()]
-        if in_plant == self.plan.faults_of("plant"):
+        if in_plant == self.plan.faults_of(PLANT_KINDS):
             return self.plan.faults
-        return [*in_plant, *self.plan.faults_of("orchestrator")]
+        return [*in_plant, *self.plan.faults_of(PROCESS_KINDS)]
 
     @property
     def has_friction(self) -> bool:
-        """Whether the joints have any."""
+        """True if the joints have friction."""
         friction = self.plant_settings.friction
         return friction.coulomb > 0.0 or friction.viscous > 0.0
 
     @property
     def gains_used(self) -> dict[str, list[float]]:
         """The numbers of the gains of the law in force at the start, an axis each."""
-        return {name: row.tolist() for name, row in self.law.gains.items()}
+        return {name: row.tolist() for name, row in self.law.gain_values.items()}
 
     @property
     def description(self) -> dict[str, Any]:
-        """What is flown, as it is stored in a bag; enough to fly it again.
+        """The flight as a bag tells it; enough to fly it again.
 
         The same plan with the same software gives the same one: it tells no time and no machine.
         """
@@ -223,30 +235,3 @@ class Flight:
             "versions": versions(),
             "commit": commit(),
         }
-
-    def default_bag(self) -> Path:
-        """``flights/<controller>_case<case>_<time>`` below the current folder."""
-        stamp = datetime.now(timezone.utc).strftime("%Y%m%d-%H%M%S")
-        case = Path(self.plant_settings.case).stem
-        return Path("flights") / f"{self.law.name}_case{case}_{stamp}"
-
-
-def check_bag_path(path: Path) -> None:
-    """See that a bag can be made there, without making anything.
-
-    Raises:
-        InputError: it exists, or its nearest existing folder cannot be written.
-    """
-    parent = path
-    try:
-        if path.exists():
-            raise InputError(f"{path}: exists already; a bag is never overwritten")
-        parent = next(p for p in path.absolute().parents if p.exists())
-        with TemporaryDirectory(dir=parent):
-            pass
-    except OSError as error:
-        raise InputError(
-            f"{path}: no bag can be written there ({parent}: {error.strerror})"
-        ) from None
-    except ValueError as error:
-        raise InputError(f"{short(str(path))}: no name of a folder ({error})") from None

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from space_robot_msgs_py.configuration import named_file
+from space_robot_msgs_py.config.files import named_file
+from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.validation import read_yaml
 from space_robot_sim.robot import Robot
 
 from .node_settings import FlightSettings

@@ -9,26 +9,27 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.blocks import block_bounds
+from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.recorder import BagRecorder
-from space_robot_msgs_py.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.flight_log import FlightLog
-from space_robot_msgs_py.plain_codecs import ClockCodec, LawCodec, TelemetryCodec
-from space_robot_msgs_py.reference_codec import ReferenceCodec
 from space_robot_msgs_py.samples import Command, LawInForce
+from space_robot_msgs_py.wire.clock import ClockCodec
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.controller_law import LawCodec
+from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
+from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 
-from ..analysis.blocks import block_bounds
-from ..closed_loop import close_loop, measured_ticks
-from ..law_history import same
+from ..controller.law_changes import LawChanges
+from .closed_loop import close_loop, measured_ticks
 from .plan import Flight
 
-STRETCH_TICKS = 2000
+STRETCH_TICKS = 10_000
 """Ticks flown between two looks at the world outside."""
 
 
@@ -46,7 +47,7 @@ class Messages:
         self._law = LawCodec(timebase)
 
     def stretch(self, log: FlightLog, start: int, stop: int, answered: int) -> None:
-        """What mission, plant and controller send in the ticks ``start`` to ``stop``.
+        """Write what mission, plant and controller send in the ticks ``start`` to ``stop``.
 
         All of them are in ``log``; the controller answers those before ``answered``.
         """
@@ -134,12 +135,13 @@ def fly_blocks(
     flight.check_in_process()
     block_of = block_of or (lambda start, stop: unflown(flight, start, stop))
     laws: tuple[LawInForce, ...] = ()
+    changes = LawChanges()
     with _recording(flight, bag) as messages:
         for start, stop in block_bounds(flight.ticks):
             block = block_of(start, stop)
             block.laws = laws
             try:
-                _fly_block(flight, block, messages, progress)
+                _fly_block(flight, block, changes, messages, progress)
             except Exception as error:
                 measured = measured_ticks(flight.plant, error)
                 yield _ended_early(block, measured - start, flight.plant.tick - start)
@@ -167,14 +169,15 @@ def simulate(
             flown += block.ticks
             log.unanswered, log.laws = block.unanswered, block.laws
     except FlightError as error:
-        error.log = log.truncated(flown)
+        error.log = log.rows(0, flown)
         raise
     return log
 
 
 def _fly_block(
-    flight: Flight, block: FlightLog, messages: Messages | None, progress: Callable[[int], None]
-) -> None:
+    flight: Flight, block: FlightLog, changes: LawChanges, messages: Messages | None,
+    progress: Callable[[int], None],
+) -> None:  # fmt: skip
     plant, controller, swaps = flight.plant, flight.controller, dict(flight.swaps)
     first, end = block.first_tick, block.first_tick + block.ticks
     cuts = {*range(first, end, STRETCH_TICKS), *(k for k in swaps if first <= k < end), end}
@@ -182,9 +185,8 @@ def _fly_block(
         progress(start)
         if start in swaps and swaps[start].name != controller.law.name:
             controller.law = swaps[start]
-        law = controller.law.in_force(start, is_first=not block.laws)
-        if not block.laws or not same(block.laws[-1], law):
-            block.laws += (law,)
+        if change := changes.at(start, controller.law):
+            block.laws += (change.law,)
         try:
             close_loop(plant, controller, block, start, stop)
         except Exception as error:
@@ -203,7 +205,7 @@ def _ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:
     block.telemetry[answered:] = np.nan
     block.unanswered = measured - answered
     block.laws = tuple(law for law in block.laws if law.tick < block.first_tick + answered)
-    return block.truncated(measured)
+    return block.rows(0, measured)
 
 
 def _check_memory(flight: Flight) -> None:
@@ -212,11 +214,10 @@ def _check_memory(flight: Flight) -> None:
     Raises:
         InputError: it has not.
     """
-    from psutil import virtual_memory
+    from .memory import available_bytes
 
-    row = unflown(flight, 0, 1)
-    columns = (value for f in fields(row) if isinstance(value := getattr(row, f.name), np.ndarray))
-    needed, free = flight.ticks * sum(c.nbytes for c in columns), virtual_memory().available
+    columns = unflown(flight, 0, 1).columns.values()
+    needed, free = flight.ticks * sum(column.nbytes for column in columns), available_bytes()
     if needed > free:
         raise InputError(
             f"duration {flight.ticks * flight.period:g} s: the whole flight in memory needs "

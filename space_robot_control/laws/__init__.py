@@ -15,9 +15,19 @@ from inspect import isabstract
 
 from space_robot_msgs_py.errors import InputError
 
-from .base import CompiledLaw, ControlLaw, Signals
+from .base import ControlLaw, LawGains, LawMemory, Signals, per_axis
+from .compiled import CompiledLaw
 
-__all__ = ["CompiledLaw", "ControlLaw", "Signals", "find_law", "laws"]
+__all__ = [
+    "CompiledLaw",
+    "ControlLaw",
+    "LawGains",
+    "LawMemory",
+    "Signals",
+    "find_law",
+    "laws",
+    "per_axis",
+]
 
 
 @cache

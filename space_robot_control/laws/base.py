@@ -4,33 +4,46 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.compiled.records import Field, Record, nested, shaped
 from space_robot_msgs_py.samples import LawInForce
+from space_robot_sim.dynamics.rho_space import RhoSpaceModel
 
 Array = NDArray[np.float64]
 
 
-@dataclass(slots=True)
-class Signals:
+def per_axis(description: str, unit: str = "") -> Any:
+    """Declare a gain, or a part of a law's memory, with one value an axis: (m,)."""
+    return shaped(lambda n: (n + 3,), ", ".join(filter(None, (description, unit))))
+
+
+class Signals(Record):
     """What a law sees at a tick, in the coordinates ``rho = [eps, theta]``, m = n+3 axes."""
 
-    error: Array
-    """(m,) ``e = rho_d - rho``."""
-    error_rate: Array
-    """(m,) ``edot``."""
-    acceleration_desired: Array
-    """(m,) ``rhodd_d``."""
-    n_hat: Array
-    """(m,) time-delay estimate N_hat of (35), (36); zero for laws without ``h_bar``."""
-    inertia: Array
-    """(m, m) nominal ``H_S``; filled only for laws with ``uses_model``."""
-    bias: Array
-    """(m,) nominal ``c_S``; filled only for laws with ``uses_model``."""
+    error: Array = per_axis("e = rho_d - rho")
+    error_rate: Array = per_axis("edot")
+    acceleration_desired: Array = per_axis("rhodd_d")
+    n_hat: Array = per_axis("time-delay estimate N_hat of (35), (36)", "N m")
+    """Zero for laws without ``h_bar``."""
+    nominal: RhoSpaceModel = nested(RhoSpaceModel)
+    """``inertia`` (m, m) H_S and ``bias`` (m,) c_S; filled only for laws with ``uses_model``."""
+
+
+class LawGains(Record):
+    """Base of a law's gains, each `per_axis`; ``lambda_`` in code is ``lambda`` to the user."""
+
+
+class LawMemory(Record):
+    """A law's last outputs; base of what it remembers beside them."""
+
+    s: Array = per_axis("sliding surface", "1/s")
+    """Stays zero for a law without one."""
+    u: Array = per_axis("pseudo-acceleration", "rad/s2 (eps: 1/s2)")
+    force: Array = per_axis("generalised force F_S", "N m")
 
 
 class ControlLaw(ABC):
@@ -42,97 +55,55 @@ class ControlLaw(ABC):
     """
 
     name: ClassVar[str]
-    gain_descriptions: ClassVar[dict[str, str]]
-    """What each gain is, by name; one value an axis."""
+    gains_type: ClassVar[type[LawGains]]
+    memory_type: ClassVar[type[LawMemory]] = LawMemory
     uses_model: ClassVar[bool] = False
 
     def __init__(self, gains: Mapping[str, Array], period: float) -> None:
-        """``gains``: an (m,) array for each of ``gain_descriptions``; ``period`` in s."""
-        names = list(self.gain_descriptions)
-        axes = len(gains[names[0]])
+        """``gains``: an (m,) array for each of ``gains_type``; ``period`` in s."""
+        n = len(next(iter(gains.values()))) - 3
         self.period = period
-        self.gain_matrix = np.zeros((len(names), axes))
-        """The gains, a row each in the order of ``gain_descriptions``."""
-        has_estimate = self.uses_time_delay_estimate()
-        self.h_bar = self.gain_matrix[names.index("h_bar")] if has_estimate else np.zeros(0)
-        """(m,) Hbar of the time-delay estimate; empty if the law has none."""
-        self.gains = gains
-        self.sliding_surface = np.zeros(axes)
-        """s of the last tick; stays zero for a law without one."""
-        self.pseudo_acceleration = np.zeros(axes)
-        """u of the last tick, rad/s2 (eps: 1/s2)."""
+        self.gains_block = self.gains_type.block(n)
+        self.memory_block = self.memory_type.block(n)
+        self.gains: Any = self.gains_type.view(self.gains_block)
+        """The gains as attributes."""
+        self.memory: Any = self.memory_type.view(self.memory_block)
+        """s and u of the last tick, and what the law remembers, as attributes."""
+        self.h_bar: Array = getattr(self.gains, "h_bar", np.zeros(0))
+        """(m,) h_bar of the time-delay estimate; empty if the law has none."""
+        self.gain_values = gains
         self.reset()
 
-    @property
-    def gains(self) -> Mapping[str, Array]:
-        """(m,) array of each gain by name."""
-        return dict(zip(self.gain_descriptions, self.gain_matrix, strict=True))
+    @classmethod
+    def gain_descriptions(cls) -> dict[str, str]:
+        """Meaning and unit of each gain by the name it has for the user."""
+        fields = cls.gains_type.fields().items()
+        return {name.rstrip("_"): f.description for name, f in fields if isinstance(f, Field)}
 
-    @gains.setter
-    def gains(self, gains: Mapping[str, Array]) -> None:
-        for row, name in zip(self.gain_matrix, self.gain_descriptions, strict=True):
-            row[:] = gains[name]
+    @property
+    def gain_values(self) -> dict[str, Array]:
+        """(m,) array of each gain by the name it has for the user."""
+        return {name.rstrip("_"): self.gains_block[name][0] for name in self.gains_type.fields()}
+
+    @gain_values.setter
+    def gain_values(self, values: Mapping[str, Array]) -> None:
+        for name, gain in self.gain_values.items():
+            gain[:] = values[name]
 
     def in_force(self, tick: int, is_first: bool = False) -> LawInForce:
         """The law with its present gains, for the record: it commands from ``tick`` on."""
-        gains = {name: tuple(row.tolist()) for name, row in self.gains.items()}
+        gains = {name: tuple(values.tolist()) for name, values in self.gain_values.items()}
         return LawInForce(tick, self.name, gains, is_first)
 
     @classmethod
     def uses_time_delay_estimate(cls) -> bool:
         """Whether the law adds N_hat."""
-        return "h_bar" in cls.gain_descriptions
+        return "h_bar" in cls.gains_type.fields()
 
-    def reset(self) -> None:  # noqa: B027  (a law without memory has nothing to do)
+    def reset(self) -> None:
         """Forget the past (integrals, last errors): called when the law is switched on."""
+        self.memory_block[:] = np.zeros_like(self.memory_block)
 
     @abstractmethod
     def force(self, signals: Signals) -> Array:
         """The generalised force F_S (m,), valid until the next call."""
-
-
-class CompiledLaw(ControlLaw):
-    """A law whose equation is a kernel, so that whole flights run in compiled code."""
-
-    memory_rows: ClassVar[int] = 0
-    """Rows of ``memory`` that belong to the law, after s, u and F_S."""
-
-    def __init__(self, gains: Mapping[str, Array], period: float) -> None:
-        """See `ControlLaw`."""
-        axes = len(next(iter(gains.values())))
-        self.memory = np.zeros((3 + self.memory_rows, axes))
-        super().__init__(gains, period)
-        self.sliding_surface, self.pseudo_acceleration = self.memory[0], self.memory[1]
-
-    @staticmethod
-    @abstractmethod
-    def kernel(
-        e: Array, edot: Array, rhodd_d: Array, n_hat: Array, h_s: Array, c_s: Array,
-        gains: Array, memory: Array, period: float,
-    ) -> None:  # fmt: skip
-        """One tick of the law: a `kernel` of exactly these arguments.
-
-        Args:
-            e: (m,) ``rho_d - rho``, and so on as in `Signals`.
-            edot: (m,).
-            rhodd_d: (m,).
-            n_hat: (m,).
-            h_s: (m, m).
-            c_s: (m,).
-            gains: ``gain_matrix``, a row a gain.
-            memory: rows s, u and F_S to be written, then the law's own.
-            period: s.
-        """
-
-    def reset(self) -> None:
-        """Forget everything."""
-        self.memory[:] = 0.0
-
-    def force(self, signals: Signals) -> Array:
-        """Run the kernel."""
-        self.kernel(
-            signals.error, signals.error_rate, signals.acceleration_desired, signals.n_hat,
-            signals.inertia, signals.bias, self.gain_matrix, self.memory, self.period,
-        )  # fmt: skip
-        force: Array = self.memory[2]
-        return force

@@ -2,47 +2,42 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_sim.dynamics.rho_space import RhoSpaceModel
 
-import numpy as np
-from numpy.typing import NDArray
+from .base import Array, LawGains, LawMemory, Signals, per_axis
+from .compiled import CompiledLaw
 
-from space_robot_msgs_py.compiled import kernel
 
-from .base import CompiledLaw
+class Gains(LawGains):
+    """Gains of (31)."""
 
-Array = NDArray[np.float64]
+    k_p: Array = per_axis("K_P of (31)", "1/s2")
+    k_d: Array = per_axis("K_D of (31)", "1/s")
 
 
 @kernel
-def computed_torque(
-    e: Array, edot: Array, rhodd_d: Array, n_hat: Array, h_s: Array, c_s: Array,
-    gains: Array, memory: Array, period: float,
-) -> None:  # fmt: skip
+def computed_torque(signals: Signals, gains: Gains, memory: LawMemory, period: float) -> None:
     """(31), (30)."""
-    k_p, k_d = gains[0], gains[1]
-    u, force = memory[1], memory[2]
+    e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
     for i in range(e.size):
-        u[i] = rhodd_d[i] + k_d[i] * edot[i] + k_p[i] * e[i]
-    inverse_dynamics(h_s, c_s, u, force)
+        memory.u[i] = rhodd_d[i] + gains.k_d[i] * edot[i] + gains.k_p[i] * e[i]
+    inverse_dynamics(signals.nominal, memory.u, memory.force)
 
 
 @kernel
-def inverse_dynamics(h_s: Array, c_s: Array, u: Array, force: Array) -> None:
+def inverse_dynamics(nominal: RhoSpaceModel, u: Array, force: Array) -> None:
     """``force = H_S u + c_S``."""
     for i in range(u.size):
-        force[i] = c_s[i]
+        force[i] = nominal.bias[i]
         for j in range(u.size):
-            force[i] += h_s[i, j] * u[j]
+            force[i] += nominal.inertia[i, j] * u[j]
 
 
 class ComputedTorque(CompiledLaw):
     """``F_S = H_S u_PD + c_S``, ``u_PD = rhodd_d + K_D edot + K_P e``."""
 
     name = "ctc"
-    gain_descriptions: ClassVar[dict[str, str]] = {
-        "k_p": "K_P of (31), 1/s2",
-        "k_d": "K_D of (31), 1/s",
-    }
+    gains_type = Gains
     uses_model = True
     kernel = staticmethod(computed_torque)

@@ -2,33 +2,36 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
-from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled import kernel
+from space_robot_msgs_py.compiled.kernels import kernel
 
-from .base import CompiledLaw
+from .base import Array, LawGains, LawMemory, Signals, per_axis
+from .compiled import CompiledLaw
 from .ctc import inverse_dynamics
 
-Array = NDArray[np.float64]
+
+class Gains(LawGains):
+    """Gains of (38), (57), (58)."""
+
+    lambda_: Array = per_axis("slope of the sliding surface (38)", "1/s")
+    g: Array = per_axis("switching gain of (57)", "N m")
+    delta: Array = per_axis("half-width Delta of the boundary layer (58)", "rad/s")
 
 
 @kernel
 def computed_torque_sliding_mode(
-    e: Array, edot: Array, rhodd_d: Array, n_hat: Array, h_s: Array, c_s: Array,
-    gains: Array, memory: Array, period: float,
-) -> None:  # fmt: skip
+    signals: Signals, gains: Gains, memory: LawMemory, period: float
+) -> None:
     """(38), the acceleration wanted, (57)."""
-    lam, g, delta = gains[0], gains[1], gains[2]
-    s, u, force = memory[0], memory[1], memory[2]
+    e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
+    lam, s, u, force = gains.lambda_, memory.s, memory.u, memory.force
     for i in range(e.size):
         s[i] = edot[i] + lam[i] * e[i]
         u[i] = rhodd_d[i] + lam[i] * edot[i]
-    inverse_dynamics(h_s, c_s, u, force)
+    inverse_dynamics(signals.nominal, u, force)
     for i in range(e.size):
-        force[i] += g[i] * saturation(s[i], delta[i])
+        force[i] += gains.g[i] * saturation(s[i], gains.delta[i])
 
 
 @kernel
@@ -41,10 +44,6 @@ class ComputedTorqueSlidingMode(CompiledLaw):
     """``F_S = H_S (rhodd_d + lambda edot) + c_S + g sat(s, Delta)``, ``s = edot + lambda e``."""
 
     name = "ctc_smc"
-    gain_descriptions: ClassVar[dict[str, str]] = {
-        "lambda": "slope of the sliding surface (38), 1/s",
-        "g": "switching gain of (57), N m",
-        "delta": "half-width Delta of the boundary layer (58), rad/s",
-    }
+    gains_type = Gains
     uses_model = True
     kernel = staticmethod(computed_torque_sliding_mode)

@@ -2,39 +2,38 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
-from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled import kernel
+from space_robot_msgs_py.compiled.kernels import kernel
 
-from .base import CompiledLaw
+from .base import Array, LawGains, LawMemory, Signals, per_axis
+from .compiled import CompiledLaw
 
-Array = NDArray[np.float64]
+
+class Gains(LawGains):
+    """Gains of (33), (38), (59)."""
+
+    h_bar: Array = per_axis("constant inertia h_bar of (33)", "kg m2")
+    lambda_: Array = per_axis("slope of the sliding surface (38)", "1/s")
+    g: Array = per_axis("switching gain of (59)", "N m")
 
 
 @kernel
 def time_delay_sliding_mode(
-    e: Array, edot: Array, rhodd_d: Array, n_hat: Array, h_s: Array, c_s: Array,
-    gains: Array, memory: Array, period: float,
-) -> None:  # fmt: skip
+    signals: Signals, gains: Gains, memory: LawMemory, period: float
+) -> None:
     """(38), the acceleration wanted, (59)."""
-    h_bar, lam, g = gains[0], gains[1], gains[2]
-    s, u, force = memory[0], memory[1], memory[2]
+    e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
+    h_bar, lam, s, u = gains.h_bar, gains.lambda_, memory.s, memory.u
     for i in range(e.size):
         s[i] = edot[i] + lam[i] * e[i]
         u[i] = rhodd_d[i] + lam[i] * edot[i]
-        force[i] = h_bar[i] * u[i] + n_hat[i] + g[i] * np.sign(s[i])
+        memory.force[i] = h_bar[i] * u[i] + signals.n_hat[i] + gains.g[i] * np.sign(s[i])
 
 
 class TimeDelaySlidingMode(CompiledLaw):
-    """``F_S = Hbar (rhodd_d + lambda edot) + N_hat + g sign(s)``, ``s = edot + lambda e``."""
+    """``F_S = h_bar (rhodd_d + lambda edot) + N_hat + g sign(s)``, ``s = edot + lambda e``."""
 
     name = "tde_smc"
-    gain_descriptions: ClassVar[dict[str, str]] = {
-        "h_bar": "constant inertia Hbar of (33), kg m2",
-        "lambda": "slope of the sliding surface (38), 1/s",
-        "g": "switching gain of (59), N m",
-    }
+    gains_type = Gains
     kernel = staticmethod(time_delay_sliding_mode)

@@ -2,52 +2,56 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
-from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled import kernel
+from space_robot_msgs_py.compiled.kernels import kernel
 
-from .base import CompiledLaw
+from .base import Array, LawGains, LawMemory, Signals, per_axis
+from .compiled import CompiledLaw
 
-Array = NDArray[np.float64]
+
+class Gains(LawGains):
+    """Gains of (31), (33), (60)."""
+
+    h_bar: Array = per_axis("constant inertia h_bar of (33)", "kg m2")
+    k_p: Array = per_axis("K_P of (31)", "1/s2")
+    k_d: Array = per_axis("K_D of (31)", "1/s")
+    k_1: Array = per_axis("reaching gain K_1 of (60)", "s^-3/2")
+
+
+class Memory(LawMemory):
+    """What the integral of (60) goes on from, beside s itself."""
+
+    last_edot: Array = per_axis("edot of the last tick; NaN: none", "rad/s (eps: 1/s)")
 
 
 @kernel
 def time_delay_terminal_sliding_mode(
-    e: Array, edot: Array, rhodd_d: Array, n_hat: Array, h_s: Array, c_s: Array,
-    gains: Array, memory: Array, period: float,
-) -> None:  # fmt: skip
+    signals: Signals, gains: Gains, memory: Memory, period: float
+) -> None:
     """Advance ``s`` by one tick, the acceleration wanted, (60)."""
-    h_bar, k_p, k_d, k_1 = gains[0], gains[1], gains[2], gains[3]
-    s, u, force, last_edot = memory[0], memory[1], memory[2], memory[3]
+    e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
+    k_p, k_d, s, u, last_edot = gains.k_p, gains.k_d, memory.s, memory.u, memory.last_edot
     for i in range(e.size):
         if not np.isnan(last_edot[i]):  # the integral of edd is the change of edot
             s[i] += edot[i] - last_edot[i] + (k_d[i] * edot[i] + k_p[i] * e[i]) * period
         last_edot[i] = edot[i]
         u_pd = rhodd_d[i] + k_d[i] * edot[i] + k_p[i] * e[i]
-        u[i] = u_pd + k_1[i] * np.sqrt(abs(s[i])) * np.sign(s[i])
-        force[i] = h_bar[i] * u[i] + n_hat[i]
+        u[i] = u_pd + gains.k_1[i] * np.sqrt(abs(s[i])) * np.sign(s[i])
+        memory.force[i] = gains.h_bar[i] * u[i] + signals.n_hat[i]
 
 
 class TimeDelayTerminalSlidingMode(CompiledLaw):
-    """``F_S = Hbar (u_PD + K_1 |s|^1/2 sign(s)) + N_hat``.
+    """``F_S = h_bar (u_PD + K_1 |s|^1/2 sign(s)) + N_hat``.
 
     ``s = integral of (edd + K_D edot + K_P e)`` from when the law is switched on, so s(0) = 0.
     """
 
     name = "tde_tsmc"
-    gain_descriptions: ClassVar[dict[str, str]] = {
-        "h_bar": "constant inertia Hbar of (33), kg m2",
-        "k_p": "K_P of (31), 1/s2",
-        "k_d": "K_D of (31), 1/s",
-        "k_1": "reaching gain K_1 of (60)",
-    }
-    memory_rows = 1
+    gains_type, memory_type = Gains, Memory
     kernel = staticmethod(time_delay_terminal_sliding_mode)
 
     def reset(self) -> None:
         """Start the surface anew."""
         super().reset()
-        self.memory[3] = np.nan
+        self.memory.last_edot[:] = np.nan

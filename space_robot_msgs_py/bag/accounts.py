@@ -1,4 +1,4 @@
-"""What our recorder counted of each topic and noted in the bag: read back with care."""
+"""The counts of each topic that our recorder noted in the bag, read back with care."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
-COVERAGE_KEY = "space_robot.coverage"
+ACCOUNTS_KEY = "space_robot.accounting"
 
 Count = Annotated[int, Field(ge=0, strict=True)]
 
@@ -22,7 +22,7 @@ class Account(BaseModel):
     """Sent, but neither received nor left out on purpose."""
     repeated: Count = 0
     """Left out, since they had come before."""
-    strange: Count = 0
+    invalid_stamps: Count = 0
     """In the bag, too, but their stamp cannot be right."""
     foreign: Count = 0
     """Left out, since a foreign publisher sent them."""
@@ -35,15 +35,15 @@ _ACCOUNTS = TypeAdapter(dict[str, Account])
 
 
 def noted_accounts(noted: Mapping[str, str]) -> dict[str, Account]:
-    """The accounts in a bag's custom data, by topic; empty if there are none that make sense."""
+    """Read the accounts in a bag's custom data, by topic; empty if none make sense."""
     try:
-        return _ACCOUNTS.validate_python(json.loads(noted.get(COVERAGE_KEY, "{}")))
+        return _ACCOUNTS.validate_python(json.loads(noted.get(ACCOUNTS_KEY, "{}")))
     except (ValueError, RecursionError, ValidationError):
         return {}
 
 
 def foreign(accounts: Mapping[str, Account]) -> list[str]:
-    """Whose messages the recorder left out, since they are not of the flight, a sentence each."""
+    """Tell whose messages were left out, since they are not of the flight, a sentence each."""
     return [
         f"{account.foreign} messages on {name} were left out: they are from "
         f"{', '.join(account.foreign_publishers) or 'a foreign publisher'}"
@@ -53,7 +53,7 @@ def foreign(accounts: Mapping[str, Account]) -> list[str]:
 
 
 def paused(accounts: Mapping[str, Account]) -> list[str]:
-    """What the recorder left out since it was inactive, in at most one sentence."""
+    """Tell what the recorder left out since it was inactive, in at most one sentence."""
     inactive = {name: a.while_inactive for name, a in accounts.items() if a.while_inactive}
     each = ", ".join(f"{name} {count}" for name, count in inactive.items())
     return [f"messages were sent while the recorder was inactive: {each}"] if inactive else []

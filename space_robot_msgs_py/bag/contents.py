@@ -1,90 +1,72 @@
-"""What a bag holds, in batches: MCAP read by ourselves, anything else by rosbags."""
+"""The messages of a bag, in batches, whatever it is stored in."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterator, Sequence
+from typing import Protocol
 
 from ..topics import Topic
 from .batch import Batch
 from .findings import SHOWN
-from .mcap_storage import McapStorage
 from .metadata import METADATA, BagInformation, parse_information
-from .rosbags_storage import RosbagsStorage
 from .writer import DESCRIPTION
 
 
-class Bag(ABC):
-    """What a flight is read from."""
+class Storage(Protocol):
+    """A file with messages, or a whole folder that rosbag2 compressed."""
 
-    finished: bool
-    """Whether its recorder closed it."""
+    counts: Counter[str] | None
+    """Messages a topic, as it has noted itself; None: it has not."""
+    metadata: dict[str, dict[str, str]]
+    """The metadata records in it, by name."""
+    has_end: bool
+    """True if its writer closed it, as far as it can tell."""
 
-    @abstractmethod
     def topics(self) -> dict[str, str]:
-        """Type by topic."""
+        """Return the type by topic."""
 
-    @abstractmethod
     def batches(self) -> Iterator[Batch]:
-        """All messages, as they were written."""
-
-    @abstractmethod
-    def recorded(self) -> dict[str, int] | None:
-        """Messages a topic that the bag should hold; None: nobody counted."""
-
-    @abstractmethod
-    def custom_data(self) -> dict[str, str]:
-        """What our recorder noted; empty for a bag of another recorder."""
+        """Yield all messages."""
 
     @property
-    @abstractmethod
     def incomplete(self) -> bool:
-        """Whether something in it could not be read; known after `batches`."""
+        """True if something could not be read; known after `batches`."""
 
     @property
-    @abstractmethod
     def damage(self) -> list[str]:
-        """What is wrong with the bag, a sentence each; all of it is known after `batches`."""
-
-    def counts(self) -> dict[str, int]:
-        """Messages a topic that can be read."""
-        counts: Counter[str] = Counter()
-        for batch in self.batches():
-            counts[batch.topic] += len(batch)
-        return counts
-
-    def messages(self, *wanted: Topic) -> Iterator[tuple[str, bytes]]:
-        """Topic name and bytes of the messages of some topics, each topic's in its order."""
-        names = {topic.name for topic in wanted}
-        for batch in self.batches():
-            if batch.topic in names:
-                yield from ((batch.topic, batch.message(i)) for i in range(len(batch)))
+        """The things found broken, a sentence each; all are known after `batches`."""
 
 
-class McapBag(Bag):
-    """MCAP files, of any recorder."""
+class Bag:
+    """The files that a flight is read from, and what rosbag2's metadata says of them."""
 
     def __init__(
-        self, files: list[McapStorage], information: BagInformation | None, damage: list[str],
-        closed: bool,
+        self, files: Sequence[Storage], information: BagInformation | None, damage: list[str],
+        closed: bool, lacks_files: bool = False,
     ) -> None:  # fmt: skip
-        """``closed``: nothing but the files can say that the bag is unfinished."""
+        """Take what was found in a folder.
+
+        Args:
+            files: in the order of their writing.
+            information: metadata.yaml's (None: there is none that can be read).
+            damage: what is wrong with the folder, a sentence each.
+            closed: nothing but the files can say that the bag is unfinished.
+            lacks_files: some that metadata.yaml names are not there.
+        """
         self._files, self._found = files, damage
         self.finished = closed and all(file.has_end for file in files)
-        self._information = information
-        named = len(information.relative_file_paths) if information else 0
-        self._missing = len(files) < named
+        """True if its recorder closed it."""
+        self._information, self._lacks_files = information, lacks_files
         self._counts: Counter[str] = Counter()
         self._span_ns: tuple[int, int] | None = None
 
     def topics(self) -> dict[str, str]:
-        """Type by topic."""
+        """Return the type by topic."""
         return {name: kind for file in self._files for name, kind in file.topics().items()}
 
     def batches(self) -> Iterator[Batch]:
-        """All messages, as they were written, file by file."""
+        """Yield all messages, as they were written, file by file."""
         self._counts, self._span_ns = Counter(), None
         for file in self._files:
             for batch in file.batches():
@@ -96,14 +78,20 @@ class McapBag(Bag):
                 yield batch
 
     def recorded(self) -> dict[str, int] | None:
-        """By the files' own statistics; by metadata.yaml, if they have none."""
+        """Return the messages a topic that the bag should hold; None: nobody counted.
+
+        By the files' own statistics; by metadata.yaml, if they have none.
+        """
         information = self._information
-        if self._missing or any(file.counts is None for file in self._files):
+        if self._lacks_files or any(file.counts is None for file in self._files):
             return information.counts if information else None
         return dict(sum((file.counts or Counter() for file in self._files), Counter[str]()))
 
     def custom_data(self) -> dict[str, str]:
-        """From metadata.yaml, its copy in the file, or what our recorder noted when it began."""
+        """Return what our recorder noted; empty for a bag of another recorder.
+
+        From metadata.yaml, its copy in the file, or what was noted when recording began.
+        """
         copies = [
             parse_information(file.metadata.get("rosbag2", {}).get("serialized_metadata", ""))
             for file in self._files[::-1]
@@ -115,12 +103,12 @@ class McapBag(Bag):
 
     @property
     def incomplete(self) -> bool:
-        """Whether a part of a file was passed over, or a file is missing."""
-        return self._missing or any(file.incomplete for file in self._files)
+        """True if a part of a file was passed over, or a file is missing."""
+        return self._lacks_files or any(file.incomplete for file in self._files)
 
     @property
     def damage(self) -> list[str]:
-        """What is wrong with files and metadata.yaml."""
+        """The faults of files and metadata.yaml, a sentence each."""
         found = self._found + [text for file in self._files for text in file.damage]
         information, recorded = self._information, self.recorded()
         if not information or not recorded:
@@ -141,40 +129,15 @@ class McapBag(Bag):
             found.append(f"{METADATA}: messages from {claimed}, but {true_span} in the bag")
         return found
 
+    def counts(self) -> dict[str, int]:
+        """Count the messages of each topic that can be read."""
+        for _ in self.batches():
+            pass
+        return self._counts
 
-class StoredBag(Bag):
-    """What rosbags reads: sqlite3, and files or messages that rosbag2 compressed."""
-
-    def __init__(
-        self, sources: list[Path], information: BagInformation | None, damage: list[str],
-        closed: bool,
-    ) -> None:  # fmt: skip
-        self._sources = [RosbagsStorage(source) for source in sources]
-        self._information, self._found, self.finished = information, damage, closed
-
-    def topics(self) -> dict[str, str]:
-        """Type by topic."""
-        return {name: kind for source in self._sources for name, kind in source.topics().items()}
-
-    def batches(self) -> Iterator[Batch]:
-        """All messages by their time, file by file."""
-        for source in self._sources:
-            yield from source.batches()
-
-    def recorded(self) -> dict[str, int] | None:
-        """By metadata.yaml."""
-        return self._information.counts if self._information else None
-
-    def custom_data(self) -> dict[str, str]:
-        """From metadata.yaml."""
-        return self._information.noted if self._information else {}
-
-    @property
-    def incomplete(self) -> bool:
-        """Whether a file could not be read to its end."""
-        return any(source.fault for source in self._sources)
-
-    @property
-    def damage(self) -> list[str]:
-        """What is wrong with files and metadata.yaml."""
-        return self._found + [s.fault for s in self._sources if s.fault]
+    def messages(self, *wanted: Topic) -> Iterator[tuple[str, bytes]]:
+        """Yield topic name and bytes of the messages of some topics, each topic's in its order."""
+        names = {topic.name for topic in wanted}
+        for batch in self.batches():
+            if batch.topic in names:
+                yield from ((batch.topic, batch.message(i)) for i in range(len(batch)))

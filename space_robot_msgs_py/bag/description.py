@@ -1,7 +1,7 @@
-"""What a bag says of its flight, checked: a bag may be anybody's, and its words anything.
+"""The description of a flight in its bag, checked: a bag may be anybody's, its words anything.
 
-One schema for all who read descriptions. Keys that it does not know are taken as they are: newer
-software may have noted more.
+All who read descriptions do so here. Keys that are not known are taken as they are: newer software
+may have noted more.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue
 
+from ..config.text import printable
+from ..config.validation import validate
 from ..errors import InputError
-from ..text import printable
-from ..validation import check
 from .recorder import FLIGHT_KEY
 
 WHERE = "the description of the flight"
@@ -42,8 +42,8 @@ class _Open(BaseModel):
     model_config = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
 
 
-class _Told(_Open):
-    """What a node was told, as far as it names things; the rest is for the node's own schema."""
+class _Names(_Open):
+    """The names of what is flown; a node's other settings are for the node's own schema."""
 
     robot: Text = ""
     mission: Text = ""
@@ -54,22 +54,15 @@ class _Told(_Open):
     faults: list[Text] = Field(default_factory=list)
 
 
-class _Description(_Open):
-    controller: Text = ""
-    case: Text = ""
-    gains: Text = ""
-    robot: Text = ""
-    mission: Text = ""
+class _Description(_Names):
     period: Annotated[float, Field(ge=1e-9, le=LONGEST_PERIOD)] = 0.0005
     ticks: Count = 0
     command_latency_ticks: Annotated[int, Field(ge=0, le=10**6)] = 0
     friction: bool = True
     realtime: bool = False
     seed: Count = 0
-    faults: list[Text] = Field(default_factory=list)
-    swaps: list[Text] = Field(default_factory=list)
     restart_controller: bool = False
-    parameters: dict[Text, _Told] = Field(default_factory=dict)
+    parameters: dict[Text, _Names] = Field(default_factory=dict)
     gains_used: dict[Text, list[float]] = Field(default_factory=dict)
     robot_file: dict[Text, JsonValue] = Field(default_factory=dict)
     controller_robot: Text = ""
@@ -77,7 +70,7 @@ class _Description(_Open):
 
 
 def read_description(noted: Mapping[str, str]) -> dict[str, Any]:
-    """What was flown, from a bag's ``custom_data``; empty for a bag of another recorder.
+    """Read what was flown from a bag's ``custom_data``; empty for a bag of another recorder.
 
     Raises:
         InputError: it is there but cannot be used; one line that names the key.
@@ -92,12 +85,12 @@ def read_description(noted: Mapping[str, str]) -> dict[str, Any]:
         raise InputError(f"{WHERE} cannot be read: a mapping was expected")
     if fault := next(_unwritable(content, "", _DEEPEST), ""):
         raise InputError(f"{WHERE} cannot be used: {printable(fault)}")
-    check(_Description, content, f"{WHERE} cannot be used")
+    validate(_Description, content, f"{WHERE} cannot be used")
     return content
 
 
 def _unwritable(value: Any, key: str, depth: int) -> Iterator[str]:
-    """What cannot be written as JSON again, wherever it stands, known key or not."""
+    """Find what cannot be written as JSON again, wherever it stands, known key or not."""
     if depth == 0:
         yield f"{key[:80]}: nested too deeply"
     elif isinstance(value, (dict, list)):

@@ -1,4 +1,4 @@
-"""What is wrong with a bag that was read, in sentences."""
+"""The faults of a bag that was read, in sentences."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def some_of(names: Iterable[str]) -> str:
 
 
 def missing_ticks(whole: NDArray[np.bool_], timebase: Timebase) -> list[str]:
-    """Which ticks lack state or reference; (N,) ``whole`` says which do not."""
+    """Tell which ticks lack state or reference; (N,) ``whole`` says which do not."""
     edges = np.diff(np.concatenate(([True], whole, [True])).astype(np.int8))
     starts, stops = np.flatnonzero(edges < 0), np.flatnonzero(edges > 0)
     if not len(starts):
@@ -39,7 +39,7 @@ def missing_ticks(whole: NDArray[np.bool_], timebase: Timebase) -> list[str]:
 
 
 def unread_messages(recorded: Mapping[str, int], gone: Mapping[str, int]) -> list[str]:
-    """How many of the recorded messages could not be read."""
+    """Tell how many of the recorded messages could not be read."""
     if not gone:
         return []
     each = ", ".join(f"{name} {count}" for name, count in gone.items())

@@ -7,10 +7,11 @@ from pathlib import Path
 from mcap.writer import MCAP0_MAGIC
 
 from ..errors import InputError
-from .contents import Bag, McapBag, StoredBag
+from .contents import Bag, Storage
 from .findings import some_of
 from .mcap_storage import McapStorage
 from .metadata import METADATA, BagInformation, read_information
+from .rosbags_storage import RosbagsStorage
 
 _SQLITE_MAGIC = b"SQLite format 3\0"
 _STORAGES = (".mcap", ".db3")
@@ -40,7 +41,7 @@ def open_bag(path: Path) -> Bag:
     if information and information.compressed:
         for name in information.relative_file_paths:
             _check_regular(path / Path(name).name)
-        return StoredBag([path], information, [], closed)
+        return Bag([RosbagsStorage(path)], information, [], closed)
     there = [file for suffix in _STORAGES for file in path.glob(f"*{suffix}")]
     there.sort(key=lambda file: (len(file.name), file.name))
     if information:
@@ -49,15 +50,6 @@ def open_bag(path: Path) -> Bag:
         hint = damage[-1] if damage else f"not a bag folder (no {METADATA}, no .mcap)"
         raise InputError(hint if damage else f"{path}: {hint}")
     return _open_files(there, information, damage, closed)
-
-
-def custom_data(path: Path) -> dict[str, str]:
-    """The ``custom_data`` of a finished bag's metadata.
-
-    Raises:
-        InputError: there is no metadata, or it is no rosbag2 metadata.
-    """
-    return read_information(path).noted
 
 
 def _listed(
@@ -81,18 +73,17 @@ def _open_files(
 ) -> Bag:
     for file in files:
         _check_regular(file)
-    kinds = {file: _kind(file) for file in files}
-    if all(kind == ".db3" for kind in kinds.values()):
-        return StoredBag(files, information, damage, closed)
-    opened = []
+    is_database = all(_kind(file) == ".db3" for file in files)
+    opened: list[Storage] = []
     for file in files:
         try:
-            opened.append(McapStorage(file))
+            opened.append(RosbagsStorage(file) if is_database else McapStorage(file))
         except OSError as error:
             if len(files) == 1:
                 raise
             damage.append(f"{file.name}: cannot be read ({error.strerror})")
-    return McapBag(opened, information, damage, closed)
+    lacks_files = information is not None and len(opened) < len(information.relative_file_paths)
+    return Bag(opened, information, damage, closed, lacks_files)
 
 
 def _check_regular(file: Path) -> None:

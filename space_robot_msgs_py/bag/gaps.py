@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..flight_log import REFERENCE, STATE, FlightLog
+from ..samples import STATE_FIELDS
+from .flight_log import REFERENCE, FlightLog
 
 
 def fill_gaps(log: FlightLog) -> None:
@@ -15,10 +16,10 @@ def fill_gaps(log: FlightLog) -> None:
 
     From the first whole tick to the last state; `FlightLog.filled` counts the states.
     """
-    states = log.finite(STATE)
+    states = log.finite(STATE_FIELDS)
     end = len(states) - int(np.argmax(states[::-1])) if states.any() else 0
     log.filled = int(np.count_nonzero(~states[:end]))
-    _repeat_before(log, STATE, states, end)
+    _repeat_before(log, STATE_FIELDS, states, end)
     references = log.finite(REFERENCE)
     _repeat_before(log, REFERENCE, references, end)
     log.reference_joints[:end][~references[:end], 1:] = 0.0  # at rest

@@ -5,19 +5,19 @@ Flat arrays in and out, so that each is compiled once for every robot and every 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import kernel, subroutine
+from ..compiled.kernels import kernel, subroutine
+from ..wire.compiled_codec import FOREIGN, is_laid_out, little_endian, stamp_of
+from ..wire.message import Offsets
 
 Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int64]
 
 CHANNEL, START, LENGTH, LOG_NS, PUBLISH_NS = range(5)
 """Rows of what `walk_messages` finds."""
-NO_STAMP = -(1 << 62)
+NO_STAMP = FOREIGN
 """In place of the stamp of a message that is too short for one."""
 _HEAD = 9
 _FIELDS = 22
@@ -26,11 +26,8 @@ _ENCAPSULATION = 4
 
 
 @subroutine
-def _little_endian(data: Bytes, at: int, size: int) -> int:
-    value: Any = np.uint64(0)
-    for i in range(size):
-        value |= np.uint64(data[at + i]) << np.uint64(8 * i)
-    return np.int64(value)  # type: ignore[return-value]
+def _integer(data: Bytes, at: int, size: int) -> int:
+    return np.int64(little_endian(data, np.uint64(at), size))  # type: ignore[return-value]
 
 
 @kernel
@@ -43,14 +40,14 @@ def walk_messages(data: Bytes, start: int, found: Integers, before: int) -> tupl
     """
     at, count = start, before
     while count < found.shape[1] and len(data) - at >= _HEAD + _FIELDS and data[at] == _MESSAGE:
-        length = _little_endian(data, at + 1, 8)
+        length = _integer(data, at + 1, 8)
         if length < _FIELDS or length > len(data) - at - _HEAD:
             break
-        found[CHANNEL, count] = _little_endian(data, at + 9, 2)
+        found[CHANNEL, count] = _integer(data, at + 9, 2)
         found[START, count] = at + _HEAD + _FIELDS
         found[LENGTH, count] = length - _FIELDS
-        found[LOG_NS, count] = _little_endian(data, at + 15, 8)
-        found[PUBLISH_NS, count] = _little_endian(data, at + 23, 8)
+        found[LOG_NS, count] = _integer(data, at + 15, 8)
+        found[PUBLISH_NS, count] = _integer(data, at + 23, 8)
         at += _HEAD + length
         count += 1
     return count, at
@@ -62,15 +59,17 @@ def read_stamps(data: Bytes, starts: Integers, lengths: Integers, stamps: Intege
     for i in range(len(starts)):
         stamps[i] = NO_STAMP
         if lengths[i] >= _ENCAPSULATION + 8:
-            at = starts[i] + _ENCAPSULATION
-            seconds = np.int64(np.int32(_little_endian(data, at, 4)))
-            stamps[i] = seconds * 1_000_000_000 + _little_endian(data, at + 4, 4)
+            head = data[starts[i] : starts[i] + _ENCAPSULATION + 8]
+            if head[0] == 0 and head[1] == 0:  # written by a big-endian machine
+                stamps[i] = stamp_of(np.concatenate((head[:4], head[7:3:-1], head[:7:-1])))
+            else:
+                stamps[i] = stamp_of(head)
 
 
 @kernel
 def gather(
-    data: Bytes, starts: Integers, lengths: Integers, layout: Bytes, constant: Bytes,
-    runs: Integers, numbers: Bytes, fits: NDArray[np.bool_],
+    data: Bytes, starts: Integers, lengths: Integers, pattern: Bytes, offsets: Offsets,
+    numbers: NDArray[np.float64], fits: NDArray[np.bool_],
 ) -> None:  # fmt: skip
     """Copy the numbers of all messages that are laid out alike.
 
@@ -78,27 +77,19 @@ def gather(
         data: what the messages lie in, at ``starts`` with ``lengths``.
         starts: first byte of each.
         lengths: bytes of each; what lies behind the layout is ignored.
-        layout: the bytes of one message.
-        constant: which bits of it are the same in all.
-        runs: offset and length of each run of numbers, in bytes.
-        numbers: (messages, bytes) the runs of each, one behind the other.
+        pattern: `MessageLayout.pattern`.
+        offsets: (K,) bytes from a message's beginning to each number.
+        numbers: (messages, K) numbers of each.
         fits: whether a message is laid out so; of others nothing is copied.
     """
+    size = pattern.shape[1]
+    bits = numbers.view(np.uint64)
     for i in range(len(starts)):
-        fits[i] = lengths[i] >= len(layout)
+        fits[i] = lengths[i] >= size
         if not fits[i]:
             continue
-        message = data[starts[i] : starts[i] + len(layout)]
-        differing = np.uint8(0)
-        for k in range(len(layout)):
-            differing |= (message[k] ^ layout[k]) & constant[k]
-        fits[i] = differing == 0
-        if not fits[i]:
-            continue
-        to = 0
-        for r in range(len(runs)):
-            source = message[runs[r, 0] : runs[r, 0] + runs[r, 1]]
-            target = numbers[i, to : to + runs[r, 1]]
-            for k in range(len(source)):
-                target[k] = source[k]
-            to += runs[r, 1]
+        message = data[starts[i] : starts[i] + size]
+        fits[i] = is_laid_out(message, pattern)
+        if fits[i]:
+            for k in range(len(offsets)):
+                bits[i, k] = little_endian(message, offsets[k], 8)

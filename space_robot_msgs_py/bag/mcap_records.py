@@ -24,7 +24,7 @@ BROKEN = (
     McapError, zstandard.ZstdError, struct.error, ValueError, RuntimeError, OverflowError,
     MemoryError,
 )  # fmt: skip
-"""What mcap, lz4 and zstd raise on bytes that end early or make no sense."""
+"""The errors of mcap, lz4 and zstd on bytes that end early or make no sense."""
 HEAD = struct.Struct("<BQ")
 INDEX_HEAD = struct.Struct("<HI")
 _PARSED: dict[int, Any] = {
@@ -82,7 +82,7 @@ def whole_messages(piece: bytes) -> int:
 
 
 def check_index(head: bytes, length: int) -> None:
-    """Whether a record of this length may be a message index.
+    """See that a record of this length may be a message index.
 
     Raises:
         ValueError: it is not.
@@ -100,7 +100,7 @@ def cause(error: BaseException) -> str:
 
 
 def next_chunk(file: BinaryIO, at: int, size: int) -> int:
-    """Where a chunk begins at or behind ``at``; ``size``, the file's: nowhere."""
+    """Find where a chunk begins at or behind ``at``; ``size``, the file's: nowhere."""
     while at < size:
         file.seek(at)
         piece = file.read(PIECE + _LONGEST_CHUNK_HEAD)

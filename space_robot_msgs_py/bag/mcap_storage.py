@@ -20,16 +20,7 @@ from mcap.records import Channel, Footer, Metadata, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
 
 from .batch import Batch
-from .kernels import (
-    CHANNEL,
-    LENGTH,
-    LOG_NS,
-    PUBLISH_NS,
-    START,
-    Bytes,
-    Integers,
-    walk_messages,
-)
+from .kernels import CHANNEL, LENGTH, LOG_NS, PUBLISH_NS, START, Bytes, Integers, walk_messages
 from .mcap_records import (
     BROKEN,
     DESCRIPTIONS,
@@ -104,12 +95,12 @@ class McapStorage:
 
     @property
     def incomplete(self) -> bool:
-        """Whether something was passed over."""
+        """True if something was passed over."""
         return bool(self._faults or self._of_no_topic)
 
     @property
     def damage(self) -> list[str]:
-        """What was found broken; all of it is known when `batches` is through."""
+        """The things found broken; all are known when `batches` is through."""
         found = [self._index_fault] if self._index_fault else []
         if self._faults:
             at, why = self._faults[0]

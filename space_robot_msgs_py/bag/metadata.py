@@ -7,9 +7,9 @@ from typing import Any
 
 from pydantic import BaseModel, Field, ValidationError
 
+from ..config.validation import read_yaml, validate
+from ..config.yaml_text import parse_yaml
 from ..errors import InputError
-from ..validation import check, read_yaml
-from ..yaml_text import parse_yaml
 
 METADATA = "metadata.yaml"
 NEWEST = 9
@@ -35,7 +35,7 @@ class _Count(BaseModel):
 
 
 class BagInformation(BaseModel):
-    """What rosbag2 notes of a bag, as far as a reader needs it."""
+    """The notes of rosbag2 about a bag, as far as a reader needs them."""
 
     version: int
     storage_identifier: str = ""
@@ -49,7 +49,7 @@ class BagInformation(BaseModel):
 
     @property
     def doubts(self) -> list[str]:
-        """What may be misunderstood in it, a sentence each."""
+        """The things that may be misunderstood in it, a sentence each."""
         if 1 <= self.version <= NEWEST:
             return []
         return [
@@ -68,7 +68,7 @@ class BagInformation(BaseModel):
 
     @property
     def compressed(self) -> bool:
-        """Whether rosbag2 itself compressed files or messages, rather than MCAP its chunks."""
+        """True if rosbag2 itself compressed files or messages, rather than MCAP its chunks."""
         return self.compression_mode.lower() in ("file", "message")
 
     @property
@@ -99,4 +99,4 @@ def parse_information(text: str) -> BagInformation | None:
 def _check(content: Any, where: str) -> BagInformation:
     if not isinstance(content, dict):
         raise InputError(f"{where}: not the metadata of a rosbag2 bag")
-    return check(BagInformation, content, where)
+    return validate(BagInformation, content, where)

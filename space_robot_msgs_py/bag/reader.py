@@ -10,19 +10,25 @@ from typing import Any
 import numpy as np
 
 from .. import topics
-from ..definitions import decode
+from ..config.text import printable
 from ..errors import InputError, MessageError
-from ..flight_log import FlightLog
 from ..samples import Timebase
-from ..text import printable
+from ..wire.definitions import decode
 from .accounts import Account, foreign, noted_accounts, paused
 from .batch import Batch
 from .contents import Bag
-from .coverage import LONGEST_JUMP, Coverage, excused_topics, lost_messages, unanswered_ticks
 from .description import read_description
 from .findings import missing_ticks, unread_messages
-from .folder import custom_data, open_bag
+from .flight_log import FlightLog
+from .folder import open_bag
 from .gaps import fill_gaps
+from .message_accounting import (
+    LONGEST_JUMP,
+    MessageAccounting,
+    lost_messages,
+    topics_with_allowed_gaps,
+    unanswered_ticks,
+)
 from .rows import Rows, stamps_of
 from .selection import Selection
 
@@ -30,7 +36,7 @@ REQUIRED = (
     topics.JOINT_STATES, topics.BASE_STATE, topics.REFERENCE_JOINTS, topics.REFERENCE_BASE,
 )  # fmt: skip
 DEFAULT_PERIOD = 0.0005
-"""Of a bag that does not tell its period, s."""
+"""The period of a bag that does not tell it, s."""
 _STAMPS_LOOKED_AT = 200
 
 
@@ -63,17 +69,6 @@ def read_flight(
     return log
 
 
-def read_coverage(path: Path) -> dict[str, dict[str, Any]]:
-    """How many messages of each topic the recorder counted: received, missing, repeated, ...
-
-    Empty for a bag of another recorder.
-
-    Raises:
-        InputError: there is no finished bag.
-    """
-    return {name: a.model_dump() for name, a in noted_accounts(custom_data(path)).items()}
-
-
 def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
     selection = Selection(bag, remap)
     flight, damage = _description(bag)
@@ -83,7 +78,7 @@ def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
     for topic in REQUIRED:
         if not rows.counts[topic.name]:
             raise missing(topic, bag, selection)
-    log, excused = rows.log, excused_topics(flight)
+    log, excused = rows.log, topics_with_allowed_gaps(flight)
     log.flight = flight
     gone = _gone(selection, rows)
     accounts = noted_accounts(bag.custom_data())
@@ -108,7 +103,7 @@ def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
 
 
 def _description(bag: Bag) -> tuple[dict[str, Any], list[str]]:
-    """What was flown, as recorded, and what is wrong with that."""
+    """Read what was flown, and tell what is wrong with that."""
     try:
         return read_description(bag.custom_data()), []
     except InputError as error:
@@ -167,7 +162,7 @@ def timebase_of(
         described_ns = round(described * 1e9)
         if likely_ns is None or likely_ns == described_ns:
             return Timebase(described_ns), []
-        if likely_ns % described_ns == 0 and excused_topics(flight):
+        if likely_ns % described_ns == 0 and topics_with_allowed_gaps(flight):
             return Timebase(described_ns), []  # states were kept back
     if likely_ns is None:
         return Timebase(round(DEFAULT_PERIOD * 1e9)), []
@@ -176,7 +171,7 @@ def timebase_of(
 
 
 def missing(topic: topics.Topic, bag: Bag, selection: Selection) -> InputError:
-    """Why a bag without a topic's messages cannot be read."""
+    """Tell why a bag without a topic's messages cannot be read."""
     selection.topics()  # a topic to remap that is not there comes first
     if topic.name in selection.wrong:
         return InputError(f"{topic.name} is {selection.wrong[topic.name]}")
@@ -202,17 +197,17 @@ def _count_lost(
     """`FlightLog.lost` and `FlightLog.unanswered`: what never came and what is gone since."""
     log = rows.log
     there = selection.topics()
-    coverages = {
-        topic.name: rows.coverages.get(topic.name, Coverage(topic))
+    accounting = {
+        topic.name: rows.accounting.get(topic.name, MessageAccounting(topic))
         for topic in topics.ALL
-        if topic.name in rows.coverages or (bag.finished and topic in there)
+        if topic.name in rows.accounting or (bag.finished and topic in there)
     }
-    log.lost = lost_messages(coverages, excused_topics(log.flight), bag.finished)
+    log.lost = lost_messages(accounting, topics_with_allowed_gaps(log.flight), bag.finished)
     for name in log.lost if bag.finished else ():
         account, unread = accounts.get(name), gone.get(name, 0)
-        if account and rows.counts[name] + unread == account.received + account.strange:
+        if account and rows.counts[name] + unread == account.received + account.invalid_stamps:
             log.lost[name] = account.missing + unread  # the bag is the one that was counted
         else:
             log.lost[name] = max(log.lost[name], unread)
-    if topics.COMMAND.name in coverages:
-        log.unanswered = unanswered_ticks(coverages, bag.finished)
+    if topics.COMMAND.name in accounting:
+        log.unanswered = unanswered_ticks(accounting, bag.finished)

@@ -11,14 +11,20 @@ from typing import Any
 from .. import topics
 from ..errors import FlightError, MessageError
 from ..samples import Timebase
-from .accounts import COVERAGE_KEY
-from .coverage import Coverage, excused_topics, lost_messages, message_tick
+from .accounts import ACCOUNTS_KEY
 from .mcap_file import Compression
+from .message_accounting import (
+    MessageAccounting,
+    lost_messages,
+    message_tick,
+    topics_with_allowed_gaps,
+)
 from .sources import PARTICIPANT_BYTES, Publishers, Sources, Unknown
 from .writer import BagWriter
 
 FLIGHT_KEY = "space_robot.flight"
-CHUNK_BYTES = 1 << 20
+CHUNK_BYTES = 1 << 18
+"""Written in less time than a tick leaves free, and read as fast as longer ones."""
 CHUNK_AGE_S = 0.25
 """A killed recorder loses the open chunk, so none stays open for longer."""
 
@@ -51,18 +57,18 @@ class BagRecorder:
         Raises:
             InputError: the bag exists already, or cannot be written.
         """
-        self._excused = excused_topics(flight)
+        self._excused = topics_with_allowed_gaps(flight)
         self._writer = BagWriter(
             path, topics.ALL, {FLIGHT_KEY: json.dumps(dict(flight))}, compression, split_size
         )
         self._chunk_bytes = min(CHUNK_BYTES, split_size or CHUNK_BYTES)
         self._timebase = timebase
-        self.coverages = {topic.name: Coverage(topic) for topic in topics.ALL}
+        self.accounting = {topic.name: MessageAccounting(topic) for topic in topics.ALL}
         self.sources = {
             topic.name: Sources(topic.name, publishers or Unknown()) for topic in topics.ALL
         }
         self.failure = ""
-        """Why nothing is written any more (empty: all is well)."""
+        """The reason why nothing is written any more (empty: all is well)."""
         self.kept_tick = -1
         """The last tick whose state is in the file for good; -1: none."""
         self._kept = 0
@@ -93,20 +99,20 @@ class BagRecorder:
                 return False
             if sources.begins_anew:
                 sources.begins_anew = False
-                self.coverages[topic.name] = Coverage(topic)
-        coverage = self.coverages[topic.name]
-        strange = coverage.strange
+                self.accounting[topic.name] = MessageAccounting(topic)
+        counted = self.accounting[topic.name]
+        invalid = counted.invalid_stamps
         try:
             tick = message_tick(topic, data, self._timebase)
-            is_new = coverage.take(tick)
+            is_new = counted.take(tick)
         except MessageError:
-            tick, is_new = coverage.last, True
-            coverage.strange += 1
+            tick, is_new = counted.last, True
+            counted.invalid_stamps += 1
         if is_unnamed:
-            sources.judge(coverage.strange == strange)
+            sources.judge(counted.invalid_stamps == invalid)
         if not is_new or self.failure:
             return True
-        log_ns = self._timebase.stamp_ns(max(0, min(tick, coverage.last)))
+        log_ns = self._timebase.stamp_ns(max(0, min(tick, counted.last)))
         if self._writer.write(topic, log_ns, sent_ns or log_ns, tick, data) > self._chunk_bytes:
             self.flush()
         return True
@@ -124,7 +130,7 @@ class BagRecorder:
 
     @property
     def is_behind(self) -> bool:
-        """Whether a node has sent more than has come."""
+        """True if a node has sent more than has come."""
         return any(sources.is_behind for sources in self.sources.values())
 
     @property
@@ -141,10 +147,10 @@ class BagRecorder:
         return sorted(found)
 
     def pause(self) -> None:
-        """What is sent until the next message recorded is left out on purpose."""
+        """Leave out on purpose what is sent until the next message recorded."""
         for name, sources in self.sources.items():
             sources.pause()
-            self.coverages[name].pause()
+            self.accounting[name].pause()
 
     def flush(self) -> None:
         """End the open chunk: what was recorded is with the kernel and survives this process."""
@@ -156,7 +162,7 @@ class BagRecorder:
             else:
                 self._kept = self.received
                 self.kept_tick = min(
-                    self.coverages[topic.name].last
+                    self.accounting[topic.name].last
                     for topic in (topics.JOINT_STATES, topics.BASE_STATE)
                 )
         self._flush_at = time.monotonic() + CHUNK_AGE_S
@@ -169,7 +175,7 @@ class BagRecorder:
     @property
     def received(self) -> int:
         """Messages recorded, repeated ones left out."""
-        return sum(coverage.kept for coverage in self.coverages.values())
+        return sum(counted.kept for counted in self.accounting.values())
 
     @property
     def unkept(self) -> int:
@@ -184,13 +190,13 @@ class BagRecorder:
         and has come then is not lost.
         """
         if not any(sources.is_counted for sources in self.sources.values()):
-            return lost_messages(self.coverages, self._excused)
+            return lost_messages(self.accounting, self._excused)
         return {name: self._lost(name) for name in self.sources}
 
     def _lost(self, name: str) -> int:
-        sources, coverage = self.sources[name], self.coverages[name]
+        sources, counted = self.sources[name], self.accounting[name]
         holes = sources.holes
-        return sources.tail + (holes if coverage.topic.is_event else min(holes, coverage.gaps))
+        return sources.tail + (holes if counted.topic.is_event else min(holes, counted.gaps))
 
     def close(self) -> None:
         """Make the bag whole, with the flight's description and the counts in its metadata.
@@ -224,12 +230,12 @@ class BagRecorder:
                 "received": c.received,
                 "missing": lost,
                 "repeated": c.repeated,
-                "strange": c.strange,
+                "invalid_stamps": c.invalid_stamps,
                 **self._left_out(name),
             }
-            for (name, c), lost in zip(self.coverages.items(), self.lost.values(), strict=True)
+            for (name, c), lost in zip(self.accounting.items(), self.lost.values(), strict=True)
         }
-        self._writer.close({COVERAGE_KEY: json.dumps(counts)})
+        self._writer.close({ACCOUNTS_KEY: json.dumps(counts)})
 
     def _left_out(self, name: str) -> dict[str, Any]:
         sources = self.sources[name]

@@ -8,16 +8,16 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from ..definitions import jazzy
 from ..topics import Topic
+from ..wire.definitions import jazzy
 
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 _NEVER_NS = 2**63 - 1
-"""Where a bag without a message starts."""
+"""The start of a bag without a message."""
 
 
 class FileSummary(NamedTuple):
-    """What metadata.yaml says of one file."""
+    """The entry of one file in metadata.yaml."""
 
     name: str
     span_ns: tuple[int, int] | None
@@ -75,7 +75,7 @@ def qos_profiles(topic: Topic) -> list[dict[str, Any]]:
 def bag_information(
     files: Sequence[FileSummary], topics: Sequence[tuple[Topic, int]], custom: Mapping[str, str]
 ) -> dict[str, Any]:
-    """What metadata.yaml says of a bag.
+    """Return what metadata.yaml says of a bag.
 
     Args:
         files: in the order of their writing.

@@ -1,7 +1,8 @@
-"""What is not plain MCAP, read with rosbags, in the batches of plain MCAP."""
+"""Bags that are not plain MCAP, read with rosbags, in the batches of plain MCAP."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -24,9 +25,11 @@ class RosbagsStorage:
             InputError: it cannot be read.
         """
         self._path = path
-        self.fault = ""
-        """What went wrong when the messages were read."""
-        self._strange = 0
+        self.counts: Counter[str] | None = None
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.has_end = True
+        self._fault = ""
+        self._not_messages = 0
         try:
             with Reader(path) as reader:
                 names = {c.topic: c.msgtype for c in reader.connections}
@@ -39,15 +42,25 @@ class RosbagsStorage:
         """Type by topic."""
         return self._types
 
+    @property
+    def incomplete(self) -> bool:
+        """True if the messages could not be read to their end."""
+        return bool(self._fault)
+
+    @property
+    def damage(self) -> list[str]:
+        """The sentence that says so."""
+        return [self._fault] if self._fault else []
+
     def batches(self) -> Iterator[Batch]:
         """All messages by log time; they end where they can no longer be read."""
-        self.fault, self._strange = "", 0
+        self._fault, self._not_messages = "", 0
         waiting: dict[str, list[tuple[int, bytes]]] = {name: [] for name in self._types}
         try:
             with Reader(self._path) as reader:
                 for connection, log_ns, data in reader.messages():
                     if connection.topic not in waiting or not isinstance(data, bytes):
-                        self._strange += 1
+                        self._not_messages += 1
                         continue
                     entries = waiting[connection.topic]
                     entries.append((int(log_ns), data))
@@ -55,9 +68,9 @@ class RosbagsStorage:
                         yield self._batch(connection.topic, entries)
                         entries.clear()
         except Exception as error:  # likewise
-            self.fault = f"{self._path.name}: cannot be read to its end ({_line(error)})"
-        if self._strange and not self.fault:
-            self.fault = f"{self._path.name}: {self._strange} messages that are none"
+            self._fault = f"{self._path.name}: cannot be read to its end ({_line(error)})"
+        if self._not_messages and not self._fault:
+            self._fault = f"{self._path.name}: {self._not_messages} messages that are none"
         for name, entries in waiting.items():
             if entries:
                 yield self._batch(name, entries)

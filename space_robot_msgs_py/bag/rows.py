@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from typing import Any
 
@@ -10,23 +11,14 @@ from numpy.typing import NDArray
 
 from .. import topics
 from ..errors import MessageError
-from ..flight_log import REFERENCE, STATE, FlightLog
-from ..plain_codecs import LawCodec
 from ..samples import LawInForce, Timebase, in_order
+from ..wire.controller_law import LawCodec
+from ..wire.message import description
 from .batch import Batch
-from .coverage import LONGEST_JUMP, Coverage
+from .field_reader import Array, FieldReader, Places
+from .flight_log import FlightLog
 from .kernels import NO_STAMP, read_stamps
-from .layouts import (
-    Describe,
-    Numbers,
-    base_state,
-    base_trajectory,
-    first_number,
-    joint_states,
-    joint_trajectory,
-)
-
-Array = NDArray[np.float64]
+from .message_accounting import LONGEST_JUMP, MessageAccounting
 
 _GROWTH = 1.25
 _TICKS_A_MESSAGE = 20
@@ -57,67 +49,68 @@ class Rows:
         n = len(joint_names)
         self.log = FlightLog.allocate(0, joint_names, timebase)
         self.log.commanded_torque = np.empty((0, n + 3))
-        self.coverages: dict[str, Coverage] = {}
+        self.accounting: dict[str, MessageAccounting] = {}
         self.counts: Counter[str] = Counter()
         """Messages a topic, of every kind."""
         self._origin_ns = origin_ns
-        self._sent_ns = {name: np.empty(0, np.int64) for name in ("state", "command")}
+        self._sent_ns = {
+            topic: np.empty(0, np.int64) for topic in (topics.BASE_STATE, topics.COMMAND)
+        }
+        """The times when a state was whole and when its answer was sent, by tick."""
         self._wall_clock = False
         self._rows = self._believed = 0
-        arrays = ("position", "velocity", "effort")
-        axes = (*topics.BASE_AXES, *joint_names)
-        describe: dict[topics.Topic, Describe] = {
-            topics.JOINT_STATES: joint_states(topics.JOINT_STATES, joint_names, arrays),
-            topics.BASE_STATE: base_state,
-            topics.COMMAND: joint_states(topics.COMMAND, axes, ("effort",)),
-            topics.REFERENCE_JOINTS: joint_trajectory(joint_names, timebase),
-            topics.REFERENCE_BASE: base_trajectory(timebase),
-            topics.TELEMETRY: first_number,
+        described = {topic: description(topic) for topic in topics.ALL}
+        self._readers = {
+            topic: FieldReader(describe.of_robot(joint_names, timebase))
+            for topic, describe in described.items()
+            if describe
         }
-        self._numbers = {topic: Numbers(topic.type, d) for topic, d in describe.items()}
+        self._names = tuple(
+            dict.fromkeys(c.name for reader in self._readers.values() for c in reader.columns)
+        )
+        """Columns of the log that messages fill."""
         self._laws: list[LawInForce] = []
         self._law_faults: list[str] = []
 
     def oddities(self, excused: bool) -> list[str]:
-        """Messages that could not be used; strange stamps are no news if ``excused``."""
+        """Messages that could not be used; invalid stamps are no news if ``excused``."""
         found = [
-            f"{numbers.misfits} messages on {topic.name} do not fit ({numbers.fault})"
-            for topic, numbers in self._numbers.items()
-            if numbers.misfits
+            f"{reader.misfits} messages on {topic.name} do not fit ({reader.fault})"
+            for topic, reader in self._readers.items()
+            if reader.misfits
         ]
         if faults := self._law_faults:
             found.append(f"{len(faults)} messages on {topics.LAW.name} do not fit ({faults[0]})")
-        for name, coverage in self.coverages.items():
-            if coverage.strange and not excused:
+        for name, counted in self.accounting.items():
+            if counted.invalid_stamps and not excused:
                 found.append(
-                    f"{coverage.strange} messages on {name} whose stamp is no whole tick "
+                    f"{counted.invalid_stamps} messages on {name} whose stamp is no whole tick "
                     "or out of all order"
                 )
         return found
 
     def take(self, topic: topics.Topic, batch: Batch) -> None:
         """Count the messages of a topic and put what they say into their ticks' rows."""
-        coverage = self.coverages.setdefault(topic.name, Coverage(topic))
+        counted = self.accounting.setdefault(topic.name, MessageAccounting(topic))
         self.counts[topic.name] += len(batch)
         ticks, known = self._ticks(topic, batch)
         places = np.flatnonzero(known)
-        coverage.strange += len(batch) - len(places)
-        fresh = places[coverage.take_all(ticks[places])]
+        counted.invalid_stamps += len(batch) - len(places)
+        fresh = places[counted.take_all(ticks[places])]
         if len(fresh) < len(batch):
             batch, ticks = batch.select(fresh), ticks[fresh]
         self._believed += _TICKS_A_MESSAGE * len(batch)
         if topic is topics.LAW:
             self._note_laws(batch, ticks)
             return
-        self._grow(coverage.last + 1)
-        if topic in (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE):
-            for which, values in self._numbers[topic].read(batch):
-                self._put_references(topic, ticks[which], values)
-        elif topic in (topics.JOINT_STATES, topics.BASE_STATE, topics.COMMAND):
-            near = ticks < self._rows
-            if not near.all():
-                batch, ticks = batch.select(near), ticks[near]
-            for which, values in self._numbers[topic].read(batch):
+        self._grow(counted.last + 1)
+        reader = self._readers.get(topic)
+        if reader and reader.columns:
+            if topic.per_tick:
+                near = ticks < self._rows
+                if not near.all():
+                    batch, ticks = batch.select(near), ticks[near]
+            for which, values in reader.read(batch):
                 self._put(topic, ticks[which], values)
                 self._note_sending(topic, batch, which, ticks[which])
 
@@ -127,10 +120,10 @@ class Rows:
         log.laws = in_order(law for law in self._laws if law.tick < ticks)
         for column in self._columns():
             column.resize((ticks, *column.shape[1:]), refcheck=False)
-        if topics.COMMAND.name not in self.coverages:
+        if topics.COMMAND.name not in self.accounting:
             log.commanded_torque = None
-        sent, answered = self._sent_ns["state"], self._sent_ns["command"]
-        if self._wall_clock and topics.COMMAND.name in self.coverages:
+        sent, answered = self._sent_ns[topics.BASE_STATE], self._sent_ns[topics.COMMAND]
+        if self._wall_clock and topics.COMMAND.name in self.accounting:
             both = (answered != _NEVER) & (sent != _NEVER)
             log.latency_s = np.where(both, answered - sent, np.nan) * 1e-9
         return log
@@ -139,9 +132,9 @@ class Rows:
         self, topic: topics.Topic, batch: Batch
     ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """(M,) ticks, and of which messages they are to be had."""
-        if topic is topics.TELEMETRY:
+        if not topic.has_stamp:
             numbers, known = np.zeros(len(batch)), np.zeros(len(batch), np.bool_)
-            for which, values in self._numbers[topic].read(batch):
+            for which, values in self._readers[topic].read(batch):
                 numbers[which], known[which] = values[:, 0], np.abs(values[:, 0]) < LAST_TICK
             return np.where(known, numbers, 0.0).astype(np.int64), known
         stamps = stamps_of(batch)
@@ -152,40 +145,29 @@ class Rows:
             known &= ticks >= 0
         return ticks, known
 
-    def _put_references(self, topic: topics.Topic, ticks: NDArray[np.int64], values: Array) -> None:
-        log, joints = self.log, topic is topics.REFERENCE_JOINTS
-        column = log.reference_joints if joints else log.reference_base
-        points = values.reshape(len(values), -1, *column.shape[1:])
-        length = points.shape[1]
-        self._believed += length * len(points)
-        self._grow(int(ticks.max()) + length)
-        for first, rows in zip(ticks.tolist(), points, strict=True):
-            start, stop = max(first, 0), min(first + length, self._rows)
-            if start < stop:
-                column[start:stop] = rows[start - first : stop - first]
-
     def _put(self, topic: topics.Topic, ticks: NDArray[np.int64], values: Array) -> None:
-        log, n = self.log, len(self.log.joint_names)
-        if topic is topics.JOINT_STATES:
-            log.joint_positions[ticks] = values[:, :n]
-            log.joint_velocities[ticks] = values[:, n : 2 * n]
-            log.applied_torque[ticks, 3:] = values[:, 2 * n :]
-        elif topic is topics.BASE_STATE:
-            log.base_position[ticks] = values[:, :3]
-            log.quaternion[ticks] = values[:, 3:7]
-            log.base_velocity[ticks] = values[:, 7:10]
-            log.omega_base[ticks] = values[:, 10:13]
-            log.applied_torque[ticks, :3] = values[:, 13:]
-        elif log.commanded_torque is not None:
-            log.commanded_torque[ticks] = values
+        """Put messages' rows, of which the first belongs to the tick, where the columns say."""
+        columns = self._readers[topic].columns
+        rows = values.reshape(len(ticks), -1, sum(column.length for column in columns))
+        length = rows.shape[1]
+        if not topic.per_tick:
+            self._believed += length * len(ticks)
+            self._grow(int(ticks.max()) + length)
+        places, rows = _by_place(ticks, rows, self._rows)
+        start = 0
+        for name, first, length in columns:
+            column = getattr(self.log, name)
+            flat = column.reshape(len(column), math.prod(column.shape[1:]))
+            flat[places, first : first + length] = rows[:, start : start + length]
+            start += length
 
     def _note_sending(
-        self, topic: topics.Topic, batch: Batch, which: NDArray[np.intp], ticks: NDArray[np.int64]
+        self, topic: topics.Topic, batch: Batch, which: Places, ticks: NDArray[np.int64]
     ) -> None:
-        if topic is topics.JOINT_STATES:
+        if topic not in self._sent_ns:
             return
         sent_ns = batch.publish_ns[which]
-        self._sent_ns["state" if topic is topics.BASE_STATE else "command"][ticks] = sent_ns
+        self._sent_ns[topic][ticks] = sent_ns
         self._wall_clock = self._wall_clock or bool(np.any(sent_ns != batch.log_ns[which]))
 
     def _note_laws(self, batch: Batch, ticks: NDArray[np.int64]) -> None:
@@ -197,7 +179,7 @@ class Rows:
 
     def _columns(self) -> list[NDArray[Any]]:
         return [
-            *(getattr(self.log, name) for name in (*STATE, *REFERENCE, "commanded_torque")),
+            *(getattr(self.log, name) for name in self._names),
             *self._sent_ns.values(),
         ]
 
@@ -211,3 +193,21 @@ class Rows:
         for column in self._columns():
             column.resize((self._rows, *column.shape[1:]), refcheck=False)
             column[before:] = _NEVER if column.dtype == np.int64 else np.nan
+
+
+def _by_place(
+    ticks: NDArray[np.int64], rows: Array, stop: int
+) -> tuple[slice | NDArray[np.int64], Array]:
+    """Find where (M, k, width) rows of messages go in a log of ``stop`` rows, and those that do.
+
+    Of several for one place the last one stays.
+    """
+    length = rows.shape[1]
+    places = (ticks[:, None] + np.arange(length)).reshape(-1)
+    rows = rows.reshape(len(places), -1)
+    inside = (places >= 0) & (places < stop)
+    if not inside.all():
+        places, rows = places[inside], rows[inside]
+    if len(places) and np.all(np.diff(places) == 1):
+        return slice(int(places[0]), int(places[-1]) + 1), rows
+    return places, rows

@@ -1,12 +1,12 @@
-"""Which of a bag's messages are ours: by topic, remapped or not, of the right type."""
+"""The messages of a bag that are ours: by topic, remapped or not, of the right type."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
 from .. import topics as graph
+from ..config.validation import one_of
 from ..errors import InputError
-from ..validation import one_of
 from .batch import Batch
 from .contents import Bag
 from .findings import some_of
@@ -23,7 +23,7 @@ class Selection:
         """
         self._bag, self._remap = bag, dict(remap)
         self.wrong: dict[str, str] = {}
-        """What was found instead of the right type, by our topic."""
+        """The finding instead of the right type, by our topic."""
         for theirs, ours in self._remap.items():
             one_of(ours, graph.BY_NAME, "topic", f" to take {theirs} for")
             if list(self._remap.values()).count(ours) > 1:

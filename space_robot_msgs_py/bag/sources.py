@@ -1,4 +1,4 @@
-"""Which publisher a recorded message is from: the graph's own, or a foreign one.
+"""The publishers of recorded messages: the graph's own, and foreign ones.
 
 A topic of the graph has one publisher. Its node has claimed the topic and noted its publisher's
 identity there, so it is told from others without asking anybody's name, from its first message on;
@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-from ..source_guard import SourceGuard
+from ..wire.source_guard import SourceGuard
 
 PARTICIPANT_BYTES = 12
 """The first bytes of a publisher's GID, which name the participant, so the process."""
@@ -21,19 +21,19 @@ FOLLOWED, OTHERS = b"followed", b"others"
 
 
 class Claimed(NamedTuple):
-    """Who has claimed a topic."""
+    """The claim on a topic."""
 
     publishers: tuple[bytes, ...] = ()
     """The GIDs noted last, the newest last, of nodes that may have ended since."""
     is_held: bool = False
-    """Whether that node still lives."""
+    """True if that node still lives."""
 
 
 class Publishers(Protocol):
-    """What can be found out about the publishers of a topic, without their messages."""
+    """Finds out about the publishers of a topic, without their messages."""
 
     def claimed(self, topic: str) -> Claimed:
-        """Who has claimed it."""
+        """Return who has claimed it."""
 
     def names(self, topic: str) -> Mapping[bytes, str]:
         """Full node name by GID of all that are listed now; empty of one without a name."""
@@ -95,9 +95,9 @@ class Sources:
         self._guard = SourceGuard()
         self._was_claimed = self._has_paused = False
         self.is_counted = False
-        """Whether our publisher tells how many messages it sent."""
+        """True if our publisher tells how many messages it sent."""
         self.begins_anew = False
-        """Whether what was recorded so far turned out to be a foreign publisher's."""
+        """True if what was recorded so far turned out to be a foreign publisher's."""
 
     def take(self, publisher: bytes, sequence: int) -> bool:
         """Count a message; whether it is ours.
@@ -125,7 +125,7 @@ class Sources:
         return is_ours
 
     def judge(self, was_good: bool) -> None:
-        """Whether the message that `take_unnamed` took for ours made sense."""
+        """Learn whether the message that `take_unnamed` took for ours made sense."""
         if was_good:
             self._guard.follow()
         else:
@@ -149,7 +149,7 @@ class Sources:
             self.is_counted = True
 
     def pause(self) -> None:
-        """What each publisher sends until its next message here is not to be recorded."""
+        """Pass over what each publisher sends until its next message here."""
         self._has_paused = True
         for source in self._sources.values():
             source.is_resuming = True
@@ -173,7 +173,7 @@ class Sources:
 
     @property
     def is_behind(self) -> bool:
-        """Whether our publishers say that they have sent more than has come."""
+        """True if our publishers say that they have sent more than has come."""
         return self.tail > 0
 
     @property
@@ -208,7 +208,7 @@ class Sources:
         return source
 
     def _follows(self, publisher: bytes) -> bool:
-        """Whether one of a topic that nobody claims is the first, or the first started again."""
+        """Tell if one of a topic that nobody claims is the first, or the first started again."""
         ours = [p for p, source in self._sources.items() if source.is_ours]
         if not ours:
             return True

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from mcap.records import Channel, Schema
 
-from ..definitions import definition, jazzy
 from ..errors import InputError
 from ..topics import Topic
+from ..wire.definitions import definition, jazzy
 from .chunk import OpenChunk
 from .mcap_file import Compression, McapFile, record_bytes
 from .rosbag2_yaml import FileSummary, bag_information, qos_profiles, to_yaml

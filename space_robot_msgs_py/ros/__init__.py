@@ -1,1 +1,1 @@
-"""The nodes' common shell: process, parameters, publishers and subscriptions of the loop."""
+"""The nodes' common host: process, parameters, publishers and subscriptions of the loop."""

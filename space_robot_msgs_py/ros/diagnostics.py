@@ -9,7 +9,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 
 from .. import topics
-from ..health import Health, Level
+from .health import Health, Level
 
 PERIOD_S = 1.0
 FLUSH_S = 0.5

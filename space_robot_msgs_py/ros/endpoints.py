@@ -1,47 +1,42 @@
 """Publishers and subscriptions for a loop that takes messages itself.
 
 The executor costs more than the loop's whole work, so the loop's subscriptions are kept out of
-it (`TakenByLoop`) and taken by hand as raw bytes; the executor only serves parameters.
+it (`PolledCallbackGroup`) and taken by hand as raw bytes; the executor only serves parameters.
 """
 
 from __future__ import annotations
 
 import importlib
-import os
 import time
 from collections.abc import Sequence
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
-from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from ..source_guard import SourceGuard
 from ..topics import Topic
+from ..wire.source_guard import SourceGuard
+from .rclpy_internals import raw_publish, take_serialized
 from .serialized_take import Received, serialized_take
-
-SPIN_S = 300e-6
-"""How long a wait takes and yields before it sleeps in the wait set. Not under SCHED_FIFO, where
-yielding gives way to nobody and sleeping threads wake at once."""
 
 MOST_REFUSED = 1_000
 """So many messages of others are passed over before the loop may look after other things."""
 
 
-class TakenByLoop(CallbackGroup):
+class PolledCallbackGroup(CallbackGroup):
     """Keeps its subscriptions out of every executor."""
 
     def can_execute(self, entity: Any) -> bool:
-        """Never."""
+        """Allow none."""
         return False
 
     def beginning_execution(self, entity: Any) -> bool:
-        """Never."""
+        """Allow none."""
         return False
 
     def ending_execution(self, entity: Any) -> None:
-        """Nothing to end."""
+        """Do nothing: there is nothing to end."""
 
 
 def message_type(name: str) -> Any:
@@ -61,33 +56,40 @@ def qos(topic: Topic) -> QoSProfile:
     )
 
 
-class Out:
+class RawPublisher:
     """A publisher of serialized messages."""
 
     def __init__(self, node: Node, topic: Topic) -> None:
         self.topic = topic
         self._node = node
         self._publisher = node.create_publisher(message_type(topic.type), topic.name, qos(topic))
+        self._publish = raw_publish(self._publisher)
         self.sent = 0
         """Messages sent."""
 
     def publish(self, data: bytes) -> None:
         """Send serialized bytes."""
         self.sent += 1
-        self._publisher.publish(data)
+        self._publish(data)
 
     @property
     def listener_count(self) -> int:
-        """How many subscriptions are connected."""
+        """Number of subscriptions that are connected."""
         return int(self._publisher.get_subscription_count())
 
     def missing_listeners(self, names: Sequence[str]) -> list[str]:
-        """Which of the named nodes that listen to this topic are not connected yet."""
-        wanted = [name for name in names if name in self.topic.listeners]
+        """Return the awaited nodes that do not listen to this topic yet.
+
+        Args:
+            names: ``NODE:TOPIC``, a node that must listen to that topic, or ``NODE``, one that must
+                listen to this one whatever it is.
+        """
+        awaited = [entry.partition(":") for entry in names if entry]
+        nodes = [node for node, _, topic in awaited if topic in ("", self.topic.name)]
         infos = self._node.get_subscriptions_info_by_topic(self.topic.name)
-        missing = [name for name in wanted if name not in {info.node_name for info in infos}]
-        if not missing and self.listener_count < len(wanted):
-            return wanted  # discovered, but not all matched with this publisher yet
+        missing = [name for name in nodes if name not in {info.node_name for info in infos}]
+        if not missing and self.listener_count < len(nodes):
+            return nodes  # discovered, but not all matched with this publisher yet
         return missing
 
     def flush(self, timeout_s: float) -> None:
@@ -97,17 +99,19 @@ class Out:
         self._publisher.wait_for_all_acked(Duration(seconds=timeout_s))
 
 
-def flush(outputs: Sequence[Out], timeout_s: float) -> None:
-    """`Out.flush` of all, in ``timeout_s`` together."""
+def flush(outputs: Sequence[RawPublisher], timeout_s: float) -> None:
+    """`RawPublisher.flush` of all, in ``timeout_s`` together."""
     until = time.monotonic() + timeout_s
     for output in outputs:
         output.flush(max(0.0, until - time.monotonic()))
 
 
-class In:
+class RawSubscription:
     """A subscription whose messages the loop takes itself, serialized."""
 
-    def __init__(self, node: Node, topic: Topic, group: TakenByLoop, depth: int = 0) -> None:
+    def __init__(
+        self, node: Node, topic: Topic, group: PolledCallbackGroup, depth: int = 0
+    ) -> None:
         self.topic = topic
         profile = qos(topic)
         profile.depth = depth or topic.depth
@@ -120,69 +124,36 @@ class In:
         self._take_serialized = serialized_take()
 
     def take(self) -> bytes | None:
-        """The next message, if there is one."""
-        with self.handle:
-            taken = self.handle.take_message(self._type, True)
+        """Take the next message, if there is one."""
+        taken = take_serialized(self.handle, self._type)
         return None if taken is None else taken[0]
 
     def take_with_source(self) -> Received | None:
-        """`take`, with when and by whom it was sent."""
+        """Take the next message, with when and by whom it was sent."""
         return self._take_serialized(self.handle, self._type)
 
 
-class FollowedIn(In):
+class FollowedSubscription(RawSubscription):
     """Follows one publisher: what others send at the same time is not taken."""
 
-    def __init__(self, node: Node, topic: Topic, group: TakenByLoop, depth: int = 0) -> None:
+    def __init__(
+        self, node: Node, topic: Topic, group: PolledCallbackGroup, depth: int = 0
+    ) -> None:
         super().__init__(node, topic, group, depth)
         self.source = SourceGuard()
 
     def take(self) -> bytes | None:
-        """The next message of the publisher followed, if there is one."""
+        """Take the next message of the publisher followed, if there is one."""
         for _ in range(MOST_REFUSED):
-            with self.handle:
-                taken = self.handle.take_message(self._type, True)
+            taken = take_serialized(self.handle, self._type)
             if taken is None:
                 return None
             data, info = taken
             if self.source.passes(info["publication_sequence_number"], info["received_timestamp"]):
-                return data  # type: ignore[no-any-return]
+                return data
         return None
 
     def counts(self, word: str) -> dict[str, int]:
-        """For a node's health: how many messages of others were ``word``, if any."""
+        """Count, for a node's health, the messages of others that were ``word``, if any."""
         count = self.source.others_messages
         return {f"{word}: another publisher's on {self.topic.name}": count} if count else {}
-
-
-class Waiter:
-    """Waits until a subscription has something to take."""
-
-    def __init__(self, node: Node, *inputs: In, spin_s: float = SPIN_S) -> None:
-        self.spin_s = spin_s
-        self._handles = [entry.handle for entry in inputs]
-        context: Any = node.context.handle
-        with context:
-            self._set = _rclpy.WaitSet(len(inputs), 0, 0, 0, 0, 0, context)
-
-    def wait(self, timeout_s: float) -> None:
-        """Sleep until a message is there or the time is over."""
-        self._set.clear_entities()
-        for handle in self._handles:
-            self._set.add_subscription(handle)
-        self._set.wait(max(1, int(timeout_s * 1e9)))
-
-
-def take_or_wait(entry: In, waiter: Waiter, timeout_s: float) -> bytes | None:
-    """The next message of ``entry``: look and yield for a moment, then sleep, then look again."""
-    data = entry.take()
-    if data is not None:
-        return data
-    until = time.perf_counter() + waiter.spin_s
-    while time.perf_counter() < until:
-        os.sched_yield()
-        data = entry.take()
-        if data is not None:
-            return data
-    waiter.wait(timeout_s)
-    return entry.take()

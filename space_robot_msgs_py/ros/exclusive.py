@@ -14,7 +14,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from ..bag.sources import Claimed
 from ..errors import InputError
-from ..locks import FileLock, HeldError, look, node_lock, topic_lock
+from .locks import FileLock, HeldError, look, node_lock, topic_lock
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
 """What discovery calls the node of a publisher until its participant has said, if it ever does."""

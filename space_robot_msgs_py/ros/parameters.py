@@ -8,8 +8,10 @@ from typing import Any, TypeVar
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
-from ..configuration import NodeSettings, flatten, leaves
+from ..config.settings import NodeSettings, leaves
+from ..config.trees import flatten
 from ..errors import InputError
+from .rclpy_internals import declared_parameters, parameter_overrides
 
 Schema = TypeVar("Schema", bound=NodeSettings)
 
@@ -61,7 +63,7 @@ def declare_settings(node: Node, schema: type[Schema], changeable: tuple[str, ..
 
 def overrides(node: Node, names: Iterable[str]) -> dict[str, Any]:
     """What the user gave for these parameters, on the command line or in a parameter file."""
-    given = node._parameter_overrides
+    given = parameter_overrides(node)
     return {name: _plain(given[name].value) for name in names if name in given}
 
 
@@ -71,8 +73,8 @@ def refuse_unknown(node: Node) -> None:
     Raises:
         InputError: naming the parameter and those there are.
     """
-    allowed = sorted(node._parameters)
-    for name in node._parameter_overrides:
+    allowed = sorted(declared_parameters(node))
+    for name in parameter_overrides(node):
         if name not in allowed and not name.startswith("qos_overrides."):
             raise InputError(
                 f"{node.get_name()} parameters: unknown parameter {name!r}: "

@@ -1,9 +1,10 @@
 """Serialized messages with their publisher, whom rclpy's own take does not tell.
 
-This is the one place that goes past rclpy, to the C interface of rcl as ROS 2 Jazzy has it
+This goes past rclpy, to the C interface of rcl as ROS 2 Jazzy has it
 (`rcl_take_serialized_message`, `rmw_message_info_t`), through ``pointer`` of a subscription's
-handle. It takes less time than rclpy's take, too. With another rclpy than `VERSIONS`, or where the
-libraries are not as expected, messages are taken by rclpy and do not tell their publisher.
+handle. It takes less time than rclpy's take, too. With another rclpy than those of
+`rclpy_internals.VERSIONS`, or where the libraries are not as expected, messages are taken by rclpy
+and do not tell their publisher.
 """
 
 from __future__ import annotations
@@ -11,13 +12,10 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from functools import cache
-from importlib import metadata
 from typing import Any, NamedTuple
 
-from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
+from .rclpy_internals import is_known_version, pointer, take_serialized, tells_pointers
 
-VERSIONS = ("7.",)
-"""Beginnings of rclpy's versions whose rcl and rmw have the interface below: Jazzy's."""
 ROOM = 4096
 """Bytes of a message that need no more memory than there is; rcl makes more where it must."""
 OK, NOTHING_THERE = 0, 401
@@ -101,7 +99,7 @@ class SerializedTake:
     def __call__(self, handle: Any, message_type: Any) -> Received | None:
         """The next message, with its publisher."""
         with handle:
-            code = self._take(handle.pointer, *self._addresses, None)
+            code = self._take(pointer(handle), *self._addresses, None)
         if code == NOTHING_THERE:
             return None
         if code != OK:
@@ -118,8 +116,7 @@ class SerializedTake:
 
 def take_by_rclpy(handle: Any, message_type: Any) -> Received | None:
     """The next message, without its publisher: all that rclpy itself tells."""
-    with handle:
-        taken = handle.take_message(message_type, True)
+    taken = take_serialized(handle, message_type)
     if taken is None:
         return None
     data, info = taken
@@ -131,10 +128,8 @@ def take_by_rclpy(handle: Any, message_type: Any) -> Received | None:
 def serialized_take() -> Take:
     """The one of this process: `SerializedTake`, or `take_by_rclpy` where that cannot be."""
     try:
-        if metadata.version("rclpy").startswith(VERSIONS) and hasattr(
-            _rclpy.Subscription, "pointer"
-        ):
+        if is_known_version() and tells_pointers():
             return SerializedTake()
-    except (metadata.PackageNotFoundError, OSError, AttributeError):
+    except (OSError, AttributeError):
         pass
     return take_by_rclpy

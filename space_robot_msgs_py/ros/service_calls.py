@@ -8,8 +8,11 @@ from typing import Any
 from rclpy.executors import ShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 
+from .rclpy_internals import ServiceWaitSet
+
 OVERLOADED_S = 1.0
 """Calls that have been waiting without a break for this long are a storm."""
+FULL_LOOK_S = 5.0
 
 
 class ServiceCalls(SingleThreadedExecutor):
@@ -18,6 +21,9 @@ class ServiceCalls(SingleThreadedExecutor):
     def __init__(self, node: Node) -> None:
         super().__init__()
         self.add_node(node)
+        self._requests = ServiceWaitSet(node)
+        self._full_look_at = 0.0
+        """When to look for what is no service call, too: the middleware's warnings."""
         self.count = 0
         """Calls run so far."""
         self.is_overloaded = False
@@ -26,7 +32,10 @@ class ServiceCalls(SingleThreadedExecutor):
         """When the first of the calls ended after each of which another one waited."""
 
     def run_one(self, timeout_s: float = 0.0) -> bool:
-        """Run a call that waits, or comes within ``timeout_s``; whether there was one."""
+        """Run a call that waits, or comes within ``timeout_s``; tell whether there was one."""
+        if not timeout_s and not self._is_worth_a_look():
+            self._busy_since, self.is_overloaded = None, False
+            return False
         # the end of a call wakes the executor, whose next look then ends at once and finds nothing
         callback = self._next(timeout_s) or (self._next(0.0) if self._busy_since else None)
         if callback is None:
@@ -41,6 +50,17 @@ class ServiceCalls(SingleThreadedExecutor):
             raise error
         self.count += 1
         return True
+
+    def _is_worth_a_look(self) -> bool:
+        """Tell whether a request waits, or whether it is time for a full look, which is slow."""
+        if (now := time.monotonic()) < self._full_look_at:
+            return self._requests.is_called()
+        self._full_look_at = now + FULL_LOOK_S
+        return True
+
+    def forget_waiting(self) -> None:
+        """Forget how long calls have waited: another node of this process was to blame."""
+        self._busy_since = None
 
     def _next(self, timeout_s: float) -> Any:
         try:

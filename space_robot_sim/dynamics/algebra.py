@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled import subroutine
+from space_robot_msgs_py.compiled.kernels import subroutine
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -19,7 +19,7 @@ Matrix = tuple[float, float, float, float, float, float, float, float, float]
 
 @subroutine
 def vector(row: Array, start: int) -> Vector:
-    """Three numbers of ``row`` from ``start`` on."""
+    """Return three numbers of ``row`` from ``start`` on."""
     return row[start], row[start + 1], row[start + 2]
 
 
@@ -31,31 +31,31 @@ def store(a: Vector, row: Array, start: int) -> None:
 
 @subroutine
 def add(a: Vector, b: Vector) -> Vector:
-    """``a + b``."""
+    """Return ``a + b``."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @subroutine
 def subtract(a: Vector, b: Vector) -> Vector:
-    """``a - b``."""
+    """Return ``a - b``."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @subroutine
 def scale(a: Vector, factor: float) -> Vector:
-    """``a * factor``."""
+    """Return ``a * factor``."""
     return a[0] * factor, a[1] * factor, a[2] * factor
 
 
 @subroutine
 def dot(a: Vector, b: Vector) -> float:
-    """``a . b``."""
+    """Return ``a . b``."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @subroutine
 def cross(a: Vector, b: Vector) -> Vector:
-    """``a x b``."""
+    """Return ``a x b``."""
     return (
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -65,19 +65,19 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 @subroutine
 def symmetric(row: Array) -> Symmetric:
-    """The six numbers of ``row``."""
+    """Return the six numbers of ``row``."""
     return row[0], row[1], row[2], row[3], row[4], row[5]
 
 
 @subroutine
 def add_symmetric(a: Symmetric, b: Symmetric) -> Symmetric:
-    """``a + b``."""
+    """Return ``a + b``."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]
 
 
 @subroutine
 def outer_subtracted(s: Symmetric, a: Vector, b: Vector) -> Symmetric:
-    """``s - a b^T`` for parallel ``a`` and ``b``."""
+    """Return ``s - a b^T`` for parallel ``a`` and ``b``."""
     return (
         s[0] - a[0] * b[0], s[1] - a[1] * b[1], s[2] - a[2] * b[2],
         s[3] - a[0] * b[1], s[4] - a[0] * b[2], s[5] - a[1] * b[2],
@@ -86,7 +86,7 @@ def outer_subtracted(s: Symmetric, a: Vector, b: Vector) -> Symmetric:
 
 @subroutine
 def transform_symmetric(s: Symmetric, a: Vector) -> Vector:
-    """``s a``."""
+    """Return ``s a``."""
     return (
         s[0] * a[0] + s[3] * a[1] + s[4] * a[2],
         s[3] * a[0] + s[1] * a[1] + s[5] * a[2],
@@ -96,7 +96,7 @@ def transform_symmetric(s: Symmetric, a: Vector) -> Vector:
 
 @subroutine
 def transform(m: Matrix, a: Vector) -> Vector:
-    """``m a``."""
+    """Return ``m a``."""
     return (
         m[0] * a[0] + m[1] * a[1] + m[2] * a[2],
         m[3] * a[0] + m[4] * a[1] + m[5] * a[2],
@@ -106,7 +106,7 @@ def transform(m: Matrix, a: Vector) -> Vector:
 
 @subroutine
 def transform_transposed(m: Matrix, a: Vector) -> Vector:
-    """``m^T a``."""
+    """Return ``m^T a``."""
     return (
         m[0] * a[0] + m[3] * a[1] + m[6] * a[2],
         m[1] * a[0] + m[4] * a[1] + m[7] * a[2],
@@ -116,7 +116,7 @@ def transform_transposed(m: Matrix, a: Vector) -> Vector:
 
 @subroutine
 def skew_added(m: Matrix, a: Vector) -> Matrix:
-    """``m + skew(a)``, ``skew(a) b = a x b``."""
+    """Return ``m + skew(a)``, ``skew(a) b = a x b``."""
     return (
         m[0], m[1] - a[2], m[2] + a[1],
         m[3] + a[2], m[4], m[5] - a[0],
@@ -126,7 +126,7 @@ def skew_added(m: Matrix, a: Vector) -> Matrix:
 
 @subroutine
 def outer_subtracted_general(m: Matrix, a: Vector, b: Vector) -> Matrix:
-    """``m - a b^T``."""
+    """Return ``m - a b^T``."""
     return (
         m[0] - a[0] * b[0], m[1] - a[0] * b[1], m[2] - a[0] * b[2],
         m[3] - a[1] * b[0], m[4] - a[1] * b[1], m[5] - a[1] * b[2],
@@ -136,7 +136,7 @@ def outer_subtracted_general(m: Matrix, a: Vector, b: Vector) -> Matrix:
 
 @subroutine
 def inverse_symmetric(s: Symmetric) -> Symmetric:
-    """``s^-1`` of a positive definite matrix, by cofactors."""
+    """Return ``s^-1`` of a positive definite matrix, by cofactors."""
     xx = s[1] * s[2] - s[5] * s[5]
     xy = s[4] * s[5] - s[3] * s[2]
     xz = s[3] * s[5] - s[4] * s[1]

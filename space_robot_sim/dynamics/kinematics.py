@@ -1,13 +1,12 @@
-"""Where each body is and how it moves, on inertial axes with the base CoM as origin."""
+"""Positions and velocities of the bodies, on inertial axes with the base CoM as origin."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled import kernel
+from space_robot_msgs_py.compiled.kernels import kernel
 
-from ..attitude import rotation_matrix
 from .algebra import (
     Matrix,
     Symmetric,
@@ -23,16 +22,18 @@ from .algebra import (
     transform_symmetric,
     vector,
 )
+from .attitude import rotation_matrix
 from .model import Data, Model
 
 Array = NDArray[np.float64]
 
 
 @kernel
-def forward_kinematics(model: Model, quaternion: Array, theta: Array, data: Data) -> None:
+def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, data: Data) -> None:
     """Fill ``data.motion, first_moment, inertia`` (modified Denavit-Hartenberg).
 
-    ``T(i-1 -> i) = Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(theta_i) Tz(d_i)``.
+    ``T(i-1 -> i) = Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(theta_i) Tz(d_i)``; ``quaternion`` (4,) is the
+    base's attitude, ``joint_positions`` (n,) rad.
     """
     rotation_matrix(quaternion, data.rotation)
     r = data.rotation
@@ -42,14 +43,14 @@ def forward_kinematics(model: Model, quaternion: Array, theta: Array, data: Data
     joint = (0.0, 0.0, 0.0)
     _place(model, 0, axes, joint, data)
     for i in range(1, model.mass.size):
-        ca, sa = model.twist_cos[i - 1], model.twist_sin[i - 1]
-        ct, st = np.cos(theta[i - 1]), np.sin(theta[i - 1])
+        ca, sa = model.cos_alpha[i - 1], model.sin_alpha[i - 1]
+        ct, st = np.cos(joint_positions[i - 1]), np.sin(joint_positions[i - 1])
         x = (axes[0], axes[3], axes[6])
         y = (axes[1], axes[4], axes[7])
         z = (axes[2], axes[5], axes[8])
         twisted_y = add(scale(y, ca), scale(z, sa))
         z = subtract(scale(z, ca), scale(y, sa))
-        joint = add(joint, add(scale(x, model.joint_x[i - 1]), scale(z, model.joint_z[i - 1])))
+        joint = add(joint, add(scale(x, model.a[i - 1]), scale(z, model.d[i - 1])))
         y = subtract(scale(twisted_y, ct), scale(x, st))
         x = add(scale(x, ct), scale(twisted_y, st))
         axes = (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])
@@ -60,7 +61,7 @@ def forward_kinematics(model: Model, quaternion: Array, theta: Array, data: Data
 
 @kernel
 def _place(model: Model, i: int, axes: Matrix, joint: Vector, data: Data) -> None:
-    """First moment and inertia of body i about the origin, from its axes and its joint."""
+    """Write first moment and inertia of body i about the origin, from its axes and its joint."""
     mass = model.mass[i]
     com = add(joint, transform(axes, vector(model.com[i], 0)))
     moment = scale(com, mass)
@@ -78,7 +79,7 @@ def _place(model: Model, i: int, axes: Matrix, joint: Vector, data: Data) -> Non
 
 @kernel
 def rotated_inertia(axes: Matrix, inertia: Symmetric) -> Symmetric:
-    """``R I R^T``."""
+    """Return ``R I R^T``, the inertia (kg m2) on the axes that ``axes`` turns into."""
     a = (axes[0], axes[1], axes[2])
     b = (axes[3], axes[4], axes[5])
     c = (axes[6], axes[7], axes[8])
@@ -89,7 +90,9 @@ def rotated_inertia(axes: Matrix, inertia: Symmetric) -> Symmetric:
 
 
 @kernel
-def spatial_velocities(model: Model, omega_inertial: Array, theta_rate: Array, data: Data) -> None:
+def spatial_velocities(
+    model: Model, omega_inertial: Array, joint_velocities: Array, data: Data
+) -> None:
     """Fill ``data.coriolis`` and ``bias`` after `forward_kinematics`: (11), (12); (15), (16).
 
     Seen from an inertial frame that moves with the base CoM at this instant, so the base's
@@ -100,13 +103,13 @@ def spatial_velocities(model: Model, omega_inertial: Array, theta_rate: Array, d
     v = (0.0, 0.0, 0.0)
     _momentum_rate(model, 0, w, v, data)
     for i in range(1, model.mass.size):
-        rate = theta_rate[i - 1]
-        axis, moment = vector(data.motion[i], 0), vector(data.motion[i], 3)
-        turning, moving = scale(axis, rate), scale(moment, rate)
+        velocity = joint_velocities[i - 1]
+        angular = scale(vector(data.motion[i], 0), velocity)
+        linear = scale(vector(data.motion[i], 3), velocity)
         # velocity of the parent times the joint's own: what (13), (14) add without qdd
-        store(cross(w, turning), data.coriolis[i], 0)
-        store(add(cross(v, turning), cross(w, moving)), data.coriolis[i], 3)
-        w, v = add(w, turning), add(v, moving)
+        store(cross(w, angular), data.coriolis[i], 0)
+        store(add(cross(v, angular), cross(w, linear)), data.coriolis[i], 3)
+        w, v = add(w, angular), add(v, linear)
         _momentum_rate(model, i, w, v, data)
 
 

@@ -11,13 +11,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled import kernel
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, nested, shaped
 
-from ..attitude import attitude_jacobian_inverse, rotate, rotate_back, rotation_matrix
-from ..records import Record, nested, shaped
-from .equations_of_motion import composite_bodies, newton_euler
+from .attitude import attitude_jacobian_inverse, rotate, rotate_back, rotation_matrix
+from .crba import crba
 from .kinematics import forward_kinematics, spatial_velocities
 from .model import Data, Model
+from .rnea import rnea_bias
 
 Array = NDArray[np.float64]
 
@@ -36,7 +37,7 @@ class RhoSpaceModel(Record):
     to_force: Array = shaped(lambda n: (3, 3))
     """``J0^-T`` for inertial axes, the transpose of ``J0^-1``."""
     rotation: Array = shaped(lambda n: (3, 3))
-    """Base to inertial frame."""
+    """Rotation from the base frame to the inertial frame."""
     vectors: Array = shaped(lambda n: (3, 3))
     """Scratch."""
     data: Data = nested(Data)
@@ -44,21 +45,27 @@ class RhoSpaceModel(Record):
 
 @kernel
 def rho_space_into(
-    model: Model, quaternion: Array, theta: Array, omega_base: Array, theta_rate: Array,
-    out: RhoSpaceModel,
+    model: Model, quaternion: Array, joint_positions: Array, omega_base: Array,
+    joint_velocities: Array, out: RhoSpaceModel,
 ) -> None:  # fmt: skip
     """Fill ``out.inertia`` and ``out.bias`` with H_S and c_S of the floating robot.
 
-    ``omega_base`` is in the base frame, as measured. Singular at eta = 0.
+    Args:
+        model: the nominal robot.
+        quaternion: (4,) base attitude, unit; singular at eta = 0.
+        joint_positions: (n,) rad.
+        omega_base: (3,) base angular velocity in the base frame, as measured, rad/s.
+        joint_velocities: (n,) rad/s.
+        out: results and scratch.
     """
     inertia, bias, full = out.inertia, out.bias, out.full_inertia
     omega, convective, moved = out.vectors[0], out.vectors[1], out.vectors[2]
     rotation_matrix(quaternion, out.rotation)
     rotate(out.rotation, omega_base, omega)
-    forward_kinematics(model, quaternion, theta, out.data)
-    composite_bodies(model, out.data, full)
-    spatial_velocities(model, omega, theta_rate, out.data)
-    newton_euler(model, out.data, out.full_bias)
+    forward_kinematics(model, quaternion, joint_positions, out.data)
+    crba(model, out.data, full)
+    spatial_velocities(model, omega, joint_velocities, out.data)
+    rnea_bias(model, out.data, out.full_bias)
     _eliminate_translation(full, out.full_bias, inertia, bias)
     # J0 on inertial axes is the transpose of J0 in the base frame, so its J0^-T is the latter's
     # inverse. For a unit quaternion J0dot w0 = -|w0|^2 eps / 4.
@@ -83,7 +90,7 @@ def rho_space_into(
 
 @kernel
 def _eliminate_translation(full: Array, full_bias: Array, inertia: Array, bias: Array) -> None:
-    """``H_r = H22 - H21 H12 / M``, ``c_r = c2 - H21 c1 / M``: no force on the base's CoM."""
+    """Write ``H_r = H22 - H21 H12 / M``, ``c_r = c2 - H21 c1 / M``: no force on the base's CoM."""
     total_mass = full[0, 0]
     for i in range(bias.size):
         bias[i] = full_bias[3 + i]

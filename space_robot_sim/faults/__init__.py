@@ -1,6 +1,4 @@
-"""Faults of the plant, its sensors, its actuators and the links to it. Knows no ROS."""
+"""Faults as text, when each acts, and those of the messages between plant and controller.
 
-from .link import Link, Parcel, awaited_stamp
-from .plant_faults import PlantFaults
-
-__all__ = ["Link", "Parcel", "PlantFaults", "awaited_stamp"]
+The faults of a sensor, an actuator or the environment stand beside it. Knows no ROS.
+"""

@@ -6,6 +6,7 @@ import numpy as np
 
 from space_robot_msgs_py.samples import Command, RobotState
 
+from .grammar import PROBABILITY, Kind
 from .schedule import Schedule
 
 QUATERNION_NORMS = (0.9, 1.1)
@@ -17,25 +18,39 @@ MEASURED = (
     "joint_velocities",
 )  # fmt: skip
 
+NAN_STATE = Kind("nan_state", PROBABILITY, 1.0, "one measured number is NaN")
+INF_STATE = Kind("inf_state", PROBABILITY, 1.0, "one measured number is infinite")
+SCALED_QUATERNION = Kind(
+    "scaled_quaternion", PROBABILITY, 1.0, "the measured quaternion's norm is 0.9 or 1.1"
+)
+STAMP_BACK = Kind("stamp_back", PROBABILITY, 1.0, "a state's stamp is 1 to 10 ticks early")
+STAMP_JUMP = Kind("stamp_jump", PROBABILITY, 1.0, "a state's stamp is 1000000 ticks late")
+NAN_COMMAND = Kind("nan_command", PROBABILITY, 1.0, "one commanded torque is NaN")
+INF_COMMAND = Kind("inf_command", PROBABILITY, 1.0, "one commanded torque is infinite")
+
 
 class Corruption:
     """Spoils samples in place; what is spoilt at a tick depends on the tick alone."""
 
+    KINDS = (
+        NAN_STATE, INF_STATE, SCALED_QUATERNION, STAMP_BACK, STAMP_JUMP, NAN_COMMAND, INF_COMMAND,
+    )  # fmt: skip
+
     def __init__(self, schedule: Schedule) -> None:
         self._states = [
-            (fault, value) for kind, value in (("nan_state", np.nan), ("inf_state", np.inf))
+            (fault, value) for kind, value in ((NAN_STATE, np.nan), (INF_STATE, np.inf))
             for fault in schedule.of(kind)
         ]  # fmt: skip
-        self._quaternions = schedule.of("scaled_quaternion")
+        self._quaternions = schedule.of(SCALED_QUATERNION)
         self._commands = [
-            (fault, value) for kind, value in (("nan_command", np.nan), ("inf_command", np.inf))
+            (fault, value) for kind, value in ((NAN_COMMAND, np.nan), (INF_COMMAND, np.inf))
             for fault in schedule.of(kind)
         ]  # fmt: skip
-        self._back = schedule.of("stamp_back")
-        self._jump = schedule.of("stamp_jump")
+        self._back = schedule.of(STAMP_BACK)
+        self._jump = schedule.of(STAMP_JUMP)
 
     def spoil_state(self, state: RobotState, tick: int) -> None:
-        """Spoil what is measured at ``tick``; not the echo of the applied torque."""
+        """Spoil the numbers measured at ``tick``, but not the echo of the applied torque."""
         for fault in self._quaternions:
             if fault.happens_at(tick):
                 state.quaternion *= QUATERNION_NORMS[fault.choose(tick, 2)]
@@ -55,7 +70,7 @@ class Corruption:
                 command.torque[fault.choose(tick, command.torque.size)] = value
 
     def stamp(self, tick: int) -> int:
-        """The tick to write on the state of ``tick``; never below 0."""
+        """Return the tick to write on the state of ``tick``; never below 0."""
         stamp = tick
         for fault in self._back:
             if fault.happens_at(tick):

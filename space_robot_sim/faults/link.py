@@ -5,39 +5,63 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
+from .grammar import PROBABILITY, TICKS, Kind
 from .schedule import Schedule
 
 Item = TypeVar("Item")
 
 
+class LinkKinds(NamedTuple):
+    """The ways in which one link fails."""
+
+    drop: Kind
+    repeat: Kind
+    delay: Kind
+    jitter: Kind
+
+    @classmethod
+    def of(cls, what: str) -> LinkKinds:
+        """Declare those of the link that carries ``what``: "state" or "command"."""
+        return cls(
+            Kind(f"drop_{what}", PROBABILITY, 1.0, f"a {what} is lost"),
+            Kind(f"repeat_{what}", PROBABILITY, 1.0, f"a {what} comes again a tick later"),
+            Kind(f"delay_{what}", TICKS, 1.0, f"{what}s come late"),
+            Kind(f"jitter_{what}", TICKS, 1.0, f"{what}s come late by 0 to TICKS, any as likely"),
+        )
+
+
+STATE_LINK, COMMAND_LINK = LinkKinds.of("state"), LinkKinds.of("command")
+"""From the sensors to the controller, and back to the actuators."""
+
+
 @dataclass(frozen=True, slots=True, order=True)
-class Parcel(Generic[Item]):
-    """Something on its way; parcels sort by arrival."""
+class DelayedMessage(Generic[Item]):
+    """A message on its way; messages sort by arrival."""
 
     due: int
     """Tick of arrival."""
     serial: int
-    """Tells parcels of one tick apart, in the order sent."""
+    """Tells messages of one tick apart, in the order sent."""
     stamp: int = field(compare=False)
     """Tick that is written on it, right or wrong."""
     item: Item = field(compare=False)
 
 
 class Link(Generic[Item]):
-    """The way of states to the controller (``what`` "state") or of commands back ("command").
+    """The way of states to the controller (`STATE_LINK`) or of commands back (`COMMAND_LINK`).
 
     What is sent in one tick shares its fate. Delays add up; where they shrink or scatter, later
     items may overtake earlier ones. Items that arrive in one tick keep the order of sending.
     """
 
-    def __init__(self, schedule: Schedule, what: str) -> None:
-        self._drops = schedule.of(f"drop_{what}")
-        self._repeats = schedule.of(f"repeat_{what}")
-        self._delays = schedule.of(f"delay_{what}")
-        self._jitters = schedule.of(f"jitter_{what}")
-        self._under_way: list[Parcel[Item]] = []
+    def __init__(self, schedule: Schedule, kinds: LinkKinds) -> None:
+        self._drops = schedule.of(kinds.drop)
+        self._repeats = schedule.of(kinds.repeat)
+        self._delays = schedule.of(kinds.delay)
+        self._jitters = schedule.of(kinds.jitter)
+        self._under_way: list[DelayedMessage[Item]] = []
         self._sent = 0
 
     def send(self, tick: int, item: Item, stamp: int | None = None) -> None:
@@ -51,26 +75,26 @@ class Link(Generic[Item]):
         carried = tick if stamp is None else stamp
         copies = 1 + any(fault.happens_at(tick) for fault in self._repeats)
         for copy in range(copies):
-            heapq.heappush(self._under_way, Parcel(due + copy, self._sent, carried, item))
+            heapq.heappush(self._under_way, DelayedMessage(due + copy, self._sent, carried, item))
         self._sent += 1
 
-    def arrivals(self, tick: int) -> list[Parcel[Item]]:
-        """What has arrived up to ``tick`` and was not handed out before, in order of arrival."""
+    def arrivals(self, tick: int) -> list[DelayedMessage[Item]]:
+        """Hand out what has arrived up to ``tick`` and was not before, in order of arrival."""
         arrived = []
         while self._under_way and self._under_way[0].due <= tick:
             arrived.append(heapq.heappop(self._under_way))
         return arrived
 
-    def push(self, tick: int, item: Item, stamp: int | None = None) -> list[Parcel[Item]]:
-        """`send`, then `arrivals`."""
+    def push(self, tick: int, item: Item, stamp: int | None = None) -> list[DelayedMessage[Item]]:
+        """Call `send`, then `arrivals`."""
         self.send(tick, item, stamp)
         return self.arrivals(tick)
 
 
-def awaited_stamp(states: Iterable[Parcel[Item]], tick: int, answered: int) -> int | None:
-    """The tick whose command will come when these states reach a controller at ``tick``.
+def awaited_stamp(states: Iterable[DelayedMessage[Item]], tick: int, answered: int) -> int | None:
+    """Return the tick whose command will come when these states reach a controller at ``tick``.
 
-    That is the newest stamp among them, for a controller that leaves alone what is no newer than
+    It is the newest stamp among them, for a controller that leaves alone what is no newer than
     what it answered last (``answered``) and what lies in the future. None: no answer will come.
     """
     fresh = [state.stamp for state in states if answered < state.stamp <= tick]

@@ -1,20 +1,22 @@
-"""Which faults act at a tick, and what chance decides there."""
+"""The faults of a flight in ticks, each with random numbers of its own."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.fault import Fault
+
+from .grammar import Fault, Kind
 
 Array = NDArray[np.float64]
 
 BLOCK_TICKS = 256
-"""Ticks whose random numbers are drawn at once."""
+"""Random numbers are drawn for that many ticks at once."""
 
 
 class ScheduledFault:
@@ -42,19 +44,19 @@ class ScheduledFault:
         self._rows = np.empty((0, 0))
 
     def acts_at(self, tick: int) -> bool:
-        """Whether ``tick`` is within its time."""
+        """Return whether ``tick`` is within the fault's time."""
         return self.first <= tick < self.stop
 
     def happens_at(self, tick: int) -> bool:
-        """Whether it acts and chance, with its value as probability, will have it."""
+        """Return whether the fault acts and its draw is below its value, a probability."""
         return self.acts_at(tick) and bool(self._row(tick, 2, normal=False)[0] < self.value)
 
     def choose(self, tick: int, count: int) -> int:
-        """One of ``range(count)``, any as likely; independent of `happens_at`."""
+        """Draw one of ``range(count)``, any as likely; independent of `happens_at`."""
         return int(self._row(tick, 2, normal=False)[1] * count)
 
     def noise(self, tick: int, size: int) -> Array:
-        """Normal numbers (size,) with its value as standard deviation."""
+        """Draw normal numbers (size,); the fault's value is their standard deviation."""
         return self.value * self._row(tick, size, normal=True)
 
     def _row(self, tick: int, size: int, normal: bool) -> Array:
@@ -71,7 +73,7 @@ class Schedule:
     """The faults of a flight in the order given, each seeded by ``seed`` and its place."""
 
     def __init__(self, faults: Sequence[Fault], seed: int, period: float) -> None:
-        """Place all.
+        """Place all faults.
 
         Raises:
             InputError: see `ScheduledFault`.
@@ -80,11 +82,45 @@ class Schedule:
             ScheduledFault(fault, index, seed, period) for index, fault in enumerate(faults)
         ]
 
-    def of(self, *kinds: str) -> list[ScheduledFault]:
-        """Those of the given kinds."""
+    def of(self, *kinds: Kind) -> list[ScheduledFault]:
+        """Return the faults of the given kinds, in the order of the flight."""
         return [fault for fault in self.faults if fault.kind in kinds]
 
 
+class PartFault(Protocol):
+    """One way for a part of the plant to fail: an actuator, or something in its environment."""
+
+    KINDS: ClassVar[tuple[Kind, ...]]
+
+    def __init__(self, schedule: Schedule) -> None:
+        """Take the faults of these kinds from a flight's."""
+
+    def apply(self, tick: int, part: Any) -> None:
+        """Spoil the part's record as it should be from ``tick`` to the next, or restore it."""
+
+
+class TemporaryChange:
+    """Changes an array of the plant while faults act on it, and takes the changes back after."""
+
+    def __init__(self, faults: Sequence[ScheduledFault]) -> None:
+        self._faults = faults
+        self._acting: list[ScheduledFault] = []
+
+    def apply(
+        self, tick: int, values: Array, change: Callable[[Array, ScheduledFault], None]
+    ) -> None:
+        """Let ``change`` spoil the sound ``values`` in place for each fault that acts at a tick."""
+        acting = [fault for fault in self._faults if fault.acts_at(tick)]
+        if acting == self._acting:
+            return
+        if not self._acting:
+            self._sound = values.copy()
+        values[:] = self._sound
+        for fault in acting:
+            change(values, fault)
+        self._acting = acting
+
+
 def _tick_from(seconds: float, period: float) -> float:
-    """The first tick at or after a time; a millionth of a tick counts as rounding."""
+    """Return the first tick at or after a time; a millionth of a tick counts as rounding."""
     return math.ceil(seconds / period - 1e-6) if math.isfinite(seconds) else seconds

@@ -1,83 +1,78 @@
-"""Tables of the checks and of the growth, and its picture."""
+"""What a person sees of a benchmark: a table a section."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from statistics import median
+from collections.abc import Sequence
 from typing import Any
 
-from growth import LARGE, Growth
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
+
+from space_robot_control.flight.terminal import say, show
+
+from .result import Result
 
 
-def print_checks(checks: list[dict[str, Any]], console: Console) -> None:
-    table = Table("peer", title="the same robot", title_justify="left", box=SIMPLE_HEAD)
-    for column in ("joints", "time, s", "moved by", "apart by", "allowed", ""):
-        table.add_column(column, justify="right")
-    for check in checks:
-        table.add_row(
-            check["peer"], str(check["joints"]), f"{check['time_s']:g}", f"{check['moved']:.2g}",
-            f"{check['apart']:.1e}", f"{check['tolerance']:.0e}",
-            "[green]same" if check["same"] else "[red]another robot",
-        )  # fmt: skip
-    console.print(table)
+def print_section(title: str, results: Sequence[Result], console: Console) -> None:
+    """Print the rows of one section."""
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table.add_column("", overflow="fold", min_width=18)
+    for column in ("median", "spread"):
+        table.add_column(column, justify="right", no_wrap=True)
+    table.add_column("beside", overflow="fold")
+    table.add_column("times better", justify="right")
+    table.add_column("asked", overflow="fold")
+    for result in results:
+        table.add_row(*cells(result))
+    show(table, console)
+    for result in results:
+        if result.note:
+            say(console, f"{result.name}: {result.note}")
 
 
-def print_growth(growth: Growth, is_cold: bool, console: Console) -> None:
-    """Times, exponents with their spread, first calls."""
-    title = "growth with the number of joints, median us"
-    table = Table("", title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for n in growth.joints:
-        table.add_column(str(n), justify="right")
-    for name in growth.samples_us:
-        table.add_row(name, *(_number(value) for value in growth.medians_us(name)))
-    console.print(table)
-    title = "exponent of the number of joints, median and spread"
-    table = Table("", title=title, title_justify="left", box=SIMPLE_HEAD)
-    table.add_column("all sizes", justify="right")
-    table.add_column(f"from {LARGE} joints on", justify="right")
-    for name in growth.samples_us:
-        table.add_row(name, *(_spread(growth.exponents(name, least)) for least in (0, LARGE)))
-    console.print(table)
-    how = "compiled" if is_cold else "from the cache if it is there"
-    for kernel in growth.first_call_s[0]:
-        calls = ", ".join(f"{call[kernel]:.2g}" for call in growth.first_call_s)
-        console.print(f"first {kernel} ({how}), s: {calls}", highlight=False)
+def print_machine(machine: dict[str, Any], console: Console) -> None:
+    """One line on the machine."""
+    build = [name.upper() for name, is_so in machine["python_build"].items() if is_so]
+    packages = ", ".join(f"{name} {number}" for name, number in machine["packages"].items())
+    say(
+        console,
+        f"{machine['cpu']}, {machine['cpus_allowed']} of {machine['cpus']} processors, load "
+        f"{machine['load_average'][0]:g}; Python {machine['python']} "
+        f"({', '.join(build) or 'no PGO, no LTO'}), {packages}",
+    )
 
 
-def _spread(values: list[float]) -> str:
-    if not values:
-        return ""
-    return f"{median(values):.2f} ({min(values):.2f}..{max(values):.2f})"
+def cells(result: Result) -> list[str | Text]:
+    """The texts of a row."""
+    low, high = result.spread
+    beside = ""
+    if result.beside and result.median_beside is not None:
+        beside = f"{result.beside.name}: {_number(result.median_beside)}"
+    return [
+        result.name,
+        f"{_number(result.median)} {result.unit}",
+        f"{_number(low)}..{_number(high)}",
+        beside,
+        f"{result.ratio:.2f}" if result.ratio is not None else "",
+        _asked(result),
+    ]
+
+
+def _asked(result: Result) -> Text:
+    target = result.target
+    if target is None:
+        return Text()
+    of = "times better " if target.of == "ratio" else ""
+    text = f"{of}{result.relation} {target.limit:g}"
+    if target.aim is not None:
+        text += f" (aim {target.aim:g})"
+    if result.reached_aim:
+        return Text.assemble(f"{text}: ", ("aim reached", "green"))
+    verdict = ("reached", "green") if result.reached else ("missed", "red")
+    return Text.assemble(f"{text}: ", verdict)
 
 
 def _number(value: float) -> str:
-    return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
-
-
-def draw_growth(growth: Growth, path: Path) -> None:
-    """Times over joints, both on logarithmic axes."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.0, 5.0), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots()
-    for name in growth.samples_us:
-        exponent = growth.exponent(name, LARGE) or growth.exponent(name)
-        ours = name.startswith("space_robot")
-        label = name if exponent is None else f"{name}: $n^{{{exponent:.2f}}}$"
-        axes.loglog(
-            growth.joints, growth.medians_us(name), marker="o", markersize=4, label=label,
-            linewidth=2.0 if ours else 1.2, linestyle="-" if ours else "--",
-        )  # fmt: skip
-    axes.set_xlabel("joints")
-    axes.set_ylabel("time, us")
-    axes.set_xticks(growth.joints, [str(n) for n in growth.joints])
-    axes.minorticks_off()
-    axes.grid(alpha=0.3, which="both")
-    axes.set_title(f"growth with the number of joints (exponents from {LARGE} joints on)")
-    axes.legend(fontsize="small")
-    figure.savefig(path, dpi=150)
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"

@@ -19,7 +19,7 @@ from space_robot_msgs_py.ros.process_environment import set_defaults
 set_defaults()
 import rclpy  # noqa: E402
 
-from space_robot_msgs_py.ros.endpoints import In, Out, TakenByLoop  # noqa: E402
+from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription  # noqa: E402
 
 KINDS = ("echo", "future", "past", "nan", "malformed")
 STAMP = slice(4, 12)
@@ -50,7 +50,10 @@ def main() -> None:
     rclpy.init(args=[])
     node = rclpy.create_node("stranger")
     topic = topics.BY_NAME[name]
-    out, heard = Out(node, topic), In(node, topic, TakenByLoop(), depth=10)
+    out, heard = (
+        RawPublisher(node, topic),
+        RawSubscription(node, topic, PolledCallbackGroup(), depth=10),
+    )
     print("ready", flush=True)
     data, count, own = bytes(400), 0, deque[bytes](maxlen=MOST_OWN)
     begin = time.monotonic()

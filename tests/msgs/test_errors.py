@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from paths import ROOT
 
-from space_robot_control.flight.following import InterruptedFlightError
+from space_robot_control.flight.graph.following import InterruptedFlightError
 from space_robot_msgs_py.errors import (
     DivergedError,
     MessageError,
@@ -18,7 +19,7 @@ from space_robot_msgs_py.errors import (
     SpaceRobotError,
     UnusableStateError,
 )
-from space_robot_msgs_py.locks import HeldError, Holder
+from space_robot_msgs_py.ros.locks import HeldError, Holder
 
 MADE: dict[type[SpaceRobotError], SpaceRobotError] = {
     DivergedError: DivergedError(11, 0.0005, "why"),
@@ -33,7 +34,7 @@ MADE: dict[type[SpaceRobotError], SpaceRobotError] = {
 
 def kinds() -> list[type[SpaceRobotError]]:
     """All there are, once the modules that define some are imported."""
-    root = Path(__file__).parents[2]
+    root = ROOT
     for file in root.glob("space_robot_*/**/*.py"):
         if re.search(r"^class \w+Error\(", file.read_text("utf-8"), re.MULTILINE):
             import_module(".".join(file.relative_to(root).with_suffix("").parts))

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import subprocess
+import sys
 from typing import Any
 
 import pytest
 import yaml
+from paths import CONFIG
 
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.wire.message import description
 
-OVERRIDES = Path(__file__).resolve().parents[2] / "config/qos/record_overrides.yaml"
+OVERRIDES = CONFIG / "qos/record_overrides.yaml"
 
 
 def test_overrides_for_ros2_bag_record_are_the_topics_own() -> None:
@@ -41,3 +45,24 @@ def test_ros2_bag_reads_the_overrides_as_the_nodes_quality_of_service() -> None:
     for name, profile in yaml.safe_load(OVERRIDES.read_text("utf-8")).items():
         read = qos.QoSProfile(**{key: policies[key](value) for key, value in profile.items()})
         assert read == of_the_nodes(topics.BY_NAME[name]), name
+
+
+@pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
+def test_what_a_topics_messages_say_stands_in_the_module_of_its_name(topic: topics.Topic) -> None:
+    """Our own message fits its own description; a law's is no columns of numbers."""
+    found = description(topic)
+    if found is None:
+        assert topic is topics.LAW
+        return
+    described = found.of_robot(["a", "b"], Timebase(500_000))
+    width = sum(column.length for column in described.columns)
+    assert not width or len(described.own(3).offsets) in (width, 3 * width)
+
+
+def test_the_recorder_starts_without_the_compiler() -> None:
+    """Half a second sooner; the descriptions of messages need it as little."""
+    modules = ["space_robot_msgs_py.bag.recorder", "space_robot_msgs_py.bag.message_accounting"]
+    names = [topic.name.strip("/").replace("/", "_") for topic in topics.ALL]
+    modules += [f"space_robot_msgs_py.wire.{name}" for name in [*names, "reference_codec"]]
+    program = f"import sys, {', '.join(modules)}; sys.exit('numba' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

@@ -23,7 +23,7 @@ class Area(NamedTuple):
 
     def tests_of(self, module: Path) -> list[str]:
         """Tests of the area, those that bear the module's name first."""
-        tests = [path.relative_to(ROOT) for pattern in self.tests for path in _found(pattern)]
+        tests = {path.relative_to(ROOT) for pattern in self.tests for path in _found(pattern)}
         return [str(path) for path in sorted(tests, key=lambda test: module.stem not in test.stem)]
 
 
@@ -34,62 +34,57 @@ def _found(pattern: str) -> list[Path]:
 
 
 SIM, CONTROL, MSGS = "space_robot_sim", "space_robot_control", "space_robot_msgs_py"
+
+
+def _rooms(package: str, *rooms: str, further: tuple[str, ...] = ()) -> Area:
+    """Rooms of a package with the tests that stand in rooms of the same names, and further ones."""
+    tests = f"tests/{package.split('_')[2]}"
+    return Area(
+        tuple(f"{package}/{room}/**/*.py" for room in rooms),
+        (*(f"{tests}/{room}/**/test_*.py" for room in rooms), *further),
+    )
+
+
+CLOSED_LOOP = (
+    "tests/control/flight/test_compiled_loop.py", "tests/control/flight/test_closed_loop.py",
+)  # fmt: skip
+GUARDS = (
+    f"{CONTROL}/controller/supervisor.py", f"{MSGS}/wire/*_guard.py", f"{SIM}/plant/*_guard.py",
+)  # fmt: skip
 AREAS = {
-    "laws": Area(
-        (f"{CONTROL}/laws/*.py",),
-        ("tests/control/test_laws.py", "tests/control/test_compiled_loop.py",
-         "tests/control/test_controller.py",
-         "tests/control/test_takeover.py", "tests/control/test_closed_loop.py"),
+    "laws": _rooms(
+        CONTROL, "laws", further=("tests/control/controller/test_takeover.py", *CLOSED_LOOP)
     ),
-    "controller": Area(
-        (f"{CONTROL}/controller.py", f"{CONTROL}/controller_kernels.py",
-         f"{CONTROL}/time_delay_estimation.py", f"{CONTROL}/tracking.py",
-         f"{CONTROL}/law_set.py", f"{CONTROL}/reference.py"),
-        ("tests/control/test_controller.py", "tests/control/test_time_delay_estimation.py",
-         "tests/control/test_tracking.py", "tests/control/test_takeover.py",
-         "tests/control/test_swaps.py", "tests/control/test_reference.py",
-         "tests/control/test_compiled_loop.py",
-         "tests/control/test_closed_loop.py"),
+    "controller": _rooms(CONTROL, "controller", further=CLOSED_LOOP),
+    "mission": _rooms(CONTROL, "mission", further=CLOSED_LOOP),
+    "dynamics": _rooms(
+        SIM, "dynamics",
+        further=("tests/sim/robot/test_*.py", "tests/sim/plant/test_conservation.py",
+                 "tests/sim/plant/test_plant.py"),
     ),
-    "dynamics": Area(
-        (f"{SIM}/dynamics/*.py", f"{SIM}/attitude.py", f"{SIM}/integrator.py",
-         f"{SIM}/environment.py"),
-        ("tests/sim/test_attitude.py", "tests/sim/test_equations_of_motion.py",
-         "tests/sim/test_forward_dynamics.py", "tests/sim/test_rho_space.py",
-         "tests/sim/test_conservation.py", "tests/sim/test_environment.py",
-         "tests/sim/test_plant.py"),
+    "robot": _rooms(SIM, "robot", further=("tests/sim/dynamics/test_equations_of_motion.py",)),
+    "environment": _rooms(SIM, "environment", further=("tests/sim/plant/test_plant.py",)),
+    "faults": _rooms(
+        SIM, "faults", further=("tests/sim/sensors/test_*.py", "tests/sim/plant/test_*.py")
     ),
+    "sensors": Area(
+        (f"{SIM}/sensors/*.py", f"{SIM}/actuators/*.py"),
+        ("tests/sim/sensors/test_*.py", "tests/sim/plant/test_*.py"),
+    ),
+    "plant": _rooms(SIM, "plant"),
     "guards": Area(
-        (f"{CONTROL}/supervisor.py", f"{MSGS}/stamp_guard.py", f"{SIM}/command_guard.py"),
-        ("tests/control/test_supervisor.py", "tests/msgs/test_stamp_guard.py",
-         "tests/sim/test_command_guard.py"),
+        GUARDS,
+        ("tests/control/controller/test_supervisor.py", "tests/msgs/wire/test_*_guard.py",
+         "tests/sim/plant/test_command_guard.py"),
     ),
-    "metrics": Area(
-        (f"{CONTROL}/analysis/metrics.py", f"{CONTROL}/analysis/actuation.py",
-         f"{CONTROL}/analysis/settling.py", f"{CONTROL}/analysis/pointing.py",
-         f"{CONTROL}/analysis/estimate_error.py", f"{CONTROL}/analysis/waypoints.py",
-         f"{CONTROL}/analysis/spectrum.py", f"{CONTROL}/analysis/blocks.py",
-         f"{CONTROL}/analysis/report.py", f"{CONTROL}/analysis/generalised_motion.py",
-         f"{CONTROL}/analysis/excerpt.py", f"{CONTROL}/analysis/table.py"),
-        ("tests/control/test_metrics.py", "tests/control/test_actuation.py",
-         "tests/control/test_settling.py", "tests/control/test_waypoints.py",
-         "tests/control/test_pointing.py",
-         "tests/control/test_estimate_error.py", "tests/control/test_blocks.py",
-         "tests/control/test_excerpt.py", "tests/control/test_table.py"),
+    "metrics": _rooms(CONTROL, "analysis"),
+    "flight": Area(
+        (f"{CONTROL}/flight/*.py",), ("tests/control/flight/test_*.py",),
     ),
-    "bag": Area(
-        (f"{MSGS}/bag/*.py",),
-        ("tests/msgs/test_bag*.py", "tests/msgs/test_coverage.py", "tests/msgs/test_mcap*.py",
-         "tests/msgs/test_sources.py", "tests/msgs/test_faulty_flights.py",
-         "tests/msgs/test_rosbag2_yaml.py", "tests/msgs/test_unfinished_bag.py",
-         "tests/msgs/test_broken_bags.py", "tests/sim/test_load_bag.py"),
-    ),
-    "wire": Area(
-        (f"{MSGS}/cdr.py", f"{MSGS}/compiled_cdr.py", f"{MSGS}/codecs.py",
-         f"{MSGS}/reference_codec.py", f"{MSGS}/plain_codecs.py", f"{MSGS}/decoded.py",
-         f"{MSGS}/samples.py"),
-        ("tests/msgs/test_cdr.py", "tests/msgs/test_codecs.py",
-         "tests/msgs/test_reference_codec.py", "tests/msgs/test_foreign_messages.py",
-         "tests/msgs/test_wire.py"),
-    ),
+    "bag": _rooms(MSGS, "bag"),
+    "wire": _rooms(MSGS, "wire"),
+    "config": _rooms(MSGS, "config"),
+    "compiled": _rooms(MSGS, "compiled"),
 }  # fmt: skip
+"""By what is said on the command line. The tests of an area are those without the marks ros and
+slow: they would take minutes for each mutant."""

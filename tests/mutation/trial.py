@@ -87,7 +87,8 @@ class Copy:
         }
         begun = time.monotonic()
         process = subprocess.Popen(
-            [sys.executable, "-m", "pytest", "-x", "-p", "no:cacheprovider", "--tb=no", *tests],
+            [sys.executable, "-m", "pytest", "-x", "-p", "no:cacheprovider", "--tb=no",
+             "-m", "not ros and not slow", *tests],
             cwd=self._tree, env=environment, text=True, start_new_session=True,
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         )  # fmt: skip

@@ -1,16 +1,15 @@
-"""Pictures of flights for print: 180 mm wide, from flight logs to matplotlib figures.
+"""Figures of flights for print, 180 mm wide, drawn by matplotlib from flight logs.
 
-Nothing here uses pyplot or leaves a trace in matplotlib's settings, so pictures may be drawn in
+Nothing here uses pyplot or leaves a trace in matplotlib's settings, so figures may be drawn in
 worker processes. The same log gives the same bytes.
 """
 
-from .base_torque import BaseTorque
-from .comparison import chatter, junctions
-from .files import save_figure
+from .base_torque import chatter, junctions
 from .overlay import errors_and_torques, latency_histogram, pointing
 from .single_flight import control_results, desired_joints
+from .style import save_figure
 
 __all__ = [
-    "BaseTorque", "chatter", "control_results", "desired_joints", "errors_and_torques", "junctions",
+    "chatter", "control_results", "desired_joints", "errors_and_torques", "junctions",
     "latency_histogram", "pointing", "save_figure",
 ]  # fmt: skip

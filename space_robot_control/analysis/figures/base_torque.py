@@ -1,46 +1,213 @@
-"""The base's torque over a flight: what pictures of several flights draw of each."""
+"""Figures of the base torque of several flights: is a law's command smooth, or does it switch?"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
+from statistics import median_low
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, FigureBase
 from numpy.typing import NDArray
-from typing_extensions import Self
 
-from space_robot_msgs_py.flight_log import FlightLog
-
-from ..waypoints import junction_ticks
+from ..plot_series import BaseTorque
+from ..spectrum import CHATTER_FREQUENCY
+from .single_flight import BASE_AXES, JUNCTION_HALF_WIDTH
+from .style import (
+    GREY,
+    Look,
+    grid,
+    house_style,
+    legend_above,
+    mark_moments,
+    page,
+    plain,
+    plot_lines,
+    scattered,
+)
 
 Array = NDArray[np.float64]
 
+CHATTER_STRETCH = 0.05
+"""s of base torque that are shown tick by tick."""
+LOUD = 2.0
+"""A flight that swings over so many times the range of the middle one does not set the scale."""
+SEGMENT = 2048
+"""Samples of a segment of the spectrum: about 1 Hz of resolution at 2 kHz."""
+SHORTEST = 64
+"""Samples below which a spectrum says nothing."""
 
-class BaseTorque(NamedTuple):
-    """A fiftieth of the flight's log, to hand from process to process."""
 
-    torque: Array
-    """(N, 3) N m, applied in the base frame."""
-    period: float
-    """s, of a tick."""
-    junctions: NDArray[np.intp]
-    """Rows at which one motion has ended and another begins."""
-    start: float = 0.0
-    """s, time of the first row: not 0 in an excerpt of a flight."""
+@house_style()
+def junctions(flights: Mapping[str, BaseTorque]) -> Figure:
+    """Draw the base torque x of all laws round the first junction of the mission's segments.
 
-    @classmethod
-    def of(cls, log: FlightLog) -> Self:
-        """Of a whole flight."""
-        period = log.timebase.period
-        return cls(
-            log.applied_torque[:, :3].copy(), period, junction_ticks(log), log.first_tick * period
-        )
+    All panels have one scale. A law that swings much farther than most does not set it: it is cut
+    off at the panel's edges, and its heading says how far it goes.
 
-    @property
-    def time(self) -> Array:
-        """(N,) s, of the ticks."""
-        return self.start + np.arange(len(self.torque), dtype=np.float64) * self.period
+    Args:
+        flights: of one mission, by the name of the law.
+    """
+    moments = [
+        flight.start + flight.period * row
+        for flight in flights.values()
+        for row in flight.junctions[:1]
+    ]
+    if not moments:
+        return page(12.0, "None of these flights passes a junction of two segments.")
+    columns = min(2, len(flights))
+    figure = page(12.0 + 45.0 * math.ceil(len(flights) / columns))
+    stretch = _Stretch(slice(0, 1), min(moments), -JUNCTION_HALF_WIDTH, JUNCTION_HALF_WIDTH)
+    panels = _draw_side_by_side(figure, columns, flights, stretch)
+    for axes in panels:
+        mark_moments(axes, np.zeros(1))
+    for axes in panels[::columns]:
+        axes.set_ylabel("base torque x (N m)")
+    return figure
 
-    @property
-    def end(self) -> float:
-        """Of the flight, s."""
-        return self.start + len(self.torque) * self.period
+
+@house_style()
+def chatter(flights: Mapping[str, BaseTorque]) -> Figure:
+    """Draw a short stretch of base torque on one scale, and the spectrum of the whole flight.
+
+    The stretch begins at a quarter of the longest flight: when the arm is fastest, if the mission
+    has two segments. Scale and headings are those of :func:`junctions`.
+
+    Args:
+        flights: of one mission, by the name of the law.
+    """
+    start = min(flight.start for flight in flights.values())
+    moment = start + (max(flight.end for flight in flights.values()) - start) / 4.0
+    columns = math.ceil(len(flights) / math.ceil(len(flights) / 4))
+    height, spectrum_height = 20.0 + 38.0 * math.ceil(len(flights) / columns), 90.0
+    figure = page(height + spectrum_height)
+    parts = figure.add_gridspec(2, 1, height_ratios=(height, spectrum_height))
+    above, below = figure.add_subfigure(parts[0]), figure.add_subfigure(parts[1])
+    stretch = _Stretch(slice(0, 3), moment, 0.0, CHATTER_STRETCH)
+    for axes in _draw_side_by_side(above, columns, flights, stretch, steps=True)[::columns]:
+        axes.set_ylabel("base torque (N m)")
+    legend_above(above, BASE_AXES, dashed=False)
+    spectra = {
+        name: power_spectral_density(flight.torque, flight.period)
+        for name, flight in flights.items()
+    }
+    _draw_spectra(below.add_subplot(), spectra)
+    names = [n if len(f) else f"{n}: too short" for n, (f, _) in spectra.items()]
+    legend_above(below, names, dashed=True)
+    return figure
+
+
+def power_spectral_density(values: Array, period: float) -> tuple[Array, Array]:
+    """Estimate the density of the power of all columns together, by Welch's method.
+
+    Each segment's trend goes, else the slow motion leaks into the high frequencies.
+
+    Args:
+        values: (N, axes) samples; the rows from the first that is not finite on are left out.
+        period: s, between two samples.
+
+    Returns:
+        Frequencies above 0, Hz, and the density in the square of the values' unit per Hz, NaN
+        where there is no power; both empty if there are too few samples.
+    """
+    from scipy.signal import detrend, welch  # slow to import
+
+    known = np.all(np.isfinite(values), axis=1)
+    samples = values[: len(values) if known.all() else int(np.argmin(known))]
+    if len(samples) < SHORTEST:
+        return np.empty(0), np.empty(0)
+    frequency, density = welch(
+        samples.T, 1.0 / period, nperseg=min(SEGMENT, len(samples)), detrend=detrend
+    )
+    total = np.sum(density[:, 1:], axis=0)
+    return frequency[1:], np.where(total > 0.0, total, np.nan)
+
+
+def _draw_spectra(axes: Axes, spectra: Mapping[str, tuple[Array, Array]]) -> None:
+    for index, (frequency, density) in enumerate(spectra.values()):
+        if len(frequency) == 0:
+            continue
+        look = Look.of(index)
+        even = np.geomspace(frequency[0], frequency[-1], 1000)
+        marks = np.searchsorted(frequency, even[scattered(len(even), index, len(spectra))])
+        axes.plot(
+            frequency, density,
+            color=look.colour, linestyle=look.dashes, marker=look.marker, markevery=marks.tolist(),
+        )  # fmt: skip
+    axes.set(xscale="log", yscale="log")
+    if not axes.get_lines():  # all too short: one mark alone gives no scale
+        axes.set_xlim(0.1 * CHATTER_FREQUENCY, 10.0 * CHATTER_FREQUENCY)
+    mark_moments(axes, np.array([CHATTER_FREQUENCY]))
+    axes.set(xlabel="frequency (Hz)", ylabel="PSD of base torque, x + y + z ((N m)²/Hz)")
+    axes.xaxis.set_major_formatter("{x:g}")
+
+
+class _Stretch(NamedTuple):
+    """The part of each flight that the panels show."""
+
+    axes: slice
+    """Axes of the base's torque."""
+    moment: float
+    """s, zero of the time axis."""
+    begin: float
+    """s from the moment."""
+    end: float
+    """s from the moment."""
+
+    def of(self, flight: BaseTorque) -> tuple[Array, Array]:
+        """Return time from the moment, s, and torque, N m; empty if the flight ended before."""
+        time = flight.time - self.moment
+        shown = (time > self.begin - 1e-9) & (time < self.end + 1e-9)
+        return time[shown], flight.torque[shown, self.axes]
+
+
+def _draw_side_by_side(
+    figure: FigureBase,
+    columns: int,
+    flights: Mapping[str, BaseTorque],
+    stretch: _Stretch,
+    *,
+    steps: bool = False,
+) -> list[Axes]:
+    """Plot the stretch of each flight in a panel of its own, all on one scale."""
+    curves = {name: stretch.of(flight) for name, flight in flights.items()}
+    low, high = common_limits([torque for _, torque in curves.values()])
+    panels = grid(figure, len(flights), columns)
+    for number, (axes, (name, (time, torque))) in enumerate(
+        zip(panels, curves.items(), strict=True)
+    ):
+        if np.isfinite(torque).any():
+            marks = None if torque.shape[1] > 1 else np.empty(0, np.intp)
+            plot_lines(axes, 1e3 * time, torque, marks=marks, steps=steps)
+        else:
+            axes.text(0.03, 0.5, f"ended at {flights[name].end:g} s", color=GREY,
+                      transform=axes.transAxes)  # fmt: skip
+        axes.set_title(plain(name + _cut(torque, low, high)))
+        if number + columns >= len(panels):
+            axes.set_xlabel(f"time from {stretch.moment:g} s (ms)")
+    panels[0].set(xlim=(1e3 * stretch.begin, 1e3 * stretch.end), ylim=(low, high))
+    return panels
+
+
+def common_limits(torques: Sequence[Array]) -> tuple[float, float]:
+    """Find limits that hold all but the loud ones of ``torques``, with a margin, N m."""
+    known = [torque[np.isfinite(torque)] for torque in torques]
+    known = [torque for torque in known if len(torque)]
+    if not known:
+        return -1.0, 1.0
+    ranges = [float(np.ptp(torque)) for torque in known]
+    usual = median_low(ranges)
+    quiet = [t for t, range_ in zip(known, ranges, strict=True) if range_ <= LOUD * usual]
+    low, high = min(float(t.min()) for t in quiet), max(float(t.max()) for t in quiet)
+    margin = 0.05 * (high - low) or max(0.05 * abs(high), 0.01)
+    return low - margin, high + margin
+
+
+def _cut(torque: Array, low: float, high: float) -> str:
+    """Say in the heading of a flight that goes beyond the limits how far it goes."""
+    known = torque[np.isfinite(torque)]
+    if not len(known) or (known.min() >= low and known.max() <= high):
+        return ""
+    return f", cut: {known.min():.2g} … {known.max():.2g}"

@@ -1,200 +1,147 @@
-"""Several flights in the same panels, a line each: errors, torques, pointing, latency."""
+"""Figures of several flights in common panels: errors, torques, pointing, latency."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
-from ..course import Course
+from ..plot_series import PlotSeries
 from ..pointing import ARCSEC
-from .envelope import envelope
-from .lines import scattered_marks
-from .quantity import Quantity, power_of_ten
-from .scale import draw_scales
-from .style import (
-    LEFT,
-    PAGE_WIDTH,
-    RIGHT,
-    TIME_AXIS,
-    Look,
-    house_style,
-    legend_above,
-    legend_height,
-    page,
-    panel,
-)
+from .style import Look, house_style, legend_above, page, plot_lines
 
 Array = NDArray[np.float64]
-Curves = dict[str, tuple[Array, Array]]
-"""Time, s, and values of each flight that has them."""
 
 USUAL = 0.5
 """% of the ticks that may lie below a logarithmic panel: an error begins at zero."""
 BINS = 80
-"""Of the latency's histogram."""
-
-_WIDTH = PAGE_WIDTH - LEFT - RIGHT
-_HALF = (PAGE_WIDTH - 2 * LEFT - 2 * RIGHT) / 2
-_HEIGHT, _GAP = 34.0, 4.0
+"""Bins of the latency's histogram."""
 
 
 class _Panel(NamedTuple):
-    curves: Curves
-    name: str
-    unit: str
-    logarithmic: bool
+    curves: dict[str, tuple[Array, Array]]
+    """Time, s, and values of each flight that has them."""
+    label: str
+    is_logarithmic: bool
 
 
 @house_style()
-def errors_and_torques(courses: Mapping[str, Course]) -> Figure:
-    """Figs. 6 to 9 of several flights: norms of errors (left, logarithmic) and torques (right).
+def errors_and_torques(flights: Mapping[str, PlotSeries]) -> Figure:
+    """Draw Figs. 6 to 9 of several flights: norms of errors (left, logarithmic), torques (right).
 
     Args:
-        courses: by name of the flight.
+        flights: by name.
     """
-    left = [
-        _Panel(_curves(courses, "errors", key), f"|{_plain(key)} error|", unit, True)
-        for key in _keys(courses, "errors")
-        for unit in ["" if key == "attitude" else "rad"]
-    ]
-    right = [
-        _Panel(_curves(courses, "torques", key), f"|{_plain(key)}|", "N m", False)
-        for key in _keys(courses, "torques")
-    ]
-    top = 1.0 + legend_height(list(courses), _WIDTH)
-    rows = max(len(left), len(right))
-    figure = page(top + rows * (_HEIGHT + _GAP) - _GAP + TIME_AXIS)
-    for x, panels in ((LEFT, left), (PAGE_WIDTH - RIGHT - _HALF, right)):
-        for row, shown in enumerate(panels):
-            axes = panel(figure, x, top + row * (_HEIGHT + _GAP), _HALF, _HEIGHT)
-            _draw(axes, shown, list(courses), last=row == len(panels) - 1)
-    legend_above(figure, LEFT, top, list(courses), _WIDTH, dashed=True)
-    return figure
+    errors = _panels(
+        flights, lambda series: series.errors,
+        lambda key: f"|{_words(key)} error|{'' if key == 'attitude' else ' (rad)'}", True,
+    )  # fmt: skip
+    torques = _panels(
+        flights, lambda series: series.torques, lambda key: f"|{_words(key)}| (N m)", False
+    )
+    return _draw([errors, torques], list(flights))
 
 
 @house_style()
-def pointing(courses: Mapping[str, Course]) -> Figure:
-    """The end effector's pointing: boresight angle, whole rotation, position, base's drift."""
-    known = {name: course for name, course in courses.items() if course.pointing is not None}
+def pointing(flights: Mapping[str, PlotSeries]) -> Figure:
+    """Draw the end effector's pointing: boresight angle, whole rotation, position, base's drift."""
+    known = {name: series for name, series in flights.items() if series.pointing is not None}
     if not known:
         return page(12.0, "No robot is known for these flights, so no pointing error.")
-    panels = []
-    for field, name, unit, scale in (
-        ("boresight", "boresight error", "arcsec", ARCSEC),
-        ("rotation", "rotation error", "arcsec", ARCSEC),
-        ("position", "tool position error", "m", 1.0),
-        ("base_drift", "base's drift", "m", 1.0),
-    ):
-        curves = {
-            key: (course.time, getattr(course.pointing, field) / scale)
-            for key, course in known.items()
-        }
-        panels.append(_Panel(curves, name, unit, field != "base_drift"))
-    top = 1.0 + legend_height(list(courses), _WIDTH)
-    figure = page(top + 4 * (_HEIGHT + _GAP) - _GAP + TIME_AXIS)
-    for row, shown in enumerate(panels):
-        axes = panel(figure, LEFT, top + row * (_HEIGHT + _GAP), _WIDTH, _HEIGHT)
-        _draw(axes, shown, list(courses), last=row == 3)
-    legend_above(figure, LEFT, top, list(courses), _WIDTH, dashed=True)
-    return figure
+    panels = [
+        _Panel(
+            {key: (s.time, getattr(s.pointing, field) / unit) for key, s in known.items()},
+            label,
+            field != "base_drift",
+        )
+        for field, label, unit in (
+            ("boresight", "boresight error (arcsec)", ARCSEC),
+            ("rotation", "rotation error (arcsec)", ARCSEC),
+            ("position", "tool position error (m)", 1.0),
+            ("base_drift", "base's drift (m)", 1.0),
+        )
+    ]
+    return _draw([panels], list(flights))
 
 
 @house_style()
-def latency_histogram(courses: Mapping[str, Course]) -> Figure:
-    """How many answers took how long, of the flights that know."""
-    known = {name: c.latency_ms for name, c in courses.items() if c.latency_ms is not None}
+def latency_histogram(flights: Mapping[str, PlotSeries]) -> Figure:
+    """Draw how many answers took how long, of the flights that know."""
+    known = {name: s.latency_ms for name, s in flights.items() if s.latency_ms is not None}
     if not known:
         return page(12.0, "None of these flights was flown as a graph, so no latency.")
-    top, height = 1.0 + legend_height(list(known), _WIDTH), 62.0
-    figure = page(top + height + TIME_AXIS)
-    axes = panel(figure, LEFT, top, _WIDTH, height)
-    low = min(float(values.min()) for values in known.values())
+    figure = page(80.0)
+    axes = figure.add_subplot()
+    low = max(min(float(values.min()) for values in known.values()), 1e-3)
     high = max(float(values.max()) for values in known.values())
-    low = max(low, 1e-3)
     edges = np.geomspace(low, max(high, 1.1 * low), BINS + 1)
     for index, values in enumerate(known.values()):
         look = Look.of(index)
         counts, _ = np.histogram(np.maximum(values, low), edges)
         axes.stairs(counts, edges, color=look.colour, linestyle=look.dashes, linewidth=0.9)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    axes.set(xscale="log", yscale="log", xlabel="from a state's sending to its command's (ms)",
+             ylabel="answers")  # fmt: skip
     axes.set_ylim(bottom=0.7)
-    axes.set_xlabel("from a state's sending to its command's (ms)")
-    axes.set_ylabel("answers")
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
-    axes.xaxis.set_minor_formatter(FuncFormatter(lambda x, _: ""))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
-    legend_above(figure, LEFT, top, list(known), _WIDTH, dashed=True)
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter("")
+    axes.yaxis.set_major_formatter("{x:g}")
+    legend_above(figure, list(known), dashed=True)
     return figure
 
 
-def _draw(axes: Axes, shown: _Panel, names: list[str], *, last: bool) -> None:
-    values = [value for _, value in shown.curves.values()]
-    if shown.logarithmic:
-        quantity = Quantity(shown.name, shown.unit)
-        axes.set_yscale("log")
-    else:
-        quantity = Quantity.of(np.concatenate(values or [np.zeros(1)]), shown.name, shown.unit)
-    axes.set_ylabel(quantity.label)
-    for name, depth in _depths(shown.curves).items():
-        (time, value), index = shown.curves[name], names.index(name)
-        look, kept = Look.of(index), envelope(value)
-        marked = scattered_marks(len(time), index, len(names))
-        drawn = np.union1d(kept, marked)
-        scaled = quantity.scaled(value[drawn])
-        axes.plot(
-            time[drawn], np.where(scaled > 0.0, scaled, np.nan) if shown.logarithmic else scaled,
-            color=look.colour, linestyle=look.dashes, marker=look.marker, zorder=depth,
-            markevery=np.searchsorted(drawn, marked).tolist(),
-        )  # fmt: skip
-    times = [time for time, _ in shown.curves.values()]
-    low, high = min(float(t[0]) for t in times), max(float(t[-1]) for t in times)
-    margin = 0.01 * (high - low) or 0.01
-    axes.set_xlim(low - margin, high + margin)
-    axes.set_xlabel("time (s)" if last else "")
-    if shown.logarithmic:
-        known = [value[value > 0.0] for value in values]
-        axes.set_ylim(
-            bottom=min((np.percentile(v, USUAL) / 2.0 for v in known if len(v)), default=None)
-        )
-        axes.yaxis.set_major_formatter(
-            FuncFormatter(lambda y, _: power_of_ten(round(math.log10(y))) if y > 0.0 else "")
-        )
-        axes.yaxis.set_minor_locator(NullLocator())
-    draw_scales(axes, x_numbers=last)
+def _draw(columns: list[list[_Panel]], names: list[str]) -> Figure:
+    """Plot columns of as many panels over time, under one legend of all flights."""
+    rows = len(columns[0])
+    figure = page(18.0 + 38.0 * rows)
+    grid = figure.subplots(rows, len(columns), sharex="col", squeeze=False)
+    for panels, column in zip(columns, grid.T, strict=True):
+        for axes, panel in zip(column, panels, strict=True):
+            _draw_panel(axes, panel, names)
+        column[-1].set_xlabel("time (s)")
+    figure.align_ylabels()
+    legend_above(figure, names, dashed=True)
+    return figure
 
 
-def _depths(curves: Curves) -> dict[str, float]:
-    """How far in front each line lies: the wildest at the back, for it would hide the others."""
-    roughness = {
-        name: np.nansum(np.abs(np.diff(value[envelope(value)])))
-        for name, (_, value) in curves.items()
-    }
-    order = sorted(curves, key=lambda name: -roughness[name])
-    return {name: 2.0 + 0.01 * place for place, name in enumerate(order)}
+def _draw_panel(axes: Axes, panel: _Panel, names: list[str]) -> None:
+    wildest_first = sorted(panel.curves, key=lambda name: -_roughness(panel.curves[name][1]))
+    for depth, name in enumerate(wildest_first):  # at the back, for it would hide the others
+        time, value = panel.curves[name]
+        plot_lines(axes, time, value[:, np.newaxis], looks=[names.index(name)], dashed=True)
+        axes.get_lines()[-1].set_zorder(2.0 + 0.01 * depth)
+    if panel.is_logarithmic:
+        axes.set_yscale("log", nonpositive="mask")
+        known = [value[value > 0.0] for _, value in panel.curves.values()]
+        usual = [float(np.percentile(value, USUAL)) for value in known if len(value)]
+        if usual:
+            axes.set_ylim(bottom=0.5 * min(usual))
+    axes.set_ylabel(panel.label)
 
 
-def _keys(courses: Mapping[str, Course], field: str) -> list[str]:
-    return list(dict.fromkeys(key for c in courses.values() for key in getattr(c, field)))
+def _roughness(values: Array) -> float:
+    return float(np.nansum(np.abs(np.diff(values))))
 
 
-def _curves(courses: Mapping[str, Course], field: str, key: str) -> Curves:
-    return {
-        name: (course.time, getattr(course, field)[key])
-        for name, course in courses.items()
-        if key in getattr(course, field)
-    }
+def _panels(
+    flights: Mapping[str, PlotSeries],
+    values_of: Callable[[PlotSeries], dict[str, Array]],
+    label: Callable[[str], str],
+    is_logarithmic: bool,
+) -> list[_Panel]:
+    """Make a panel of every column that any of the flights has."""
+    curves: dict[str, dict[str, tuple[Array, Array]]] = {}
+    for name, series in flights.items():
+        for key, values in values_of(series).items():
+            curves.setdefault(key, {})[name] = series.time, values
+    return [_Panel(found, label(key), is_logarithmic) for key, found in curves.items()]
 
 
-def _plain(key: str) -> str:
-    """``joints_1_3`` as in a label: joints 1-3."""
+def _words(key: str) -> str:
+    """Write ``joints_1_3`` as in a label: joints 1-3."""
     word, _, axes = key.partition("_")
     if not axes or not axes[0].isdigit():
         return key.replace("_", " ")

@@ -1,33 +1,19 @@
-"""Pictures of one flight, as in the paper's Fig. 5 and Figs. 6 to 9."""
+"""Figures of one flight, as in the paper's Fig. 5 and Figs. 6 to 9."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.flight_log import FlightLog
+from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from ..metrics import tracking_error
+from ..plot_series import tick_times
 from ..waypoints import junction_ticks, waypoint_ticks
-from .lines import draw_lines, mark_moments, tick_times
-from .quantity import Quantity
-from .scale import draw_scales
-from .style import (
-    LEFT,
-    PAGE_WIDTH,
-    RIGHT,
-    TIME_AXIS,
-    house_style,
-    legend_above,
-    legend_height,
-    page,
-    panel,
-    title_height,
-)
+from .style import PAGE_WIDTH, house_style, legend_above, mark_moments, page, plot_lines
 
 Array = NDArray[np.float64]
 
@@ -37,33 +23,23 @@ JUNCTION_HALF_WIDTH = 0.15
 MOST_JUNCTIONS = 3
 """Junctions enlarged, from the first on: more would not fit beside one another."""
 
-_PANEL_HEIGHT = 38.0
-_COLUMN = (PAGE_WIDTH - 2 * LEFT - 2 * RIGHT) / 2
-_GAP = 4.0
-"""mm between panels."""
-
 
 @house_style()
 def desired_joints(log: FlightLog) -> Figure:
-    """Fig. 5: the desired joint angles over time, each marked at the waypoints."""
-    width, height = PAGE_WIDTH - LEFT - RIGHT, 62.0
-    top = 2.0 + legend_height(log.joint_names, width)
-    figure = page(top + height + TIME_AXIS)
-    axes = panel(figure, LEFT, top, width, height)
-    time, angles = tick_times(log), np.degrees(log.reference_joints[:, 0])
-    waypoints = waypoint_ticks(log)
-    quantity = Quantity.of(angles, "desired joint angle", "deg")
-    draw_lines(axes, time, angles, quantity, marks=waypoints, dashed=True)
+    """Draw Fig. 5: the desired joint angles over time, each marked at the waypoints."""
+    figure = page(80.0)
+    axes = figure.add_subplot()
+    time, waypoints = tick_times(log), waypoint_ticks(log)
+    plot_lines(axes, time, np.degrees(log.reference_joints[:, 0]), marks=waypoints, dashed=True)
     mark_moments(axes, time[waypoints])
-    axes.set_xlabel("time (s)")
-    draw_scales(axes)
-    legend_above(figure, LEFT, top, log.joint_names, width, dashed=True)
+    axes.set(xlabel="time (s)", ylabel="desired joint angle (deg)")
+    legend_above(figure, log.joint_names, dashed=True)
     return figure
 
 
 @house_style()
 def control_results(log: FlightLog, title: str) -> Figure:
-    """Figs. 6 to 9: errors and torques of the base (left) and of the joints (right).
+    """Draw Figs. 6 to 9: errors and torques of the base (left) and of the joints (right).
 
     Below, the torques are enlarged round the junctions of the mission's segments, if the flight
     has reached one.
@@ -73,60 +49,43 @@ def control_results(log: FlightLog, title: str) -> Figure:
         title: what was flown.
     """
     error, torque, time = tracking_error(log), log.applied_torque, tick_times(log)
-    junctions = junction_ticks(log)[:MOST_JUNCTIONS]
-    legend = max(legend_height(names, _COLUMN) for names in (BASE_AXES, log.joint_names))
-    error_top = title_height(title) + legend
-    torque_top = error_top + _PANEL_HEIGHT + _GAP
-    enlarged_top = torque_top + _PANEL_HEIGHT + TIME_AXIS
-    enlarged_height = _PANEL_HEIGHT + TIME_AXIS if len(junctions) else 0.0
-    figure = page(enlarged_top + enlarged_height, title)
-    columns = [
-        (LEFT, slice(0, 3), BASE_AXES, ("attitude error", ""), ("base torque", "N m")),
-        (PAGE_WIDTH - RIGHT - _COLUMN, slice(3, None), log.joint_names,
-         ("joint error", "rad"), ("joint torque", "N m")),
-    ]  # fmt: skip
-    for left, part, names, error_name, torque_name in columns:
-        errors = panel(figure, left, error_top, _COLUMN, _PANEL_HEIGHT)
-        draw_lines(errors, time, error[:, part], Quantity.of(error[:, part], *error_name))
-        legend_above(figure, left, error_top, names, _COLUMN, dashed=False)
-        torques = panel(figure, left, torque_top, _COLUMN, _PANEL_HEIGHT)
-        draw_lines(torques, time, torque[:, part], Quantity.of(torque[:, part], *torque_name))
-        torques.set_xlabel("time (s)")
+    moments = time[junction_ticks(log)[:MOST_JUNCTIONS]]
+    rows = 3 if len(moments) else 2
+    figure = page(22.0 + 46.0 * rows, title)
+    cells = figure.add_gridspec(rows, 2)
+    for column, (part, names, error_label, torque_label) in enumerate((
+        (slice(0, 3), BASE_AXES, "attitude error", "base torque (N m)"),
+        (slice(3, None), log.joint_names, "joint error (rad)", "joint torque (N m)"),
+    )):  # fmt: skip
+        errors = figure.add_subplot(cells[0, column])
+        torques = figure.add_subplot(cells[1, column], sharex=errors)
+        plot_lines(errors, time, error[:, part])
+        plot_lines(torques, time, torque[:, part])
         for axes in (errors, torques):
-            mark_moments(axes, time[junctions])
-            draw_scales(axes, x_numbers=axes is torques)
-        if len(junctions):
-            stretches = [_round(moment, time, torque[:, part]) for moment in time[junctions]]
-            _enlarge(figure, left, enlarged_top, time[junctions], stretches, torque_name)
+            mark_moments(axes, moments)
+        errors.tick_params(labelbottom=False)
+        errors.set_ylabel(error_label)
+        torques.set(xlabel="time (s)", ylabel=torque_label)
+        legend_above(errors, names, dashed=False, width=PAGE_WIDTH / 2 - 20)
+        if len(moments):
+            enlarged = _enlarge(figure, cells, column, moments, time, torque[:, part])
+            enlarged.set_ylabel(torque_label)
+        figure.align_ylabels([errors, torques])
     return figure
 
 
-def _round(moment: float, time: Array, torque: Array) -> tuple[Array, Array]:
-    """Time from ``moment``, s, and torque, of the ticks near it."""
-    near = np.abs(time - moment) < JUNCTION_HALF_WIDTH + 1e-9
-    return time[near] - moment, torque[near]
-
-
 def _enlarge(
-    figure: Figure,
-    left: float,
-    top: float,
-    moments: Array,
-    stretches: Sequence[tuple[Array, Array]],
-    name: tuple[str, str],
-) -> None:
-    """Panels of torque round the junctions, beside one another on one scale."""
-    width = (_COLUMN - _GAP * (len(stretches) - 1)) / len(stretches)
-    quantity = Quantity.of(np.concatenate([torque for _, torque in stretches]), *name)
-    panels: list[Axes] = []
-    for number, (moment, (time, torque)) in enumerate(zip(moments, stretches, strict=True)):
-        axes = panel(figure, left + number * (width + _GAP), top, width, _PANEL_HEIGHT)
-        draw_lines(axes, 1e3 * time, torque, quantity)
+    figure: Figure, cells: GridSpec, column: int, moments: Array, time: Array, torque: Array
+) -> Axes:
+    """Plot the torque round the junctions, beside one another on one scale; the first panel."""
+    below = cells[2, column].subgridspec(1, len(moments))
+    panels = below.subplots(sharey=True, squeeze=False)[0].tolist()
+    for axes, moment in zip(panels, moments, strict=True):
+        near = np.abs(time - moment) < JUNCTION_HALF_WIDTH + 1e-9
+        plot_lines(axes, 1e3 * (time[near] - moment), torque[near])
         mark_moments(axes, np.zeros(1))
-        axes.set_xlabel(f"time from {moment:g} s (ms)")
-        if panels:
-            axes.sharey(panels[0])
-            axes.set_ylabel("")
-        panels.append(axes)
-    for axes in panels:
-        draw_scales(axes, y_numbers=axes is panels[0])
+        axes.set_xlabel(f"time from {moment:g} s (ms)" if len(moments) < MOST_JUNCTIONS
+                        else f"from {moment:g} s (ms)")  # fmt: skip
+        axes.locator_params(axis="x", nbins=7 if len(moments) == 1 else 3)
+    first: Axes = panels[0]
+    return first

@@ -1,4 +1,4 @@
-"""Which controller answers the replay: the one that flew, or another."""
+"""The controller that answers the replay: the one that flew, or another."""
 
 from __future__ import annotations
 
@@ -10,23 +10,17 @@ from typing import Any
 
 import yaml
 
-from space_robot_msgs_py.configuration import named_file
+from space_robot_msgs_py.config.files import named_file
+from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import LawInForce
-from space_robot_msgs_py.validation import one_of
 from space_robot_sim.robot import Robot
 
+from ...controller.gains import build_law, build_laws, gain_files, gains_as_path, split_gains
+from ...controller.settings import ControllerNodeSettings
+from ...controller.swaps import parse_swaps
 from ...laws import ControlLaw, find_law
-from ...settings import (
-    ControllerNodeSettings,
-    available_laws,
-    build_law,
-    check_gains,
-    gain_files,
-    gains_as_path,
-)
-from ...swaps import parse_swaps
-from ...trust import check_file, check_law, is_plain
+from ...laws.trust import check_file, check_law, is_plain
 
 NODE = ControllerNodeSettings.node
 OF_THE_GRAPH = ("wait_for", "fifo_priority", "autostart")
@@ -82,7 +76,7 @@ class ControllerChoice:
         self.law_name = law.name
         is_same_law = law.name == flight.get("controller", law.name)
         self.parameters: dict[str, Any] = {**flown, **self._robot(flown)}
-        """Of the node, by dotted name."""
+        """The node's parameters, by dotted name."""
         recorded_gains = flight.get("gains_used", {})
         if recorded_gains and is_same_law and not gains:
             self.parameters["gains"] = self._gains_folder(law, recorded_gains)
@@ -92,7 +86,7 @@ class ControllerChoice:
         self.swaps = [text for text in self.parameters.get("swaps", []) if text.strip()]
         """Laws swapped to in flight."""
         try:
-            self.robot, now = self._check(law)
+            self.robot, now = self._check()
         except InputError as error:
             if not self._left_out:
                 raise
@@ -100,14 +94,14 @@ class ControllerChoice:
                 f"{error}; the gains flown are of {self._left_out!r}, read only with --trust"
             ) from None
         self.is_as_flown = is_same_law and (
-            not gains or gains == flown.get("gains") or _same(now.gains, recorded_gains)
+            not gains or gains == flown.get("gains") or _same(now.gain_values, recorded_gains)
         )
-        """Whether law and gains are those that flew; what was ``given`` is not looked at."""
+        """True if law and gains are those that flew; what was ``given`` is not looked at."""
         self.follows_flight = is_same_law and "swaps" not in given
-        """Whether laws and gains change as they did in flight."""
+        """True if laws and gains change as they did in flight."""
 
     def law_parameters(self, law: LawInForce) -> dict[str, str | list[float]]:
-        """What to set to have a law of the flight in force; what the user gave stays."""
+        """Return what to set to have a law of the flight in force; what the user gave stays."""
         gains = {f"{law.name}.{gain}": list(values) for gain, values in law.gains.items()}
         kept = {name: gains[name] for name in gains if name not in self._said}
         return {"controller": law.name, **(kept if self.is_as_flown else {})}
@@ -152,29 +146,20 @@ class ControllerChoice:
         _write(folder / f"{law.name}.yaml", {f"{NODE}_node": {"ros__parameters": section}})
         return str(folder)
 
-    def _check(self, law: type[ControlLaw]) -> tuple[Robot, ControlLaw]:
-        """The robot, and the law as it will fly."""
-        settings = ControllerNodeSettings.resolve(
-            {name: value for name, value in self.parameters.items() if "." not in name}
-        )
+    def _check(self) -> tuple[Robot, ControlLaw]:
+        """The robot, and the law with the gains of the files, see `build_law`."""
+        own, gains = split_gains(self.parameters)
+        settings = ControllerNodeSettings.resolve(own)
         robot = Robot.from_yaml(named_file("robots", settings.robot))
         axes = robot.n + 3
-        built = {law.name: build_law(settings.controller, settings, axes)}
-        for name in available_laws(settings):
-            built.setdefault(name, build_law(name, settings, axes))
+        laws = build_laws(settings, axes, gains)
         for swap in parse_swaps(settings.swaps, settings.period):
-            one_of(swap.name, built, "controller", " of swaps")
-        for name, value in self.parameters.items():
-            law_name, dot, gain = name.partition(".")
-            if dot:
-                one_of(law_name, built, "controller", f" in {NODE}.{name}")
-                tree = {**built[law_name].gains, gain: value}
-                check_gains(tree, type(built[law_name]), axes, f"{NODE} parameters")
-        return robot, built[law.name]
+            one_of(swap.name, laws, "controller", " of swaps")
+        return robot, build_law(settings.controller, settings, axes)
 
 
 def recorded_parameters(flight: Mapping[str, Any]) -> dict[str, Any]:
-    """What the flown controller was given; older bags have names only."""
+    """Return what the flown controller was given; older bags have names only."""
     recorded = flight.get("parameters", {}).get(NODE)
     if recorded is None:
         names = ("controller", "gains", "robot", "swaps", "period")

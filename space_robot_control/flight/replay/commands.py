@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.codecs import JointStateMessage
-from space_robot_msgs_py.compiled_cdr import FOREIGN, read_effort
-from space_robot_msgs_py.decoded import name_order, stamp_of
-from space_robot_msgs_py.definitions import decode
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.wire.cdr import header_stamp_ns
+from space_robot_msgs_py.wire.command import Commands as CommandMessages
+from space_robot_msgs_py.wire.compiled_codec import FOREIGN, CompiledCodec
+from space_robot_msgs_py.wire.definitions import decode
+from space_robot_msgs_py.wire.message import name_order
 
 Array = NDArray[np.float64]
 Ticks = NDArray[np.int64]
@@ -58,10 +59,7 @@ class CommandList:
 
     def __init__(self, axis_names: tuple[str, ...], timebase: Timebase) -> None:
         self._names, self._timebase = axis_names, timebase
-        message = JointStateMessage(
-            topics.COMMAND, axis_names, topics.BASE_FRAME, fields=("effort",)
-        )
-        self._block = message.block
+        self._codec = CompiledCodec(CommandMessages(axis_names, timebase))
         self._torque = np.zeros(len(axis_names))
         usual = Form(topics.BASE_FRAME, str(list(axis_names)))
         self._forms: dict[Form, int] = {usual: 0}
@@ -72,7 +70,7 @@ class CommandList:
         """Take a message; the tick it answers, or None if it is not readable."""
         form = 0
         try:
-            stamp_ns = read_effort(self._block, data, self._torque)
+            stamp_ns = self._codec.read(data, self._torque)
             if stamp_ns == FOREIGN:
                 stamp_ns, form = self._read_foreign(data)
             tick = self._timebase.tick(stamp_ns)
@@ -97,10 +95,10 @@ class CommandList:
         except (MessageError, IndexError):
             self._torque[:] = np.nan
             form = form._replace(effort=_text(efforts))
-        return stamp_of(message), self._forms.setdefault(form, len(self._forms))
+        return header_stamp_ns(data), self._forms.setdefault(form, len(self._forms))
 
     def commands(self) -> Commands:
-        """What has come; of several commands of one tick the first."""
+        """Return what has come; of several commands of one tick the first."""
         ticks, first = np.unique(np.frombuffer(self._ticks, np.int64), return_index=True)
         torques = np.frombuffer(self._torques, np.float64).reshape(-1, len(self._names))
         form = np.frombuffer(self._form, np.uint32).astype(np.intp)

@@ -68,7 +68,7 @@ class Comparison:
 
     @property
     def is_identical(self) -> bool:
-        """Whether all are equal and none is missing on either side."""
+        """True if all are equal and none is missing on either side."""
         missing = len(self.unanswered) + len(self.unrecorded) + self.without_state
         unreadable = self._recorded.unreadable + self._replayed.unreadable
         return bool(len(self.ticks) and self.equal.all() and not missing and not unreadable)
@@ -136,7 +136,7 @@ class Comparison:
 
     @property
     def _replayed_torque(self) -> Array:
-        """Of the ticks compared; of all, where nothing was recorded."""
+        """The torques of the ticks compared; of all, where nothing was recorded."""
         return self.replayed if len(self._recorded.ticks) else self._replayed.torque
 
     def table(self) -> tuple[Ticks, Array, Array]:

@@ -1,26 +1,25 @@
-"""What is to be replayed, and what came of it."""
+"""The options of a replay, and its outcome."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from space_robot_msgs_py.bag.law_history import as_data
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.samples import LawInForce
 
-from ...law_history import as_data
 from .choice import ControllerChoice
 from .comparison import Comparison
-from .reasons import reasons
 from .recording import Recording
 
 
 @dataclass(frozen=True)
 class Options:
-    """What to replay, and how."""
+    """A choice of what to replay, and how."""
 
     bag: Path
     controller: str = ""
@@ -39,12 +38,12 @@ class Options:
     """Our topic by the bag's."""
     domain: int | None = None
     trust: bool = False
-    """Whether modules and files that the bag names may be opened."""
+    """True if modules and files that the bag names may be opened."""
 
 
 @dataclass(frozen=True)
 class Replay:
-    """What came of it."""
+    """The outcome of a replay."""
 
     options: Options
     choice: ControllerChoice
@@ -56,16 +55,16 @@ class Replay:
     """States that the controller did not answer in flight, and was not sent now."""
     elapsed_s: float
     error: FlightError | None
-    """What ended it before its time."""
+    """The error that ended it before its time."""
 
     @property
     def is_judged(self) -> bool:
-        """Whether the commands are to be the recorded ones."""
+        """True if the commands are to be the recorded ones."""
         return self.choice.is_as_flown and self.recording.has_commands
 
     @property
     def has_passed(self) -> bool:
-        """Whether nothing is other than expected; another law is not expected to agree."""
+        """True if nothing is other than expected; another law is not expected to agree."""
         return self.error is None and (self.comparison.is_identical or not self.is_judged)
 
     def report(self) -> dict[str, Any]:
@@ -93,17 +92,33 @@ class Replay:
             "has_commands": self.recording.has_commands,
             "judged": self.is_judged,
             "passed": self.has_passed,
-            "reasons": [
-                *reasons(
-                    flight,
-                    has_laws=bool(self.laws),
-                    begins_late=options.start_s > 0.0,
-                    by_the_clock=options.rate is not None,
-                    is_finished=self.recording.is_finished,
-                )
-            ],
+            "reasons": [*self._reasons()],
             "skipped": self.skipped,
             "elapsed_s": self.elapsed_s,
             "ticks_per_s": numbers["played"] / self.elapsed_s if self.elapsed_s else None,
             "error": str(self.error) if self.error else None,
         }
+
+    def _reasons(self) -> Iterator[str]:
+        """Yield what can keep an unchanged controller from giving the recorded bits again."""
+        flight, has_laws = self.recording.flight, bool(self.laws)
+        if self.options.start_s > 0.0:
+            yield (
+                "it does not begin where the flight did: laws with memory start afresh, and every "
+                "law takes over from the applied torque within 20 ms"
+            )
+        if self.options.rate is not None:
+            yield "by the wall clock the controller may miss states, and a law's memory with them"
+        faults = " ".join(flight.get("faults", []))
+        if not has_laws and (flight.get("restart_controller") or "_controller" in faults):
+            yield "the controller was stopped or started again in flight, the replayed one is not"
+        if not has_laws:
+            yield "the bag has no record of laws and gains changed in flight with `ros2 param set`"
+        if "_mission" in faults:
+            yield "the mission was killed or stopped: references may have come late in flight"
+        if not flight:
+            yield "the bag does not say what was flown: case, gains and swaps are a guess"
+        elif "parameters" not in flight:
+            yield "the bag is an older one: parameters changed with --set are not in it"
+        if not self.recording.is_finished:
+            yield "the bag was not finished: played up to its last command"

@@ -14,9 +14,9 @@ import numpy as np
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import FlightError, InputError
 
-from ..visitor import Visitor
+from ..graph.temporary_node import TemporaryNode
 from .commands import CommandList, Ticks
-from .recording import Reference, State
+from .recording import ReferenceMessage, StateMessages
 
 CONTROLLER = "controller_node"
 STATES = (topics.JOINT_STATES, topics.BASE_STATE)
@@ -37,8 +37,8 @@ LAST_ANSWER_S = 1.0
 class _Stream(NamedTuple):
     """One topic's messages of the reference."""
 
-    messages: Iterator[Reference]
-    needed: deque[Reference]
+    messages: Iterator[ReferenceMessage]
+    needed: deque[ReferenceMessage]
     """Those sent that are needed from now on: the last one that has begun, and what is ahead."""
 
 
@@ -51,21 +51,26 @@ class Player:
         Raises:
             InputError: a plant or a mission is in this domain.
         """
-        from space_robot_msgs_py.ros.endpoints import In, Out, TakenByLoop, Waiter, take_or_wait
+        from space_robot_msgs_py.ros.endpoints import (
+            PolledCallbackGroup,
+            RawPublisher,
+            RawSubscription,
+        )
         from space_robot_msgs_py.ros.exclusive import Claim
+        from space_robot_msgs_py.ros.waiting import Waiter, take_or_wait
 
         self._take_or_wait = take_or_wait
-        self._visitor = Visitor("replay_node", domain)
+        self._visitor = TemporaryNode("replay_node", domain)
         self.node = self._visitor.node
         try:
             self._claim = Claim(self.node, [topic.name for topic in (*STATES, *REFERENCES)])
         except InputError:
             self._visitor.leave()
             raise
-        self._outs = {t.name: Out(self.node, t) for t in (*STATES, *REFERENCES)}
+        self._outs = {t.name: RawPublisher(self.node, t) for t in (*STATES, *REFERENCES)}
         self._joints, self._base = (self._outs[topic.name] for topic in STATES)
-        self._commands = In(self.node, topics.COMMAND, TakenByLoop())
-        self._waiter = Waiter(self.node, self._commands)
+        self._commands = RawSubscription(self.node, topics.COMMAND, PolledCallbackGroup())
+        self._waiter = Waiter(self.node)
         self._answers = answers
         self._references: list[_Stream] = []
         self._played = array("q")
@@ -116,7 +121,7 @@ class Player:
                 self._outs[reference.topic.name].publish(reference.data)
 
     def lockstep(
-        self, states: Iterable[State], references: Iterable[Iterator[Reference]],
+        self, states: Iterable[StateMessages], references: Iterable[Iterator[ReferenceMessage]],
         before: Callable[[int], None], show: Callable[[int], None],
     ) -> None:  # fmt: skip
         """Send state after state, each when the one before has its answer.
@@ -149,7 +154,7 @@ class Player:
             state = following
 
     def by_the_clock(
-        self, states: Iterable[State], references: Iterable[Iterator[Reference]],
+        self, states: Iterable[StateMessages], references: Iterable[Iterator[ReferenceMessage]],
         before: Callable[[int], None], show: Callable[[int], None], period_s: float,
     ) -> None:  # fmt: skip
         """Send a tick's state every ``period_s`` of the wall clock, answered or not.
@@ -174,7 +179,7 @@ class Player:
             show(state.tick)
         self._take_until(time.perf_counter() + LAST_ANSWER_S)
 
-    def _send(self, state: State) -> None:
+    def _send(self, state: StateMessages) -> None:
         self._joints.publish(state.joints)
         self._base.publish(state.base)
         self._played.append(state.tick)
@@ -190,7 +195,7 @@ class Player:
                     needed.pop()
                 needed.append(reference)
 
-    def _is_answered(self, state: State) -> bool:
+    def _is_answered(self, state: StateMessages) -> bool:
         """Wait for the answer to the state just sent; whether it has come."""
         begin = time.monotonic()
         ask_again = begin + ASK_AGAIN_S
@@ -216,5 +221,5 @@ class Player:
             left = moment - time.perf_counter()
             if left <= 0.0:
                 return
-            self._waiter.wait(min(left, POLL_S))
+            self._waiter.wait((self._commands,), min(left, POLL_S))
             self.check()

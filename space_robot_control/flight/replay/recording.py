@@ -10,21 +10,21 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.coverage import excused_topics, message_tick
 from space_robot_msgs_py.bag.description import read_description
 from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.message_accounting import message_tick, topics_with_allowed_gaps
 from space_robot_msgs_py.bag.reader import REQUIRED, first_states, missing, timebase_of
 from space_robot_msgs_py.bag.selection import Selection
+from space_robot_msgs_py.config.text import printable
 from space_robot_msgs_py.errors import InputError, MessageError
-from space_robot_msgs_py.plain_codecs import LawCodec
 from space_robot_msgs_py.samples import LawInForce, in_order
-from space_robot_msgs_py.text import printable
 from space_robot_msgs_py.topics import Topic
+from space_robot_msgs_py.wire.controller_law import LawCodec
 
 from .commands import CommandList, Commands
 
 
-class State(NamedTuple):
+class StateMessages(NamedTuple):
     """The two messages of a tick's state."""
 
     tick: int
@@ -32,11 +32,11 @@ class State(NamedTuple):
     base: bytes
 
 
-class Reference(NamedTuple):
+class ReferenceMessage(NamedTuple):
     """A message of the reference."""
 
     tick: int
-    """Of its first point."""
+    """The tick of its first point."""
     topic: Topic
     data: bytes
 
@@ -66,15 +66,15 @@ class Recording:
             if doubts:
                 raise InputError(doubts[0])
         self.flight: dict[str, Any] = flight
-        """What was flown, as recorded; empty for a bag of another recorder."""
+        """The flight as recorded; empty for a bag of another recorder."""
         self.states_count = counts[topics.JOINT_STATES]
         """Ticks, about."""
         self.has_commands = bool(counts[topics.COMMAND])
         self.is_finished = self._bag.finished
-        self.answers_are_complete = bool(flight) and topics.COMMAND.name not in excused_topics(
+        self.answers_are_complete = bool(
             flight
-        )
-        """Whether the controller has answered every state, so that no answer means a loss."""
+        ) and topics.COMMAND.name not in topics_with_allowed_gaps(flight)
+        """True if the controller has answered every state, so that no answer means a loss."""
 
     def commands(self, axis_names: tuple[str, ...]) -> Commands:
         """The recorded answers."""
@@ -86,23 +86,19 @@ class Recording:
     def laws(self) -> tuple[LawInForce, ...]:
         """The laws in force, with their gains, by rising tick; empty: not recorded."""
         found = []
-        for topic, data in self._messages(topics.LAW):
+        for _, tick, data in self._of_ticks(topics.LAW):
             with suppress(MessageError):
-                found.append(LawCodec.decode(data, message_tick(topic, data, self.timebase)))
+                found.append(LawCodec.decode(data, tick))
         return in_order(found)
 
-    def states(self, start: int = 0, stop: float = math.inf) -> Iterator[State]:
+    def states(self, start: int = 0, stop: float = math.inf) -> Iterator[StateMessages]:
         """States of the ticks from ``start`` to before ``stop``, as they were sent.
 
         One of which half is missing, or whose stamp is none, is passed over.
         """
         joints: deque[tuple[int, bytes]] = deque()
         base: deque[tuple[int, bytes]] = deque()
-        for topic, data in self._messages(topics.JOINT_STATES, topics.BASE_STATE):
-            try:
-                tick = message_tick(topic, data, self.timebase)
-            except MessageError:
-                continue
+        for topic, tick, data in self._of_ticks(topics.JOINT_STATES, topics.BASE_STATE):
             (joints if topic is topics.JOINT_STATES else base).append((tick, data))
             while joints and base:
                 if joints[0][0] != base[0][0]:  # the earlier one has lost its other half
@@ -110,16 +106,13 @@ class Recording:
                     continue
                 (tick, one), (_, other) = joints.popleft(), base.popleft()
                 if start <= tick < stop:
-                    yield State(tick, one, other)
+                    yield StateMessages(tick, one, other)
 
-    def references(self, topic: Topic, start: int = 0) -> Iterator[Reference]:
+    def references(self, topic: Topic, start: int = 0) -> Iterator[ReferenceMessage]:
         """Messages of half the reference, from the last one that begins by tick ``start``."""
-        begun: Reference | None = None
-        for _, data in self._messages(topic):
-            try:
-                reference = Reference(message_tick(topic, data, self.timebase), topic, data)
-            except MessageError:
-                continue
+        begun: ReferenceMessage | None = None
+        for _, tick, data in self._of_ticks(topic):
+            reference = ReferenceMessage(tick, topic, data)
             if reference.tick <= start:
                 begun = reference
                 continue
@@ -129,6 +122,12 @@ class Recording:
             yield reference
         if begun:
             yield begun
+
+    def _of_ticks(self, *wanted: Topic) -> Iterator[tuple[Topic, int, bytes]]:
+        """Yield the messages of some topics whose stamps are whole ticks, with these."""
+        for topic, data in self._messages(*wanted):
+            with suppress(MessageError):
+                yield topic, message_tick(topic, data, self.timebase), data
 
     def _messages(self, *wanted: Topic) -> Iterator[tuple[Topic, bytes]]:
         with self._readable():

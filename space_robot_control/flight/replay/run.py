@@ -7,27 +7,26 @@ import math
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 
+from space_robot_msgs_py.bag.law_history import within
 from space_robot_msgs_py.errors import FlightError, InputError
 
-from ...law_history import within
 from ..compilation import compile_kernels
-from ..display import FlightProgress, flight_progress
-from ..domain import ros_domain
-from ..following import InterruptedFlightError
-from ..lifecycle import LifecycleDriver
-from ..orchestrator import require_ros, stop_signals
-from ..parameters import ParameterClient
-from ..processes import Graph, NodeProcess, node_command, node_environment
+from ..graph.domain import ros_domain
+from ..graph.following import InterruptedFlightError
+from ..graph.node_services import change_state, set_parameters
+from ..graph.orchestrator import require_ros, stop_signals
+from ..graph.processes import Graph, NodeProcess, node_command, node_environment
+from ..progress import FlightProgress, flight_progress
 from .choice import ControllerChoice
 from .commands import CommandList, Commands, Ticks
 from .comparison import Comparison
 from .laws import RecordedLaws
 from .outcome import Options, Replay
 from .player import CONTROLLER, REFERENCES, Player
-from .recording import Recording, State
+from .recording import Recording, StateMessages
 
 SHOW_S = 0.2
 
@@ -111,7 +110,7 @@ class _Run:
         )  # fmt: skip
 
     def _recorded_until(self, played: Ticks, error: FlightError | None) -> Commands:
-        """Of a replay that ended early, or a bag that did, only what came until then."""
+        """Take of a replay, or a bag, that ended early only what came until then."""
         if error is None and self._recording.is_finished:
             return self._recorded
         return self._recorded.within(self._start, int(played.max()) + 1)
@@ -119,19 +118,20 @@ class _Run:
     def _play(self, player: Player, show: Callable[[int], None]) -> None:
         states = self._states()
         references = [self._recording.references(topic, self._start) for topic in REFERENCES]
-        with closing(ParameterClient(player.node, CONTROLLER, player.check)) as client:
-            laws = RecordedLaws(
-                self._laws if self._choice.follows_flight else (),
-                lambda law: client.set(self._choice.law_parameters(law)),
-                lambda: _start_again(player),
-            )
-            if self._options.rate is None:
-                player.lockstep(states, references, laws.before, show)
-            else:
-                period = self._recording.timebase.period / self._options.rate
-                player.by_the_clock(states, references, laws.before, show, period)
+        laws = RecordedLaws(
+            self._laws if self._choice.follows_flight else (),
+            lambda law: set_parameters(
+                player.node, CONTROLLER, self._choice.law_parameters(law), player.check
+            ),
+            lambda: _start_again(player),
+        )
+        if self._options.rate is None:
+            player.lockstep(states, references, laws.before, show)
+        else:
+            period = self._recording.timebase.period / self._options.rate
+            player.by_the_clock(states, references, laws.before, show, period)
 
-    def _states(self) -> Iterator[State]:
+    def _states(self) -> Iterator[StateMessages]:
         """The states that the controller took; where it did not answer all, those answered."""
         recording = self._recording
         states = recording.states(self._start, self._stop)
@@ -163,7 +163,7 @@ class _Run:
 
 def _bring_up(controller: NodeProcess, player: Player) -> None:
     if refused := _change_state(player, "configure", "activate"):
-        raise FlightError(f"{CONTROLLER} refused to {refused}:\n{controller.last_words()}")
+        raise FlightError(f"{CONTROLLER} refused to {refused}:\n{controller.output_tail()}")
     player.wait_for_controller()
 
 
@@ -175,11 +175,10 @@ def _start_again(player: Player) -> None:
 
 
 def _change_state(player: Player, *transitions: str) -> str:
-    """Put the controller through these transitions; the one it refuses, if any."""
-    with closing(LifecycleDriver(player.node)) as driver:
-        for transition in transitions:
-            if driver.change([CONTROLLER], transition, player.check):
-                return transition
+    """Put the controller through these transitions; return the one it refuses, if any."""
+    for transition in transitions:
+        if change_state(player.node, [CONTROLLER], transition, player.check):
+            return transition
     return ""
 
 
@@ -188,13 +187,13 @@ def _check(controller: NodeProcess, stopped: list[int]) -> None:
         raise InterruptedFlightError("the replay was stopped", stopped[0])
     if controller.exit_code is not None:
         raise FlightError(
-            f"{controller.obituary()} before the replay was over:\n{controller.last_words()}"
+            f"{controller.exit_summary()} before the replay was over:\n{controller.output_tail()}"
         )
 
 
 @contextmanager
 def _frozen() -> Iterator[None]:
-    """What lives now need not be looked through while the replay lasts."""
+    """Keep the garbage collector from what lives now while the replay lasts."""
     gc.collect()
     gc.freeze()
     try:

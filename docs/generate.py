@@ -1,0 +1,176 @@
+"""Writes docs/reference from the code: parameters, faults, topics.
+
+    python docs/generate.py
+
+`tests/test_reference.py` sees that the pages are up to date.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from types import GenericAlias
+from typing import Any, get_args, get_origin
+
+from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.flight.faults import PROCESS_KINDS
+from space_robot_control.laws import laws
+from space_robot_control.mission.settings import MissionNodeSettings
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.config.settings import NodeSettings, leaves
+from space_robot_msgs_py.config.trees import flatten
+from space_robot_sim.faults.grammar import Kind
+from space_robot_sim.plant.faults import PLANT_KINDS
+from space_robot_sim.plant.settings import PlantNodeSettings
+
+REFERENCE = Path(__file__).parent / "reference"
+MADE = "Made by `python docs/generate.py`: change the code, not this page."
+NODES: dict[str, type[NodeSettings]] = {
+    "plant": PlantNodeSettings,
+    "controller": ControllerNodeSettings,
+    "mission": MissionNodeSettings,
+    "recorder": RecorderNodeSettings,
+}
+ROS_TYPES = {bool: "bool", int: "integer", float: "double", str: "string"}
+EXAMPLES = {
+    "P": "0.1", "TICKS": "2", "SIGMA": "1e-5", "STEP": "1e-5", "TORQUE": "0.5",
+    "JOINT=TORQUE": "3=20", "SECONDS": "1.5",
+}  # fmt: skip
+"""An argument as it may be given, by the form of the kind."""
+
+
+def pages() -> dict[str, str]:
+    """The text of each page by the name of its file."""
+    return {"parameters.md": parameters(), "faults.md": faults(), "topics.md": topic_page()}
+
+
+def table(head: Sequence[str], rows: Iterator[Sequence[str]]) -> str:
+    """A Markdown table."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
+
+
+def parameters() -> str:
+    """All parameters of all nodes."""
+    shared = dict(leaves(NodeSettings))
+    defaults = dict(flatten(PlantNodeSettings.resolve({}).model_dump()))
+    parts = [
+        "# Parameters", MADE,
+        "Defaults are those of a flight without options: the schema, `config/space_robot.yaml`,"
+        " the mission `paper`, case 1. [Configuration](../manual/configuration.md): setting them.",
+        "## All nodes",
+        table(HEAD, iter([*_rows(shared, defaults), AUTOSTART])),
+    ]  # fmt: skip
+    for node, schema in NODES.items():
+        own = {name: field for name, field in leaves(schema) if name not in shared}
+        defaults = dict(flatten(schema.resolve({}).model_dump()))
+        parts += [f"## {node}_node", table(HEAD, _rows(own, defaults))]
+        if node == "controller":
+            parts += [
+                "A list for each gain `<law>.<gain>`, one value an axis or one for all; the set"
+                " has the defaults. Gains change in flight, as `controller` does.",
+                table(("parameter", "description"), _gains()),
+            ]  # fmt: skip
+    return "\n\n".join(parts) + "\n"
+
+
+HEAD = ("parameter", "type", "default", "range", "description")
+AUTOSTART = (
+    "`autostart`", "bool", "true", "", "configure and activate by itself; false: wait to be told",
+)  # fmt: skip
+
+
+def _rows(fields: Mapping[str, Any], defaults: Mapping[str, Any]) -> Iterator[Sequence[str]]:
+    for name, field in fields.items():
+        default = defaults[name]
+        yield (
+            f"`{name}`", _ros_type(field.annotation), _text(default),
+            _range(field), (field.description or "").replace("|", "\\|"),
+        )  # fmt: skip
+
+
+def _ros_type(annotation: Any) -> str:
+    if get_origin(annotation) is list or isinstance(annotation, GenericAlias):
+        return f"{_ros_type(get_args(annotation)[0])}[]"
+    return ROS_TYPES.get(annotation, "string")
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if value == [""]:
+        return ""
+    if isinstance(value, list):
+        return f"[{', '.join(_text(item) for item in value)}]"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _range(field: Any) -> str:
+    said = []
+    for item in field.metadata:
+        said += [f"from {item.ge:g}"] if hasattr(item, "ge") else []
+        said += [f"above {item.gt:g}"] if hasattr(item, "gt") else []
+        said += [f"to {item.le:g}"] if hasattr(item, "le") else []
+        said += [f"below {item.lt:g}"] if hasattr(item, "lt") else []
+    return " ".join(said)
+
+
+def _gains() -> Iterator[Sequence[str]]:
+    for name, law in laws().items():
+        for gain, description in law.gain_descriptions().items():
+            yield f"`{name}.{gain}`", description.replace("|", "\\|")
+
+
+def faults() -> str:
+    """All kinds of faults."""
+    parts = [
+        "# Kinds of faults", MADE,
+        "`KIND@T[-END][:ARGUMENT]`, times in simulated seconds;"
+        " [faults](../manual/faults.md) says how to use them.",
+    ]  # fmt: skip
+    for title, kinds in (("Of the plant", PLANT_KINDS), ("Of the processes", PROCESS_KINDS)):
+        head = ("fault", "unit", "default", "what is done", "example")
+        parts += [f"## {title}", table(head, map(_kind, kinds.values()))]
+    return "\n\n".join(parts) + "\n"
+
+
+def _kind(kind: Kind) -> Sequence[str]:
+    example = f"{kind.name}@2-3" if kind.lasts else f"{kind.name}@2"
+    default = ""
+    if kind.argument:
+        example += f":{EXAMPLES[kind.argument.form]}"
+    if kind.default is not None:
+        default = "for ever" if math.isinf(kind.default) else f"{kind.default:g}"
+    unit = kind.argument.unit if kind.argument else ""
+    return f"`{kind.form}`", unit, default, kind.description, f"`{example}`"
+
+
+def topic_page() -> str:
+    """All topics of the graph."""
+    rows = (
+        (
+            f"`{topic.name}`", topic.type, str(topic.depth),
+            "transient local" if topic.transient_local else "volatile",
+            "each tick" if topic.per_tick else "an event" if topic.is_event else "now and then",
+        )
+        for topic in (*topics.ALL, topics.DIAGNOSTICS)
+    )  # fmt: skip
+    return "\n\n".join([
+        "# Topics", MADE,
+        "All are reliable and keep the last messages. Fields, units, frames and rates are in"
+        " [bags](../manual/bags.md#topics). Every topic but `/diagnostics` is recorded.",
+        table(("topic", "type", "history", "durability", "a message"), rows),
+    ]) + "\n"  # fmt: skip
+
+
+def main() -> None:
+    """Write all pages."""
+    REFERENCE.mkdir(exist_ok=True)
+    for name, text in pages().items():
+        (REFERENCE / name).write_text(text, "utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,113 @@
+"""The figures of one flight, or of several overlaid: the paper's figures, pointing, latency."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from matplotlib.figure import Figure
+
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.law_history import as_data, laws_of
+
+from ..plot_series import PlotSeries
+from ..words import flown
+from .base_torque import chatter, junctions
+from .overlay import errors_and_torques, latency_histogram, pointing
+from .single_flight import control_results, desired_joints
+from .style import save_figure
+
+
+class SavedFigure(NamedTuple):
+    """A figure on disk."""
+
+    caption: str
+    svg: Path
+
+    @property
+    def data_uri(self) -> str:
+        """Return the SVG as a data URI, for a page that refers to nothing outside itself."""
+        return "data:image/svg+xml;base64," + base64.b64encode(self.svg.read_bytes()).decode()
+
+
+class FigureFolder(NamedTuple):
+    """The folder that the figures go to, from whatever process draws them."""
+
+    path: Path
+    png: bool
+    """True if they are written as PNG too; the report has the SVG."""
+
+    def save(self, figure: Figure, stem: str) -> None:
+        """Write a figure."""
+        save_figure(figure, self.path / stem, png=self.png)
+
+    def saved(self, captions: Iterable[tuple[str, str]]) -> list[SavedFigure]:
+        """List those of the given stems that were written, with their captions."""
+        return [
+            SavedFigure(caption, path)
+            for stem, caption in captions
+            if (path := self.path / f"{stem}.svg").is_file()
+        ]
+
+
+class FigureSet:
+    """Takes flights one after the other, keeps of each what the figures need, and draws them.
+
+    Figures 5 to 9 of the paper are drawn of a single flight as the paper has them; of several,
+    errors and torques lie over one another as norms of the columns of Table V.
+    """
+
+    def __init__(self) -> None:
+        self._flights: dict[str, PlotSeries] = {}
+        self._missions: dict[bytes, tuple[str, Figure]] = {}
+        self._first: Figure | None = None
+
+    def add(self, name: str, log: FlightLog) -> None:
+        """Take a flight."""
+        reference = log.reference_joints[:: max(1, log.ticks // 100)]
+        self._missions.setdefault(reference.tobytes(), (name, desired_joints(log)))
+        if not self._flights:
+            self._first = control_results(log, title(name, log))
+        self._flights[name] = PlotSeries.of(log)
+
+    def save(self, folder: Path) -> list[SavedFigure]:
+        """Draw all figures into ``folder``, each as PNG and SVG; older ones are replaced.
+
+        Those without a panel are left out: these flights have nothing to show there.
+
+        Raises:
+            InputError: a figure cannot be written there.
+        """
+        return [
+            SavedFigure(caption, save_figure(figure, folder / stem)[-1])
+            for stem, caption, figure in self._figures()
+            if figure.axes
+        ]
+
+    def _figures(self) -> Iterator[tuple[str, str, Figure]]:
+        """Draw the figures one after the other; with name of the file and caption."""
+        flights = self._flights
+        torques = {name: series.base_torque for name, series in flights.items()}
+        several = len(self._missions) > 1
+        for number, (name, figure) in enumerate(self._missions.values(), start=1):
+            suffix, of = (f"_{number}", f" of {name}") if several else ("", "")
+            yield f"desired_joints{suffix}", f"Desired joint angles{of} (Fig. 5)", figure
+        if len(flights) == 1 and self._first is not None:
+            caption = "Errors and torques of base and joints (Figs. 6 to 9)"
+            yield "control_results", caption, self._first
+        else:
+            caption = "Errors and torques, norms over each group of axes (Figs. 6 to 9)"
+            yield "control_results", caption, errors_and_torques(flights)
+        yield "junctions", "Base torque x where two motions meet", junctions(torques)
+        yield "chatter", "A stretch of base torque, and its spectrum", chatter(torques)
+        caption = "The end effector's pointing error in the inertial frame"
+        yield "pointing", caption, pointing(flights)
+        yield "latency", "Time from a state's sending to its command's", latency_histogram(flights)
+
+
+def title(name: str, log: FlightLog) -> str:
+    """Say what was flown, in a line."""
+    laws = as_data(laws_of(log), log.timebase)
+    return f"{name}: {flown({**log.flight, 'laws': laws})}"

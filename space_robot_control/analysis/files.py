@@ -1,0 +1,129 @@
+"""Files that are whole or not there, and never over another one unasked."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from io import TextIOWrapper
+from pathlib import Path
+from secrets import token_hex
+from tempfile import TemporaryFile
+from typing import IO, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.errors import InputError
+
+
+def check_free(path: Path) -> None:
+    """See that a file can be made there, before any work is done for it.
+
+    Raises:
+        InputError: it exists, or its folder cannot be made or written.
+    """
+    if path.exists():
+        raise InputError(f"{path}: exists already; it is not overwritten")
+    make_folder(path.parent)
+    if not os.access(path.parent, os.W_OK | os.X_OK):
+        raise InputError(f"{path}: cannot be written (no permission for its folder)")
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder, and those above it, where they are not there yet.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path}: no folder can be made there ({error.strerror})") from None
+
+
+def check_writable(path: Path) -> None:
+    """See that a file can be written or replaced, before any work is done for it.
+
+    Raises:
+        InputError: it cannot.
+    """
+    with _told(path):
+        if path.exists():
+            path.open("r+b", buffering=0).close()  # a folder, or one of others
+        with TemporaryFile(dir=path.parent):  # nothing is left if the work fails
+            pass
+
+
+def write_text(text: str, path: Path) -> None:
+    """Write ``text`` in UTF-8.
+
+    Raises:
+        InputError: the file exists or cannot be written.
+    """
+    with whole_file(path) as file:
+        file.write(text.encode())
+
+
+@contextmanager
+def csv_writer(path: Path, replace: bool = False) -> Iterator[Any]:
+    """Open a `whole_file` for the writer of the module `csv`."""
+    with (
+        whole_file(path, replace) as raw,
+        TextIOWrapper(raw, encoding="utf-8", newline="") as file,
+    ):
+        yield csv.writer(file, lineterminator="\n")
+
+
+def csv_rows(integers: NDArray[np.int64], numbers: NDArray[np.float64]) -> list[list[Any]]:
+    """Return the rows of a table for `csv_writer`; a number that is not known is empty.
+
+    Args:
+        integers: (N,) first column.
+        numbers: (N, C) all others.
+    """
+    known = np.where(np.isnan(numbers), None, numbers)  # type: ignore[call-overload]
+    rows: list[list[Any]] = np.column_stack([integers.astype(object), known]).tolist()
+    return rows
+
+
+@contextmanager
+def whole_file(path: Path, replace: bool = False) -> Iterator[IO[Any]]:
+    """Open a file that takes its name only when all is in it.
+
+    Args:
+        path: its name, which must not be taken yet; a pipe or device is written as it is.
+        replace: whether an older file of that name is replaced.
+
+    Raises:
+        InputError: the file exists, or it cannot be written.
+    """
+    if path.exists() and not path.is_file() and not path.is_dir():
+        with _told(path), path.open("wb") as file:
+            yield file
+        return
+    if not replace:
+        check_free(path)
+    with _told(path):
+        unnamed = path.with_name(f".{path.name}.{token_hex(4)}")
+        try:
+            with unnamed.open("xb") as file:
+                yield file
+            if replace:
+                unnamed.replace(path)
+            else:
+                os.link(unnamed, path)  # a rename would overwrite
+        finally:
+            with suppress(OSError):
+                unnamed.unlink()
+
+
+@contextmanager
+def _told(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except FileExistsError:
+        raise InputError(f"{path}: exists already; it is not overwritten") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from None

@@ -1,0 +1,97 @@
+"""The series that figures of several flights plot of each; the flights need not stay in memory."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from typing_extensions import Self
+
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import InputError
+
+from .described import robot_of
+from .metrics import error_columns, torque_columns, tracking_error
+from .pointing import PointingError, pointing_error
+from .waypoints import junction_ticks
+
+Array = NDArray[np.float64]
+
+
+def tick_times(log: FlightLog) -> Array:
+    """Return the times of the ticks of a log, (N,) s."""
+    ticks = log.first_tick + np.arange(log.ticks, dtype=np.float64)
+    return ticks * log.timebase.period
+
+
+class BaseTorque(NamedTuple):
+    """The base's torque over a flight: a fiftieth of its log, to hand from process to process."""
+
+    torque: Array
+    """(N, 3) N m, applied in the base frame."""
+    period: float
+    """s, of a tick."""
+    junctions: NDArray[np.intp]
+    """Rows at which one motion has ended and another begins."""
+    start: float = 0.0
+    """s, time of the first row: not 0 in an excerpt of a flight."""
+
+    @classmethod
+    def of(cls, log: FlightLog) -> Self:
+        """Copy it from a whole flight or an excerpt."""
+        period = log.timebase.period
+        return cls(
+            log.applied_torque[:, :3].copy(), period, junction_ticks(log), log.first_tick * period
+        )
+
+    @property
+    def time(self) -> Array:
+        """Times of the rows, (N,) s."""
+        return self.start + np.arange(len(self.torque), dtype=np.float64) * self.period
+
+    @property
+    def end(self) -> float:
+        """End of the flight, s."""
+        return self.start + len(self.torque) * self.period
+
+
+class PlotSeries(NamedTuple):
+    """Sizes of a flight's errors and torques over time, and its base torque itself."""
+
+    time: Array
+    """(N,) s."""
+    errors: dict[str, Array]
+    """(N,) norm of the error of each column of Table V: eps, rad."""
+    torques: dict[str, Array]
+    """(N,) norm of the torque of each column of Table V, N m."""
+    base_torque: BaseTorque
+    pointing: PointingError | None
+    """None where the robot is not known."""
+    latency_ms: Array | None
+    """(K,) of every answer, by the wall clock; None for flights without any."""
+
+    @classmethod
+    def of(cls, log: FlightLog) -> Self:
+        """Compute them from a whole flight or an excerpt."""
+        error, axes = tracking_error(log), log.axes
+        try:
+            pointing = pointing_error(log, robot_of(log))
+        except InputError:
+            pointing = None
+        latency = None
+        if log.latency_s is not None:
+            known = log.latency_s[np.isfinite(log.latency_s)]
+            latency = 1e3 * known if len(known) else None
+        return cls(
+            tick_times(log),
+            _norms(error, error_columns(axes)),
+            _norms(log.applied_torque, torque_columns(axes)),
+            BaseTorque.of(log),
+            pointing,
+            latency,
+        )
+
+
+def _norms(values: Array, columns: dict[str, slice]) -> dict[str, Array]:
+    return {name: np.linalg.norm(values[:, axes], axis=1) for name, axes in columns.items()}

@@ -1,0 +1,210 @@
+"""The tables of a report, or of several: what the terminal and the page both show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from itertools import groupby
+from typing import Any, NamedTuple
+
+from .pointing import ARCSEC
+from .settling import BAND
+from .tables import NONE, Column, Group, Table
+from .words import Report, flown, law_of, notes, remarks
+
+UNITS = {"attitude": "-", "joints": "rad", "base_torque": "N m", "torque": "N m"}
+
+DEFINITIONS = {
+    "RMS, mean of axes": "mean over a column's axes of each axis' root mean square: what Table V "
+    "of the paper holds",
+    "RMS, eq. (64)": "a third of the root mean square of the vector: what the paper defines",
+    "maximum": "largest absolute value on any axis of the column",
+    "variation per s": "how far the torque moves up and down in a second, mean over the axes",
+    "power > 100 Hz": "share of the torque's power above 100 Hz, mean over the axes: chatter",
+    "settled after": "time from the last waypoint after which the error stays to the end within "
+    f"{BAND:g} (rad on joints; on the attitude's quaternion, where it is 4.1 arcsec)",
+    "saturation": "ticks at which a torque was at the actuator's limit",
+    "latency": "from a state's sending to its command's, by the wall clock; in brackets in ticks",
+    "commands": "ticks without an answer, and ticks after which the plant applied another torque "
+    "than was commanded for them",
+    "estimate error": "error N - N_hat of the time-delay estimate, from recorded motion and "
+    "torque; on the base in units of the generalised force of eps, about twice the torque",
+    "pointing": "angle between the measured and the desired direction of the end effector's z "
+    "axis in the inertial frame",
+    "rotation": "angle of the one rotation between the end effector's desired and measured frame",
+    "tool position": "distance from the desired position, the base at its measured position",
+    "base's drift": "of the base's centre of mass from where it began; nothing holds it",
+    "recording": "what is missing of the flight or was found wrong with the bag",
+}
+"""The meaning of each group of metrics, for someone who sees it for the first time."""
+
+
+class Line(NamedTuple):
+    """One metric of each report."""
+
+    group: str
+    """A key of `DEFINITIONS`."""
+    name: str
+    unit: str
+    texts: list[str]
+    """One a report; `NONE` where it does not have the metric."""
+
+
+def rms_table(report: Report) -> Table:
+    """Tabulate RMS and chatter of a flight; its remarks stand below."""
+    title = f"{flown(report)}: {report['ticks']} ticks, {report['duration_s']:g} s"
+    columns = (
+        Column(is_label=True), Column("unit"), Column("RMS, mean of axes"),
+        Column("RMS, eq. (64)"), Column("variation per s", spec=".3g"),
+        Column("power > 100 Hz", spec=".2e"),
+    )  # fmt: skip
+    chatter = report["chatter"].values()
+    rows: list[list[Any]] = []
+    for key, value in report["rms"]["mean_axis"].items():
+        spec = ".4f" if "torque" in key else ".3e"
+        rms = f"{value:{spec}}", f"{report['rms']['eq64'][key]:{spec}}"
+        rows.append([key, unit_of(key), *rms, *(measure.get(key, "") for measure in chatter)])
+    return Table(title, columns, [Group(rows)], remarks(report))
+
+
+def metrics_table(report: Report) -> Table:
+    """Tabulate what `rms_table` leaves out; below stands why a metric is missing."""
+    columns = Column(is_label=True), Column()
+    return Table("further metrics", columns, _groups(lines([report], brief=True)), notes(report))
+
+
+def comparison_table(reports: Mapping[str, Report]) -> Table:
+    """Tabulate all metrics of several bags, a column each."""
+    each = list(reports.values())
+    flights: list[list[Any]] = [["controller", *map(law_of, each)]]
+    for key in ("case", "gains", "robot"):
+        flights.append([key, *(report[key] and str(report[key]) for report in each)])
+    flights.append(["time (s)", *(f"{r['from_s']:g} to {r['to_s']:g}" for r in each)])
+    columns = Column(is_label=True), *(Column(name) for name in reports)
+    return Table("", columns, [Group(flights, "flight"), *_groups(lines(each))])
+
+
+def _groups(shown: Sequence[Line]) -> list[Group]:
+    return [
+        Group(
+            [[f"{x.name} ({x.unit})" if x.unit else x.name, *x.texts] for x in found],
+            name,
+            DEFINITIONS[name],
+        )
+        for name, found in groupby(shown, key=lambda line: line.group)
+    ]
+
+
+def unit_of(column: str) -> str:
+    """Return the unit of a column of Table V."""
+    return next(unit for prefix, unit in UNITS.items() if column.startswith(prefix))
+
+
+def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
+    """List all metrics of the reports, a line each.
+
+    Args:
+        reports: of `analyze`.
+        brief: without RMS and chatter, which a table of their own shows.
+    """
+    each, one = partial(_each_key, reports), partial(_line, reports)
+    found: list[Line] = []
+    if not brief:
+        found += each("RMS, mean of axes", ("rms", "mean_axis"), unit_of)
+        found += each("RMS, eq. (64)", ("rms", "eq64"), unit_of)
+        found += each("variation per s", ("chatter", "total_variation_per_s"), "N m/s")
+        found += each("power > 100 Hz", ("chatter", "power_above_100_hz"))
+    found += each("maximum", ("maxima",), unit_of)
+    found += each("settled after", ("settling", "settled_s"), "s", text=_settled)
+    found.append(one("saturation", "ticks at a limit", "", _saturated))
+    for name in ("p50", "p99", "max"):
+        found.append(one("latency", name, "ms", partial(_latency, name=name)))
+    found.append(one("commands", "unanswered", "", lambda r: str(r["unanswered_ticks"])))
+    found.append(one("commands", "not as commanded", "", _differing))
+    for kind in ("rms", "max"):
+        label = partial(_axes, kind=kind)
+        found += each("estimate error", ("estimate_error", kind), "N m", label=label)
+    for group, key in (("pointing", "boresight_rad"), ("rotation", "rotation_rad")):
+        found += each(group, ("pointing", key), text=_angle, label=_upper)
+    for group, key in (("tool position", "tool_position_m"), ("base's drift", "base_drift_m")):
+        found += each(group, ("pointing", key), "m", label=_upper)
+    return [
+        *found,
+        one("recording", "messages lost", "", lambda r: str(sum(r["lost"].values()))),
+        one("recording", "states filled in", "", lambda r: str(r["filled_ticks"])),
+        one("recording", "finished", "", lambda r: "no" if r["unfinished"] else "yes"),
+        one("recording", "damage found", "", lambda r: str(len(r["damage"]))),
+    ]
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}"
+
+
+def _each_key(
+    reports: Sequence[Report],
+    group: str,
+    path: tuple[str, ...],
+    unit: str | Callable[[str], str] = "",
+    text: Callable[[Any], str] = _number,
+    label: Callable[[str], str] = str,
+) -> list[Line]:
+    """Make a line for every key below ``path`` in any of the reports."""
+    below = [_at(report, path) for report in reports]
+    return [
+        Line(
+            group, label(key), unit if isinstance(unit, str) else unit(key),
+            [text(values[key]) if key in values else NONE for values in below],
+        )
+        for key in dict.fromkeys(key for values in below for key in values)
+    ]  # fmt: skip
+
+
+def _at(report: Report, path: tuple[str, ...]) -> dict[str, Any]:
+    found: Any = report
+    for key in path:
+        found = (found or {}).get(key)
+    return found or {}
+
+
+def _line(
+    reports: Sequence[Report], group: str, name: str, unit: str, text: Callable[[Report], str]
+) -> Line:
+    return Line(group, name, unit, [text(report) for report in reports])
+
+
+def _angle(value: float) -> str:
+    arcsec = value / ARCSEC
+    readable = f"{arcsec:.3g} arcsec" if arcsec < 3600 else f"{arcsec / 3600:.3g} deg"
+    return f"{value:.3g} rad\n{readable}"
+
+
+def _settled(value: float | None) -> str:
+    return "never" if value is None else _number(value)
+
+
+def _saturated(report: Report) -> str:
+    found = report["saturation"]
+    if found is None:
+        return NONE
+    if found["base_torque_limit_n_m"] is None and found["joint_torque_limit_n_m"] is None:
+        return "no limits"
+    return f"{found['ticks']} ({found['share']:.2%})"
+
+
+def _latency(report: Report, name: str) -> str:
+    found = report["latency"]
+    return f"{found[f'{name}_ms']:.3g} ({found[f'{name}_ticks']:.3g})" if found else NONE
+
+
+def _differing(report: Report) -> str:
+    found = report["missed_deadlines"]
+    return str(found["differing_ticks"]) if found else NONE
+
+
+def _axes(key: str, kind: str) -> str:
+    return f"{key if key == 'base' else f'joints_{key}'} {_upper(kind)}"
+
+
+def _upper(kind: str) -> str:
+    return kind.upper() if kind == "rms" else kind

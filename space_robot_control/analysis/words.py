@@ -1,0 +1,50 @@
+"""Sentences on what was flown, and on what a report's numbers do not say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from space_robot_msgs_py.bag.law_history import in_words
+
+Report = dict[str, Any]
+
+
+def flown(described: Mapping[str, Any]) -> str:
+    """Say what was flown, in a few words.
+
+    Args:
+        described: a report, or the description in a bag.
+    """
+    law = law_of(described)
+    known = [f"{key} {described[key]}" for key in ("case", "gains") if described.get(key)]
+    return ", ".join([str(law or "unknown law"), *known])
+
+
+def law_of(described: Mapping[str, Any]) -> str | None:
+    """Name the law, or all the laws and when they changed; None: nobody says."""
+    return in_words(described.get("laws", ())) or described.get("controller")
+
+
+def remarks(report: Report) -> list[str]:
+    """Say in sentences what was lost, damaged or left unanswered."""
+    lost = {topic: count for topic, count in report["lost"].items() if count}
+    found = [f"messages lost: {lost or 'none'}"]
+    found += [
+        text for text in (report["unfinished"], *report["damage"], *report["foreign"]) if text
+    ]
+    if report["unanswered_ticks"]:
+        found.append(f"ticks that no command was recorded for: {report['unanswered_ticks']}")
+    if report["filled_ticks"]:
+        found.append(
+            f"ticks without a usable state, shown as the one before: {report['filled_ticks']}"
+        )
+    return found
+
+
+def notes(report: Report) -> list[str]:
+    """Say of single metrics whence they count, or why there is none."""
+    missing = [f"no {key.replace('_', ' ')}: {why}" for key, why in report["unavailable"].items()]
+    if settling := report["settling"]:
+        return [f"settling is counted from the waypoint at {settling['after_s']:g} s", *missing]
+    return missing

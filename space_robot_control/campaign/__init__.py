@@ -1,0 +1,1 @@
+"""Many flights, and a verdict on all of them."""

@@ -1,0 +1,84 @@
+"""``space-robot fly``: a mission flown on a ROS 2 graph."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .options import OPTIONS, flight_options, plan_flight
+
+
+def _list_faults(context: click.Context, given: Sequence[str]) -> Sequence[str]:
+    if list(given) == ["list"]:
+        from space_robot_sim.faults.grammar import help_lines
+
+        from ..flight.faults import KINDS
+
+        click.echo("\n".join(help_lines(KINDS)))
+        context.exit()
+    return given
+
+
+@click.command()
+@flight_options(*OPTIONS)
+@click.option(
+    "--composed",
+    is_flag=True,
+    help="All nodes in one process: faster, and no node can be killed or stopped alone.",
+)
+@click.option("--realtime", is_flag=True, help="Pace by the wall clock instead of lockstep.")
+@click.option(
+    "--fifo-priority",
+    type=click.IntRange(0, 98),
+    default=0,
+    help="Ask for SCHED_FIFO for plant and controller; for machines with cores to spare.",
+)
+@click.option(
+    "--fault", "faults", multiple=True, metavar="KIND@T[-END][:ARG]",
+    help="Inject a fault at T simulated seconds; may be repeated; --fault list lists all kinds.",
+    callback=lambda context, option, given: _list_faults(context, given),
+)  # fmt: skip
+@click.option("--seed", type=int, default=0, help="Seed of the faults' random numbers.")
+@click.option("--restart-controller", is_flag=True, help="Start a dead or hung controller again.")
+@click.option("--domain", type=int, help="ROS domain [default: ROS_DOMAIN_ID, or a free one].")
+def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
+    """Fly a mission on a ROS 2 graph, record it, and print the RMS table.
+
+    Starts plant, controller, mission and recorder as processes of their own (through `ros2 run`
+    where that is installed), or with --composed in one; configures and activates them, follows
+    the flight, stops them, checks the bag. Set ROS_DOMAIN_ID or --domain to watch the flight from
+    another terminal.
+
+    \b
+    Examples:
+      space-robot fly --controller tde_smc --duration 5
+      space-robot fly --case 4-2 --bag flights/heavy --json
+      space-robot fly --command-latency-ticks 2
+      space-robot fly --composed --realtime
+      space-robot fly --swap 5:tde_smc --swap 10:tde_stc
+      space-robot fly --fault kill_controller@3 --restart-controller
+      space-robot fly --fault drop_state@2-4:0.1 --fault noise_gyro@0:1e-5 --seed 7
+    """
+    from space_robot_msgs_py.errors import FlightError
+
+    from ..analysis import analyze
+    from ..flight.bag_path import default_bag
+    from ..flight.graph.orchestrator import fly as fly_graph
+    from ..flight.terminal import echo_json
+    from .failure import failed_report, report_of
+    from .report_display import show_report
+
+    flight = plan_flight(**options)
+    bag = bag or default_bag(flight)
+    try:
+        report = fly_graph(flight, bag, analyze)
+    except FlightError as error:
+        if as_json:
+            echo_json(failed_report(flight, bag, error, report_of(bag)))
+        raise
+    show_report(report, as_json)
+    if failures := report["graph"]["failures"]:
+        raise FlightError("; ".join(failures))

@@ -1,0 +1,38 @@
+"""Reports on a terminal: the table of a flight, or of several bags side by side."""
+
+from __future__ import annotations
+
+from itertools import islice
+from typing import Any
+
+from rich.console import Console
+
+from ..analysis.report_tables import comparison_table, rms_table
+from ..analysis.terminal import print_table
+from ..analysis.words import notes, remarks
+from ..flight.terminal import echo_json, say, terminal
+
+LABELS = 44
+"""Columns of the terminal that names and units take beside the metrics of several bags."""
+NARROWEST = 17
+"""Columns of one bag."""
+
+
+def show_report(report: dict[str, Any], as_json: bool) -> None:
+    """Print the report of a flight on standard output."""
+    if as_json:
+        echo_json(report)
+    else:
+        print_table(rms_table(report), terminal())
+
+
+def print_comparison(reports: dict[str, dict[str, Any]], console: Console) -> None:
+    """Print all metrics of several bags, in as many tables as the width asks for."""
+    every = max(1, (console.width - LABELS) // NARROWEST)
+    remaining = iter(reports.items())
+    while shown := dict(islice(remaining, every)):
+        print_table(comparison_table(shown), console)
+    for name, report in reports.items():
+        say(console, f"{name}:")
+        for sentence in (*remarks(report), *notes(report)):
+            say(console, f"  {sentence}")

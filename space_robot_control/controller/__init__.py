@@ -1,0 +1,1 @@
+"""The controller: tracking errors, time-delay estimate, laws and their supervision."""

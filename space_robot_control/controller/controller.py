@@ -1,0 +1,115 @@
+"""The controller: measured state and reference in, torque out, every tick. Knows no ROS."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.records import Block, assign
+from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
+from space_robot_msgs_py.samples import Command, RobotState
+from space_robot_sim.robot import Robot
+
+from ..laws import ControlLaw, Signals
+from .kernels import (
+    LARGEST,
+    NOT_UNIT,
+    SINGULAR,
+    TOO_LARGE,
+    USABLE,
+    ControllerMemory,
+    apply_transfer,
+    compute_signals,
+)
+from .time_delay_estimation import low_pass_weight
+
+Array = NDArray[np.float64]
+
+TRANSFER_S = 0.02
+"""Time in which a law that takes over passes from the force it found to its own, s."""
+
+
+class Controller:
+    """Runs one law on a robot's nominal model; the law can be swapped between ticks.
+
+    The time-delay pair is kept whatever the law, and a law takes over from the force it finds
+    applied: neither a swap nor a controller that starts in the middle of a flight gives a jolt.
+    """
+
+    def __init__(
+        self, robot: Robot, law: ControlLaw, period: float, acceleration_filter_hz: float = 0.0
+    ) -> None:
+        """``acceleration_filter_hz``: corner of the low-pass of the time-delay pair (0: none)."""
+        self.period = period
+        self.block = ControllerMemory.block(robot.n)
+        """The controller's `ControllerMemory`, for compiled loops."""
+        memory: ControllerMemory = self.block[0]
+        assign(memory, model=robot.model, last_jacobian_inverse=2.0 * np.eye(3))
+        assign(memory, transfer_ticks=max(1, round(TRANSFER_S / period)))
+        assign(memory.pair, smoothing=low_pass_weight(acceleration_filter_hz, period))
+        self._memory = memory
+        self._command = Command(-1, np.zeros(robot.n + 3))
+        self.signals = Signals.view(self.block["signals"])
+        """What the law saw at the last tick."""
+        self.law = law
+
+    @property
+    def law(self) -> ControlLaw:
+        """The law in force; setting it makes it `engage`."""
+        return self._law
+
+    @law.setter
+    def law(self, law: ControlLaw) -> None:
+        self._law = law
+        self.engage()
+
+    def engage(self) -> None:
+        """Let the law forget its past and take over, at the next tick, from the applied force."""
+        self._law.reset()
+        self.signals.n_hat[:] = 0.0
+        assign(self._memory, transfer_left=-1.0)
+
+    def update(self, state: RobotState, reference: Block) -> Command:
+        """The torque that answers a measured state.
+
+        Args:
+            state: the plant's measurements, with the torque it applied since the last tick.
+            reference: of a `Reference`.
+
+        Returns:
+            The command for this tick, valid until the next call.
+
+        Raises:
+            UnusableStateError: the state is not finite, beyond `LARGEST`, or its quaternion not
+                unit; nothing was remembered of it.
+            SingularAttitudeError: the base has turned by 180 degrees.
+        """
+        law, command = self._law, self._command
+        status = compute_signals(
+            self.block, state.tick, state.block, reference, law.h_bar, law.uses_model, self.period
+        )
+        if status != USABLE:
+            raise unusable(status, state.tick, state.quaternion)
+        apply_transfer(self.block, state.tick, law.force(self.signals), command.torque)
+        command.tick = state.tick
+        return command
+
+    def telemetry(self) -> tuple[Array, Array, Array, Array]:
+        """s, u, N_hat and e of the last tick, (m,) each."""
+        memory, signals = self._law.memory, self.signals
+        return memory.s, memory.u, signals.n_hat, signals.error
+
+
+def unusable(status: int, tick: int, quaternion: Array) -> UnusableStateError:
+    """What to raise for a state of a ``status`` other than `USABLE`."""
+    if status == SINGULAR:
+        return SingularAttitudeError(tick, float(quaternion[0]))
+    if status == NOT_UNIT:
+        norm = float(np.linalg.norm(quaternion))
+        why = f"the base's quaternion has norm {norm:.6g}, not 1"
+        return UnusableStateError(tick, why, "quaternion not unit")
+    if status == TOO_LARGE:
+        return UnusableStateError(
+            tick, f"the state has a number beyond {LARGEST:g}", "state too large"
+        )
+    return UnusableStateError(tick, "the state is not finite", "state not finite")

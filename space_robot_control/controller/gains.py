@@ -1,0 +1,208 @@
+"""Gain sets: which files they are, how their numbers are checked, and the laws built from them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.config.files import config_directory, node_parameters
+from space_robot_msgs_py.config.trees import Tree, nest
+from space_robot_msgs_py.config.validation import one_of, read_yaml, short
+from space_robot_msgs_py.config.yaml_text import check_file, is_folder
+from space_robot_msgs_py.errors import InputError
+
+from ..laws import ControlLaw, find_law, laws
+from .settings import ControllerNodeSettings
+
+Array = NDArray[np.float64]
+
+STRICTLY_POSITIVE = ("h_bar", "delta")
+"""Gains that divide or invert something; the others may be zero."""
+DEFAULT_SETS = "default_sets.yaml"
+PARAMETERS = "controller parameters"
+
+
+def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
+    """The file of each law's gains by the law's name, for a robot (name or path) and a set.
+
+    ``gain_set`` is ``default``, a folder's name in ``config/gains/<robot>``, or a path to a
+    folder of ``<law>.yaml`` or to one such file.
+
+    Raises:
+        InputError: there is no such set; names the ones there are.
+    """
+    path = Path(gain_set)
+    if gain_set.endswith((".yaml", ".yml")):
+        check_file(path)
+        return {path.stem: path}
+    if "/" in gain_set:
+        return _gains_folder(path)
+    folder = config_directory() / "gains" / Path(robot).stem
+    sets = _shipped_sets(robot)
+    if not sets:
+        raise InputError(
+            f"no gains for robot {short(Path(robot).stem)} in {folder.parent}: "
+            "name a folder of <law>.yaml files as gains"
+        )
+    if gain_set == "default":
+        chosen = read_yaml(folder / DEFAULT_SETS)
+        return {law: folder / name / f"{law}.yaml" for law, name in chosen.items()}
+    one_of(gain_set, ["default", *sets], "gain set", f" of robot {short(Path(robot).stem)}")
+    return {file.stem: file for file in sorted((folder / gain_set).glob("*.yaml"))}
+
+
+def gains_as_path(gain_set: str, robot: str) -> str:
+    """What a user means by the name of a gain set: ``g`` is ``g/``, a folder, where no set is so.
+
+    Not for names out of bags: these open no folder of the user's.
+    """
+    if "/" in gain_set or gain_set in ("default", *_shipped_sets(robot)):
+        return gain_set
+    return f"{gain_set}/" if gain_set and is_folder(Path(gain_set)) else gain_set
+
+
+def _shipped_sets(robot: str) -> list[str]:
+    folder = config_directory() / "gains" / Path(robot).stem
+    entries = folder.iterdir() if is_folder(folder) else ()
+    return sorted(entry.name for entry in entries if entry.is_dir())
+
+
+def _gains_folder(path: Path) -> dict[str, Path]:
+    files = {file.stem: file for file in sorted(path.glob("*.yaml"))} if is_folder(path) else {}
+    if not files:
+        raise InputError(f"{short(str(path))}: no folder with gain files (<law>.yaml)")
+    return files
+
+
+def read_gains(path: Path, law: type[ControlLaw], axes: int) -> dict[str, Array]:
+    """A law's gains from its section in a ROS parameter file of the controller.
+
+    Raises:
+        InputError: naming file, key, value given and values allowed.
+    """
+    tree = node_parameters(path, ControllerNodeSettings.node)
+    if not isinstance(tree.get(law.name), dict):
+        raise InputError(f"{path}: {law.name}: missing (the gains of this law)")
+    return check_gains(tree[law.name], law, axes, str(path))
+
+
+def check_gains(content: Tree, law: type[ControlLaw], axes: int, where: str) -> dict[str, Array]:
+    """Gains as (axes,) arrays; a list of one value counts for all axes.
+
+    Raises:
+        InputError: a gain is missing, unknown, of the wrong length or out of its range.
+    """
+    descriptions = law.gain_descriptions()
+    for name in content:
+        one_of(name, descriptions, f"gain of {law.name}", f" in {where}")
+    gains = {}
+    for name, description in descriptions.items():
+        key = f"{where}: {law.name}.{name}"
+        if name not in content:
+            raise InputError(f"{key}: missing ({description})")
+        values = _numbers(content[name])
+        if values is None:
+            raise InputError(f"{key}: numbers were expected, got {short(content[name])}")
+        if values.shape not in ((axes,), (1,)):
+            raise InputError(
+                f"{key}: {gain_lengths(axes)} were expected, got {short(content[name])}"
+            )
+        fits = values > 0.0 if name in STRICTLY_POSITIVE else values >= 0.0
+        if not np.all(fits & np.isfinite(values)):
+            raise InputError(f"{key}: {gain_range(name)} were expected, got {short(content[name])}")
+        gains[name] = np.ascontiguousarray(np.broadcast_to(values, axes))
+    return gains
+
+
+def gain_range(name: str) -> str:
+    """The values a gain may have, in words."""
+    return f"finite values {'above 0' if name in STRICTLY_POSITIVE else '0 or more'}"
+
+
+def gain_lengths(axes: int) -> str:
+    """How many values a gain may have, in words."""
+    return f"{axes} values (base x, y, z and the joints) or 1"
+
+
+def _numbers(value: Any) -> Array | None:
+    """A list of numbers; None if it is anything else: truth values and texts are no numbers."""
+    if isinstance(value, np.ndarray):
+        return value
+    if not isinstance(value, (list, tuple)):
+        return None
+    if not all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in value):
+        return None
+    try:
+        return np.array(value, dtype=np.float64)
+    except OverflowError:
+        return None
+
+
+def build_law(
+    name: str, settings: ControllerNodeSettings, axes: int, given: Mapping[str, Any] | None = None
+) -> ControlLaw:
+    """A law by name (or ``module:Class``) with the gains that the settings choose.
+
+    Args:
+        name: of the law.
+        settings: they choose its gains.
+        axes: m = n+3.
+        given: gains that come over those.
+
+    Raises:
+        InputError: unknown law, gain set without it, or gains that do not fit.
+    """
+    law = find_law(name)
+    files = gain_files(settings.robot, settings.gains)
+    if law.name not in files:
+        raise InputError(
+            f"gains {settings.gains!r} have no file for controller {law.name!r}, "
+            f"only for {', '.join(sorted(files))}"
+        )
+    gains = read_gains(files[law.name], law, axes)
+    if given:
+        gains = check_gains({**gains, **given}, law, axes, PARAMETERS)
+    return law(gains, settings.period)
+
+
+def build_laws(
+    settings: ControllerNodeSettings, axes: int, given: Mapping[str, Tree] | None = None
+) -> dict[str, ControlLaw]:
+    """The laws a controller can fly, by name: the one in force first, then those of the gain set.
+
+    Args:
+        settings: they choose the law in force and the gains.
+        axes: m = n+3.
+        given: gains by law that come over those of the files.
+
+    Raises:
+        InputError: a law that is not there, or gains that do not fit.
+    """
+    given = given or {}
+    first = find_law(settings.controller).name
+    wanted = {first: settings.controller}
+    for name in available_laws(settings):
+        wanted.setdefault(name, name)
+    for name in given:
+        one_of(name, wanted, "law", f" in {PARAMETERS} (gains are <law>.<gain>)")
+    return {law: build_law(name, settings, axes, given.get(law)) for law, name in wanted.items()}
+
+
+def split_gains(parameters: Mapping[str, Any]) -> tuple[Tree, dict[str, Tree]]:
+    """The controller's own parameters, and the gains ``<law>.<gain>`` by law."""
+    own, gains = Tree(), {}
+    for name, value in nest(parameters).items():
+        if isinstance(value, dict) and name not in ControllerNodeSettings.model_fields:
+            gains[name] = value
+        else:
+            own[name] = value
+    return own, gains
+
+
+def available_laws(settings: ControllerNodeSettings) -> list[str]:
+    """Names of the laws of this project that the chosen gains cover."""
+    return sorted(set(gain_files(settings.robot, settings.gains)) & set(laws()))

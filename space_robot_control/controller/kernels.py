@@ -1,0 +1,170 @@
+"""A tick of the controller as kernels: errors, estimate or model, law, transfer, torque."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
+from space_robot_msgs_py.samples import State
+from space_robot_sim.dynamics.attitude import SINGULAR_ETA, attitude_jacobian_inverse
+from space_robot_sim.dynamics.model import Model
+from space_robot_sim.dynamics.rho_space import rho_space_into
+
+from ..laws import Signals
+from ..laws.compiled import LawCode
+from .time_delay_estimation import TimeDelayPair, follows, observe, time_delay_estimate
+from .tracking import force_from_torque, measured_rate, torque_from_force, tracking_errors
+
+Array = NDArray[np.float64]
+
+NORM_TOLERANCE = 1e-3
+"""How far the square of a quaternion's norm may be from 1."""
+LARGEST = 1e30
+"""No number of a state or reference is larger: far beyond any flight, yet no law's products of
+such numbers overflow."""
+
+USABLE, NOT_FINITE, TOO_LARGE, NOT_UNIT, SINGULAR = range(5)
+"""The status of a state."""
+
+
+class ControllerMemory(Record):
+    """What the controller knows and remembers, apart from its law."""
+
+    model: Model = nested(Model)
+    """The nominal robot."""
+    signals: Signals = nested(Signals)
+    """Those of the last tick."""
+    pair: TimeDelayPair = nested(TimeDelayPair)
+    quaternion: Array = shaped(lambda n: (4,))
+    """The measured one or its negative: the same attitude, but rho must not jump."""
+    rate: Array = shaped(lambda n: (n + 3,))
+    """rhodot."""
+    jacobian: Array = shaped(lambda n: (3, 3))
+    """J0."""
+    last_jacobian_inverse: Array = shaped(lambda n: (3, 3))
+    """J0^-1 of the last tick."""
+    desired_jacobian: Array = shaped(lambda n: (3, 3))
+    """Scratch."""
+    applied_force: Array = shaped(lambda n: (n + 3,))
+    """F_S over the last interval."""
+    force: Array = shaped(lambda n: (n + 3,))
+    """F_S commanded."""
+    transfer: Array = shaped(lambda n: (n + 3,))
+    """What the law in force lacked of the applied force when it took over."""
+    transfer_ticks: float = shaped(lambda n: ())
+    """Length of a transfer."""
+    transfer_left: float = shaped(lambda n: ())
+    """Ticks until ``transfer`` has faded; -1: the law takes over at this tick."""
+
+
+@kernel
+def controller_tick(
+    block: Block, law: LawCode, tick: int, state: Block, reference: Block, torque: Array,
+    period: float,
+) -> int:  # fmt: skip
+    """A whole tick of the controller under a law in compiled code.
+
+    Args:
+        block: of the `ControllerMemory`.
+        law: a `CompiledLaw.code`.
+        tick: of the state.
+        state: of a `State`.
+        reference: of a `Reference`.
+        torque: (m,) command to be written, if the state is `USABLE`; N m.
+        period: s.
+
+    Returns:
+        The status of the state, see `compute_signals`.
+    """
+    status: int = compute_signals(block, tick, state, reference, law.h_bar, law.uses_model, period)
+    if status == USABLE:
+        law.run(block[0].signals, law.gains[0], law.memory[0], period)
+        apply_transfer(block, tick, law.memory[0].force, torque)
+    return status
+
+
+@kernel
+def compute_signals(
+    block: Block, tick: int, state: Block, reference: Block, h_bar: Array, uses_model: bool,
+    period: float,
+) -> int:  # fmt: skip
+    """Turn a measured state and its reference into the law's signals.
+
+    Args: see `controller_tick`; ``h_bar`` is empty for a law without time-delay estimate.
+
+    Returns:
+        `USABLE`, or why the state is not: then nothing was done.
+    """
+    memory, measured = block[0], state[0]
+    signals, rate = memory.signals, memory.rate
+    status: int = status_of(measured)
+    if status != USABLE:
+        return status
+    near, dot = memory.quaternion, 0.0
+    for k in range(4):
+        dot += measured.quaternion[k] * near[k]
+    side = -1.0 if dot < 0.0 else 1.0
+    for k in range(4):
+        near[k] = side * measured.quaternion[k]
+    measured_rate(measured, near, memory.jacobian, rate)
+    if not follows(memory.pair, tick):  # whatever J0 was, this one's is nearer
+        attitude_jacobian_inverse(near, memory.last_jacobian_inverse)
+    # the applied torque acted from the last tick on, so that tick's J0 turns it into F_S
+    force_from_torque(memory.last_jacobian_inverse, measured.applied_torque, memory.applied_force)
+    attitude_jacobian_inverse(near, memory.last_jacobian_inverse)
+    tracking_errors(measured, near, rate, reference[0], memory.desired_jacobian, signals)
+    observe(memory.pair, tick, memory.applied_force, rate, signals.acceleration_desired, period)
+    if h_bar.size > 0:
+        time_delay_estimate(memory.pair, h_bar, signals.n_hat)
+    if uses_model:
+        rho_space_into(
+            memory.model, near, measured.joint_positions, measured.omega_base,
+            measured.joint_velocities, signals.nominal,
+        )  # fmt: skip
+    return USABLE
+
+
+@kernel
+def status_of(state: State) -> int:
+    """`USABLE`, or why no law may see the state."""
+    quaternion, total = state.quaternion, 0.0
+    for k in range(4):
+        total += quaternion[k] * quaternion[k]
+    square = total
+    for k in range(3):
+        total += abs(state.omega_base[k])
+    for i in range(state.joint_positions.size):
+        total += abs(state.joint_positions[i]) + abs(state.joint_velocities[i])
+    for i in range(state.applied_torque.size):
+        total += abs(state.applied_torque[i])
+    if not np.isfinite(total):  # any number that is not makes the sum so
+        return NOT_FINITE
+    if total > LARGEST:
+        return TOO_LARGE
+    if abs(square - 1.0) > NORM_TOLERANCE:
+        return NOT_UNIT
+    return SINGULAR if abs(quaternion[0]) <= SINGULAR_ETA else USABLE
+
+
+@kernel
+def apply_transfer(block: Block, tick: int, force: Array, torque: Array) -> None:
+    """Write the ``torque`` of a law's ``force`` (m,), which takes over from the one applied before.
+
+    ``F_S + (F_applied - F_S at the takeover) fade``, the fade falling from 1 to 0. At tick 0
+    nothing has been applied, so nothing is taken over.
+    """
+    memory = block[0]
+    if memory.transfer_left < 0.0:
+        memory.transfer_left = memory.transfer_ticks if tick > 0 else 0.0
+        for i in range(force.size):
+            memory.transfer[i] = memory.applied_force[i] - force[i]
+    fade = memory.transfer_left / memory.transfer_ticks
+    for i in range(force.size):
+        memory.force[i] = force[i]
+        if fade > 0.0:
+            memory.force[i] += fade * memory.transfer[i]
+    if fade > 0.0:
+        memory.transfer_left -= 1.0
+    torque_from_force(memory.jacobian, memory.force, torque)

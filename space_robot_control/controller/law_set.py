@@ -1,0 +1,122 @@
+"""The laws a controller node can fly, with their gains as parameters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.parameter import Parameter
+
+from space_robot_msgs_py.bag.law_history import LawChange
+from space_robot_msgs_py.config.trees import nest
+from space_robot_msgs_py.config.validation import one_of
+from space_robot_msgs_py.errors import SpaceRobotError
+from space_robot_msgs_py.ros.managed_node import ManagedNode
+from space_robot_msgs_py.ros.parameters import overrides
+from space_robot_msgs_py.samples import Reference, RobotState
+from space_robot_sim.robot import Robot
+
+from ..laws import ControlLaw
+from .controller import Controller
+from .gains import PARAMETERS, build_laws, check_gains, gain_lengths, gain_range
+from .law_changes import LawChanges
+from .settings import ControllerNodeSettings
+from .swaps import Swap, parse_swaps
+
+
+class LawSet:
+    """The laws of the gain set as parameters: ``controller``, and ``<law>.<gain>`` for each."""
+
+    def __init__(self, node: ManagedNode[Any], settings: ControllerNodeSettings, axes: int) -> None:
+        """Build all laws and declare their gains.
+
+        Raises:
+            InputError: a law, a gain or a swap that cannot be.
+        """
+        self._node, self._settings, self._axes = node, settings, axes
+        self._laws = build_laws(settings, axes)
+        for law in self._laws.values():
+            self._declare(law)
+        self.chosen = next(iter(self._laws.values()))
+        self._may_differ = True
+        """Whether law or gains may be others than at the last tick answered."""
+        self._changes = LawChanges()
+        self._was_swapped = False
+        self._swaps: list[Swap] = parse_swaps(settings.swaps, settings.period)
+        for swap in self._swaps:
+            one_of(swap.name, self._laws, "controller", " of swaps")
+        descriptor = node.describe_parameter("controller")
+        descriptor.additional_constraints = f"one of {', '.join(self._laws)}"
+        node.set_descriptor("controller", descriptor)
+        node.add_on_set_parameters_callback(self._on_set)
+
+    def warm_up(self, robot: Robot) -> None:
+        """Load every law's compiled code, so that no first tick and no swap comes late."""
+        rest = RobotState.allocate(robot.n)
+        for law in self._laws.values():
+            controller = Controller(robot, law, self._settings.period)
+            controller.update(rest, Reference.at_rest(robot.n))
+
+    def change_at(self, tick: int) -> LawChange | None:
+        """Choose the law of the swaps that are due; what is in force, if not as before.
+
+        Called once for each tick that is answered.
+        """
+        while self._swaps and self._swaps[0].tick <= tick:
+            self.chosen = self._laws[self._swaps.pop(0).name]
+            self._may_differ = self._was_swapped = True
+        if not self._may_differ:
+            return None
+        self._may_differ = False
+        return self._changes.at(tick, self.chosen)
+
+    def tell(self, change: LawChange) -> None:
+        """Log a change, and let the parameter ``controller`` follow a planned swap."""
+        when = (
+            f"from tick {change.law.tick} on (t = {change.law.tick * self._settings.period:.4f} s)"
+        )
+        self._node.log(f"controller: {change}, {when}")
+        if self._was_swapped:
+            self._was_swapped = False
+            name = Parameter("controller", value=change.law.name)  # type: ignore[no-untyped-call]
+            self._node.set_parameters([name])
+
+    def close(self) -> None:
+        """Take no more changes."""
+        self._node.remove_on_set_parameters_callback(self._on_set)
+
+    def _declare(self, law: ControlLaw) -> None:
+        """Declare a law's gains, and take those given as parameters over those of its file."""
+        node, descriptions = self._node, law.gain_descriptions()
+        given = overrides(node, [f"{law.name}.{gain}" for gain in descriptions])
+        tree = {**law.gain_values, **nest(given).get(law.name, {})}
+        law.gain_values = check_gains(tree, type(law), self._axes, PARAMETERS)
+        for gain, values in law.gain_values.items():
+            node.declare_parameter(
+                f"{law.name}.{gain}", values.tolist(),
+                ParameterDescriptor(
+                    description=descriptions[gain],
+                    additional_constraints=f"{gain_lengths(self._axes)}; {gain_range(gain)}",
+                ),
+                ignore_override=True,
+            )  # fmt: skip
+
+    def _on_set(self, parameters: list[Any]) -> SetParametersResult:
+        """Check all changes first, then make them; the loop sees them at its next tick."""
+        gains = {name: law.gain_values for name, law in self._laws.items()}
+        chosen = self.chosen
+        try:
+            for parameter in parameters:
+                law_name, _, gain = parameter.name.partition(".")
+                if parameter.name == "controller":
+                    chosen = self._laws[one_of(parameter.value, self._laws, "controller")]
+                elif law_name in gains and gain:
+                    law = self._laws[law_name]
+                    changed = {**gains[law_name], gain: list(parameter.value)}
+                    gains[law_name] = check_gains(changed, type(law), self._axes, "parameter")
+        except SpaceRobotError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        for name, law in self._laws.items():
+            law.gain_values = gains[name]
+        self.chosen, self._may_differ = chosen, True
+        return SetParametersResult(successful=True)

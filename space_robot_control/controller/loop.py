@@ -1,0 +1,183 @@
+"""The controller node's loop: answers every state with a command."""
+
+from __future__ import annotations
+
+import time
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.compiled.records import Block
+from space_robot_msgs_py.config.files import named_file
+from space_robot_msgs_py.ros.endpoints import RawPublisher, flush
+from space_robot_msgs_py.ros.health import Health, Level
+from space_robot_msgs_py.ros.loop import Wait
+from space_robot_msgs_py.ros.managed_node import ManagedNode
+from space_robot_msgs_py.wire.codecs import CommandCodec
+from space_robot_msgs_py.wire.controller_law import LawCodec
+from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
+from space_robot_msgs_py.wire.stamp_guard import StampGuard
+from space_robot_sim.robot import Robot
+
+from .controller import Controller
+from .law_set import LawSet
+from .reference_input import ReferenceInput
+from .settings import ControllerNodeSettings
+from .state_input import StateInput
+from .supervisor import Mode, Supervisor
+
+FLUSH_S = 1.0
+LOOK_AHEAD_S = 0.02
+"""The reference is looked for this often though it is not needed yet, so that no flood of others'
+messages pushes it out of its queue."""
+STAND_DOWN_S = 0.1
+"""How long a controller that stands down waits for a state to answer."""
+
+
+class ControllerLoop:
+    """Takes the newest state, waits for its reference, answers; never answers a tick anew."""
+
+    is_complete = False
+
+    def __init__(
+        self, node: ManagedNode[ControllerNodeSettings], settings: ControllerNodeSettings
+    ) -> None:
+        """Load the laws' compiled code, so that no tick comes late for it."""
+        self._node, self._settings = node, settings
+        robot = Robot.from_yaml(named_file("robots", settings.robot))
+        self._laws = LawSet(node, settings, robot.n + 3)
+        self._laws.warm_up(robot)
+        self._controller = Controller(
+            robot, self._laws.chosen, settings.period, settings.acceleration_filter_hz
+        )
+        self._supervisor = Supervisor(self._controller, robot.n + 3, settings.hold_ticks)
+        self._stamps = StampGuard(settings.longest_jump)
+        timebase = settings.timebase
+        self._states = StateInput(node, robot, timebase)
+        self._references = ReferenceInput(node, robot, timebase, settings.reference_timeout)
+        self._commands = CommandCodec(robot.axis_names, timebase)
+        self._telemetry = TelemetryCodec(robot.axis_names)
+        self._law = LawCodec(timebase)
+        self._command_out = RawPublisher(node, topics.COMMAND)
+        self._telemetry_out = RawPublisher(node, topics.TELEMETRY)
+        self._law_out = RawPublisher(node, topics.LAW)
+        self.outputs = (self._command_out, self._telemetry_out, self._law_out)
+        self.wait_for = settings.wait_for
+        self._answered, self._answer = -1, b""
+        self._unanswered = -1
+        """A state's tick whose reference has not come yet; -1: none."""
+        self._state_at = time.monotonic()
+        self._look_ahead_at = 0.0
+
+    def begin(self) -> None:
+        """Begin with the next state."""
+        self._unanswered = -1
+
+    def step(self) -> Wait | None:
+        """Take a state and answer it, if it and its reference are there."""
+        tick = self._unanswered
+        if tick < 0:
+            found = self._states.take()
+            if found is None:
+                self._look_ahead(time.monotonic())
+                return self._states.wait
+            tick = found
+            if tick == self._answered:  # the plant asked again: the same answer
+                self._command_out.publish(self._answer)
+                return None
+            if tick != self._stamps.last and not self._believe(tick):
+                return None
+        reference = self._references.at(tick)
+        if reference is None:
+            is_awaited = self._references.is_awaited
+            self._unanswered = tick if is_awaited else -1
+            return self._references.wait if is_awaited else None
+        self._unanswered = -1
+        self._answer_tick(tick, reference)
+        self._look_ahead(self._state_at)
+        return None
+
+    def stand_down(self) -> None:
+        """Answer one more state, with no torque: the plant holds that."""
+        if self._answered >= 0 and self._node.count_publishers(topics.JOINT_STATES.name):
+            until = time.monotonic() + STAND_DOWN_S
+            tick = self._unanswered
+            while tick <= self._answered and time.monotonic() < until:
+                self._node.let_others_work()
+                found = self._states.take()
+                tick = self._answered if found is None else found
+            if tick > self._answered:
+                self._command_out.publish(self._commands.encode(self._supervisor.stand_down(tick)))
+        flush(self.outputs, FLUSH_S)
+
+    def close(self) -> None:
+        """Leave the parameters alone."""
+        self._laws.close()
+
+    def health(self) -> Health:
+        """Tell the mode, the law, and what was rejected."""
+        supervisor, references = self._supervisor, self._references
+        rejected = self._states.rejected + references.rejected + supervisor.rejected
+        silence = time.monotonic() - self._state_at
+        values: dict[str, float | int | str] = {
+            "tick": self._answered,
+            "controller": self._controller.law.name,
+            "references_held": references.held,
+            **{f"rejected: {reason}": count for reason, count in rejected.items()},
+        }
+        for entry in (*self._states.inputs, *references.inputs):
+            values |= entry.counts("rejected")
+        if references.is_waited_for:
+            return Health("waiting for the reference: no mission sends it", Level.WARN, values)
+        if self._answered < 0:
+            return Health("waiting for the first state", values=values)
+        if supervisor.mode is not Mode.NOMINAL:
+            level = Level.ERROR if supervisor.mode is Mode.SAFE else Level.WARN
+            return Health(f"{supervisor.mode.value}: {supervisor.reason}", level, values)
+        if silence > self._settings.state_timeout:
+            values["silence_s"] = silence
+            return Health("safe: no new state, so no command", Level.ERROR, values)
+        if references.is_missing:
+            return Health("holding the reference: the mission is silent", Level.WARN, values)
+        return Health("nominal", values=values)
+
+    def _look_ahead(self, now: float) -> None:
+        """Take references now and then though none is needed yet."""
+        if now > self._look_ahead_at:
+            self._references.take()
+            self._look_ahead_at = now + LOOK_AHEAD_S
+
+    def _answer_tick(self, tick: int, reference: Block) -> None:
+        controller = self._controller
+        change = self._laws.change_at(tick)
+        if change:
+            self._law_out.publish(self._law.encode(change.law))
+            if controller.law is not self._laws.chosen:
+                controller.law = self._laws.chosen
+        state = self._states.state
+        state.tick = tick
+        mode = self._supervisor.mode
+        command = self._supervisor.answer(state, reference)
+        self._answer = self._commands.encode(command)
+        self._command_out.publish(self._answer)
+        self._answered = tick
+        if self._supervisor.mode is not mode:
+            self._node.report()
+        if change:
+            self._laws.tell(change)
+        if tick % self._settings.telemetry_decimation == 0:
+            self._telemetry_out.publish(self._telemetry.encode(tick, controller.telemetry()))
+
+    def _believe(self, tick: int) -> bool:
+        """Judge a state's stamp: it fits, or begins a new time; then its sender is followed."""
+        stamps, last = self._stamps, self._stamps.last
+        if not stamps.passes(tick):
+            self._states.reject("stamp")
+            return False
+        self._states.follow()
+        references = self._references.buffer
+        if stamps.is_new_time:
+            references.begin(tick)
+            if last >= 0:
+                self._node.log(f"a new time begins at tick {tick}, after {last}")
+        references.now = tick
+        self._state_at = time.monotonic()
+        return True

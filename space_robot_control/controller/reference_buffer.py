@@ -1,0 +1,120 @@
+"""The desired motion as it arrives in chunks, kept until its tick has come."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.records import Block
+from space_robot_msgs_py.errors import MessageError
+from space_robot_msgs_py.samples import Reference, ReferenceChunk
+
+from .kernels import LARGEST
+
+Array = NDArray[np.float64]
+
+EMPTY = np.iinfo(np.int64).min
+"""Tick of a row that holds nothing; older than any."""
+PAST_SHARE = 4
+"""One row in so many is kept for ticks that are over."""
+MOST_PUT_ASIDE = 256
+
+
+class ReferenceBuffer:
+    """A ring of reference rows by tick; the joints' and the base's part may come apart.
+
+    Once it has been told what is `now`, it holds rows around that: a part of the ring's length
+    behind, the rest ahead. Others are put aside for the case that `begin` tells another time.
+    Before that, newer rows push out older ones.
+    Rows with a number not finite, or beyond `LARGEST`, are refused with a `MessageError`.
+    """
+
+    def __init__(self, n: int, capacity: int = 32_768) -> None:
+        """``capacity``: rows; a mission's lead and one chunk of it (20,000) must find place."""
+        self.now = EMPTY
+        """The tick that is needed; `EMPTY` while it is not known."""
+        self._references: Block = np.zeros(capacity, Reference.dtype(n))
+        self._joints, self._base = map(_Ring, Reference.parts(self._references))
+        self._aside: deque[tuple[_Ring, int, Array]] = deque(maxlen=MOST_PUT_ASIDE)
+
+    def begin(self, tick: int) -> None:
+        """A new time begins at ``tick``: what was put aside may fit now."""
+        self.now = tick
+        aside = list(self._aside)
+        self._aside.clear()
+        for ring, start, rows in aside:
+            self._store(ring, start, rows, only_missing=False)
+
+    def add(self, chunk: ReferenceChunk) -> None:
+        """Take both parts of a chunk."""
+        self.add_joints(chunk.start, chunk.joints)
+        self.add_base(chunk.start, chunk.base)
+
+    def add_joints(self, start: int, rows: Array, only_missing: bool = False) -> bool:
+        """Take (k, 3, n) rows from tick ``start`` on, or of those only what is not there yet.
+
+        Returns:
+            Whether any of them has found its place.
+        """
+        return self._store(self._joints, start, rows, only_missing)
+
+    def add_base(self, start: int, rows: Array, only_missing: bool = False) -> bool:
+        """Take (k, 10) rows, see `add_joints`."""
+        return self._store(self._base, start, rows, only_missing)
+
+    def covers(self, tick: int) -> bool:
+        """Whether both parts of a tick's row are here."""
+        i = tick % len(self._joints.ticks)
+        return bool(self._joints.ticks[i] == tick and self._base.ticks[i] == tick)
+
+    def at(self, tick: int) -> Block:
+        """The `Reference` of a tick that `covers`."""
+        i = tick % len(self._references)
+        return self._references[i : i + 1]
+
+    def hold(self, tick: int) -> Block | None:
+        """The `Reference` for a ``tick`` that is not covered: the last point before it, at rest.
+
+        None if nothing has come yet.
+        """
+        ticks = self._joints.ticks
+        whole = np.where(ticks == self._base.ticks, ticks, EMPTY)
+        whole[whole > tick] = EMPTY
+        i = int(np.argmax(whole))
+        if whole[i] == EMPTY:
+            return None
+        held = np.zeros_like(self._references[:1])
+        for name in ("joint_positions", "quaternion"):
+            held[name] = self._references[name][i]
+        return held
+
+    def _store(self, ring: _Ring, start: int, rows: Array, only_missing: bool) -> bool:
+        if not np.all(np.abs(rows) <= LARGEST):
+            raise MessageError(
+                f"reference from tick {start}: a number is not finite or beyond {LARGEST:g}",
+                "not finite",
+            )
+        arriving = np.arange(start, start + len(rows))
+        there = ring.ticks[arriving % len(ring.ticks)]
+        if self.now == EMPTY:  # a repeated old chunk must not push out a newer one
+            wanted = arriving >= there
+        else:
+            first = self.now - len(ring.ticks) // PAST_SHARE
+            wanted = (first <= arriving) & (arriving < first + len(ring.ticks))
+            if not wanted.all():
+                self._aside.append((ring, start, rows))
+        if only_missing:
+            wanted &= arriving != there
+        places = arriving[wanted] % len(ring.ticks)
+        ring.rows[places], ring.ticks[places] = rows[wanted], arriving[wanted]
+        return bool(wanted.any())
+
+
+class _Ring:
+    """One part of the references by tick modulo their number, and whose tick each is."""
+
+    def __init__(self, rows: Array) -> None:
+        self.rows = rows
+        self.ticks = np.full(len(rows), EMPTY, dtype=np.int64)

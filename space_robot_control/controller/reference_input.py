@@ -1,0 +1,146 @@
+"""The mission's reference as it comes, and what stands in for it while it stays away."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from rclpy.node import Node
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.compiled.records import Block
+from space_robot_msgs_py.errors import MessageError
+from space_robot_msgs_py.ros.endpoints import FollowedSubscription, PolledCallbackGroup
+from space_robot_msgs_py.ros.loop import Wait
+from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
+from space_robot_sim.robot import Robot
+
+from .reference_buffer import ReferenceBuffer
+
+Array = NDArray[np.float64]
+
+QUEUE_DEPTH = 10_000
+MOST_AT_ONCE = 100
+"""Messages looked at before other work goes on: somebody may flood a topic."""
+DRAIN_S = 0.01
+"""How long a reference is looked for among those that have come already."""
+PATIENCE_S = 0.02
+WAIT_TOLD_S = 0.5
+"""A wait that lasts longer is told."""
+
+
+class ReferenceInput:
+    """Takes both halves of the reference into a `ReferenceBuffer`, without waiting for them."""
+
+    def __init__(self, node: Node, robot: Robot, timebase: Timebase, timeout_s: float) -> None:
+        """``timeout_s``: how long the mission is waited for."""
+        self._timeout_s = timeout_s
+        self.buffer = ReferenceBuffer(robot.n)
+        self.rejected: Counter[str] = Counter()
+        """Messages not used, by reason."""
+        self.held = 0
+        """Ticks for which a point before was held."""
+        self.is_missing = False
+        """Whether the last one was."""
+        self._until = 0.0
+        """How long the reference that is needed now is waited for; 0: none is."""
+        self._waits_since = 0.0
+        """When the wait began that has not ended well yet; 0: none."""
+        codec, buffer = ReferenceCodec(robot.joint_names, timebase), self.buffer
+        group = PolledCallbackGroup()
+        self._halves = (
+            _Half(
+                FollowedSubscription(node, topics.REFERENCE_JOINTS, group, QUEUE_DEPTH),
+                codec.decode_joints, buffer.add_joints,
+            ),
+            _Half(
+                FollowedSubscription(node, topics.REFERENCE_BASE, group, QUEUE_DEPTH),
+                codec.decode_base, buffer.add_base,
+            ),
+        )  # fmt: skip
+        self.inputs = tuple(half.input for half in self._halves)
+        self.wait = Wait(PATIENCE_S, self.inputs)
+        """What is waited for while `at` has no row."""
+
+    @property
+    def is_waited_for(self) -> bool:
+        """Whether a reference has been waited for in vain, for so long that it is worth a word."""
+        return bool(self._waits_since) and time.monotonic() - self._waits_since > WAIT_TOLD_S
+
+    @property
+    def is_awaited(self) -> bool:
+        """Whether the tick that `at` had no row for may still get one."""
+        return self._until > 0.0
+
+    def at(self, tick: int) -> Block | None:
+        """The `Reference` of ``tick``, or its last point where the mission stays away.
+
+        None if they have not come yet (`is_awaited`), or if nothing has come that could be held.
+        """
+        buffer = self.buffer
+        if buffer.covers(tick) or self._look_for(tick):
+            self.is_missing, self._waits_since, self._until = False, 0.0, 0.0
+            return buffer.at(tick)
+        if self.is_awaited:
+            return None
+        held = buffer.hold(tick)
+        if held is not None:
+            self.is_missing, self._waits_since = True, 0.0
+            self.held += 1
+        return held
+
+    def take(self) -> bool:
+        """Take the next good message of each half; whether there was any."""
+        return any([half.take(self.rejected) for half in self._halves])
+
+    def _look_for(self, tick: int) -> bool:
+        """Take what has come until it covers ``tick``; give up once it has stayed away too long."""
+        now = time.monotonic()
+        self._waits_since = self._waits_since or now
+        self._until = self._until or now + (0.0 if self.is_missing else self._timeout_s)
+        turn_until = now + DRAIN_S
+        while has_come := self.take():
+            if self.buffer.covers(tick):
+                return True
+            if (now := time.monotonic()) >= turn_until:
+                break
+        if now >= self._until + (DRAIN_S if has_come else 0.0):
+            self._until = 0.0
+        return False
+
+
+class _Half:
+    """One of the two topics; what another than the mission sends only fills gaps."""
+
+    def __init__(
+        self, source: FollowedSubscription, decode: Callable[[bytes], tuple[int, Array]],
+        add: Callable[[int, Array, bool], bool],
+    ) -> None:  # fmt: skip
+        self.input, self._decode, self._add = source, decode, add
+        self._stop = -1
+        """Where the mission's next message should begin."""
+
+    def take(self, rejected: Counter[str]) -> bool:
+        """Take the next good message, if there is one; bad ones take nobody's place."""
+        source = self.input.source
+        for _ in range(MOST_AT_ONCE):
+            data = self.input.take()
+            if data is None:
+                return False
+            try:
+                start, rows = self._decode(data)
+                has_place = self._add(start, rows, not source.is_sure)
+            except MessageError as error:
+                rejected[f"reference: {error.reason}"] += 1
+                source.doubt()
+                continue
+            continues = start == self._stop
+            if source.is_sure or continues or (has_place and not source.is_contested):
+                source.follow()
+                self._stop = start + len(rows)
+            return True
+        return False

@@ -1,0 +1,49 @@
+"""Parameters of controller_node."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from pydantic import Field
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.config.settings import NodeSettings, Texts
+
+
+class ControllerNodeSettings(NodeSettings):
+    """Parameters of controller_node; the gains stand beside them as ``<law>.<gain>``."""
+
+    node: ClassVar[str] = "controller"
+    sends: ClassVar[tuple[topics.Topic, ...]] = (topics.COMMAND, topics.TELEMETRY, topics.LAW)
+
+    controller: str = Field(
+        "tde_stc", description="control law in force, or module:Class of your own"
+    )
+    gains: str = Field(
+        "default", description="gain set of config/gains/<robot>, or a path to a file or folder"
+    )
+    telemetry_decimation: Annotated[int, Field(ge=1, le=10**6)] = Field(
+        20, description="ticks between two messages on /controller/telemetry"
+    )
+    swaps: Texts = Field(
+        [""], description="laws to swap to in flight, each as T:LAW with T in simulated seconds"
+    )
+    acceleration_filter_hz: Annotated[float, Field(ge=0.0, le=1e5)] = Field(
+        0.0, description="corner of the low-pass of the time-delay estimate's pair, Hz (0: none)"
+    )
+    hold_ticks: Annotated[int, Field(ge=0, le=10**6)] = Field(
+        200, description="bad states over which the last torque is repeated; then it is zero"
+    )
+    longest_jump: Annotated[int, Field(ge=1, le=10**9)] = Field(
+        2000, description="ticks from one state to the next that are still believed"
+    )
+    reference_timeout: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
+        2.0, description="s by the wall clock to wait for a reference; then its last point is held"
+    )
+    state_timeout: Annotated[float, Field(ge=0.001, le=1e6)] = Field(
+        2.0, description="s by the wall clock without a state until that is reported"
+    )
+    wait_for: Texts = Field(
+        [""],
+        description="who must listen before the first command: NODE:TOPIC, or NODE to all it sends",
+    )

@@ -1,0 +1,86 @@
+"""The time-delay estimate (35), (36), shared by every law that uses one.
+
+``N_hat(t) = F_S(t - delta) - h_bar rhodd(t - delta)`` holds only if the force is the one that was
+*applied* while the acceleration was measured. Under zero-order hold the backward difference of
+rhodot is the mean acceleration over the last interval, so it pairs with the force that the plant
+reports as applied over that interval: not with the controller's own last output, which may
+arrive late or saturate.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, shaped
+
+Array = NDArray[np.float64]
+
+LONGEST_GAP = 20
+"""Ticks between two states that still make a pair: without states the plant holds its command, so
+the force it reports acted all that time."""
+
+
+class TimeDelayPair(Record):
+    """The last applied force and the acceleration it caused, per axis."""
+
+    seen: float = shaped(lambda n: ())
+    """Whether any tick has been observed, 0 or 1."""
+    smoothing: float = shaped(lambda n: ())
+    """Weight of a new pair in the low-pass, see `low_pass_weight`; 0: no low-pass."""
+    tick: float = shaped(lambda n: ())
+    """The last tick observed."""
+    rate: Array = shaped(lambda n: (n + 3,))
+    """rhodot at that tick."""
+    applied_force: Array = shaped(lambda n: (n + 3,))
+    """F_S over the last interval."""
+    acceleration: Array = shaped(lambda n: (n + 3,))
+    """Mean rhodd over the last interval."""
+
+
+def low_pass_weight(corner_hz: float, period: float) -> float:
+    """Weight of a new sample in a first-order low-pass; 0 (for none) where ``corner_hz`` is 0."""
+    return 1.0 - math.exp(-2.0 * math.pi * corner_hz * period)
+
+
+@kernel
+def follows(pair: TimeDelayPair, tick: int) -> bool:
+    """Whether ``tick`` makes a pair with the last tick observed."""
+    elapsed = tick - pair.tick
+    return bool(pair.seen == 1.0 and 1.0 <= elapsed <= LONGEST_GAP)
+
+
+@kernel
+def observe(
+    pair: TimeDelayPair, tick: int, applied_force: Array, rate: Array,
+    acceleration_desired: Array, period: float,
+) -> None:  # fmt: skip
+    """Take force and rate (m,) of the interval that ended at ``tick``.
+
+    The first tick, and one after a longer gap, has no acceleration: the desired one is taken.
+    A low-pass takes force and acceleration alike, so that they stay a pair.
+    """
+    known, elapsed = follows(pair, tick), tick - pair.tick
+    weight = pair.smoothing if known and pair.smoothing > 0.0 else 1.0
+    for i in range(rate.size):
+        force, acceleration = applied_force[i], acceleration_desired[i]
+        if known:
+            acceleration = (rate[i] - pair.rate[i]) / (elapsed * period)
+        if weight < 1.0:
+            force = pair.applied_force[i] + weight * (force - pair.applied_force[i])
+            acceleration = pair.acceleration[i] + weight * (acceleration - pair.acceleration[i])
+        pair.applied_force[i] = force
+        pair.acceleration[i] = acceleration
+    pair.seen = 1.0
+    pair.tick = tick
+    pair.rate[:] = rate
+
+
+@kernel
+def time_delay_estimate(pair: TimeDelayPair, h_bar: Array, n_hat: Array) -> None:
+    """(36) for a constant diagonal inertia ``h_bar`` (m,)."""
+    for i in range(n_hat.size):
+        n_hat[i] = pair.applied_force[i] - h_bar[i] * pair.acceleration[i]

@@ -1,0 +1,71 @@
+"""From measured and desired motion to the coordinates ``rho = [eps, theta]`` of the laws."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.samples import Reference, State
+from space_robot_sim.dynamics.attitude import attitude_jacobian, rotate, rotate_back
+
+from ..laws import Signals
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def measured_rate(state: State, quaternion: Array, jacobian: Array, rate: Array) -> None:
+    """Write J0 into ``jacobian`` and rhodot (m,) into ``rate`` (22).
+
+    ``quaternion`` is the state's or its negative, here and below.
+    """
+    attitude_jacobian(quaternion, jacobian)
+    rotate(jacobian, state.omega_base, rate[:3])
+    rate[3:] = state.joint_velocities
+
+
+@kernel
+def tracking_errors(
+    state: State, quaternion: Array, rate: Array, reference: Reference, jacobian: Array,
+    signals: Signals,
+) -> None:  # fmt: skip
+    """Write e, edot and rhodd_d into ``signals``.
+
+    Of the two quaternions of the desired attitude the one on the measured side is taken.
+    ``jacobian`` is scratch.
+    """
+    error, error_rate = signals.error, signals.error_rate
+    acceleration, desired, omega = (
+        signals.acceleration_desired, reference.quaternion, reference.omega_base,
+    )  # fmt: skip
+    dot = 0.0
+    for k in range(4):
+        dot += quaternion[k] * desired[k]
+    side = 1.0 if dot >= 0.0 else -1.0
+    attitude_jacobian(desired, jacobian)
+    rotate(jacobian, omega, error_rate[:3])
+    rotate(jacobian, reference.alpha_base, acceleration[:3])
+    squared_rate = omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2]
+    for k in range(3):
+        error[k] = side * desired[1 + k] - quaternion[1 + k]
+        error_rate[k] = side * error_rate[k] - rate[k]
+        acceleration[k] = side * (acceleration[k] - 0.25 * squared_rate * desired[1 + k])
+    for i in range(state.joint_positions.size):
+        error[3 + i] = reference.joint_positions[i] - state.joint_positions[i]
+        error_rate[3 + i] = reference.joint_velocities[i] - rate[3 + i]
+        acceleration[3 + i] = reference.joint_accelerations[i]
+
+
+@kernel
+def torque_from_force(jacobian: Array, force: Array, torque: Array) -> None:
+    """``tau = J^T F_S``: torque in the base frame and on the joints from the generalised force."""
+    rotate_back(jacobian, force[:3], torque[:3])
+    torque[3:] = force[3:]
+
+
+@kernel
+def force_from_torque(jacobian_inverse: Array, torque: Array, force: Array) -> None:
+    """``F_S = J^-T tau``, the inverse of `torque_from_force`."""
+    rotate_back(jacobian_inverse, torque[:3], force[:3])
+    force[3:] = torque[3:]

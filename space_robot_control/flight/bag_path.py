@@ -1,0 +1,40 @@
+"""The folder of a flight's bag."""
+
+from __future__ import annotations
+
+from datetime import datetime, timezone
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from space_robot_msgs_py.config.validation import short
+from space_robot_msgs_py.errors import InputError
+
+from .plan import Flight
+
+
+def default_bag(flight: Flight) -> Path:
+    """Return ``flights/<controller>_case<case>_<time>`` below the current folder."""
+    stamp = datetime.now(timezone.utc).strftime("%Y%m%d-%H%M%S")
+    case = Path(flight.plant_settings.case).stem
+    return Path("flights") / f"{flight.law.name}_case{case}_{stamp}"
+
+
+def check_bag_path(path: Path) -> None:
+    """See that a bag can be made there, without making anything.
+
+    Raises:
+        InputError: it exists, or its nearest existing folder cannot be written.
+    """
+    parent = path
+    try:
+        if path.exists():
+            raise InputError(f"{path}: exists already; a bag is never overwritten")
+        parent = next(p for p in path.absolute().parents if p.exists())
+        with TemporaryDirectory(dir=parent):
+            pass
+    except OSError as error:
+        raise InputError(
+            f"{path}: no bag can be written there ({parent}: {error.strerror})"
+        ) from None
+    except ValueError as error:
+        raise InputError(f"{short(str(path))}: no name of a folder ({error})") from None

@@ -1,0 +1,27 @@
+"""A process of this project that a command starts beside its own work."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from space_robot_msgs_py.ros import lifeline
+from space_robot_msgs_py.ros.run_module import clean_environment
+
+
+@contextmanager
+def child_process(command: Sequence[str], **options: Any) -> Iterator[subprocess.Popen[bytes]]:
+    """A process that does not outlive the context, nor this process; ``options``: of `Popen`.
+
+    It must be one that holds to its standard input, see `lifeline`.
+    """
+    environment = {**clean_environment(), **lifeline.held(), **options.pop("env", {})}
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, env=environment, start_new_session=True, **options
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.terminate()

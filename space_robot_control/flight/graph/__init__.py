@@ -1,0 +1,1 @@
+"""A flight as a graph of nodes: processes started, watched, disturbed and stopped."""

@@ -1,0 +1,46 @@
+"""The shortcomings of a flight that was flown to its end, by its nodes' last reports."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import NamedTuple
+
+MISSION_FAULTS = frozenset({"kill_mission", "stop_mission"})
+_NOT_USED = re.compile(r"(rejected|refused): (another publisher's on /|reference: )")
+
+
+class Degradation(NamedTuple):
+    """In words, each a line."""
+
+    failures: list[str]
+    """Reasons why the flight is not the one that was asked for."""
+    warnings: list[str]
+    """Things that were seen and did no harm."""
+
+
+def degradation(
+    nodes: Mapping[str, Mapping[str, str]], fault_kinds: frozenset[str], realtime: bool
+) -> Degradation:
+    """Judge a flight.
+
+    A reference that was held is another motion than the mission's. In lockstep nothing but a fault
+    of the mission can bring that about; by the wall clock any delay can.
+
+    Args:
+        nodes: the values that each node reported last, by its name.
+        fault_kinds: what was made to fail.
+        realtime: whether it was flown by the wall clock.
+    """
+    found = Degradation([], [])
+    for node, values in nodes.items():
+        held = int(values.get("references_held", 0))
+        if held and not fault_kinds & MISSION_FAULTS:
+            text = f"{node} held the reference for {held} ticks, for the mission's did not come"
+            (found.warnings if realtime else found.failures).append(text)
+        found.warnings.extend(
+            f"{node} {key}: {count} messages"
+            for key, count in values.items()
+            if _NOT_USED.match(key)
+        )
+    return found

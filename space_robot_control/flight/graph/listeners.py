@@ -1,0 +1,27 @@
+"""The listeners to each topic in a flight, for whom the nodes wait."""
+
+from __future__ import annotations
+
+from space_robot_msgs_py import topics
+
+from ..node_settings import SCHEMAS
+
+_TO_CONTROLLER = ("controller_node", "recorder_node")
+
+LISTENERS = {
+    topics.JOINT_STATES: _TO_CONTROLLER,
+    topics.BASE_STATE: _TO_CONTROLLER,
+    topics.COMMAND: ("plant_node", "recorder_node"),
+    topics.REFERENCE_JOINTS: _TO_CONTROLLER,
+    topics.REFERENCE_BASE: _TO_CONTROLLER,
+    topics.TELEMETRY: ("recorder_node",),
+    topics.LAW: ("recorder_node",),
+    topics.CLOCK: ("mission_node", "recorder_node"),
+}
+"""Nodes of the graph that subscribe to each topic."""
+
+
+def wait_for(node: str) -> list[str]:
+    """Return the parameter ``wait_for`` of the plant or the controller in a whole graph."""
+    (sends,) = (schema.sends for schema in SCHEMAS if schema.node == node)
+    return [f"{name}:{topic.name}" for topic in sends for name in LISTENERS[topic]]

@@ -1,0 +1,112 @@
+"""Following a flight from outside, on the topics any tool can read."""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.errors import MessageError
+from space_robot_msgs_py.wire.controller_telemetry import SIGNALS, TelemetryCodec
+from space_robot_msgs_py.wire.definitions import decode
+
+from .temporary_node import TemporaryNode
+
+CLOCK_DEPTH = 1_000
+"""All of a plant's messages are needed to tell them from another's."""
+MOST_AT_ONCE = 1_000
+"""Messages of a topic looked at in one poll: somebody may flood it."""
+
+
+class Event(NamedTuple):
+    """Something that happened in a flight."""
+
+    simulated_s: float
+    node: str
+    what: str
+
+    def __str__(self) -> str:
+        return f"{self.simulated_s:8.3f} s  {self.node}: {self.what}"
+
+
+class Monitor:
+    """Simulated time from /clock, errors from telemetry, the nodes' modes from /diagnostics."""
+
+    def __init__(self, domain: int) -> None:
+        from space_robot_msgs_py.ros.endpoints import (
+            FollowedSubscription,
+            PolledCallbackGroup,
+            RawSubscription,
+        )
+
+        self._visitor = TemporaryNode("flight_monitor", domain)
+        self.node = self._visitor.node
+        group = PolledCallbackGroup()
+        self._clock = FollowedSubscription(self.node, topics.CLOCK, group, depth=CLOCK_DEPTH)
+        self._telemetry = RawSubscription(self.node, topics.TELEMETRY, group, depth=1)
+        self._diagnostics = RawSubscription(self.node, topics.DIAGNOSTICS, group)
+        self.simulated_s = 0.0
+        self.has_begun = False
+        """True if the plant has sent a tick."""
+        self.errors: tuple[float, float] | None = None
+        """Largest current attitude error (eps) and joint error (rad)."""
+        self.modes: dict[str, str] = {}
+        """The mode of each node, by ROS name."""
+        self._levels: dict[str, int] = {}
+        self.values: dict[str, dict[str, str]] = {}
+        """The values that each node reported last."""
+        self.heard_at: dict[str, float] = {}
+        """The time of each node's last report, by the monotonic clock."""
+
+    def poll(self) -> list[Event]:
+        """Take the newest messages; the nodes' changes of mode that are worth a word."""
+        events: list[Event] = []
+        for take, read in (
+            (self._clock.take, self._read_clock),
+            (self._telemetry.take, self._read_telemetry),
+            (self._diagnostics.take, self._read_diagnostics),
+        ):
+            for _ in range(MOST_AT_ONCE):
+                data = take()
+                if data is None:
+                    break
+                with suppress(MessageError):  # somebody else's, not fit to be shown
+                    events += read(data)
+        return events
+
+    def _read_clock(self, data: bytes) -> list[Event]:
+        from space_robot_msgs_py.wire.cdr import header_stamp_ns
+
+        self.simulated_s, self.has_begun = header_stamp_ns(data) / 1e9, True
+        self._clock.source.follow()
+        return []
+
+    def _read_telemetry(self, data: bytes) -> list[Event]:
+        _, rows = TelemetryCodec.decode(data)
+        if rows.ndim == 2 and len(rows) == len(SIGNALS) and rows.shape[1] > 3:
+            error = abs(rows[SIGNALS.index("e")])
+            self.errors = float(error[:3].max()), float(error[3:].max())
+        return []
+
+    def _read_diagnostics(self, data: bytes) -> list[Event]:
+        statuses = decode(data, topics.DIAGNOSTICS.type).status
+        return [event for status in statuses for event in self._take_status(status)]
+
+    def _take_status(self, status: Any) -> list[Event]:
+        name, mode = status.name, status.message
+        self.heard_at[name] = time.monotonic()
+        self.values[name] = {item.key: item.value for item in status.values}
+        before, self.modes[name] = self.modes.get(name), mode
+        level_before, self._levels[name] = self._levels.get(name, 0), status.level
+        is_news = before != mode and (status.level > 0 or level_before > 0)
+        return [Event(self.simulated_s, name, mode)] if is_news else []
+
+    @property
+    def complaints(self) -> dict[str, str]:
+        """The modes of nodes that are not well, by their names."""
+        return {name: mode for name, mode in self.modes.items() if self._levels[name] > 0}
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._visitor.leave()

@@ -1,0 +1,92 @@
+"""Calls of the nodes' services: their lifecycle, and their parameters."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from space_robot_msgs_py.errors import FlightError
+
+TIMEOUT_S = 60.0
+POLL_S = 0.02
+
+Check = Callable[[], None]
+"""Called while waiting; raises to give up."""
+
+
+def change_state(node: Any, names: Sequence[str], transition: str, check: Check) -> list[str]:
+    """Put nodes through a transition of their lifecycle, all at once.
+
+    Args:
+        node: the rclpy node to call from.
+        names: ROS names of the nodes.
+        transition: its label, as ``configure``.
+        check: see `Check`.
+
+    Returns:
+        The nodes that refused.
+
+    Raises:
+        FlightError: a node does not answer.
+    """
+    from lifecycle_msgs.msg import Transition
+    from lifecycle_msgs.srv import ChangeState
+
+    number = getattr(Transition, f"TRANSITION_{transition.upper()}")
+    request = ChangeState.Request(transition=Transition(id=number))
+    answers = _call(node, ChangeState, [f"/{name}/change_state" for name in names], request, check)
+    return [name for name, answer in zip(names, answers, strict=True) if not answer.success]
+
+
+def set_parameters(
+    node: Any, name: str, parameters: Mapping[str, str | list[float]], check: Check
+) -> None:
+    """Set parameters of a live node, all of them or none; return when it has done so.
+
+    Args:
+        node: the rclpy node to call from.
+        name: ROS name of the node whose parameters they are.
+        parameters: their values.
+        check: see `Check`.
+
+    Raises:
+        FlightError: the node refuses, or does not answer.
+    """
+    from rcl_interfaces.srv import SetParametersAtomically
+    from rclpy.parameter import Parameter
+
+    make: Any = Parameter
+    request = SetParametersAtomically.Request(
+        parameters=[make(n, value=v).to_parameter_msg() for n, v in parameters.items()]
+    )
+    service = f"/{name}/set_parameters_atomically"
+    (answer,) = _call(node, SetParametersAtomically, [service], request, check)
+    if not answer.result.successful:
+        raise FlightError(f"{name} refused to change its parameters: {answer.result.reason}")
+
+
+def _call(node: Any, kind: Any, services: Sequence[str], request: Any, check: Check) -> list[Any]:
+    """Call services of one kind at the same time; return their answers."""
+    from rclpy.executors import SingleThreadedExecutor
+
+    clients = {service: node.create_client(kind, service) for service in services}
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    answers: dict[str, Any] = {}
+    until = time.monotonic() + TIMEOUT_S
+    try:
+        while len(answers) < len(clients) or not all(a.done() for a in answers.values()):
+            check()
+            for service, client in clients.items():
+                if service not in answers and client.service_is_ready():
+                    answers[service] = client.call_async(request)
+            if time.monotonic() > until:
+                silent = [s for s in services if s not in answers or not answers[s].done()]
+                raise FlightError(f"no answer of {', '.join(silent)} for {TIMEOUT_S:.0f} s")
+            executor.spin_once(timeout_sec=POLL_S)
+        return [answers[service].result() for service in services]
+    finally:
+        executor.shutdown()
+        for client in clients.values():
+            node.destroy_client(client)

@@ -1,0 +1,32 @@
+"""A node of a command in the graph it started: beside the flight's nodes, and gone with it."""
+
+from __future__ import annotations
+
+import os
+
+from space_robot_msgs_py.ros.process_environment import set_defaults
+
+
+class TemporaryNode:
+    """Joins a domain under ``<name>_<pid>``, without services or logs of its own."""
+
+    def __init__(self, name: str, domain: int) -> None:
+        set_defaults()
+        import rclpy
+        from rclpy.context import Context
+        from rclpy.signals import SignalHandlerOptions
+
+        self._context = Context()
+        rclpy.init(
+            args=[], context=self._context, domain_id=domain,
+            signal_handler_options=SignalHandlerOptions.NO,
+        )  # fmt: skip
+        self.node = rclpy.create_node(
+            f"{name}_{os.getpid()}", context=self._context,
+            start_parameter_services=False, enable_rosout=False,
+        )  # fmt: skip
+
+    def leave(self) -> None:
+        """Leave the graph."""
+        self.node.destroy_node()
+        self._context.try_shutdown()

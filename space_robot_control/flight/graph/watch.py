@@ -1,0 +1,106 @@
+"""Looking after a flight's processes: what is done when one ends or hangs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+from .monitor import Event, Monitor
+from .processes import Graph, NodeProcess
+
+HUNG_S = 2.0
+"""Without a word for this long a controller hangs; its diagnostics come every second."""
+MOST_RESTARTS = 20
+
+
+class Watch:
+    """Keeps the flight going where that makes sense.
+
+    Without its plant a flight is over. A controller is restarted if that is wanted. Without
+    recorder or mission the flight goes on: the one costs the bag's end, without the other the last
+    point of the reference is held.
+    """
+
+    def __init__(
+        self,
+        graph: Graph,
+        monitor: Monitor,
+        planned: frozenset[str],
+        restart_command: Sequence[str] | None,
+        last_tick: int,
+    ) -> None:
+        """Watch a graph.
+
+        Args:
+            graph: the processes.
+            monitor: of what the nodes say.
+            planned: nodes that are killed on purpose.
+            restart_command: the controller's (None: it is not started again).
+            last_tick: the plant has flown to its end when it has reached this one.
+        """
+        self._graph, self._monitor, self._last_tick = graph, monitor, last_tick
+        self._planned, self._restart_command = planned, restart_command
+        self._gone: set[str] = set()
+        self._has_flown = False
+        self.restarts = 0
+        self.failures: list[str] = []
+        """Reasons why the flight is not whole."""
+
+    def poll(self, simulated_s: float) -> list[Event]:
+        """Look after all processes.
+
+        Raises:
+            FlightError: the flight cannot go on.
+        """
+        events = []
+        leader = self._graph.leader
+        for name, node in list(self._graph.nodes.items()):
+            hangs = name == "controller" and self._restart_command is not None and self._hangs(name)
+            if (node.exit_code is None and not hangs) or name in self._gone:
+                continue
+            if node is leader:
+                if node.exit_code != 0:
+                    self._lose_leader(node)
+                continue
+            ended = "does not answer" if hangs else node.exit_summary()
+            events.append(Event(simulated_s, f"{name}_node", ended))
+            if name == "controller":
+                self._lose_controller(node)
+            else:
+                self._gone.add(name)
+                if name == "recorder" or name not in self._planned:
+                    self.failures.append(f"{ended} at {simulated_s:.2f} s")
+        return events
+
+    def check_recorder_exit(self) -> None:
+        """See, once all nodes have been stopped, whether the recorder kept everything."""
+        recorder = self._graph.host_of("recorder")
+        if recorder.exit_code != 0 and "recorder" not in self._gone:
+            self.failures.append(recorder.output_tail().splitlines()[-1].strip())
+
+    @property
+    def is_complete(self) -> bool:
+        """True if the plant has flown to its end."""
+        return self._graph.leader.exit_code == 0 or self._has_flown
+
+    def _hangs(self, name: str) -> bool:
+        heard_at = self._monitor.heard_at.get(f"{name}_node")
+        return heard_at is not None and time.monotonic() - heard_at > HUNG_S
+
+    def _lose_leader(self, leader: NodeProcess) -> None:
+        """End the flight; if the plant has flown to its end it was the recorder that failed."""
+        self._monitor.poll()
+        tick = int(self._monitor.values.get("plant_node", {}).get("tick", 0))
+        self._has_flown = leader is self._graph.host_of("recorder") and tick >= self._last_tick
+        if not self._has_flown:
+            raise leader.early_end()
+
+    def _lose_controller(self, node: NodeProcess) -> None:
+        if self._restart_command is not None and self.restarts < MOST_RESTARTS:
+            self.restarts += 1
+            self._graph.restart("controller", self._restart_command)
+            self._monitor.heard_at.pop("controller_node", None)  # until it speaks again
+        elif "controller" in self._planned:
+            self._gone.add("controller")
+        else:
+            raise node.early_end()

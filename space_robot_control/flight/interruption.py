@@ -1,0 +1,58 @@
+"""Signals that end a command: with its files and processes put away, and a shell's exit code."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+QUIET_S = 2.0
+"""A signal that comes twice, as from ``timeout``, must not disturb the putting away."""
+
+
+class Interrupted(KeyboardInterrupt):
+    """The user has ended the command by a signal."""
+
+    def __init__(self, number: int) -> None:
+        """``number``: of the signal."""
+        super().__init__(f"stopped by {signal.Signals(number).name}")
+        self.number, self.exit_code = number, exit_code(number)
+
+
+def exit_code(number: int) -> int:
+    """Return a command's exit code after a signal, as shells tell it: 130 for SIGINT."""
+    return 128 + number
+
+
+@contextmanager
+def raising_signals() -> Iterator[None]:
+    """In the context SIGINT, SIGTERM and SIGHUP raise `Interrupted` in the main thread."""
+    quiet_until = 0.0
+
+    def raise_interrupted(number: int, frame: object) -> None:
+        nonlocal quiet_until
+        if (now := time.monotonic()) >= quiet_until:
+            quiet_until = now + QUIET_S
+            raise Interrupted(number)
+
+    with handled_signals(raise_interrupted):
+        yield
+
+
+@contextmanager
+def handled_signals(handler: Callable[[int, Any], None]) -> Iterator[None]:
+    """In the context a handler for `SIGNALS`, but not for a SIGHUP that is ignored (``nohup``)."""
+    numbers = [
+        number
+        for number in SIGNALS
+        if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN
+    ]
+    previous = {number: signal.signal(number, handler) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, before in previous.items():
+            signal.signal(number, before)

@@ -1,0 +1,19 @@
+"""The memory that is left."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+
+def available_bytes() -> float:
+    """Memory that a process can still have without swapping, as Linux estimates it.
+
+    Infinite where that is not told.
+    """
+    try:
+        lines = Path("/proc/meminfo").read_text("ascii").splitlines()
+    except OSError:
+        return math.inf
+    kibibytes = next((line.split()[1] for line in lines if line.startswith("MemAvailable:")), "inf")
+    return 1024.0 * float(kibibytes)

@@ -1,0 +1,46 @@
+"""The software that flies: the commit it was started from, and the versions of what it uses."""
+
+from __future__ import annotations
+
+import platform
+import subprocess
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from space_robot_msgs_py.config.files import config_directory
+
+PACKAGES = (
+    "space_robot", "numpy", "scipy", "numba", "llvmlite", "matplotlib", "mcap", "rosbags",
+)  # fmt: skip
+
+
+@cache
+def commit() -> str | None:
+    """Return the commit, with ``-dirty`` if a file was changed since; None outside a checkout."""
+    root = Path(__file__).resolve().parents[2]
+    if not (root / ".git").exists() or root != config_directory().parent:
+        return None
+    try:
+        done = subprocess.run(
+            # no tag matches, so it prints the hash
+            ["git", "-C", str(root), "describe", "--always", "--abbrev=40", "--exclude=*",
+             "--dirty"],
+            capture_output=True, text=True, timeout=10, check=True,
+        )  # fmt: skip
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return done.stdout.strip()
+
+
+@cache
+def versions() -> dict[str, str | None]:
+    """Return the versions of Python and the packages (None: not installed as a package)."""
+    return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None

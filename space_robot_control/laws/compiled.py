@@ -1,0 +1,79 @@
+"""Laws whose equation is a kernel, so that whole flights run in compiled code."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from space_robot_msgs_py.compiled.kernels import RecordFunction
+from space_robot_msgs_py.compiled.records import Block, Record, prefix, shaped
+
+from .base import Array, ControlLaw, LawMemory, Signals
+
+
+class SomeGains(Record):
+    """The gains of a law that is not known: there is a number at least."""
+
+    first: float = shaped(lambda n: ())
+
+
+class LawCode(NamedTuple):
+    """A law as compiled loops take it, the same type for every law."""
+
+    run: Any
+    """The kernel as a function of `Signals`, `SomeGains`, `LawMemory` and the period."""
+    gains: Block
+    """Of `SomeGains`."""
+    memory: Block
+    """Of `LawMemory`."""
+    h_bar: Array
+    """See `ControlLaw`."""
+    uses_model: bool
+
+
+class CompiledLaw(ControlLaw):
+    """A law with a ``kernel`` (and a ``memory_type``, if it remembers anything)."""
+
+    @staticmethod
+    @abstractmethod
+    def kernel(signals: Signals, gains: Any, memory: Any, period: float) -> None:
+        """Write ``memory.s``, ``memory.u`` and ``memory.force`` of a tick; a `kernel`.
+
+        Args:
+            signals: of this tick; not to be changed.
+            gains: a record of ``gains_type``.
+            memory: a record of ``memory_type``.
+            period: s.
+        """
+
+    @property
+    def function(self) -> RecordFunction:
+        """The kernel, compiled for this law's records."""
+        n = len(self.memory.s) - 3
+        own: list[Any] = [self.gains_type, self.memory_type]  # classes, which can be hashed
+        return _compiled(type(self).kernel, *own, n)
+
+    @property
+    def code(self) -> LawCode:
+        """The law for compiled loops; it shares gains and memory."""
+        n = len(self.memory.s) - 3
+        gains = prefix(self.gains_block, SomeGains.dtype(n))
+        memory = prefix(self.memory_block, LawMemory.dtype(n))
+        return LawCode(self.function, gains, memory, self.h_bar, self.uses_model)
+
+    def force(self, signals: Signals) -> Array:
+        """Run the kernel; ``signals`` is a `Signals.view`."""
+        self.function.call(signals.address, self.gains.address, self.memory.address, self.period)
+        force: Array = self.memory.force
+        return force
+
+
+@cache
+def _compiled(kernel: Callable[..., None], gains: Any, memory: Any, n: int) -> RecordFunction:
+    layouts: list[np.dtype[Any]] = [record.dtype(n) for record in (Signals, gains, memory)]
+    seen_as = [record.dtype(n) for record in (Signals, SomeGains, LawMemory)]
+    return RecordFunction(kernel, layouts, seen_as)

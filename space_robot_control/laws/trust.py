@@ -1,0 +1,53 @@
+"""Whose word is followed: a bag may be anybody's, and its description may name files and modules.
+
+Names of what is shipped are looked up whoever says them. A path to a file, or a ``module:Class``
+that would be imported, is opened only if the user has given it, or trusts the bag.
+"""
+
+from __future__ import annotations
+
+from space_robot_msgs_py.errors import InputError
+
+from . import laws
+
+_LONGEST_NAME = 100
+
+
+class NotTrustedError(InputError):
+    """The bag names a file or module, which is opened only on the user's word."""
+
+
+def is_plain(name: str) -> bool:
+    """Whether a name is looked up among what is shipped; else it is a path to somewhere."""
+    is_path = "/" in name or name.endswith((".yaml", ".yml")) or name in (".", "..")
+    return name.isprintable() and not is_path and len(name) <= _LONGEST_NAME
+
+
+def check_file(what: str, name: str) -> None:
+    """See that a name out of a bag that is not trusted opens no file but those shipped.
+
+    Raises:
+        NotTrustedError: it is a path.
+    """
+    if not is_plain(name):
+        raise NotTrustedError(
+            f"the bag names a file as its {what}, {_short(name)}: read only with --trust"
+        )
+
+
+def check_law(name: str) -> None:
+    """See that a law's name out of a bag that is not trusted imports nothing but what is shipped.
+
+    Raises:
+        NotTrustedError: it is not the name of a shipped law.
+    """
+    if name not in laws():
+        raise NotTrustedError(
+            f"the bag names the law {_short(name)}, which is none of those shipped: if it is "
+            "module:Class, --trust imports it, which runs its code"
+        )
+
+
+def _short(name: str) -> str:
+    text = repr(name)
+    return text if len(text) <= 80 else f"{text[:77]}..."

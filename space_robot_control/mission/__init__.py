@@ -1,0 +1,1 @@
+"""The desired motion: quintic segments through waypoints, streamed ahead of need."""

@@ -1,0 +1,63 @@
+"""The figures of the report: the mission, the laws side by side, each row by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future
+
+from matplotlib.figure import Figure
+
+from ...analysis.figures import chatter, desired_joints, junctions
+from ...analysis.figures.figure_set import FigureFolder, SavedFigure
+from ...analysis.plot_series import BaseTorque
+from ...flight.plan import Flight, FlightPlan
+from ...flight.simulate import unflown
+from .flights import ROBOT, Result, Row
+
+FIGURE_OF_CASE = {"1": "6", "2": "7", "3": "8", "4-1": "9a", "4-2": "9b"}
+MISSION = "figure5_desired_joints"
+
+
+COMPARISONS: dict[str, tuple[str, Callable[[Mapping[str, BaseTorque]], Figure]]] = {
+    "chatter": ("Chatter of the base torque in case 1", chatter),
+    "junctions": ("Base torque at the junction of the two motions, case 1", junctions),
+}
+"""Caption and drawing of the figures of all laws, by the name of their files."""
+
+
+def start_comparisons(
+    pool: Executor, results: Sequence[Result], duration: float | None, folder: FigureFolder
+) -> Iterator[Future[None]]:
+    """Draw the mission and the comparisons of ``results`` in other processes."""
+    flights = {r.row.controller: r.base_torque for r in results if r.base_torque is not None}
+    if flights:
+        yield pool.submit(_draw_mission, duration, folder)
+        for stem in COMPARISONS:
+            yield pool.submit(_draw_comparison, stem, flights, folder)
+
+
+def _draw_mission(duration: float | None, folder: FigureFolder) -> None:
+    log = unflown(Flight(FlightPlan(robot=ROBOT, duration=duration)))
+    folder.save(desired_joints(log), MISSION)
+
+
+def _draw_comparison(stem: str, flights: Mapping[str, BaseTorque], folder: FigureFolder) -> None:
+    _, draw = COMPARISONS[stem]
+    folder.save(draw(flights), stem)
+
+
+def figure_groups(rows: Sequence[Row], folder: FigureFolder) -> dict[str, list[SavedFigure]]:
+    """Return the figures that were drawn by their heading, the mission's first, then by case."""
+    groups = {
+        "The mission, and the laws beside one another": [
+            (MISSION, "Figure 5: desired joint angles"),
+            *((stem, caption) for stem, (caption, _) in COMPARISONS.items()),
+        ]
+    }
+    for case, number in FIGURE_OF_CASE.items():
+        groups[f"Case {case}"] = [
+            (row.stem, f"Figure {number}: {row.controller}, {row.shown.title}")
+            for row in rows
+            if row.case == case
+        ]
+    return {title: found for title, g in groups.items() if (found := folder.saved(g))}

@@ -1,0 +1,38 @@
+"""The circle criterion of Appendix B: does G stay within the circle of radius 1 / beta?
+
+The text under (71) names the radius beta; (73) has it right. Printed (77) has a wrong second case
+(its terms do not even share a unit); the one here follows from (75) and (76).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+def transfer_function(k_1: float, k_2: float, omega: Array) -> ComplexArray:
+    """(74): ``G(j omega) = 1 / (2 s^2 + K_1 s + K_2)``, at ``omega`` in rad/s; s3/rad."""
+    s = 1j * omega
+    return np.asarray(1.0 / (2.0 * s**2 + k_1 * s + k_2))
+
+
+def peak_gain(k_1: float, k_2: float) -> float:
+    """(77), corrected: ``max |G(j omega)|``, infinite if G has a pole that does not decay.
+
+    ``1 / K_2^2`` at omega = 0 if ``K_1^2 >= 4 K_2``, else ``16 / (8 K_2 K_1^2 - K_1^4)`` at
+    ``omega^2 = K_2 / 2 - K_1^2 / 8``, both of the square.
+    """
+    tolerated = largest_tolerated_beta(k_1, k_2)
+    return 1.0 / tolerated if tolerated > 0.0 else np.inf
+
+
+def largest_tolerated_beta(k_1: float, k_2: float) -> float:
+    """Return the beta up to which (73) holds, ``1 / max |G|``: K_2 itself if ``K_1^2 >= 4 K_2``."""
+    if k_1 <= 0.0 or k_2 <= 0.0:
+        return 0.0
+    if k_1**2 >= 4.0 * k_2:
+        return k_2
+    return k_1 / 4.0 * float(np.sqrt(8.0 * k_2 - k_1**2))

@@ -1,0 +1,139 @@
+"""Figures of a stability study: the Nyquist plot of G (74) and V(t) against its bound (55)."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ...analysis.figures.style import COLOURS, GREY, grid, house_style, page, plain, save_figure
+from .circle_criterion import transfer_function
+from .study import Study
+from .super_twisting import SuperTwisting
+
+BLACK, BLUE, ORANGE = COLOURS[0], COLOURS[2], COLOURS[6]
+POINTS = 1500
+"""Points of a line; more would only make the SVG larger."""
+
+
+def draw(study: Study, folder: Path) -> list[Path]:
+    """Write ``nyquist`` and ``lyapunov`` as PNG and SVG; nothing for a law without K_1 and K_2."""
+    if study.super_twisting is None:
+        return []
+    figures = {
+        "nyquist": nyquist(study.super_twisting, study.axis_names),
+        "lyapunov": lyapunov(study.super_twisting, study.axis_names),
+    }
+    return [file for name, figure in figures.items() for file in save_figure(figure, folder / name)]
+
+
+@house_style()
+def nyquist(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
+    """G(j omega) of each distinct pair of gains, with the circles of (73).
+
+    The criterion holds where the curve lies within the circle of radius 1 / beta. The circle of
+    the tolerated beta is the smallest that the curve does not leave; that of the measured beta
+    is drawn for the axis of the group where beta is smallest.
+    """
+    groups: dict[tuple[float, float], list[int]] = {}
+    for axis, gains in enumerate(twisting.gains):
+        if min(gains) > 0.0:
+            groups.setdefault(gains, []).append(axis)
+    columns = max(1, min(2, len(groups)))
+    figure = page(14.0 + 78.0 * max(1, math.ceil(len(groups) / columns)))
+    panels = grid(figure, len(groups), columns, shared=False)
+    for panel, (gains, axes) in zip(panels, groups.items(), strict=True):
+        tolerated, measured = twisting.tolerated_beta[axes[0]], np.min(twisting.beta[axes])
+        _nyquist_panel(panel, gains, float(tolerated), float(measured))
+        panel.set_title(
+            f"{plain(', '.join(names[axis] for axis in axes))}\n"
+            rf"$\beta$ tolerated {tolerated:.3g}, measured {measured:.3g} or more"
+        )
+    figure.supxlabel(r"real part of $G(j\omega)$ (s$^3$/rad; base: s$^3$)")
+    figure.supylabel(r"imaginary part of $G(j\omega)$ (s$^3$/rad; base: s$^3$)")
+    _legend(figure, panels)
+    return figure
+
+
+def _nyquist_panel(
+    panel: Axes, gains: tuple[float, float], tolerated: float, measured: float
+) -> None:
+    half = np.geomspace(1e-3, 1e3, POINTS) * math.sqrt(gains[1] / 2.0)
+    g = transfer_function(*gains, np.concatenate([-half[::-1], half]))
+    angle = np.linspace(0.0, 2.0 * np.pi, 361)
+    circles = [(tolerated, "--", BLUE, r"radius 1/$\beta$, $\beta$ tolerated")]
+    if measured > 0.0:
+        circles.append((measured, "-", ORANGE, r"radius 1/$\beta$, $\beta$ measured"))
+    for beta, dashes, colour, label in circles:
+        panel.plot(
+            np.cos(angle) / beta, np.sin(angle) / beta, dashes, color=colour, label=label,
+            linewidth=1.6 if dashes == "-" else 1.0,
+        )  # fmt: skip
+    panel.plot(g.real, g.imag, color=BLACK, label=r"$G(j\omega)$, all $\omega$")
+    if measured > 0.0:  # its circle may be too small to be seen
+        panel.plot(0.0, 0.0, "o", color=ORANGE, markersize=3.0)
+    panel.set_aspect("equal")
+    reach = 1.1 / tolerated
+    panel.set_xlim(-reach, reach)
+    panel.set_ylim(-reach, reach)
+    panel.locator_params(nbins=5)
+
+
+@house_style()
+def lyapunov(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
+    """V(t) of (47) in the flight from the initial error, each axis with its bound (55).
+
+    V is shown against V(0): its own unit is that of beta^2 |s| / K_1, and tells nothing. Of each
+    step of the figure's time its largest value is drawn, so no peak above the bound is lost.
+    """
+    figure = page(14.0 + 46.0 * math.ceil(len(names) / 3))
+    panels = grid(figure, len(names), 3, shared=False)
+    reaching = twisting.reaching
+    steps = np.unique(np.geomspace(1, len(reaching.time) - 1, POINTS).astype(int))
+    rows = zip(
+        panels, names, twisting.certificates, twisting.measured_certificates,
+        twisting.reaching_time, strict=True,
+    )  # fmt: skip
+    for axis, (panel, name, certificate, measured, check) in enumerate(rows):
+        panel.set_title(plain(name))
+        if certificate is None:
+            panel.text(0.5, 0.5, "no solution of (51)", ha="center", transform=panel.transAxes)
+            continue
+        value = certificate.value(reaching.eta[:, axis])
+        start = float(value[0])
+        if start == 0.0:
+            panel.text(0.5, 0.5, "V(0) = 0", ha="center", transform=panel.transAxes)
+            continue
+        time = np.geomspace(reaching.time[1], 0.999 * check.limit, POINTS)
+        panel.loglog(
+            reaching.time[steps], np.maximum.reduceat(value, steps) / start, color=BLUE,
+            linewidth=0.7, label="measured",
+        )  # fmt: skip
+        which = "measured" if measured else "assumed"
+        panel.loglog(
+            time, certificate.bound(start, time) / start, "--", color=ORANGE,
+            label=rf"bound (55) for the {which} $\beta$",
+        )  # fmt: skip
+        if math.isfinite(check.value):
+            panel.axvline(check.value, color=GREY, linestyle=":", label="|s| reached")
+        panel.set_ylim(1e-8, 1e3)
+        panel.set_xlim(reaching.time[1], None)
+        panel.minorticks_off()
+    figure.supxlabel("time (s)")
+    figure.supylabel("V(t) / V(0) (dimensionless)")
+    _legend(figure, panels)
+    return figure
+
+
+def _legend(figure: Figure, panels: list[Axes]) -> None:
+    """Name each kind of line once, above all panels."""
+    lines = {
+        label: handle
+        for panel in panels
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True)
+    }
+    if lines:
+        figure.legend(lines.values(), lines.keys(), loc="outside upper center", ncols=len(lines))

@@ -1,0 +1,97 @@
+"""Finite-time reaching (53)-(56): a flight that starts off the mission, against its bound.
+
+The state of (46) is ``eta = [|s|^1/2 sign(s), psi]``. Its psi is *not* the integral in the law
+(42), which appears on the other side of (44): ``psi = eps - integral of K_2 sign(s)``, hence
+``psidot = -K_2 sign(s) + epsdot`` as (45) has it. The first line of (46) gives it without either,
+``psi = sdot + K_1 |s|^1/2 sign(s)``, with sdot the mean over a tick: so it is measured here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.bag.flight_log import FlightLog
+
+from ...flight.plan import Flight, FlightPlan
+
+Array = NDArray[np.float64]
+
+REACHED = 0.01
+"""Share of |s(0)| below which the sliding surface counts as reached."""
+RIPPLE_PERCENTILE = 99.9
+"""% of the ticks of a flight without initial error that define the ripple of s."""
+DWELL = 1.0
+"""s that |s| must stay below: later, friction may push a joint off the surface again."""
+
+
+@dataclass(frozen=True)
+class Reaching:
+    """A flight from an initial error, per axis."""
+
+    time: Array
+    """(K,) s."""
+    eta: Array
+    """(K, m, 2) state of (46)."""
+    threshold: Array
+    """(m,) |s| below which an axis counts as arrived, rad/s (eps: 1/s)."""
+    measured: Array
+    """(m,) s until then; NaN where that never happened."""
+
+
+def off_mission_plan(flight: Flight, initial_error: float) -> FlightPlan:
+    """Return the plan of ``flight``, started with ``e = initial_error`` on every axis, at rest."""
+    start = flight.mission.chunk(0, 1)
+    eps = start.base[0, 1:4] - initial_error
+    eta = np.copysign(np.sqrt(1.0 - eps @ eps), start.base[0, 0])
+    plant: dict[str, Any] = {
+        "initial_quaternion": [float(eta), *eps.tolist()],
+        "initial_joints_deg": np.degrees(start.joints[0, 0] - initial_error).tolist(),
+    }
+    return flight.plan.with_parameters("plant", plant)
+
+
+def ripple(s: Array) -> Array:
+    """(m,) how far ``s`` (N, m) is off zero anyway, by sampling, in all but the rarest ticks."""
+    return np.asarray(np.percentile(np.abs(s), RIPPLE_PERCENTILE, axis=0))
+
+
+def lyapunov_state(s: Array, k_1: Array, period: float) -> Array:
+    """(N-1, m, 2) eta of (47) from ``s`` (N, m) and ``k_1`` (m,)."""
+    root = np.sqrt(np.abs(s[:-1])) * np.sign(s[:-1])
+    psi = np.diff(s, axis=0) / period + k_1 * root
+    return np.asarray(np.stack([root, psi], axis=-1))
+
+
+def arrival(s: Array, threshold: Array, period: float) -> Array:
+    """(m,) s after which |s| first stays below ``threshold`` for `DWELL`; NaN if never."""
+    ticks = max(1, round(DWELL / period))
+    times = np.full(s.shape[1], np.nan)
+    for axis in range(s.shape[1]):
+        outside = np.flatnonzero(np.abs(s[:, axis]) > threshold[axis])
+        begins = np.concatenate([[0], outside + 1])
+        ends = np.concatenate([outside, [len(s)]])
+        long_enough = np.flatnonzero(ends - begins >= ticks)
+        if len(long_enough):
+            times[axis] = begins[long_enough[0]] * period
+    return times
+
+
+def reaching(log: FlightLog, k_1: Array, undisturbed: Array) -> Reaching:
+    """Measure when a flight from an initial error arrives on the sliding surface.
+
+    Args:
+        log: that flight, with telemetry.
+        k_1: (m,) K_1 of its law.
+        undisturbed: (m,) `ripple` of the flight without an initial error.
+    """
+    if log.telemetry is None:
+        raise ValueError("the reaching time needs a log with the controller's telemetry")
+    s, period = log.telemetry[:, 0], log.timebase.period
+    threshold = np.maximum(REACHED * np.abs(s[0]), undisturbed)
+    eta = lyapunov_state(s, k_1, period)
+    time = np.arange(len(eta), dtype=np.float64) * period
+    return Reaching(time, eta, threshold, arrival(s, threshold, period))

@@ -1,0 +1,84 @@
+"""A study as plain data for JSON: no NaN, no infinity, None where there is no number."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from .check import Check
+from .lemma_1 import SAMPLING
+from .lyapunov import Certificate
+from .study import Study
+from .super_twisting import SuperTwisting
+from .time_delay_error import ErrorDerivative
+
+
+def report(study: Study) -> dict[str, Any]:
+    """Everything found; lists hold one entry an axis, in the order of ``axes``."""
+    flight, lemma_1 = study.flight, study.lemma_1
+    found = {
+        **{key: flight.description[key] for key in ("controller", "case", "gains", "robot")},
+        "friction": flight.has_friction,
+        "duration_s": flight.ticks * flight.period,
+        "axes": study.axis_names,
+        "lemma_1": {
+            "sampled_every_s": SAMPLING,
+            "spectral_norm": lemma_1.norm._asdict(),
+            "spectral_radius": lemma_1.radius._asdict(),
+            "spectral_norm_below_1": lemma_1.norm_below_one,
+            "spectral_radius_below_1": lemma_1.radius_below_one,
+        },
+        "time_delay_error": {
+            "as_flown": study.error,
+            "without_friction": study.frictionless_error,
+        },
+        "super_twisting": study.super_twisting and _super_twisting(study.super_twisting),
+    }
+    plain: dict[str, Any] = _plain(found)
+    return plain
+
+
+def _super_twisting(found: SuperTwisting) -> dict[str, Any]:
+    return {
+        "k_1": found.k_1,
+        "k_2": found.k_2,
+        "beta": found.beta,
+        "tolerated_beta": found.tolerated_beta,
+        "beta_below_k_2": found.k_2_above_beta,
+        "4_k_2_below_k_1_squared": found.k_1_squared_above_4_k_2,
+        "circle_criterion": found.circle_criterion,
+        "lmi": {
+            "residual_of_paper_m_at_beta_0_gamma_0": found.paper_m_residual,
+            "paper_m_eigenvalues": found.paper_m_eigenvalues,
+            "measured_beta": found.measured_certificates,
+            "assumed_beta_half_of_tolerated": found.assumed_certificates,
+        },
+        "reaching": {
+            "initial_error": found.initial_error,
+            "initial_lyapunov_value": found.initial_values,
+            "threshold_of_s": found.reaching.threshold,
+            "beta_of_bound": [c and c.beta for c in found.certificates],
+            "beta_of_this_flight": found.reaching_beta,
+            "reaching_time_s_below_bound": found.reaching_time,
+        },
+    }
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Check):
+        return _plain({"holds": value.holds, **value._asdict()})
+    if isinstance(value, (Certificate, ErrorDerivative)):
+        return _plain(asdict(value))
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, Mapping):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value

@@ -1,0 +1,67 @@
+"""Long flights come in blocks: metrics are summed up block by block, in flat memory."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .flight_log import FlightLog
+
+Array = NDArray[np.float64]
+
+BLOCK_TICKS = 60_000
+"""Rows of a block but the last: 30 s at 2 kHz, the paper's whole mission."""
+
+
+class Metric(ABC):
+    """A number, or several, that tell how well a flight was flown, summed up block by block.
+
+    The same blocks give the same bits, and blocks cut elsewhere the same numbers but for rounding:
+    what spans two blocks (a difference, a delay) is taken across their border.
+    """
+
+    @abstractmethod
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take the next rows of the flight, whole ones, and their tracking error (N, m)."""
+
+    @abstractmethod
+    def result(self) -> Any:
+        """Return the metric of all rows so far, ready for JSON.
+
+        Raises:
+            InputError: this flight does not have it.
+        """
+
+
+def block_bounds(ticks: int) -> Iterator[tuple[int, int]]:
+    """Yield the first row and the row after the last of each block of a flight of ``ticks``."""
+    for start in range(0, ticks, BLOCK_TICKS):
+        yield start, min(start + BLOCK_TICKS, ticks)
+
+
+def blocks_of(log: FlightLog) -> Iterator[FlightLog]:
+    """Yield the blocks of a log that is in memory as a whole, as views, from its first row on."""
+    for start, stop in block_bounds(log.ticks):
+        yield log.rows(start, stop)
+
+
+def last_rows(log: FlightLog, count: int) -> FlightLog:
+    """Copy the last ``count`` rows, or all if there are fewer."""
+    rows = log.rows(max(0, log.ticks - count), log.ticks)
+    return replace(rows, **{name: column.copy() for name, column in rows.columns.items()})
+
+
+def joined(before: FlightLog | None, log: FlightLog) -> FlightLog:
+    """Put the rows of ``before`` in front of ``log``; without any it is ``log`` itself."""
+    if before is None:
+        return log
+    columns: dict[str, Any] = {
+        name: np.concatenate([getattr(before, name), column])
+        for name, column in log.columns.items()
+    }
+    return replace(log, **columns, first_tick=before.first_tick)

@@ -1,0 +1,158 @@
+"""A flight as arrays, one row a tick: what the analysis reads, from a bag or from memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled.records import Block
+from ..samples import STATE_FIELDS, LawInForce, ReferenceChunk, RobotState, State, Timebase
+
+Array = NDArray[np.float64]
+
+REFERENCE = ("reference_joints", "reference_base")
+"""The columns the desired motion fills."""
+
+
+@dataclass(slots=True)
+class FlightLog:
+    """Measured and desired motion and the applied torque, tick by tick from 0."""
+
+    timebase: Timebase
+    joint_names: tuple[str, ...]
+    base_position: Array
+    """(N, 3) m, inertial frame."""
+    quaternion: Array
+    """(N, 4) ``[w, x, y, z]``."""
+    base_velocity: Array
+    """(N, 3) m/s, inertial frame."""
+    omega_base: Array
+    """(N, 3) rad/s, base frame."""
+    joint_positions: Array
+    """(N, n) rad."""
+    joint_velocities: Array
+    """(N, n) rad/s."""
+    applied_torque: Array
+    """(N, n+3) N m over the interval that ended at the tick; base frame, then joints."""
+    reference_joints: Array
+    """(N, 3, n) desired position, velocity, acceleration."""
+    reference_base: Array
+    """(N, 10) desired quaternion, angular velocity, acceleration (base frame)."""
+    flight: dict[str, Any] = field(default_factory=dict)
+    """The flight as recorded: controller, case, ..."""
+    lost: dict[str, int] = field(default_factory=dict)
+    """Missing messages a topic."""
+    unanswered: int = 0
+    """Ticks without a command of their own (by the wall clock, or where something failed)."""
+    filled: int = 0
+    """Ticks without a usable state, which have the one before."""
+    unfinished: str = ""
+    """The end of a bag that nobody finished, as far as it is known; empty for a whole one."""
+    damage: tuple[str, ...] = ()
+    """The faults found in the bag, a sentence each."""
+    foreign: tuple[str, ...] = ()
+    """The messages left out since their publishers are not of the flight, a sentence each."""
+    commanded_torque: Array | None = None
+    """(N, n+3) N m, the controller's answer to the tick (NaN: none); None: not recorded."""
+    latency_s: Array | None = None
+    """(N,) s from the state's sending to its answer's, by the wall clock (NaN: none)."""
+    telemetry: Array | None = None
+    """(N, 4, n+3) s, u, N_hat, e of the controller; of flights in this process only."""
+    laws: tuple[LawInForce, ...] = ()
+    """Every change of law or gains in flight, the first law first; empty: not recorded."""
+    first_tick: int = 0
+    """Tick of row 0; not 0 in a part of a flight."""
+    trusted: bool = True
+    """True if ``flight`` is the user's own word: files and modules it names may be opened.
+
+    A bag may be anybody's: of one it is so only if the user says so.
+    """
+
+    @classmethod
+    def allocate(cls, ticks: int, joint_names: tuple[str, ...], timebase: Timebase) -> FlightLog:
+        """A log of ``ticks`` rows of NaN."""
+        n = len(joint_names)
+        shapes = [(3,), (4,), (3,), (3,), (n,), (n,), (n + 3,), (3, n), (10,)]
+        columns: list[Any] = [np.full((ticks, *shape), np.nan) for shape in shapes]
+        return cls(timebase, joint_names, *columns)
+
+    @property
+    def ticks(self) -> int:
+        """Number of rows."""
+        return len(self.quaternion)
+
+    @property
+    def time(self) -> Array:
+        """(N,) s, simulated time of the rows."""
+        ticks = np.arange(self.first_tick, self.first_tick + self.ticks, dtype=np.float64)
+        return np.asarray(ticks * self.timebase.period)
+
+    @property
+    def angular_velocity(self) -> Array:
+        """(N, 3) rad/s, base frame; the same as ``omega_base``."""
+        return self.omega_base
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """The flight as recorded; the same as ``flight``. Empty for a bag of others."""
+        return self.flight
+
+    @property
+    def whole(self) -> NDArray[np.bool_]:
+        """(N,) whether state and reference of a row are there and finite."""
+        return self.finite(STATE_FIELDS) & self.finite(REFERENCE)
+
+    def finite(self, columns: Iterable[str]) -> NDArray[np.bool_]:
+        """(N,) whether a row has no NaN in some of the columns."""
+        found = np.ones(self.ticks, np.bool_)
+        for name in columns:
+            found &= np.isfinite(getattr(self, name).reshape(self.ticks, -1)).all(axis=1)
+        return found
+
+    def longest_stretch(self) -> FlightLog:
+        """The longest stretch of `whole` rows, for what cannot bear a gap; views, not copies."""
+        edges = np.diff(np.concatenate(([False], self.whole, [False])).astype(np.int8))
+        starts, stops = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+        if not len(starts):
+            return self.rows(0, 0)
+        longest = int(np.argmax(stops - starts))
+        return self.rows(int(starts[longest]), int(stops[longest]))
+
+    @property
+    def axes(self) -> int:
+        """Controlled coordinates, n+3."""
+        return int(self.applied_torque.shape[1])
+
+    def put(self, start: int, states: Block) -> None:
+        """Copy the `State` of each tick from ``start`` on into its row."""
+        k = start - self.first_tick
+        for name in STATE_FIELDS:
+            getattr(self, name)[k : k + len(states)] = states[name]
+
+    def state(self, tick: int) -> RobotState:
+        """The state of a tick, as the plant measured it."""
+        block = State.block(len(self.joint_names))
+        for name in STATE_FIELDS:
+            block[name] = getattr(self, name)[tick - self.first_tick]
+        return RobotState(tick, block)
+
+    def references(self, start: int, stop: int) -> Block:
+        """(stop - start,) array of the ticks' `Reference` each, a copy."""
+        rows = slice(start - self.first_tick, stop - self.first_tick)
+        chunk = ReferenceChunk(start, self.reference_joints[rows], self.reference_base[rows])
+        return chunk.references()
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """All arrays that have a row a tick, by name."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+
+    def rows(self, start: int, stop: int) -> FlightLog:
+        """The rows ``start`` to ``stop``: views, not copies. Counts stay those of the whole log."""
+        rows = {name: column[start:stop] for name, column in self.columns.items()}
+        return replace(self, **rows, first_tick=self.first_tick + start)

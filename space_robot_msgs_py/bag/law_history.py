@@ -1,0 +1,95 @@
+"""The laws of a flight one after the other, and what changes from one to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..samples import LawInForce, Timebase
+from .flight_log import FlightLog
+
+MOST_TOLD = 3
+"""Changes that are told one by one where there is little room."""
+
+
+class LawChange(NamedTuple):
+    """From one law to another, or to other gains of the same one."""
+
+    before: LawInForce | None
+    """None: the controller begins."""
+    law: LawInForce
+
+    def __str__(self) -> str:
+        before, law = self
+        if before is None:
+            return law.name
+        if before.name != law.name:
+            return f"{before.name} -> {law.name}"
+        changed = [gain for gain in law.gains if before.gains.get(gain) != law.gains[gain]]
+        return f"{law.name}: other {', '.join(changed)}"
+
+
+def same(one: LawInForce, other: LawInForce) -> bool:
+    """Tell if two laws are the same with the same gains, to the last bit."""
+    return (
+        one.name == other.name
+        and one.gains.keys() == other.gains.keys()
+        and all(
+            np.array_equal(
+                np.array(values).view(np.int64), np.array(other.gains[gain]).view(np.int64)
+            )
+            for gain, values in one.gains.items()
+        )
+    )
+
+
+def within(laws: Iterable[LawInForce], start: int, stop: float) -> tuple[LawInForce, ...]:
+    """The laws, by rising tick, in force at the ticks from ``start`` to before ``stop``."""
+    laws = tuple(laws)
+    begun = [law for law in laws if law.tick <= start]
+    return (*begun[-1:], *(law for law in laws if start < law.tick < stop))
+
+
+def laws_of(log: FlightLog) -> tuple[LawInForce, ...]:
+    """Those in force in the rows of ``log``."""
+    return within(log.laws, log.first_tick, log.first_tick + log.ticks)
+
+
+def as_data(laws: Iterable[LawInForce], timebase: Timebase) -> list[dict[str, Any]]:
+    """The laws for JSON: tick, time, name and gains of each."""
+    return [
+        {
+            "tick": law.tick,
+            "t_s": timebase.stamp_ns(law.tick) / 1e9,
+            "controller": law.name,
+            "gains": {gain: list(values) for gain, values in law.gains.items()},
+        }
+        for law in laws
+    ]
+
+
+def in_words(laws: Sequence[dict[str, Any]]) -> str:
+    """Laws as data in a line, as ``tde_stc -> tde_tsmc at 1.2345 s (other k_1 at 2.0000 s)``."""
+    if not laws:
+        return ""
+    words, flown = str(laws[0]["controller"]), [laws[0]]
+    for law in laws[1 : 1 + MOST_TOLD]:
+        last_of_name = [known for known in flown if known["controller"] == law["controller"]][-1:]
+        others = [
+            k
+            for known in last_of_name
+            for k, v in law["gains"].items()
+            if known["gains"].get(k) != v
+        ]
+        other, when = f"other {', '.join(others)}", f"at {law['t_s']:.4f} s"
+        if law["controller"] != flown[-1]["controller"]:
+            words += f" -> {law['controller']} {when}" + (f" ({other})" if others else "")
+        elif others:
+            words += f" ({other} {when})"
+        else:
+            words += f" (begun again {when})"
+        flown.append(law)
+    left = len(laws) - 1 - MOST_TOLD
+    return words + (f" and {left} more" if left > 0 else "")

@@ -1,0 +1,172 @@
+"""Counting what arrived and what is missing, from the ticks in the messages themselves.
+
+Nothing else in a bag tells a lost message: header stamps are ticks, so gaps are losses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import topics
+from ..samples import Timebase
+from ..wire.cdr import header_stamp_ns
+from ..wire.controller_telemetry import TelemetryCodec
+from ..wire.stamp_guard import StampGuard
+
+
+def message_tick(topic: topics.Topic, data: bytes, timebase: Timebase) -> int:
+    """The tick a serialized message is stamped with (of a chunk: its first)."""
+    if topic.has_stamp:
+        return timebase.tick(header_stamp_ns(data))
+    return TelemetryCodec.decode(data)[0]
+
+
+LONGEST_JUMP = 20_000
+"""Ticks from one message to the next that are still believed: 10 s at 2 kHz."""
+
+
+@dataclass(slots=True)
+class MessageAccounting:
+    """Ticks of one topic's messages."""
+
+    topic: topics.Topic
+    received: int = 0
+    repeated: int = 0
+    """Messages of a tick that had come already."""
+    invalid_stamps: int = 0
+    """Messages whose stamp cannot be right, or cannot be read."""
+    first: int = 0
+    last: int = -1
+    unit: int = 0
+    """Ticks from one message to the next: the smallest step seen (0: not known yet)."""
+    _guard: StampGuard = field(default_factory=lambda: StampGuard(LONGEST_JUMP))
+    _holes: set[int] = field(default_factory=set)
+    """Ticks passed over, which may still come late."""
+    _is_resuming: bool = False
+    _left_out: int = 0
+    """Ticks from the last message before each pause, or from tick 0, to the first after it."""
+    _pauses: int = 0
+    """The number of pauses that lie between messages."""
+
+    def __post_init__(self) -> None:
+        if self.topic.per_tick:
+            self.unit = 1
+
+    def take(self, tick: int) -> bool:
+        """Count a message; False if one of this tick has come already (events: never)."""
+        if self.topic.is_event:
+            self.last = max(self.last, tick)
+        elif self.received and tick <= self.last:
+            if tick not in self._holes:
+                self.repeated += 1
+                return False
+            self._take_late(tick)
+        elif not self._guard.passes(tick):
+            self.invalid_stamps += 1
+            return True
+        elif self.received == 0:
+            self._pass_over(tick, 1)
+            self.first = self.last = tick
+        else:
+            step = tick - self.last
+            self._pass_over(tick, self.unit)
+            self.unit = min(self.unit, step) if self.unit else step
+            self.last = tick
+        self.received += 1
+        return True
+
+    def take_all(self, ticks: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """`take` of many, in their order; those that come as usual are counted at once."""
+        is_usual = self.unit and np.all(np.diff(ticks, prepend=self.last) == self.unit)
+        if not is_usual or self.topic.is_event or self._is_resuming or not len(ticks):
+            return np.fromiter((self.take(int(tick)) for tick in ticks), np.bool_, len(ticks))
+        self.last = self._guard.last = int(ticks[-1])
+        self.received += len(ticks)
+        return np.ones(len(ticks), np.bool_)
+
+    def _pass_over(self, tick: int, step: int) -> None:
+        """The next message is ``tick``: those between may still come, late, but for a pause."""
+        if self._is_resuming:
+            self._is_resuming = False
+            self._left_out += tick - max(0, self.last)
+            self._pauses += self.received > 0
+        if step < tick - self.last <= LONGEST_JUMP:
+            self._holes.update(range(self.last + 1, tick))
+
+    def _take_late(self, tick: int) -> None:
+        self._holes.remove(tick)
+        step = min(abs(tick - self.first), self.last - tick)
+        self.unit = min(self.unit, step) if self.unit else step
+        self.first = min(self.first, tick)
+
+    @property
+    def gaps(self) -> int:
+        """Places up to its own last message that none is of, for a topic that begins at tick 0."""
+        places = (self.last - self._left_out) // (self.unit or 1) + 1 + self._pauses
+        return max(0, places - self.received)
+
+    def pause(self) -> None:
+        """The next message may be of any later tick; those between are left out on purpose."""
+        self._guard = StampGuard(LONGEST_JUMP)
+        self._is_resuming = True
+
+    @property
+    def kept(self) -> int:
+        """Messages that belong into a bag."""
+        return self.received + self.invalid_stamps
+
+    def missing(self, last_tick: int) -> int:
+        """Messages that were sent but are not here, for a flight from tick 0 to ``last_tick``."""
+        if self.topic.is_event:
+            return 0
+        if self.topic.per_tick:
+            return last_tick + 1 - self.received
+        if self.received == 0:
+            return 1 if last_tick >= 0 else 0
+        return (self.last - self.first) // (self.unit or 1) + 1 - self.received
+
+
+def lost_messages(
+    accounting: Mapping[str, MessageAccounting],
+    excused: frozenset[str] = frozenset(),
+    finished: bool = True,
+) -> dict[str, int]:
+    """Missing messages a topic; the flight's length is that of the longest per-tick topic.
+
+    Gaps in the ``excused`` topics are not lost messages. Of a bag that was not
+    ``finished`` each topic counts up to its own last message: nobody knows what came after.
+    """
+    lost = {
+        name: counted.missing(_last_tick(accounting) if finished else counted.last)
+        for name, counted in accounting.items()
+    }
+    return lost | dict.fromkeys(excused & lost.keys(), 0)
+
+
+def topics_with_allowed_gaps(flight: Mapping[str, Any]) -> frozenset[str]:
+    """Topics that may have ticks without a message in a flight of this description.
+
+    By the wall clock, or where something fails, the controller does not answer every tick
+    (`unanswered_ticks`); states may be kept back by a fault.
+    """
+    excused: tuple[topics.Topic, ...] = ()
+    if any(flight.get(key) for key in ("realtime", "faults", "restart_controller")):
+        excused += (topics.COMMAND, topics.TELEMETRY)
+    if flight.get("faults"):
+        excused += (topics.JOINT_STATES, topics.BASE_STATE)
+    return frozenset(topic.name for topic in excused)
+
+
+def unanswered_ticks(accounting: Mapping[str, MessageAccounting], finished: bool = True) -> int:
+    """Ticks without a command."""
+    command = accounting[topics.COMMAND.name]
+    return command.missing(_last_tick(accounting) if finished else command.last)
+
+
+def _last_tick(accounting: Mapping[str, MessageAccounting]) -> int:
+    return max((c.last for c in accounting.values() if c.topic.per_tick), default=-1)

@@ -1,0 +1,96 @@
+"""One decorator for every compiled function, with a disk cache that cannot go stale.
+
+Numba's own cache watches only the file a function stands in, so a change in a function it
+calls from another file goes unseen. Here the cache folder's name is a digest of the source of
+all three packages: any edit starts a fresh cache, and all processes share what one compiled.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, TypeVar, cast
+
+import numba
+import numpy as np
+
+from .cache import cache_directory
+
+_OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+_njit: Any = numba.njit
+config: Any = numba.config
+_FunctionType: Any = numba.types.WrapperAddressProtocol
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def kernel(function: _Function) -> _Function:
+    """Compile ``function`` on first call, without the GIL, cached on disk.
+
+    IEEE arithmetic is kept as written (no fast-math): the same inputs give the same bits in
+    every process, which is what makes the graph and the in-process flight agree.
+    """
+    with _our_cache():
+        compiled = _njit(cache=True, **_OPTIONS)(function)
+    save = compiled._cache.save_overload
+
+    def save_if_there_is_room(*arguments: Any) -> None:
+        with suppress(OSError):  # the next process compiles it again
+            save(*arguments)
+
+    compiled._cache.save_overload = save_if_there_is_room
+    return cast(_Function, compiled)
+
+
+def subroutine(function: _Function) -> _Function:
+    """A small part of kernels, callable from them only: it compiles in half the time."""
+    return cast(_Function, _njit(no_cpython_wrapper=True, **_OPTIONS)(function))
+
+
+class RecordFunction(_FunctionType):  # type: ignore[misc]
+    """A kernel of records, and a float at last, as a value that a compiled loop can be given.
+
+    The kernel is compiled for the layouts of its own records. A loop sees it as a function of
+    other layouts, which all such kernels share, and is compiled once for all of them: a record
+    is passed by its address, and what lies there is the kernel's affair alone.
+    """
+
+    def __init__(
+        self, function: Callable[..., Any], layouts: Iterable[np.dtype[Any]],
+        seen_as: Iterable[np.dtype[Any]],
+    ) -> None:  # fmt: skip
+        """``layouts``: of the kernel's records; ``seen_as``: those a loop passes in their place."""
+        compiled: Any = function
+        own, self._signature = _signature(layouts), _signature(seen_as)
+        with _our_cache():
+            try:
+                self._code = numba.cfunc(own, cache=True, error_model="numpy")(compiled.py_func)
+            except OSError:  # no room in the cache
+                self._code = numba.cfunc(own, error_model="numpy")(compiled.py_func)
+        self._address = int(self._code.address or 0)
+        pointers = [ctypes.c_void_p] * (len(own.args) - 1)
+        self.call = ctypes.CFUNCTYPE(None, *pointers, ctypes.c_double)(self._address)
+        """Run it from Python, on the records at these addresses."""
+
+    def __wrapper_address__(self) -> int:
+        """Address of the machine code, for Numba."""
+        return self._address
+
+    def signature(self) -> Any:
+        """The type that a loop sees, for Numba."""
+        return self._signature
+
+
+def _signature(layouts: Iterable[np.dtype[Any]]) -> Any:
+    return numba.void(*(numba.from_dtype(layout) for layout in layouts), numba.float64)
+
+
+@contextmanager
+def _our_cache() -> Iterator[None]:
+    """Numba reads the folder when it decorates."""
+    previous = config.CACHE_DIR
+    config.CACHE_DIR = str(cache_directory())
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = previous

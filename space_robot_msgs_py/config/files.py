@@ -1,0 +1,84 @@
+"""The files of ``config/``, by name or by path."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+from ..errors import InputError
+from .trees import Tree, merge, nest
+from .validation import read_yaml, short
+from .yaml_text import check_file
+
+GRAPH_FILE = "space_robot.yaml"
+"""The file of the graph's defaults in the config folder."""
+
+
+@cache
+def config_directory() -> Path:
+    """Return the ``config/`` folder: the source tree's, or the one installed under ``share/``.
+
+    Raises:
+        InputError: the installation is incomplete.
+    """
+    for parent in Path(__file__).resolve().parents:
+        for folder in (parent / "config", parent / "share/space_robot/config"):
+            if (folder / GRAPH_FILE).is_file():
+                return folder
+    raise InputError("the package's config folder is not installed: reinstall space_robot")
+
+
+def named_file(kind: str, name: str) -> Path:
+    """Return ``config/<kind>/<name>.yaml``, or ``name`` itself if it is a path to a YAML file.
+
+    Raises:
+        InputError: there is no such file; names the ones there are.
+    """
+    if name.endswith((".yaml", ".yml")):
+        path = Path(name)
+        check_file(path)
+        return path
+    folder = config_directory() / kind
+    names = sorted(file.stem for file in folder.glob("*.yaml"))
+    if name not in names:
+        raise InputError(
+            f"unknown {kind.rstrip('s')} {short(name)}: choose one of {', '.join(names)}, "
+            "or a path to a .yaml file"
+        )
+    return folder / f"{name}.yaml"
+
+
+def mission_file(robot: str, mission: str) -> Path:
+    """Return the file of a mission, of the robot's own if the name is empty.
+
+    Raises:
+        InputError: there is none, or no such robot; names those there are.
+    """
+    if mission:
+        return named_file("missions", mission)
+    named_file("robots", robot)  # first: else its mission would be said to be unknown
+    name = Path(robot).stem
+    try:
+        return named_file("missions", name)
+    except InputError as error:
+        raise InputError(f"robot {short(robot)} has no mission of its own, {error}") from None
+
+
+def node_parameters(path: Path, node: str) -> Tree:
+    """Read what a ROS parameter file says to a node (keys ``/**``, then its ROS name), as a tree.
+
+    Raises:
+        InputError: the file cannot be read or is not a ROS parameter file.
+    """
+    merged: Tree = {}
+    for name, content in read_yaml(path).items():
+        if not isinstance(content, dict) or list(content) != ["ros__parameters"]:
+            raise InputError(
+                f"{path}: {name}: 'ros__parameters' was expected below the node's name"
+            )
+        given = content["ros__parameters"] or {}
+        if not isinstance(given, dict):
+            raise InputError(f"{path}: {name}: parameters were expected, got {short(given)}")
+        if str(name).strip("/") in ("**", f"{node}_node"):
+            merged = merge(merged, nest(given))
+    return merged

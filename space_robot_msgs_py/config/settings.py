@@ -1,0 +1,97 @@
+"""Settings of the nodes: from files in ``config/``, by name, with overrides on top.
+
+``config/`` holds ROS parameter files (and the robots). A node's settings are the defaults of
+its schema, then the files its selectors name (a robot, a case, ...), then what the user gives.
+The nodes and the in-process flight resolve them here, so both fly the same numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from inspect import isclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, get_origin
+
+from pydantic import AfterValidator, BaseModel, Field, field_validator
+from typing_extensions import Self
+
+from ..samples import Timebase
+from ..topics import Topic
+from .files import GRAPH_FILE, config_directory, node_parameters
+from .trees import Tree, merge, nest
+from .validation import StrictModel, short, validate
+
+Texts = Annotated[list[str], AfterValidator(lambda texts: texts or [""])]
+"""Texts of which empty ones count for nothing: ROS has no empty list of strings."""
+
+
+class NodeSettings(StrictModel):
+    """Settings of every node of the graph; each node's schema derives from it."""
+
+    node: ClassVar[str]
+    """The node: plant, controller, mission, recorder."""
+    selectors: ClassVar[tuple[str, ...]] = ("robot",)
+    """Fields that choose configuration files."""
+    sends: ClassVar[tuple[Topic, ...]] = ()
+    """Topics whose listeners the node can be told to wait for (parameter ``wait_for``)."""
+
+    robot: str = Field("paper", description="a robot of config/robots, or a path to its YAML")
+    period: Annotated[float, Field(ge=1e-5, le=0.1)] = Field(
+        0.0005, description="length of a tick, s; the same for all nodes"
+    )
+    fifo_priority: Annotated[int, Field(ge=0, le=98)] = Field(
+        0, description="SCHED_FIFO priority to ask for (0: the usual scheduling)"
+    )
+
+    @field_validator("wait_for", check_fields=False)
+    @classmethod
+    def _can_be_waited_for(cls, entries: list[str]) -> list[str]:
+        names = [topic.name for topic in cls.sends]
+        for entry in entries:
+            _, colon, topic = entry.partition(":")
+            if colon and topic not in names:
+                raise ValueError(f"{short(entry)}: choose a topic it sends, {', '.join(names)}")
+        return entries
+
+    @classmethod
+    def ros_name(cls) -> str:
+        """Return the name of the node in ROS, of its executable, of its section in files."""
+        return f"{cls.node}_node"
+
+    @property
+    def timebase(self) -> Timebase:
+        """Ticks and stamps at this period."""
+        return Timebase(round(self.period * 1e9))
+
+    @classmethod
+    def layers(cls, selected: Mapping[str, str]) -> list[Path]:
+        """Return the parameter files below the user's overrides, for the selectors' values."""
+        return [config_directory() / GRAPH_FILE]
+
+    @classmethod
+    def resolve(cls, overrides: Mapping[str, Any]) -> Self:
+        """Read the settings from the files and the user's (dotted or nested) overrides.
+
+        Raises:
+            InputError: naming the file or override at fault.
+        """
+        where = f"{cls.node} parameters"
+        given, tree = nest(overrides), Tree()
+        base = node_parameters(config_directory() / GRAPH_FILE, cls.node)
+        chosen = validate(cls, merge(base, given), where)
+        selected = {name: str(getattr(chosen, name)) for name in cls.selectors}
+        for path in cls.layers(selected):
+            layer = node_parameters(path, cls.node)
+            validate(cls, merge(tree, layer), str(path))
+            tree = merge(tree, layer)
+        return validate(cls, merge(tree, given), where)
+
+
+def leaves(schema: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield dotted name and pydantic field of every setting of a schema."""
+    for name, field in schema.model_fields.items():
+        inner = field.annotation
+        if get_origin(inner) is None and isclass(inner) and issubclass(inner, BaseModel):
+            yield from leaves(inner, f"{prefix}{name}.")
+        else:
+            yield prefix + name, field

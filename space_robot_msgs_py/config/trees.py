@@ -1,0 +1,45 @@
+"""Nested settings and their dotted names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from ..errors import InputError
+
+Tree = dict[str, Any]
+
+
+def merge(below: Tree, above: Mapping[str, Any]) -> Tree:
+    """Return ``below`` with the leaves of ``above`` put over it."""
+    merged = dict(below)
+    for key, value in above.items():
+        old = merged.get(key)
+        both = isinstance(old, dict) and isinstance(value, Mapping)
+        merged[key] = merge(old, value) if both else value  # type: ignore[arg-type]
+    return merged
+
+
+def nest(flat: Mapping[Any, Any]) -> Tree:
+    """Turn ``{"a.b": 1}`` into ``{"a": {"b": 1}}``.
+
+    Raises:
+        InputError: something is given as a value and as a group of values.
+    """
+    tree: Tree = {}
+    for key, value in flat.items():
+        head, _, rest = str(key).partition(".")
+        inner = nest({rest: value}) if rest else nest(value) if isinstance(value, dict) else value
+        if head in tree and isinstance(tree[head], dict) is not isinstance(inner, dict):
+            raise InputError(f"{head}: given as a value, and as a group of values")
+        tree = merge(tree, {head: inner})
+    return tree
+
+
+def flatten(tree: Mapping[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Turn ``{"a": {"b": 1}}`` into ``("a.b", 1)``, leaf by leaf; an empty mapping is one."""
+    for key, value in tree.items():
+        if isinstance(value, Mapping) and value:
+            yield from flatten(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value

@@ -1,0 +1,114 @@
+"""YAML to checked data: every error names file, key, value given and values allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
+
+from ..errors import InputError
+from .text import printable
+from .yaml_text import YamlTextError, parse_yaml, read_file
+
+
+class StrictModel(BaseModel):
+    """Base of what is read from files, parameters and options: no other keys, no other types.
+
+    A whole number may stand for a decimal one, and a number for a name (``case: 1``).
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _meant(cls, value: Any, field: ValidationInfo) -> Any:
+        if isinstance(value, tuple):
+            return list(value)
+        wanted = cls.model_fields[field.field_name or ""].annotation
+        if wanted is str and isinstance(value, (int, float)) and not isinstance(value, bool):
+            return str(value)
+        return value
+
+
+Schema = TypeVar("Schema", bound=BaseModel)
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """Read the mapping in a YAML file.
+
+    Raises:
+        InputError: the file is missing, unreadable, no file, not YAML, or not a mapping.
+    """
+    text = read_file(path)
+    try:
+        content = parse_yaml(text)
+    except YamlTextError as error:
+        raise InputError(f"{path}: {error}") from None
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: a mapping was expected, got {type(content).__name__}")
+    return content
+
+
+def validate(schema: type[Schema], content: Any, where: str) -> Schema:
+    """Validate ``content``; ``where`` names its file (and enclosing key) in errors.
+
+    Raises:
+        InputError: with the first fault found, in one line.
+    """
+    try:
+        return schema.model_validate(content)
+    except ValidationError as error:
+        raise InputError(_one_line(error, schema, where)) from None
+
+
+def _one_line(error: ValidationError, schema: type[BaseModel], where: str) -> str:
+    # a misspelt key shows as one missing and one unknown: the unknown one is the cause
+    faults = sorted(
+        error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden"
+    )
+    first = faults[0]
+    key = printable(".".join(str(part) for part in first["loc"]))
+    given = "" if first["type"] == "missing" else f", got {short(first['input'])}"
+    text = first["msg"].removeprefix("Value error, ")
+    if first["type"] == "model_type":
+        text = "a mapping was expected"
+    if first["type"] == "extra_forbidden":
+        allowed = _allowed_keys(schema, first["loc"][:-1])
+        text, given = f"unknown key{given}: choose one of {', '.join(allowed)}", ""
+    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    return f"{where}: {key + ': ' if key else ''}{text}{given}{more}"
+
+
+def _allowed_keys(schema: Any, location: tuple[int | str, ...]) -> list[str]:
+    """Return the names of the fields of the model at a location within ``schema``."""
+    for step in location:
+        if isinstance(step, str):
+            schema = schema.model_fields[step].annotation
+        while not hasattr(schema, "model_fields"):  # Annotated, list
+            schema = get_args(schema)[0]
+    return sorted(schema.model_fields)
+
+
+def short(value: Any) -> str:
+    """Show a value as an error does, in one line of at most 80 characters."""
+    try:
+        text = repr(value)
+    except ValueError:  # a whole number of more digits than Python likes to print
+        text = f"a number of type {type(value).__name__}"
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def one_of(given: str, allowed: Iterable[str], what: str, context: str = "") -> str:
+    """Return ``given`` if it is allowed.
+
+    Raises:
+        InputError: naming what was given and what is allowed.
+    """
+    names = list(allowed)
+    if given not in names:
+        raise InputError(
+            f"unknown {what} {short(given)}{context}: choose one of {', '.join(names)}"
+        )
+    return given

@@ -1,0 +1,194 @@
+"""YAML, read strictly: what a text can do to its reader is bounded, and each mistake has a line.
+
+The types are those of ROS parameter files: ``1e3`` is a number, a date is a word.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from collections.abc import Hashable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import yaml
+
+from ..errors import InputError
+
+try:
+    from yaml import CSafeLoader as SafeLoader  # four times as fast
+except ImportError:  # PyYAML was built without libyaml
+    from yaml import SafeLoader  # type: ignore[assignment]
+
+LARGEST_FILE = 16 * 2**20
+"""Bytes."""
+DEEPEST = 64
+"""Lists and mappings within one another."""
+LONGEST_NAME = 250
+"""Characters of a file's name that an error shows."""
+MOST_REPEATED = 100_000
+"""Values that aliases may add to those written out."""
+
+_FLOAT, _TIMESTAMP, _MERGE = (
+    f"tag:yaml.org,2002:{kind}" for kind in ("float", "timestamp", "merge")
+)
+_EXPONENT = re.compile(r"^[-+]?(?:[0-9][0-9_]*(?:\.[0-9_]*)?|\.[0-9][0-9_]*)[eE][-+]?[0-9]+$")
+
+
+class YamlTextError(InputError):
+    """A text is not the YAML that is read here; says in which line."""
+
+
+def read_file(path: Path) -> str:
+    """Read the text in a file; pipes and devices, which may never end, are none.
+
+    Raises:
+        InputError: there is no such file, or it cannot be read.
+    """
+    with _opened(path) as file:
+        data = file.read(LARGEST_FILE + 1)
+        if len(data) > LARGEST_FILE:
+            raise InputError(f"{path}: cannot be read (more than {LARGEST_FILE >> 20} MiB)")
+        return data.decode("utf-8")
+
+
+def check_file(path: Path) -> None:
+    """See that a file can be read.
+
+    Raises:
+        InputError: see `read_file`.
+    """
+    with _opened(path):
+        pass
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[BinaryIO]:
+    name = str(path) if str(path).isprintable() else repr(str(path))
+    name = name if len(name) <= LONGEST_NAME else f"{name[:40]}...{name[-40:]}"
+    try:
+        # not to wait for the other end of a pipe
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        try:
+            if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+                raise InputError(f"{name}: not a file")
+            with os.fdopen(descriptor, "rb", closefd=False) as file:
+                yield file
+        finally:
+            os.close(descriptor)
+    except InputError:
+        raise
+    except FileNotFoundError:
+        raise InputError(f"{name}: no such file") from None
+    except OSError as error:
+        raise InputError(f"{name}: cannot be read ({error.strerror})") from None
+    except ValueError as error:  # not UTF-8, or no name of a file
+        raise InputError(f"{name}: cannot be read ({error})") from None
+
+
+def is_folder(path: Path) -> bool:
+    """Return whether a folder is there; False for what cannot be the name of one, too."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False
+
+
+def parse_yaml(text: str) -> Any:
+    """Build the value of a YAML text.
+
+    Raises:
+        YamlTextError: it is not YAML, has a key twice, or is nested or repeated without measure.
+    """
+    try:
+        _measure(text)
+        return yaml.load(text, Loader=_Loader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        line = f"line {mark.line + 1}: " if mark else ""
+        problem = " ".join(str(getattr(error, "problem", None) or error).split())
+        raise YamlTextError(f"{line}not YAML ({problem})") from None
+    except ValueError as error:  # characters that no file could hold
+        raise YamlTextError(f"not YAML ({error})") from None
+
+
+def _measure(text: str) -> None:
+    """See that a text may be built, from its events, which come one by one."""
+    sizes: dict[str, int] = {}
+    opened: list[tuple[str | None, int]] = []
+    size = repeated = 0
+    for event in yaml.parse(text, Loader=_Loader):
+        if isinstance(event, yaml.CollectionStartEvent):
+            opened.append((event.anchor, size))
+            size += 1
+            if len(opened) > DEEPEST:
+                raise _refused(f"nested deeper than {DEEPEST} levels", event)
+        elif isinstance(event, yaml.CollectionEndEvent):
+            anchor, before = opened.pop()
+            if anchor:
+                sizes[anchor] = size - before
+        elif isinstance(event, yaml.ScalarEvent):
+            size += 1
+            if event.anchor:
+                sizes[event.anchor] = 1
+        elif isinstance(event, yaml.AliasEvent):
+            if any(anchor == event.anchor for anchor, _ in opened):
+                raise _refused(f"the alias {event.anchor!r} contains itself", event)
+            again = sizes.get(event.anchor or "", 0)
+            size += again
+            repeated += again
+            if repeated > MOST_REPEATED:
+                raise _refused(f"aliases repeat more than {MOST_REPEATED} values", event)
+
+
+def _refused(problem: str, event: Any) -> yaml.YAMLError:
+    return yaml.constructor.ConstructorError(problem=problem, problem_mark=event.start_mark)
+
+
+class _Loader(SafeLoader):
+    """Takes a key that occurs twice, or a value that is not what its tag says, for a mistake."""
+
+    yaml_implicit_resolvers = {  # noqa: RUF012  (a class variable, as in the base)
+        first: [(tag, pattern) for tag, pattern in resolvers if tag != _TIMESTAMP]
+        for first, resolvers in SafeLoader.yaml_implicit_resolvers.items()
+    }
+
+    def construct_object(self, node: Any, deep: bool = False) -> Any:
+        try:
+            value = super().construct_object(node, deep)
+            if isinstance(value, int) and not -(2**63) <= value < 2**64:
+                raise OverflowError
+            return value
+        except (ValueError, TypeError, LookupError, AttributeError, OverflowError):
+            kind = node.tag.removeprefix("tag:yaml.org,2002:")
+            said = f" {node.value[:40]!r}" if isinstance(node.value, str) else ""
+            raise yaml.constructor.ConstructorError(
+                problem=f"the value{said} is no {kind}", problem_mark=node.start_mark
+            ) from None
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        if not isinstance(node, yaml.MappingNode):
+            raise yaml.constructor.ConstructorError(
+                problem="a mapping was expected", problem_mark=node.start_mark
+            )
+        seen = set()
+        for key_node, _ in node.value:
+            if key_node.tag == _MERGE:
+                continue
+            key = self.construct_object(key_node, deep=True)
+            if not isinstance(key, Hashable):
+                raise yaml.constructor.ConstructorError(
+                    problem="a key must be a word or a number", problem_mark=key_node.start_mark
+                )
+            if key in seen:
+                raise yaml.constructor.ConstructorError(
+                    problem=f"the key {key!r} occurs twice", problem_mark=key_node.start_mark
+                )
+            seen.add(key)
+        mapping: dict[Any, Any] = super().construct_mapping(node, deep)
+        return mapping
+
+
+_Loader.add_implicit_resolver(_FLOAT, _EXPONENT, list("-+.0123456789"))

@@ -1,0 +1,148 @@
+"""Who is in a ROS domain: locks that the kernel releases however their holder ends.
+
+Discovery would not do: it takes its time, and lists a killed node for another 20 s. Each lock is a
+file in the temporary folder that names its holder; it stays when the lock goes.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from ..errors import InputError
+from .lifeline import starter
+
+TRIES, PAUSE_S = 5, 0.01
+"""A lock that is just being looked at is free a moment later."""
+MOST_NOTES = 16
+"""So many are kept, of earlier holders too: who looks late still finds a short-lived one."""
+
+
+class Holder(NamedTuple):
+    """Who has a lock."""
+
+    name: str
+    """With the pid."""
+    starter: int
+    """Pid of the process it ends with; 0: none."""
+
+
+class HeldError(InputError):
+    """Somebody else has a lock."""
+
+    def __init__(self, path: Path, holder: Holder) -> None:
+        super().__init__(f"{path} is held by {holder.name}")
+        self.holder = holder
+
+
+def topic_lock(domain: int, topic: str) -> Path:
+    """The file that is locked by the publisher of a topic, given by its full name."""
+    # a ROS name has no dots and no @, so no two topics, and no topic and node, share a file
+    return _path(f"{domain}{topic.replace('/', '.')}")
+
+
+def node_lock(domain: int, node: str) -> Path:
+    """The file that is locked by the node of a full name."""
+    return _path(f"{domain}@{node.replace('/', '.')}")
+
+
+def domain_lock(domain: int) -> Path:
+    """The file that is locked by the command that has started a graph there."""
+    return _path(f"{domain}")
+
+
+def _path(name: str) -> Path:
+    return Path(tempfile.gettempdir()) / f"space_robot_{name}.lock"
+
+
+class FileLock:
+    """A lock, until its process ends or lets go."""
+
+    def __init__(self, path: Path, name: str, notes: Sequence[str] = ()) -> None:
+        """Take it as ``name``, and add ``notes`` there, a word each, for those who `look`.
+
+        Raises:
+            HeldError: somebody else has it.
+            InputError: no lock can be taken there.
+        """
+        self._descriptor = _open(path)
+        for _ in range(TRIES):
+            if _try(self._descriptor, fcntl.LOCK_EX):
+                break
+            time.sleep(PAUSE_S)
+        else:
+            holder = _holder(self._descriptor)
+            self.release()
+            raise HeldError(path, holder)
+        noted = [*_lines(self._descriptor)[2].split(), *notes][-MOST_NOTES:]
+        os.ftruncate(self._descriptor, 0)
+        lines = (f"{name} (pid {os.getpid()})", str(starter()), " ".join(noted))
+        os.pwrite(self._descriptor, "\n".join(lines).encode(), 0)
+
+    def release(self) -> None:
+        """Let others have it."""
+        os.close(self._descriptor)
+
+
+def nodes_in(domain: int) -> list[Holder]:
+    """The nodes of this project in a domain."""
+    found = []
+    for path in sorted(node_lock(domain, "").parent.glob(node_lock(domain, "*").name)):
+        try:
+            descriptor = _open(path)
+        except InputError:
+            continue
+        if not _try(descriptor, fcntl.LOCK_SH):
+            found.append(_holder(descriptor))
+        os.close(descriptor)
+    return found
+
+
+def look(path: Path) -> tuple[bool, list[str]]:
+    """Whether somebody holds a lock, and the notes of those who took it, the newest last."""
+    try:
+        descriptor = _open(path)
+    except InputError:
+        return False, []
+    try:
+        is_held = not _try(descriptor, fcntl.LOCK_SH)
+        return is_held, _lines(descriptor)[2].split()
+    finally:
+        os.close(descriptor)
+
+
+def _try(descriptor: int, kind: int) -> bool:
+    try:
+        fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def _holder(descriptor: int) -> Holder:
+    name, started_by, _ = _lines(descriptor)
+    return Holder(name or "another process", int(started_by) if started_by.isdecimal() else 0)
+
+
+def _lines(descriptor: int) -> list[str]:
+    """Holder, starter, notes; empty where nobody has written any."""
+    lines = os.pread(descriptor, 1000, 0).decode(errors="replace").split("\n")
+    return [*lines, "", "", ""][:3]
+
+
+def _open(path: Path) -> int:
+    """Open a lock file, for all users: a domain is the whole machine's."""
+    flags = os.O_RDWR | os.O_NOFOLLOW
+    try:
+        if path.exists():  # Linux refuses O_CREAT for others' files in /tmp
+            return os.open(path, flags)
+        descriptor = os.open(path, flags | os.O_CREAT, 0o666)
+        os.fchmod(descriptor, 0o666)  # past the umask
+        return descriptor
+    except OSError as error:
+        raise InputError(f"{path}: no lock can be taken there ({error.strerror})") from None

@@ -1,0 +1,62 @@
+"""What a node does, as a loop that its host steps: it never waits itself.
+
+So one host can run one node in a process, or step several in turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+from .endpoints import RawPublisher, RawSubscription
+from .health import Health
+
+
+class Wait(NamedTuple):
+    """What a loop waits for when it has nothing to do."""
+
+    seconds: float
+    """After this long it is to be stepped in any case."""
+    inputs: tuple[RawSubscription, ...] = ()
+    """It is to be stepped as soon as one of these has a message."""
+    is_brief: bool = False
+    """Whether a message is expected at once, so that sleeping would cost more than looking."""
+
+
+class Loop(Protocol):
+    """A node's work; made with its settings in configure, stepped while the node is active."""
+
+    @property
+    def outputs(self) -> Sequence[RawPublisher]:
+        """Topics that nobody else may publish."""
+
+    @property
+    def wait_for(self) -> Sequence[str]:
+        """Who must listen before the first step: ``NODE:TOPIC``, or ``NODE`` to all ``outputs``."""
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the loop has come to its end, and with it the flight."""
+
+    def begin(self) -> None:
+        """Get ready to be stepped: called whenever the node has become active."""
+
+    def step(self) -> Wait | None:
+        """Do what can be done now, without waiting.
+
+        Returns:
+            What to wait for; None if something was done and there may be more.
+        """
+
+    def stand_down(self) -> None:
+        """Leave the graph safe: called on deactivate, and before the end of an active node."""
+
+    def close(self) -> None:
+        """Let go of everything: called on cleanup and at the end.
+
+        Raises:
+            FlightError: something that was promised has not been kept.
+        """
+
+    def health(self) -> Health:
+        """Tell how the node is; called some times a second."""

@@ -1,0 +1,236 @@
+"""A node of this project as a ROS 2 lifecycle node.
+
+Files and parameters are checked in configure, which fails with the reason; topics are there once
+it has succeeded. Nothing is sent before activate.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+
+from ..config.settings import NodeSettings
+from ..errors import InputError, SpaceRobotError
+from .diagnostics import Diagnostics
+from .exclusive import Claim, claim_name, foreign_publishers
+from .health import SENT, Health, Level
+from .locks import FileLock
+from .loop import Loop
+from .parameters import declare_settings, refuse_unknown
+from .rclpy_internals import declared_parameters, forget_parameters, guard_change_state
+from .service_calls import ServiceCalls
+
+Schema = TypeVar("Schema", bound=NodeSettings)
+AUTOSTART = "autostart"
+DISCOVERY_S = 0.3
+LOOK_AGAIN_S = 0.3
+PAUSE_S = 1e-3
+
+
+class ManagedNode(LifecycleNode, Generic[Schema]):
+    """Makes, starts, stops and closes a `Loop` in the transitions of the lifecycle."""
+
+    def __init__(
+        self,
+        schema: type[Schema],
+        make_loop: Callable[[ManagedNode[Schema], Schema], Loop],
+        changeable: tuple[str, ...] = (),
+    ) -> None:
+        super().__init__(schema.ros_name())
+        self._schema, self._make_loop, self._changeable = schema, make_loop, changeable
+        self.settings: Schema | None = None
+        self.loop: Loop | None = None
+        self.is_active = False
+        self.is_shut_down = False
+        self.let_others_work: Callable[[], None] = lambda: time.sleep(PAUSE_S)
+        """To be called by a loop that stands down while it waits for what another node does."""
+        self._topics: list[str] = []
+        self._claim: Claim | None = None
+        self._name: FileLock | None = None
+        self.error: SpaceRobotError | None = None
+        """Why the last transition failed."""
+        description = ParameterDescriptor(
+            description="configure and activate without being told (false: wait for transitions)",
+            read_only=True,
+        )
+        self.autostart = bool(self.declare_parameter(AUTOSTART, True, description).value)
+        self._diagnostics = Diagnostics(self)
+        self._own = self._entities()
+        self.calls = ServiceCalls(self)
+        guard_change_state(self, self._refuse_transition)
+
+    def log(self, text: str) -> None:
+        """Say something on the node's log."""
+        self.get_logger().info(text)
+
+    def report(self) -> None:
+        """Report the health, if it is time again or the mode has changed."""
+        self._diagnostics.report(self._health())
+
+    def _health(self) -> Health:
+        """Ask the loop, and add the messages it has sent: the recorder looks if all have come."""
+        if self.loop is None:
+            return Health("unconfigured")
+        health = self.loop.health()
+        sent = {f"{SENT}{output.topic.name}": output.sent for output in self.loop.outputs}
+        values = {**health.values, **sent, "service_calls": self.calls.count}
+        if not self.is_active:
+            return Health("inactive", values=values)
+        if health.level is Level.OK and (foreign := self._foreign_publishers()):
+            return Health(foreign, Level.WARN, values)
+        if health.level is Level.OK and self.calls.is_overloaded:
+            return Health("more service calls than can be answered in flight", Level.WARN, values)
+        return Health(health.mode, health.level, values)
+
+    def claim_name(self) -> None:
+        """Be the only node of this name in the domain; before anything is served.
+
+        Raises:
+            InputError: another node of this project has the name.
+        """
+        self._name = claim_name(self)
+
+    def destroy_node(self) -> None:
+        """Let go of everything, what serves the node before the node."""
+        self.calls.shutdown()
+        super().destroy_node()
+        if self._name:
+            self._name.release()
+
+    def start(self) -> None:
+        """Configure and activate.
+
+        Raises:
+            SpaceRobotError: it cannot be.
+        """
+        self._insist(self.trigger_configure())
+        time.sleep(DISCOVERY_S)  # to see who else is there
+        self._insist(self.trigger_activate())
+
+    def _insist(self, outcome: TransitionCallbackReturn) -> None:
+        if outcome is not TransitionCallbackReturn.SUCCESS:
+            raise self.error or SpaceRobotError(f"{self.get_name()} cannot be started")
+
+    def end(self) -> None:
+        """Shut down, unless that has been done, and let go of everything.
+
+        Raises:
+            SpaceRobotError: the loop could not be closed as it should.
+        """
+        if self.is_shut_down:
+            self._try(self._release)
+        else:
+            if self.loop is not None and self.is_active:
+                self._diagnostics.report(self._health(), now_or_never=True)
+            self.trigger_shutdown()
+        if self.error:
+            raise self.error
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Check parameters and files, make the loop and its topics."""
+
+        def configure() -> None:
+            self.settings = declare_settings(self, self._schema, self._changeable)
+            if not self._changeable:  # else the loop declares more
+                refuse_unknown(self)
+            self.loop = self._make_loop(self, self.settings)
+            refuse_unknown(self)
+            self._topics = [output.topic.name for output in self.loop.outputs]
+            self._claim = Claim(self, self._topics)
+
+        return self._try(configure, undo=self._release)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Let the loop be stepped from here on, unless another node publishes this one's topics."""
+
+        def activate() -> None:
+            if foreign := self._lasting_foreign_publishers():
+                raise InputError(foreign)
+            self.is_active = True
+
+        return self._try(activate)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop the loop."""
+        return self._try(self._stand_down)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Remove topics and parameters; a new configure reads the files again."""
+        return self._try(self._release)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """End the node, from any state."""
+
+        def shut_down() -> None:
+            self.is_shut_down = True
+            self._stand_down()
+            self._release()
+
+        return self._try(shut_down)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Give the node up: something unforeseen was raised in a transition."""
+        return TransitionCallbackReturn.FAILURE
+
+    def _foreign_publishers(self) -> str:
+        """Tell who else publishes this node's topics, in words; empty if nobody."""
+        crowded = [topic for topic in self._topics if self.count_publishers(topic) > 1]
+        foreign = foreign_publishers(self, crowded)
+        return "; ".join(f"{t} is also published by {', '.join(n)}" for t, n in foreign.items())
+
+    def _lasting_foreign_publishers(self) -> str:
+        """Look twice for foreign publishers: one that is just being discovered has no name yet."""
+        if self._foreign_publishers():
+            time.sleep(LOOK_AGAIN_S)
+        return self._foreign_publishers()
+
+    def _try(
+        self, action: Callable[[], None], undo: Callable[[], None] | None = None
+    ) -> TransitionCallbackReturn:
+        self.error = None
+        try:
+            action()
+        except SpaceRobotError as error:
+            self.error = error
+            if undo:
+                undo()
+            if not self.autostart:  # else the process ends with these words
+                self.get_logger().error(str(error))
+            return TransitionCallbackReturn.FAILURE
+        except Exception as error:  # rclpy would swallow it without a word
+            self.error = SpaceRobotError(f"unforeseen {type(error).__name__}: {error}")
+            self.get_logger().error(str(self.error))
+            return TransitionCallbackReturn.ERROR
+        return TransitionCallbackReturn.SUCCESS
+
+    def _stand_down(self) -> None:
+        if self.is_active and self.loop is not None:
+            self.is_active = False
+            self.loop.stand_down()
+
+    def _release(self) -> None:
+        """Close the loop, take back what configure made."""
+        loop, self.loop = self.loop, None
+        try:
+            if loop is not None:
+                loop.close()
+        finally:
+            if self._claim:
+                self._claim.release()
+            publishers, subscriptions, parameters = self._entities()
+            for publisher in publishers - self._own[0]:
+                self.destroy_publisher(publisher)
+            for subscription in subscriptions - self._own[1]:
+                self.destroy_subscription(subscription)
+            forget_parameters(self, parameters - self._own[2])
+
+    def _entities(self) -> tuple[set[Any], set[Any], set[str]]:
+        return set(self.publishers), set(self.subscriptions), declared_parameters(self)
+
+    def _refuse_transition(self) -> None:
+        self.error = InputError("this transition is not possible in the present state")
+        self.get_logger().error(str(self.error))

@@ -1,0 +1,153 @@
+"""A process of nodes: ROS up, the lifecycle, the loops of the active nodes stepped, a clean end.
+
+As a rule a process hosts one node; a composed graph is several nodes in one process.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import signal
+import sys
+import textwrap
+from collections.abc import Callable, Sequence
+from typing import Any, Generic, NamedTuple, NoReturn, TypeVar
+
+from .process_environment import set_defaults
+
+set_defaults()
+
+import rclpy  # noqa: E402  (the environment must be set before)
+import rclpy.utilities  # noqa: E402
+from rclpy.signals import SignalHandlerOptions  # noqa: E402
+
+from ..config.settings import NodeSettings, leaves  # noqa: E402
+from ..config.validation import short  # noqa: E402
+from ..errors import InputError, SpaceRobotError  # noqa: E402
+from .lifeline import hold_to_standard_input  # noqa: E402
+from .loop import Loop  # noqa: E402
+from .managed_node import AUTOSTART, ManagedNode  # noqa: E402
+from .turns import Turns  # noqa: E402
+
+Schema = TypeVar("Schema", bound=NodeSettings)
+
+
+class NodeKind(NamedTuple, Generic[Schema]):
+    """How a node is made."""
+
+    schema: type[Schema]
+    """Its parameters; it tells the node's name, too."""
+    make_loop: Callable[[ManagedNode[Schema], Schema], Loop]
+    changeable: tuple[str, ...] = ()
+    """Names of the parameters that may be changed in flight."""
+
+    def make_node(self) -> ManagedNode[Schema]:
+        """Join the graph, unconfigured."""
+        return ManagedNode(self.schema, self.make_loop, self.changeable)
+
+
+class NodeHost:
+    """Starts, serves, steps and ends the nodes of this process."""
+
+    def __init__(self, nodes: Sequence[ManagedNode[Any]]) -> None:
+        """Take the nodes, in the order in which they are started."""
+        self._nodes = nodes
+        self._turns = Turns(nodes)
+        self._is_signalled = False
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self._stop)
+        hold_to_standard_input()
+
+    def _stop(self, number: int, frame: object) -> None:
+        self._is_signalled = True
+
+    def run(self) -> None:
+        """Start the nodes that start by themselves; then serve and step until the end.
+
+        That is a signal, a loop that is complete, or the shutdown of all nodes.
+
+        Raises:
+            SpaceRobotError: a node cannot be started, or its loop cannot go on.
+        """
+        for node in self._nodes:
+            node.claim_name()
+        for node in self._nodes:
+            if node.autostart and not self._is_signalled:
+                node.start()
+        take_turn = self._turns.take
+        while not self._is_signalled and take_turn():
+            pass
+
+    def end(self) -> list[tuple[str, SpaceRobotError]]:
+        """End all nodes, the last one first; which ones could not end as they should, and why."""
+        failures = []
+        for node in reversed(self._nodes):
+            try:
+                node.end()
+            except SpaceRobotError as error:
+                failures.append((node.get_name(), error))
+        return failures
+
+
+def run_nodes(*kinds: NodeKind[Any], arguments: list[str] | None = None) -> NoReturn:
+    """Run nodes in this process until a loop is complete, or until all are shut down.
+
+    Exit code 0 at the end or on SIGINT, SIGTERM or SIGHUP, 2 on bad input, 1 on a failed flight,
+    each failure with one line on standard error.
+
+    Args:
+        kinds: the nodes in the order in which they are started; they end in the reverse order.
+        arguments: the command line (None: this process').
+    """
+    faulthandler.enable()  # a crash of the middleware leaves a word on where it was
+    schemas = [kind.schema for kind in kinds]
+    who = schemas[0].ros_name() if len(kinds) == 1 else "composed nodes"
+    try:
+        _, *others = rclpy.utilities.remove_ros_args(sys.argv if arguments is None else arguments)
+        if others:
+            _answer(schemas, others)
+        rclpy.init(args=arguments, signal_handler_options=SignalHandlerOptions.NO)
+    except InputError as error:
+        sys.exit(_say(who, error))
+    except Exception as error:  # RCLError is private; whatever it is, the arguments are at fault
+        sys.exit(_say(who, InputError(str(error).splitlines()[0])))
+    nodes = [kind.make_node() for kind in kinds]
+    host = NodeHost(nodes)
+    code = 0
+    try:
+        host.run()
+    except SpaceRobotError as error:
+        code = _say(who, error)
+    try:
+        for name, failure in host.end():
+            code = code or _say(name, failure)
+    finally:
+        for node in nodes:
+            node.destroy_node()
+        rclpy.utilities.try_shutdown()
+    sys.exit(code)
+
+
+def _answer(schemas: Sequence[type[NodeSettings]], others: Sequence[str]) -> None:
+    """Print the usage and end, if that is what the arguments that are not for ROS ask for.
+
+    Raises:
+        InputError: they ask for something else.
+    """
+    if not {"-h", "--help"} & set(others):
+        raise InputError(
+            f"unknown argument {short(others[0])}: a node takes only those of ROS, after "
+            "--ros-args (--help tells more)"
+        )
+    for schema in schemas:
+        name = schema.ros_name()
+        parameters = ", ".join([AUTOSTART, *(key for key, _ in leaves(schema))])
+        print(
+            f"usage: {name} [--ros-args [-p NAME:=VALUE]... [--params-file FILE] [-r FROM:=TO]...]"
+        )
+        print(textwrap.fill(f"parameters: {parameters}", 96, subsequent_indent="  "))
+    sys.exit(0)
+
+
+def _say(who: str, error: SpaceRobotError) -> int:
+    print(f"{who}: error: {error}", file=sys.stderr, flush=True)
+    return error.exit_code

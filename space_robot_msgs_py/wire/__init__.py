@@ -1,0 +1,1 @@
+"""The messages of the graph: laid out, encoded and decoded."""

@@ -1,0 +1,55 @@
+"""/base/state: pose and velocity of the base, and the torque that was applied to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from .. import topics
+from ..errors import MessageError
+from ..samples import Timebase
+from .message import Column, MessageDescription, Run, name_order
+
+XYZ = (0, 1, 2)
+WXYZ = (3, 0, 1, 2)
+"""A sample's quaternion in ROS's, which is x, y, z, w."""
+
+
+class BaseState(MessageDescription):
+    """A sensor_msgs/MultiDOFJointState of one body; forces are zero: nobody pushes the base."""
+
+    topic = topics.BASE_STATE
+    columns = (
+        Column("base_position", 0, 3),
+        Column("quaternion", 0, 4),
+        Column("base_velocity", 0, 3),
+        Column("omega_base", 0, 3),
+        Column("applied_torque", 0, 3),
+    )
+
+    def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
+        """``names``: those of the joints do not matter here."""
+        super().__init__([topics.BASE_FRAME], timebase)
+
+    def content(self, rows: int = 1) -> Mapping[str, Any]:
+        """The base, in the inertial frame."""
+        return {
+            "header": {"frame_id": topics.INERTIAL_FRAME},
+            "joint_names": self.names,
+            "transforms": [{}],
+            "twist": [{}],
+            "wrench": [{}],
+        }
+
+    def runs(self, message: Any) -> Iterable[Run]:
+        """Linear velocity in the inertial frame, angular velocity and torque in the base's."""
+        name_order(message.joint_names, self.names, self.topic.name)
+        if not (len(message.transforms) == len(message.twist) == len(message.wrench) == 1):
+            raise MessageError(f"{self.topic.name}: one transform, twist, wrench expected")
+        return (
+            Run("transforms[0].translation", XYZ),
+            Run("transforms[0].rotation", WXYZ),
+            Run("twist[0].linear", XYZ),
+            Run("twist[0].angular", XYZ),
+            Run("wrench[0].torque", XYZ),
+        )

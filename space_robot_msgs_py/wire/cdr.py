@@ -1,0 +1,172 @@
+"""The bytes of a message, laid out by walking its definition: what stays, where numbers stand.
+
+The messages of a flight keep their names and lengths, so the bytes between the numbers never
+change. A `MessageLayout` knows them of one message, and of all that differ in numbers only.
+
+Plain CDR, little endian: a primitive is aligned to its size counted from the end of the 4-byte
+encapsulation header; a string is its length (with NUL), bytes, NUL; a sequence is its length,
+then its elements.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.interfaces import Nodetype
+
+from ..errors import MessageError
+from .definitions import jazzy
+
+Bytes = NDArray[np.uint8]
+
+ENCAPSULATION = b"\x00\x01\x00\x00"
+BODY = len(ENCAPSULATION)
+BIG_ENDIAN = b"\x00\x00"
+"""The beginning of a message that a big-endian machine wrote."""
+STAMP = struct.Struct("<iI")
+_BIG_STAMP = struct.Struct(">iI")
+TIME = "builtin_interfaces/msg/Time"
+_PRIMITIVES = {
+    name: struct.Struct(f"<{letter}")
+    for name, letter in {
+        "bool": "?", "byte": "B", "octet": "B", "char": "B", "uint8": "B", "int8": "b",
+        "uint16": "H", "int16": "h", "uint32": "I", "int32": "i", "uint64": "Q", "int64": "q",
+        "float32": "f", "float64": "d",
+    }.items()
+}  # fmt: skip
+_LENGTH = _PRIMITIVES["uint32"]
+_NUMBER = (Nodetype.BASE, ("float64", 0))
+
+
+class Slot(NamedTuple):
+    """The place of a run of float64 in a message."""
+
+    offset: int
+    """Bytes from the message's beginning."""
+    length: int
+
+
+class MessageLayout:
+    """The bytes of one message, and where in them the numbers stand.
+
+    Numbers are every float64 and Time; all else, as names, lengths and other integers, is the same
+    in all messages of one layout.
+    """
+
+    def __init__(self, type_name: str, content: Any) -> None:
+        """Lay out a message.
+
+        Args:
+            type_name: as ``sensor_msgs/msg/JointState``.
+            content: the decoded message, or a mapping of its fields; what it lacks is zero or
+                empty.
+        """
+        walk = _Walk()
+        walk.message(type_name, content, "")
+        self.pattern: Bytes = np.full((2, BODY + len(walk.body)), 0xFF, np.uint8)
+        """The message's bytes, and which of their bits are the same in all of this layout."""
+        self.pattern[0] = np.frombuffer(ENCAPSULATION + walk.body, np.uint8)
+        for start, stop in walk.changing:
+            self.pattern[1, BODY + start : BODY + stop] = 0
+        self.slots = walk.slots
+        """The runs of float64 by their path, as ``transforms[0].translation``."""
+
+    @property
+    def data(self) -> bytes:
+        """The message as it goes on the wire."""
+        data: bytes = self.pattern[0].tobytes()
+        return data
+
+
+class _Walk:
+    """Goes through the fields of a message in the order of its definition and writes each."""
+
+    def __init__(self) -> None:
+        self.body = bytearray()
+        self.changing: list[tuple[int, int]] = []
+        """Numbers, and padding: a foreign writer pads with what it likes."""
+        self.slots: dict[str, Slot] = {}
+
+    def message(self, type_name: str, content: Any, path: str) -> None:
+        """A message, or a message in it."""
+        fields = _fields(type_name)
+        values = [_value(content, name) for name, _ in fields]
+        if type_name == TIME:
+            self._align(4)
+            self._change(STAMP.pack(*(value or 0 for value in values)))
+        elif all(description == _NUMBER for _, description in fields):
+            self._numbers([0.0 if value is None else value for value in values], path)
+        else:
+            for (name, description), value in zip(fields, values, strict=True):
+                self._field(description, value, f"{path}.{name}" if path else name)
+
+    def _field(self, description: Any, value: Any, path: str) -> None:
+        kind, of = description
+        if kind is Nodetype.BASE and of[0] == "string":
+            text = (value or "").encode() + b"\0"
+            self._primitive(_LENGTH, len(text))
+            self.body += text
+        elif description == _NUMBER:
+            self._numbers([0.0 if value is None else value], path)
+        elif kind is Nodetype.BASE:
+            self._primitive(_PRIMITIVES[of[0]], value or 0)
+        elif kind is Nodetype.NAME:
+            self.message(of, value, path)
+        else:
+            element, count = of
+            items = [None] * count if value is None else value  # of a sequence that lacks: none
+            if kind is Nodetype.SEQUENCE:
+                self._primitive(_LENGTH, len(items))
+            if element == _NUMBER:
+                self._numbers(np.zeros(count) if value is None else items, path)
+            else:
+                for i, item in enumerate(items):
+                    self._field(element, item, f"{path}[{i}]")
+
+    def _primitive(self, form: struct.Struct, value: Any) -> None:
+        self._align(form.size)
+        self.body += form.pack(value)
+
+    def _numbers(self, values: Any, path: str) -> None:
+        if len(values):  # an empty sequence has no padding after it
+            self._align(8)
+        self.slots[path] = Slot(BODY + len(self.body), len(values))
+        self._change(np.asarray(values, "<f8").tobytes())
+
+    def _align(self, size: int) -> None:
+        self._change(bytes(-len(self.body) % size))
+
+    def _change(self, data: bytes) -> None:
+        if data:
+            self.changing.append((len(self.body), len(self.body) + len(data)))
+            self.body += data
+
+
+@cache
+def _fields(type_name: str) -> list[Any]:
+    return list(jazzy().get_msgdef(type_name).fields)
+
+
+def _value(content: Any, name: str) -> Any:
+    if content is None:
+        return None
+    return content.get(name) if isinstance(content, Mapping) else getattr(content, name)
+
+
+def header_stamp_ns(data: bytes) -> int:
+    """Stamp of a serialized message that starts with a Header or is a Time, of either order, ns.
+
+    Raises:
+        MessageError: the message ends before that.
+    """
+    try:
+        form = _BIG_STAMP if data.startswith(BIG_ENDIAN) else STAMP
+        sec, nanosec = form.unpack_from(data, BODY)
+    except struct.error:
+        raise MessageError(f"a message of {len(data)} bytes has no stamp") from None
+    return int(sec * 1_000_000_000 + nanosec)

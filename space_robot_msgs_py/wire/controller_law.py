@@ -1,0 +1,66 @@
+"""/controller/law: a message whenever the law or its gains change."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .. import topics
+from ..errors import MessageError
+from ..samples import LawInForce, Timebase
+from .cdr import MessageLayout
+from .definitions import decode
+
+NODE = topics.LAW.name.rpartition("/")[0] + "_node"
+CONTROLLER = "controller"
+"""The parameter that names the law."""
+STRING, DOUBLE_ARRAY = 4, 8
+"""Members of rcl_interfaces/ParameterType."""
+
+
+class LawCodec:
+    """`LawInForce` as the parameters ``controller`` and ``<law>.<gain>``.
+
+    They are ``new_parameters`` of the law a controller begins with, ``changed_parameters`` of
+    every other. A change is rare, so each message is laid out anew.
+    """
+
+    def __init__(self, timebase: Timebase) -> None:
+        self._timebase = timebase
+
+    def encode(self, law: LawInForce) -> bytes:
+        """The bytes of /controller/law."""
+        sec, nanosec = divmod(self._timebase.stamp_ns(law.tick), 1_000_000_000)
+        values: dict[str, dict[str, Any]] = {
+            CONTROLLER: {"type": STRING, "string_value": law.name}
+        } | {
+            f"{law.name}.{gain}": {"type": DOUBLE_ARRAY, "double_array_value": numbers}
+            for gain, numbers in law.gains.items()
+        }
+        given = [{"name": name, "value": value} for name, value in values.items()]
+        content = {
+            "stamp": {"sec": sec, "nanosec": nanosec},
+            "node": NODE,
+            "new_parameters" if law.is_first else "changed_parameters": given,
+        }
+        return MessageLayout(topics.LAW.type, content).data
+
+    @staticmethod
+    def decode(data: bytes, tick: int) -> LawInForce:
+        """The law of a message stamped with ``tick``.
+
+        Raises:
+            MessageError: the message names no law, or a gain of it is no list of numbers.
+        """
+        message = decode(data, topics.LAW.type)
+        given = {p.name: p.value for p in (*message.new_parameters, *message.changed_parameters)}
+        law = given.get(CONTROLLER)
+        if law is None or law.type != STRING:
+            raise MessageError(f"{topics.LAW.name}: no parameter {CONTROLLER!r}")
+        name, gains = law.string_value, {}
+        for key, value in given.items():
+            if key.startswith(f"{name}."):
+                if value.type != DOUBLE_ARRAY:
+                    raise MessageError(f"{topics.LAW.name}: {key} is no list of numbers")
+                gains[key.removeprefix(f"{name}.")] = tuple(value.double_array_value.tolist())
+        is_first = any(p.name == CONTROLLER for p in message.new_parameters)
+        return LawInForce(tick, name, gains, is_first)

@@ -1,0 +1,48 @@
+"""/joint_states: position, velocity and effort of every joint, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from .. import topics
+from ..errors import MessageError
+from ..samples import Timebase
+from .message import Column, MessageDescription, Run, name_order
+
+
+class JointStates(MessageDescription):
+    """A sensor_msgs/JointState; its efforts are the torques applied to the joints."""
+
+    topic = topics.JOINT_STATES
+    fields: tuple[str, ...] = ("position", "velocity", "effort")
+    frame_id = ""
+
+    def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
+        super().__init__(names, timebase)
+        n = len(self.names)
+        self.columns = (
+            Column("joint_positions", 0, n),
+            Column("joint_velocities", 0, n),
+            Column("applied_torque", 3, n),
+        )
+
+    def content(self, rows: int = 1) -> Mapping[str, Any]:
+        """Our names, and the numbers of our fields."""
+        numbers = [0.0] * len(self.names)
+        return {
+            "header": {"frame_id": self.frame_id},
+            "name": self.names,
+            **dict.fromkeys(self.fields, numbers),
+        }
+
+    def runs(self, message: Any) -> Iterable[Run]:
+        """Field by field in the order of our names, whatever theirs."""
+        order = name_order(message.name, self.names, self.topic.name)
+        for field in self.fields:
+            count = len(getattr(message, field))
+            if count != len(order):
+                raise MessageError(
+                    f"{self.topic.name}: {count} values of {field} for {len(order)} names", "size"
+                )
+            yield Run(field, order)

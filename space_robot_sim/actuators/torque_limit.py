@@ -1,0 +1,82 @@
+"""The largest torque that the actuators give."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, shaped
+from space_robot_msgs_py.config.validation import StrictModel
+
+from ..faults.grammar import Argument, Kind
+from ..faults.schedule import Schedule, ScheduledFault, TemporaryChange
+
+Array = NDArray[np.float64]
+Limit = Annotated[float, Field(ge=0.0, le=1e9)]
+
+
+class TorqueLimitSettings(StrictModel):
+    """The largest torque of each actuator."""
+
+    base_torque_limit: Limit = Field(
+        0.0, description="largest torque on each base axis, N m (0: none)"
+    )
+    joint_torque_limit: Limit = Field(
+        0.0, description="largest torque on each joint, N m (0: none)"
+    )
+
+
+class TorqueLimit(Record):
+    """The torque limits of one robot's actuators."""
+
+    limit: Array = shaped(lambda n: (n + 3,))
+    """Largest torque of each axis, N m: base x, y, z (base frame), then joints."""
+    saturated_ticks: float = shaped(lambda n: ())
+    """Ticks so far in which a torque was at its limit."""
+
+    @classmethod
+    def build(cls, n: int, settings: TorqueLimitSettings) -> TorqueLimit:
+        """Give each of ``n`` joints, and each base axis, the same limit."""
+        limits = cls.allocate(n)
+        limits.limit[:] = settings.joint_torque_limit or np.inf
+        limits.limit[:3] = settings.base_torque_limit or np.inf
+        return limits
+
+
+@kernel
+def limit_torque(limits: TorqueLimit, torque: Array) -> None:
+    """Cut ``torque`` (n+3,) N m to the limits in place, and count the tick if it exceeds one."""
+    limit, saturated = limits.limit, 0.0
+    for i in range(torque.size):
+        wanted = torque[i]
+        torque[i] = min(max(wanted, -limit[i]), limit[i])
+        if torque[i] != wanted:
+            saturated = 1.0
+    limits.saturated_ticks += saturated
+
+
+_TORQUE = Argument("TORQUE", "N m", 0.0, 1e6)
+SATURATE_BASE = Kind("saturate_base", _TORQUE, None, "the base's actuators give no more")
+SATURATE_JOINTS = Kind("saturate_joints", _TORQUE, None, "the joints' motors give no more")
+
+
+class WeakActuators:
+    """Lowers torque limits for a while."""
+
+    KINDS: ClassVar[tuple[Kind, ...]] = (SATURATE_BASE, SATURATE_JOINTS)
+
+    def __init__(self, schedule: Schedule) -> None:
+        self._change = TemporaryChange(schedule.of(*self.KINDS))
+
+    def apply(self, tick: int, part: TorqueLimit) -> None:
+        """Make the actuators as weak as they should be from ``tick`` to the next."""
+        self._change.apply(tick, part.limit, _weaken)
+
+
+def _weaken(limit: Array, fault: ScheduledFault) -> None:
+    axes = limit[:3] if fault.kind == SATURATE_BASE else limit[3:]
+    np.minimum(axes, fault.value, out=axes)

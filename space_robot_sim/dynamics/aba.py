@@ -1,0 +1,129 @@
+"""Accelerations from forces, ``qdd = H^-1 (F - c)``, by the articulated-body algorithm.
+
+Featherstone's recursion, linear in the number of joints. With every quantity on inertial axes
+about one origin the usual changes of frame between links vanish. A spatial inertia is held in
+three blocks: ``[[J, G], [G^T, M]]``, angular part first, J and M symmetric.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+
+from .algebra import (
+    Matrix,
+    Symmetric,
+    Vector,
+    add,
+    add_symmetric,
+    dot,
+    inverse_symmetric,
+    outer_subtracted,
+    outer_subtracted_general,
+    scale,
+    skew_added,
+    store,
+    subtract,
+    symmetric,
+    transform,
+    transform_symmetric,
+    transform_transposed,
+    vector,
+)
+from .kinematics import forward_kinematics, spatial_velocities
+from .model import Data, Model
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def aba(
+    model: Model, quaternion: Array, joint_positions: Array, omega_inertial: Array,
+    joint_velocities: Array, force: Array, data: Data, out: Array,
+) -> None:  # fmt: skip
+    """Write the acceleration ``[v0dot, w0dot, thetadd]`` (n+6,) into ``out``.
+
+    ``force`` (n+6,) is ``[f0, tau0, tau]``, the base's part on inertial axes, N and N m.
+    """
+    forward_kinematics(model, quaternion, joint_positions, data)
+    spatial_velocities(model, omega_inertial, joint_velocities, data)
+    # inwards: the articulated-body inertia and bias force of each link, free about its joint
+    inertia = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    coupling = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    mass = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    bias_moment, bias_force = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for i in range(model.mass.size - 1, -1, -1):
+        inertia = add_symmetric(inertia, symmetric(data.inertia[i]))
+        coupling = skew_added(coupling, vector(data.first_moment[i], 0))
+        m = model.mass[i]
+        mass = (mass[0] + m, mass[1] + m, mass[2] + m, mass[3], mass[4], mass[5])
+        bias_moment = add(bias_moment, vector(data.bias[i], 0))
+        bias_force = add(bias_force, vector(data.bias[i], 3))
+        if i == 0:
+            break
+        angular, linear = vector(data.motion[i], 0), vector(data.motion[i], 3)
+        # U = I^A S, D = S^T U, u = tau - S^T p^A
+        U_angular = add(transform_symmetric(inertia, angular), transform(coupling, linear))
+        U_linear = add(transform_transposed(coupling, angular), transform_symmetric(mass, linear))
+        inverse = 1.0 / (dot(angular, U_angular) + dot(linear, U_linear))
+        u_over_d = (force[5 + i] - dot(angular, bias_moment) - dot(linear, bias_force)) * inverse
+        U_over_D_angular, U_over_D_linear = scale(U_angular, inverse), scale(U_linear, inverse)
+        store(U_over_D_angular, data.U_over_D[i], 0)
+        store(U_over_D_linear, data.U_over_D[i], 3)
+        data.u_over_d[i] = u_over_d
+        # I^a = I^A - U U^T / D,  p^a = p^A + I^a c + U u / D
+        inertia = outer_subtracted(inertia, U_over_D_angular, U_angular)
+        coupling = outer_subtracted_general(coupling, U_over_D_angular, U_linear)
+        mass = outer_subtracted(mass, U_over_D_linear, U_linear)
+        angular, linear = vector(data.coriolis[i], 0), vector(data.coriolis[i], 3)
+        bias_moment = add(bias_moment, scale(U_angular, u_over_d))
+        bias_moment = add(bias_moment, transform_symmetric(inertia, angular))
+        bias_moment = add(bias_moment, transform(coupling, linear))
+        bias_force = add(bias_force, scale(U_linear, u_over_d))
+        bias_force = add(bias_force, transform_transposed(coupling, angular))
+        bias_force = add(bias_force, transform_symmetric(mass, linear))
+    # the base floats: no joint to the ground
+    angular, linear = solve_spatial(
+        inertia, coupling, mass,
+        subtract(vector(force, 3), bias_moment), subtract(vector(force, 0), bias_force),
+    )  # fmt: skip
+    store(linear, out, 0)
+    store(angular, out, 3)
+    # outwards: the accelerations
+    for i in range(1, model.mass.size):
+        angular = add(angular, vector(data.coriolis[i], 0))
+        linear = add(linear, vector(data.coriolis[i], 3))
+        acceleration = data.u_over_d[i] - dot(vector(data.U_over_D[i], 0), angular)
+        acceleration -= dot(vector(data.U_over_D[i], 3), linear)
+        out[5 + i] = acceleration
+        angular = add(angular, scale(vector(data.motion[i], 0), acceleration))
+        linear = add(linear, scale(vector(data.motion[i], 3), acceleration))
+
+
+@kernel
+def solve_spatial(
+    inertia: Symmetric, coupling: Matrix, mass: Symmetric, moment: Vector, force: Vector
+) -> tuple[Vector, Vector]:
+    """Return angular and linear acceleration of a body of this spatial inertia under a wrench."""
+    inverse_mass = inverse_symmetric(mass)
+    g = coupling
+    rows = (
+        transform_symmetric(inverse_mass, (g[0], g[1], g[2])),
+        transform_symmetric(inverse_mass, (g[3], g[4], g[5])),
+        transform_symmetric(inverse_mass, (g[6], g[7], g[8])),
+    )
+    # Schur complement J - G M^-1 G^T
+    complement = (
+        inertia[0] - dot(rows[0], (g[0], g[1], g[2])),
+        inertia[1] - dot(rows[1], (g[3], g[4], g[5])),
+        inertia[2] - dot(rows[2], (g[6], g[7], g[8])),
+        inertia[3] - dot(rows[0], (g[3], g[4], g[5])),
+        inertia[4] - dot(rows[0], (g[6], g[7], g[8])),
+        inertia[5] - dot(rows[1], (g[6], g[7], g[8])),
+    )
+    coupled = (dot(rows[0], force), dot(rows[1], force), dot(rows[2], force))
+    angular = transform_symmetric(inverse_symmetric(complement), subtract(moment, coupled))
+    linear = transform_symmetric(inverse_mass, subtract(force, transform_transposed(g, angular)))
+    return angular, linear

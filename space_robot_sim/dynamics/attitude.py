@@ -1,0 +1,93 @@
+"""Attitude kinematics with unit quaternions ``[w, x, y, z]`` = ``{eta, eps}`` (Section II-A).
+
+Two angular velocities occur: ``omega_base`` in the base frame, where (1) holds, and
+``omega_inertial``, where the sign of its skew term flips. Every function here names its frame.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+
+Array = NDArray[np.float64]
+
+SINGULAR_ETA = 1e-6
+"""Below this |eta| the base has turned by 180 degrees and J0 cannot be inverted."""
+
+
+@kernel
+def rotation_matrix(quaternion: Array, out: Array) -> None:
+    """Write into ``out`` (3, 3) the rotation from the base frame to the inertial frame."""
+    w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
+    out[0, 0] = 1.0 - 2.0 * (y * y + z * z)
+    out[0, 1] = 2.0 * (x * y - w * z)
+    out[0, 2] = 2.0 * (x * z + w * y)
+    out[1, 0] = 2.0 * (x * y + w * z)
+    out[1, 1] = 1.0 - 2.0 * (x * x + z * z)
+    out[1, 2] = 2.0 * (y * z - w * x)
+    out[2, 0] = 2.0 * (x * z - w * y)
+    out[2, 1] = 2.0 * (y * z + w * x)
+    out[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+
+
+@kernel
+def quaternion_rate(quaternion: Array, omega_inertial: Array, out: Array) -> None:
+    """Write into ``out`` (4,) the rate of ``quaternion``, 1/s, by ``J0^T`` of (1).
+
+    ``omega_inertial`` (3,) rad/s is on inertial axes.
+    """
+    w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
+    p, q, r = omega_inertial[0], omega_inertial[1], omega_inertial[2]
+    out[0] = -0.5 * (x * p + y * q + z * r)
+    out[1] = 0.5 * (w * p + z * q - y * r)
+    out[2] = 0.5 * (w * q - z * p + x * r)
+    out[3] = 0.5 * (w * r + y * p - x * q)
+
+
+@kernel
+def attitude_jacobian(quaternion: Array, out: Array) -> None:
+    """Write into ``out`` (3, 3) ``J0 = (eta E + skew(eps)) / 2`` of (1): epsdot = J0 omega_base."""
+    w, x, y, z = 0.5 * quaternion[0], 0.5 * quaternion[1], 0.5 * quaternion[2], 0.5 * quaternion[3]
+    out[0, 0] = w
+    out[0, 1] = -z
+    out[0, 2] = y
+    out[1, 0] = z
+    out[1, 1] = w
+    out[1, 2] = -x
+    out[2, 0] = -y
+    out[2, 1] = x
+    out[2, 2] = w
+
+
+@kernel
+def attitude_jacobian_inverse(quaternion: Array, out: Array) -> None:
+    """Write into ``out`` (3, 3) ``J0^-1 = 2 (eta E - skew(eps) + eps eps^T / eta)``.
+
+    Exact for a unit quaternion; the caller keeps away from eta = 0 (``SINGULAR_ETA``).
+    """
+    w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
+    out[0, 0] = 2.0 * (w + x * x / w)
+    out[0, 1] = 2.0 * (z + x * y / w)
+    out[0, 2] = 2.0 * (-y + x * z / w)
+    out[1, 0] = 2.0 * (-z + y * x / w)
+    out[1, 1] = 2.0 * (w + y * y / w)
+    out[1, 2] = 2.0 * (x + y * z / w)
+    out[2, 0] = 2.0 * (y + z * x / w)
+    out[2, 1] = 2.0 * (-x + z * y / w)
+    out[2, 2] = 2.0 * (w + z * z / w)
+
+
+@kernel
+def rotate(matrix: Array, vector: Array, out: Array) -> None:
+    """Write ``matrix @ vector`` into ``out`` (3,); ``out`` is not ``vector``."""
+    for i in range(3):
+        out[i] = matrix[i, 0] * vector[0] + matrix[i, 1] * vector[1] + matrix[i, 2] * vector[2]
+
+
+@kernel
+def rotate_back(matrix: Array, vector: Array, out: Array) -> None:
+    """Write ``matrix.T @ vector`` into ``out`` (3,); ``out`` is not ``vector``."""
+    for i in range(3):
+        out[i] = matrix[0, i] * vector[0] + matrix[1, i] * vector[1] + matrix[2, i] * vector[2]

@@ -1,0 +1,1 @@
+"""What acts on the robot besides its actuators: friction, disturbances, payload."""

@@ -1,0 +1,73 @@
+"""Disturbance torques on base and joints, (61)."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, assign, shaped
+from space_robot_msgs_py.config.validation import StrictModel
+
+Array = NDArray[np.float64]
+
+Amplitude = Annotated[float, Field(ge=0.0, le=1e6)]
+Frequencies = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class DisturbanceSettings(StrictModel):
+    """Disturbance torques: ``scale * amplitude * (sin(2 pi f1 t) + sin(2 pi f2 t))``, (61)."""
+
+    scale: Amplitude = Field(0.0, description="factor on all disturbances, k of (61)-(63)")
+    base_amplitude: Amplitude = Field(0.010, description="on base x, y, z, N m")
+    base_frequencies: Frequencies = Field([0.5, 0.75], description="of its two sines, Hz (0: none)")
+    inner_amplitude: Amplitude = Field(0.005, description="on joints 1 to 3, N m")
+    inner_frequencies: Frequencies = Field(
+        [0.25, 0.5], description="of its two sines, Hz (0: none)"
+    )
+    outer_amplitude: Amplitude = Field(0.002, description="on joints 4 and up, N m")
+    outer_frequencies: Frequencies = Field(
+        [0.25, 0.0], description="of its two sines, Hz (0: none)"
+    )
+
+
+class Disturbance(Record):
+    """The sines that disturb one robot, in three groups: base, joints 1 to 3, joints 4 and up."""
+
+    amplitude: Array = shaped(lambda n: (3,))
+    """N m; on the base about inertial axes."""
+    angular_frequency: Array = shaped(lambda n: (3, 2))
+    """rad/s, of the two sines of each group."""
+
+    @classmethod
+    def build(cls, n: int, settings: DisturbanceSettings) -> Disturbance:
+        """Read the numbers of the settings for a robot of ``n`` joints."""
+        s = settings
+        amplitudes = [s.base_amplitude, s.inner_amplitude, s.outer_amplitude]
+        frequencies = [s.base_frequencies, s.inner_frequencies, s.outer_frequencies]
+        disturbance = cls.allocate(n)
+        assign(
+            disturbance, amplitude=s.scale * np.array(amplitudes),
+            angular_frequency=2.0 * np.pi * np.array(frequencies),
+        )  # fmt: skip
+        return disturbance
+
+
+@kernel
+def disturbance_torque(disturbance: Disturbance, time: float, out: Array) -> None:
+    """Write into ``out`` (n+3,) ``f_d`` of (61) at ``time`` (s), N m.
+
+    On the base about inertial axes, then on the joints.
+    """
+    frequency = disturbance.angular_frequency
+    for group in range(3):
+        first, last = 3 * group, out.size if group == 2 else min(3 * group + 3, out.size)
+        amplitude, torque = disturbance.amplitude[group], 0.0
+        if amplitude != 0.0:
+            wave = np.sin(frequency[group, 0] * time) + np.sin(frequency[group, 1] * time)
+            torque = amplitude * wave
+        for i in range(first, last):
+            out[i] = torque

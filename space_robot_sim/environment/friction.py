@@ -1,0 +1,74 @@
+"""Friction in the joints, the last term of (27)."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, assign, shaped
+from space_robot_msgs_py.config.validation import StrictModel
+
+from ..faults.grammar import Argument, Kind
+from ..faults.schedule import Schedule, ScheduledFault, TemporaryChange
+
+Array = NDArray[np.float64]
+Coefficient = Annotated[float, Field(ge=0.0, le=1e6)]
+
+
+class FrictionSettings(StrictModel):
+    """``f_f = f_C sign(thetadot) + f_V thetadot`` on every joint."""
+
+    coulomb: Coefficient = Field(0.02, description="Coulomb friction f_C of each joint, N m")
+    viscous: Coefficient = Field(0.2, description="viscous friction f_V of each joint, N m s/rad")
+
+
+class Friction(Record):
+    """The friction of one robot's joints."""
+
+    coulomb: Array = shaped(lambda n: (n,))
+    """f_C, N m."""
+    viscous: Array = shaped(lambda n: (n,))
+    """f_V, N m s/rad."""
+
+    @classmethod
+    def build(cls, n: int, settings: FrictionSettings) -> Friction:
+        """Give each of ``n`` joints the same friction."""
+        friction = cls.allocate(n)
+        assign(friction, coulomb=settings.coulomb, viscous=settings.viscous)
+        return friction
+
+
+@kernel
+def friction_torque(friction: Friction, joint_velocities: Array, out: Array) -> None:
+    """Write into ``out`` (n,) the torque ``f_f`` that opposes the motion of each joint, N m.
+
+    ``joint_velocities`` (n,) rad/s.
+    """
+    for i in range(out.size):
+        rate = joint_velocities[i]
+        out[i] = friction.coulomb[i] * np.sign(rate) + friction.viscous[i] * rate
+
+
+class StuckJoint:
+    """Raises the Coulomb friction of a joint for a while."""
+
+    KINDS: ClassVar[tuple[Kind, ...]] = (
+        Kind("stuck_joint", Argument("TORQUE", "N m", 0.0, 1e3, joint=True), None,
+             "a joint's Coulomb friction rises to TORQUE"),
+    )  # fmt: skip
+
+    def __init__(self, schedule: Schedule) -> None:
+        self._change = TemporaryChange(schedule.of(*self.KINDS))
+
+    def apply(self, tick: int, part: Friction) -> None:
+        """Make the joints stick as they should from ``tick`` to the next."""
+        self._change.apply(tick, part.coulomb, _stick)
+
+
+def _stick(coulomb: Array, fault: ScheduledFault) -> None:
+    joint = fault.joint - 1
+    coulomb[joint] = max(coulomb[joint], fault.value)

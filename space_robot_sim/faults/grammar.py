@@ -1,0 +1,179 @@
+"""Faults to be injected, as text: ``KIND@T[-END][:ARGUMENT]``, times in simulated seconds.
+
+A `Kind` is declared beside the class that brings it about; this module knows none by name.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from space_robot_msgs_py.config.validation import one_of
+from space_robot_msgs_py.errors import InputError
+
+_NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_FAULT = re.compile(
+    rf"(?P<kind>[^@]*)@(?P<start>{_NUMBER})(?:-(?P<stop>{_NUMBER}))?(?::(?P<argument>.+))?",
+    re.ASCII,
+)
+_JOINT_AND_NUMBER = re.compile(r"(?P<joint>\d+)=(?P<number>.+)", re.ASCII)
+
+
+class Argument(NamedTuple):
+    """A fault's number beside its time; it is about one joint if ``joint`` is set."""
+
+    symbol: str
+    unit: str
+    low: float
+    high: float
+    whole: bool = False
+    joint: bool = False
+
+    @property
+    def form(self) -> str:
+        """The argument as it is written."""
+        return f"JOINT={self.symbol}" if self.joint else self.symbol
+
+    @property
+    def allowed(self) -> str:
+        """The values that may stand there, in words."""
+        number = "a whole number" if self.whole else "a number"
+        joint = ", JOINT counted from 1" if self.joint else ""
+        return f"{self.form}, {number} from {self.low:g} to {self.high:g} ({self.unit}){joint}"
+
+
+class Kind(NamedTuple):
+    """One way to fail."""
+
+    name: str
+    argument: Argument | None
+    default: float | None
+    """The argument when none is given; None: it must be given."""
+    description: str
+    lasts: bool = True
+    """The fault acts over a stretch of time, so that an end may be given."""
+
+    @property
+    def form(self) -> str:
+        """The text of a fault of this kind; what may be left out is in brackets."""
+        text = f"{self.name}@T[-END]" if self.lasts else f"{self.name}@T"
+        if self.argument is None:
+            return text
+        argument = f":{self.argument.form}"
+        return text + (argument if self.default is None else f"[{argument}]")
+
+    def read(self, argument: str) -> tuple[int, float]:
+        """Return joint (from 1; 0 if none is named) and number of an argument's text.
+
+        Raises:
+            InputError: says what is allowed instead.
+        """
+        if self.argument is None:
+            if argument:
+                raise InputError(f"{self.name} takes no argument, got {argument!r}")
+            return 0, math.nan
+        if not argument:
+            if self.default is None:
+                raise InputError(f"{self.name} needs an argument: {self.argument.allowed}")
+            return 0, self.default
+        joint, number = 0, argument
+        if self.argument.joint:
+            match = _JOINT_AND_NUMBER.fullmatch(argument)
+            joint, number = (int(match["joint"]), match["number"]) if match else (0, "")
+        try:
+            value = float(number)
+        except ValueError:
+            value = math.nan
+        fits = self.argument.low <= value <= self.argument.high
+        if not fits or (self.argument.whole and value % 1) or (self.argument.joint and not joint):
+            raise InputError(f"argument {argument!r}: {self.argument.allowed} is allowed")
+        return joint, value
+
+
+Kinds = Mapping[str, Kind]
+"""Kinds by their names."""
+
+
+def by_name(*kinds: Kind) -> Kinds:
+    """Collect kinds; two of one name are a mistake in the code."""
+    collected = {kind.name: kind for kind in kinds}
+    if len(collected) != len(kinds):
+        raise ValueError("two kinds of faults have one name")
+    return collected
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One fault of a flight, made by `parse_fault`; ``str`` gives its text."""
+
+    kind: Kind
+    start_s: float
+    """Simulated time from which it acts, s."""
+    stop_s: float
+    """Simulated time from which it no longer acts, s (inf: it lasts)."""
+    argument: str
+    """As given; empty if it was left out."""
+
+    def __str__(self) -> str:
+        stop = "" if math.isinf(self.stop_s) else f"-{_shortest(self.stop_s)}"
+        argument = f":{self.argument}" if self.argument else ""
+        return f"{self.kind.name}@{_shortest(self.start_s)}{stop}{argument}"
+
+    @property
+    def value(self) -> float:
+        """The argument's number in its kind's unit; NaN if the kind has no argument."""
+        return self.kind.read(self.argument)[1]
+
+    @property
+    def joint(self) -> int:
+        """The joint it is about, from 1; 0 if it is about none."""
+        return self.kind.read(self.argument)[0]
+
+
+def parse_fault(text: str, kinds: Kinds) -> Fault:
+    """Read the fault of a text; ``kinds`` are those allowed here.
+
+    Raises:
+        InputError: names the text, what is wrong with it, what is allowed.
+    """
+    where = f"fault {text!r}"
+    match = _FAULT.fullmatch(text.strip())
+    if match is None:
+        raise InputError(f"{where}: KIND@T[-END][:ARGUMENT] expected, as in drop_state@2-3:0.1")
+    start, stop = float(match["start"]), float(match["stop"] or math.inf)
+    try:
+        kind = kinds[one_of(match["kind"], kinds, "kind")]
+        if match["stop"] and not kind.lasts:
+            raise InputError(f"{kind.name} has no end: {kind.form}")
+        if not start < stop or (match["stop"] and math.isinf(stop)):
+            raise InputError(f"END must be later than T, got {match['start']} to {match['stop']}")
+        kind.read(match["argument"] or "")
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    return Fault(kind, start, stop, match["argument"] or "")
+
+
+def parse_faults(texts: Iterable[str], kinds: Kinds) -> list[Fault]:
+    """Read the faults of several texts; empty ones are none (ROS has no empty list of strings).
+
+    Raises:
+        InputError: see `parse_fault`.
+    """
+    return [parse_fault(text, kinds) for text in texts if text.strip()]
+
+
+def _shortest(seconds: float) -> str:
+    return repr(seconds).removesuffix(".0")
+
+
+PROBABILITY = Argument("P", "probability per tick", 0.0, 1.0)
+TICKS = Argument("TICKS", "ticks", 0.0, 1e6, whole=True)
+
+
+def help_lines(kinds: Kinds) -> list[str]:
+    """Describe each kind in a line for the help of a command: its text, what it does."""
+    width = max(len(kind.form) for kind in kinds.values())
+    return [f"{kind.form:{width}}  {kind.description}" for kind in kinds.values()]

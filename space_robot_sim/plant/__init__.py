@@ -1,0 +1,1 @@
+"""The plant: the robot in its environment, stepped tick by tick."""

@@ -1,0 +1,294 @@
+"""The plant node's loop: sends a state, takes its command, steps."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.config.files import named_file
+from space_robot_msgs_py.errors import MessageError
+from space_robot_msgs_py.ros.endpoints import (
+    FollowedSubscription,
+    PolledCallbackGroup,
+    RawPublisher,
+    flush,
+)
+from space_robot_msgs_py.ros.health import Health, Level
+from space_robot_msgs_py.ros.loop import Wait
+from space_robot_msgs_py.ros.managed_node import ManagedNode
+from space_robot_msgs_py.samples import Command
+from space_robot_msgs_py.wire.clock import ClockCodec
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+
+from ..robot import Robot
+from .command_guard import CommandGuard
+from .plant import Plant
+from .settings import PlantNodeSettings
+from .wall_clock import WallClock
+
+PATIENCE_S = 0.02
+ASK_AGAIN_S = 0.2
+"""Without an answer for this long the state is sent again (lockstep): well before a listener takes
+this plant for silent, and soon enough for one that believes a new time only after some states."""
+SPIN_BEFORE_DEADLINE_S = 100e-6
+GIVE_WAY_S = 100e-6
+FLUSH_S = 5.0
+"""How long a flight's end waits for its listeners: one may be stopped, or dead."""
+STOPPED_FLUSH_S = 1.0
+"""How long a plant that was told to stop waits: its listeners may be ending, too."""
+MOST_AT_ONCE = 100
+"""Commands taken before the clock is looked at again: somebody may flood the topic."""
+HOLDING_TICKS = 20
+"""A command held for longer is worth a word in the diagnostics."""
+NONE = -1
+"""No tick."""
+
+
+class SentState(NamedTuple):
+    """A measured state as it goes out."""
+
+    joints: bytes
+    base: bytes
+    answered_by: int
+    """Tick of the command that will come for it; `NONE`: no command will."""
+
+
+class PlantLoop:
+    """Sends the state of a tick, takes its command, steps; paced by the graph or the clock.
+
+    In lockstep a tick waits for its answer. A controller that has fallen silent is not waited
+    for: then, and always by the wall clock, a tick lasts its period and the last command is held.
+    """
+
+    def __init__(self, node: ManagedNode[PlantNodeSettings], settings: PlantNodeSettings) -> None:
+        """Make the plant and load its compiled code, so that no tick comes late for it."""
+        self._node, self._settings = node, settings
+        robot = Robot.from_yaml(named_file("robots", settings.robot))
+        self._plant = Plant(robot, settings, settings.period)
+        at_rest = Command(0, np.zeros(robot.n + 3))
+        Plant(robot, settings, settings.period).step(at_rest)
+        timebase = settings.timebase
+        self._timebase = timebase
+        self._states = StateCodec(robot.joint_names, timebase)
+        self._commands = CommandCodec(robot.axis_names, timebase)
+        self._clock = ClockCodec()
+        self._guard = CommandGuard(robot.n + 3, settings.hold_ticks)
+        self._joint_states = RawPublisher(node, topics.JOINT_STATES)
+        self._base_state = RawPublisher(node, topics.BASE_STATE)
+        self._clock_out = RawPublisher(node, topics.CLOCK)
+        self._command_in = FollowedSubscription(node, topics.COMMAND, PolledCallbackGroup())
+        self._for_answer = Wait(PATIENCE_S, (self._command_in,), is_brief=True)
+        self.outputs = (self._joint_states, self._base_state, self._clock_out)
+        self.wait_for = settings.wait_for
+        self.is_complete = False
+        self._wall_clock = WallClock(settings.period)
+        self._silence_s = settings.silence_timeout or math.inf
+        self._controller_silent = False
+        self._by_the_clock = False
+        """Whether the tick that is under way lasts its period by the wall clock."""
+        self._must_give_way = False
+        self._is_under_way = False
+        """Whether the tick's state has been measured."""
+        self._unsent: deque[SentState] = deque()
+        """States of this tick that are still to be sent: in lockstep, once the one before has been
+        answered."""
+        self._sent, self._clock_sent = SentState(b"", b"", NONE), b""
+        self._answered_by = NONE
+        """Tick of the newest command that can come."""
+        self._awaits = False
+        """Whether it is waited for, in lockstep."""
+        self._heard = self._heard_before = NONE
+        """The newest tick that a command has come for: now, and at this tick's begin."""
+        self._sent_at = self._awaited_since = 0.0
+        self._began_at, self._first_tick = time.monotonic(), 0
+        self._answers, self._latency_s, self._latency_max_s = 0, 0.0, 0.0
+        self.missed_deadlines = 0
+        """Ticks whose command was not there by their end, be it late or never sent."""
+
+    def begin(self) -> None:
+        """Begin with the state of the present tick."""
+        self._is_under_way = self._awaits = False
+        self._unsent.clear()
+        self._began_at, self._first_tick = time.monotonic(), self._plant.tick
+        self._wall_clock.start(self._plant.tick)
+
+    def step(self) -> Wait | None:
+        """Send a state, or take its answer and step the plant."""
+        if not self._is_under_way:
+            self._begin_tick()
+        if self._by_the_clock:
+            return self._step_by_the_clock()
+        if self._awaits:
+            data = self._command_in.take()
+            if data is None:
+                return self._be_patient()
+            if self._receive(data) != self._answered_by:
+                return None
+            self._time_answer()
+            self._awaits = False
+        if self._unsent:
+            self._send_next()
+        else:
+            self._end_tick()
+        return None
+
+    def stand_down(self) -> None:
+        """Leave the actuators at zero, and let the listeners have all that was sent."""
+        self._guard.release()
+        elapsed = time.monotonic() - self._began_at
+        flush(self.outputs, FLUSH_S if self.is_complete else STOPPED_FLUSH_S)
+        clock, missed = self._wall_clock, self.missed_deadlines
+        late = f", {missed} missed deadlines" if missed else ""
+        late += f", {clock.lost_time_s:.3f} s behind the wall clock" if clock.lost_time_s else ""
+        flown_s = (self._plant.tick - self._first_tick) * self._settings.period
+        self._node.log(f"flew {flown_s:.4f} s in {elapsed:.2f} s{late}")
+
+    def close(self) -> None:
+        """Keep nothing."""
+
+    def health(self) -> Health:
+        """Tell the mode, the answers, and what was refused."""
+        guard, tick = self._guard, self._plant.tick
+        values: dict[str, float | int | str] = {
+            "tick": tick,
+            "missed_deadlines": self.missed_deadlines,
+            "held_ticks": guard.held_ticks(tick),
+            "saturated_ticks": self._plant.saturated_ticks,
+            **{f"refused: {reason}": count for reason, count in guard.refused.items()},
+            **self._command_in.counts("refused"),
+        }
+        if self._answers:
+            values["latency_mean_ms"] = 1e3 * self._latency_s / self._answers
+            values["latency_max_ms"] = 1e3 * self._latency_max_s
+        if guard.answered < 0:
+            return Health("waiting for the first command", values=values)
+        if guard.is_safe:
+            return Health("safe: no good command, the torque is zero", Level.ERROR, values)
+        if guard.held_ticks(tick) > HOLDING_TICKS:
+            return Health("holding the last good command", Level.WARN, values)
+        return Health("nominal", values=values)
+
+    def _measure(self) -> Iterable[SentState]:
+        """Measure this tick's state; what reaches the controller in this tick."""
+        joints, base = self._states.encode(self._plant.state)
+        return (SentState(joints, base, self._plant.tick),)
+
+    def _begin_tick(self) -> None:
+        tick = self._plant.tick
+        self._is_under_way = True
+        self._by_the_clock = self._controller_silent or (self._settings.realtime and tick > 0)
+        self._must_give_way = self._by_the_clock and self._wall_clock.left(tick) <= 0.0
+        self._heard_before = self._heard
+        self._unsent.extend(self._measure())
+        if self._unsent:
+            self._send_next()
+        if tick % self._settings.clock_decimation == 0:
+            self._clock_sent = self._clock.encode(self._timebase.stamp_ns(tick))
+            self._clock_out.publish(self._clock_sent)
+
+    def _send_next(self) -> None:
+        self._sent = state = self._unsent.popleft()
+        self._publish()
+        if state.answered_by != NONE:
+            self._answered_by, self._awaits = state.answered_by, True
+            self._awaited_since = self._sent_at
+
+    def _publish(self) -> None:
+        self._joint_states.publish(self._sent.joints)
+        self._base_state.publish(self._sent.base)
+        self._sent_at = time.monotonic()
+
+    def _be_patient(self) -> Wait | None:
+        """Wait on for the answer; ask for it again, or give the controller up for silent."""
+        now = time.monotonic()
+        if now > self._awaited_since + self._silence_s and self._heard >= 0:
+            self._node.log(f"no command for {self._silence_s:g} s: the controller is silent")
+            self._controller_silent, self._awaits = True, False
+            self._wall_clock.start(self._plant.tick)
+            self._by_the_clock = True
+            return None
+        if now > self._sent_at + ASK_AGAIN_S:
+            self._publish()
+            self._clock_out.publish(self._clock_sent)
+        return self._for_answer
+
+    def _step_by_the_clock(self) -> Wait | None:
+        """Take what comes until the tick is over, then step the plant."""
+        while self._unsent:
+            self._send_next()
+        if self._must_give_way:  # behind: catch up, but never take the whole processor
+            self._must_give_way = False
+            return Wait(GIVE_WAY_S)
+        self._take_all()
+        left = self._wall_clock.left(self._plant.tick)
+        if left > SPIN_BEFORE_DEADLINE_S:
+            inputs = () if self._heard == self._answered_by else (self._command_in,)
+            return Wait(left - SPIN_BEFORE_DEADLINE_S, inputs)
+        if left <= 0.0:
+            if self._controller_silent and self._heard > self._heard_before:
+                self._node.log("the controller answers again")
+                self._controller_silent = False
+            self._end_tick()
+        return None
+
+    def _end_tick(self) -> None:
+        """Step the plant under the command in force, and begin the next tick."""
+        plant, guard, clock = self._plant, self._guard, self._wall_clock
+        tick = plant.tick
+        if tick == 0:
+            clock.start(0)  # time begins when the loop is closed
+        elif self._by_the_clock and clock.slip(tick) and (remark := clock.remark()):
+            self._node.log(remark)
+        self.missed_deadlines += guard.answered != tick
+        was_safe = guard.is_safe
+        command = guard.act(tick)
+        if guard.is_safe is not was_safe:
+            self._node.report()
+        plant.step(command)
+        self._is_under_way = self._awaits = False
+        ticks = self._settings.ticks
+        self.is_complete = bool(ticks) and plant.tick >= ticks
+        if not self.is_complete:
+            self._begin_tick()
+
+    def _take_all(self) -> None:
+        for _ in range(MOST_AT_ONCE):
+            data = self._command_in.take()
+            if data is None:
+                return
+            if self._receive(data) == self._answered_by:
+                self._time_answer()
+
+    def _receive(self, data: bytes) -> int | None:
+        """Take a command that has come, if it is good; the tick it answers, if it can be read."""
+        guard, source = self._guard, self._command_in.source
+        try:
+            self._commands.decode(data, guard.offered)
+            if not (source.is_sure or np.isfinite(guard.offered.torque).all()):
+                raise MessageError("a number is not finite", "not finite")
+        except MessageError as error:
+            guard.refuse(error.reason)
+            source.doubt()
+            return None
+        tick = guard.offered.tick
+        if self._heard < tick <= self._plant.tick:
+            self._heard = tick
+            source.follow()
+        self._deliver()
+        return tick
+
+    def _deliver(self) -> None:
+        """Hand the command in the guard's `offered` to the actuators."""
+        self._guard.accept(self._plant.tick)
+
+    def _time_answer(self) -> None:
+        latency = time.monotonic() - self._sent_at
+        self._answers += 1
+        self._latency_s += latency
+        self._latency_max_s = max(self._latency_max_s, latency)

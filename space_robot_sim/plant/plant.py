@@ -1,0 +1,170 @@
+"""The plant: the robot in its environment, stepped tick by tick. Knows no ROS."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
+from space_robot_msgs_py.errors import DivergedError, InputError
+from space_robot_msgs_py.samples import Command, RobotState, State
+
+from ..actuators.actuators import Actuators, ActuatorSettings, actuate
+from ..actuators.command_delay import command_delay_buffer
+from ..dynamics.model import Model
+from ..environment.environment import Environment, EnvironmentSettings
+from ..environment.payload import with_payload
+from ..robot import Robot
+from ..sensors.measurement import measure
+from .integrator import Stages, rk4_step
+
+Array = NDArray[np.float64]
+Block = NDArray[Any]
+
+RATE_LIMIT = 1e4
+"""rad/s; a body that turns faster has left the physics (a diverged loop)."""
+
+
+class PlantSettings(ActuatorSettings, EnvironmentSettings):
+    """Settings of the plant's world, beside the robot's own file."""
+
+    initial_joints_deg: list[float] = Field(
+        [0.0], description="joint angles at tick 0, degrees, one a joint"
+    )
+    initial_quaternion: Annotated[list[float], Field(min_length=4, max_length=4)] = Field(
+        [1.0, 0.0, 0.0, 0.0], description="base attitude at tick 0: w, x, y, z"
+    )
+
+
+class PlantMemory(Record):
+    """The memory that a step of the plant reads and writes."""
+
+    model: Model = nested(Model)
+    environment: Environment = nested(Environment)
+    actuators: Actuators = nested(Actuators)
+    stages: Stages = nested(Stages)
+    x: Array = shaped(lambda n: (2 * n + 13,))
+    """The state, see `Stages`."""
+    rotation: Array = shaped(lambda n: (3, 3))
+    """Scratch."""
+    measured: State = nested(State)
+    """The state as the sensors report it at the current tick."""
+
+
+class Plant:
+    """Integrates the robot at a fixed period; a command is held over one tick.
+
+    `state` is what the sensors report at the current tick; `step` applies a command until the
+    next one. Momentum and energy follow from `state` alone (`space_robot_sim.plant.conservation`).
+    """
+
+    def __init__(self, robot: Robot, settings: PlantSettings, period: float) -> None:
+        """Place the robot at rest.
+
+        Raises:
+            InputError: the initial configuration does not fit the robot.
+        """
+        n = robot.n
+        if len(settings.initial_joints_deg) != n:
+            raise InputError(
+                f"initial_joints_deg has {len(settings.initial_joints_deg)} values, "
+                f"robot {robot.name!r} has {n} joints"
+            )
+        norm = float(np.linalg.norm(settings.initial_quaternion))
+        if not 1e-3 <= norm <= 1e3:
+            raise InputError(f"initial_quaternion must have a norm near 1, got {norm:g}")
+        self.robot = with_payload(robot, settings.payload)
+        self.period = period
+        self.block = PlantMemory.block(n)
+        """The plant's `PlantMemory`, for compiled loops."""
+        self.command_delay_buffer = command_delay_buffer(settings, n)
+        """Ring of the commands that are still on their way."""
+        memory = self.memory
+        assign(
+            memory, model=self.robot.model, environment=Environment.build(n, settings),
+            actuators=Actuators.build(n, settings),
+        )  # fmt: skip
+        memory.x[3:7] = np.array(settings.initial_quaternion) / norm
+        memory.x[7 : 7 + n] = np.radians(settings.initial_joints_deg)
+        self.state = RobotState(0, self.block["measured"])
+        # at rest: what `measure` would say, without waiting for compiled code
+        self.state.quaternion[:] = memory.x[3:7]
+        self.state.joint_positions[:] = memory.x[7 : 7 + n]
+
+    @property
+    def tick(self) -> int:
+        """Ticks flown so far."""
+        return self.state.tick
+
+    @property
+    def memory(self) -> PlantMemory:
+        """The record in `block`; its numbers may be changed in flight."""
+        record: PlantMemory = self.block[0]
+        return record
+
+    @property
+    def saturated_ticks(self) -> int:
+        """Ticks so far in which a torque was at its limit."""
+        return int(self.memory.actuators.torque_limit.saturated_ticks)
+
+    def step(self, command: Command) -> None:
+        """Hold ``command`` (or the one due, if commands are delayed) over one tick.
+
+        Raises:
+            DivergedError: the state is no longer finite, or turns faster than `RATE_LIMIT`.
+        """
+        tick = self.state.tick
+        fastest = step(self.block, self.command_delay_buffer, command.torque, tick, self.period)
+        self.state.tick = tick + 1
+        if not fastest <= RATE_LIMIT:
+            raise self.diverged(fastest)
+
+    def diverged(self, fastest: float) -> DivergedError:
+        """Return the error for a fastest rate after a step of ``fastest``, rad/s."""
+        why = "the state is not finite" if np.isnan(fastest) else f"{fastest:.3g} rad/s"
+        return DivergedError(self.tick, self.period, why)
+
+
+@kernel
+def step(
+    block: Block, command_delay_buffer: Array, torque: Array, tick: int, period: float
+) -> float:
+    """Call `advance` from Python."""
+    fastest: float = advance(block[0], command_delay_buffer, torque, tick, period)
+    return fastest
+
+
+@kernel
+def advance(
+    memory: PlantMemory, command_delay_buffer: Array, torque: Array, tick: int, period: float
+) -> float:
+    """Fly from ``tick`` to the next under the command ``torque`` (n+3,), N m, given at ``tick``.
+
+    Returns:
+        The fastest rate then, see `fastest_rate`.
+    """
+    measured = memory.measured
+    actuate(memory.actuators, command_delay_buffer, torque, tick, measured.applied_torque)
+    rk4_step(
+        memory.model, memory.environment, memory.x, measured.applied_torque, tick * period,
+        period, memory.stages,
+    )  # fmt: skip
+    measure(memory.x, memory.rotation, measured)
+    fastest: float = fastest_rate(memory.x, measured.joint_positions.size)
+    return fastest
+
+
+@kernel
+def fastest_rate(x: Array, n: int) -> float:
+    """Return the fastest angular velocity of base axes and joints, rad/s (NaN if any is)."""
+    fastest = 0.0
+    for i in range(10 + n, x.size):
+        if not abs(x[i]) <= fastest:  # also true of NaN
+            fastest = abs(x[i])
+            if np.isnan(fastest):
+                break
+    return fastest

@@ -1,0 +1,80 @@
+"""Settings of the plant node: the plant's own, and how it is paced."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+from pydantic import AfterValidator, Field
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.config.files import mission_file, named_file
+from space_robot_msgs_py.config.settings import NodeSettings, Texts
+
+from ..faults.grammar import Fault, parse_faults
+from .faults import PLANT_KINDS
+from .plant import PlantSettings
+
+MOST_TICKS = 10**10
+"""No flight is longer."""
+
+
+def _readable(texts: list[str]) -> list[str]:
+    parse_faults(texts, PLANT_KINDS)
+    return texts
+
+
+class PlantNodeSettings(PlantSettings, NodeSettings):
+    """Parameters of plant_node."""
+
+    node: ClassVar[str] = "plant"
+    selectors: ClassVar[tuple[str, ...]] = ("robot", "mission", "case")
+    sends: ClassVar[tuple[topics.Topic, ...]] = (
+        topics.JOINT_STATES, topics.BASE_STATE, topics.CLOCK,
+    )  # fmt: skip
+
+    mission: str = Field(
+        "", description="a mission of config/missions (empty: the robot's), or a path"
+    )
+    case: str = Field("1", description="a case of config/cases, or a path to its YAML")
+    ticks: Annotated[int, Field(ge=0, le=MOST_TICKS)] = Field(
+        0, description="ticks to fly, then exit (0: until stopped)"
+    )
+    realtime: bool = Field(
+        False, description="step by the wall clock whatever happens (false: lockstep)"
+    )
+    clock_decimation: Annotated[int, Field(ge=1, le=10**6)] = Field(
+        20, description="ticks between two messages on /clock"
+    )
+    hold_ticks: Annotated[int, Field(ge=0, le=10**6)] = Field(
+        200, description="ticks for which the last good command is held; then the torque is zero"
+    )
+    silence_timeout: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
+        3.0,
+        description="s by the wall clock a tick waits for its command in lockstep (0: for ever)",
+    )
+    wait_for: Texts = Field(
+        [""],
+        description="who must listen before the first tick: NODE:TOPIC, or NODE to all it sends",
+    )
+    faults: Annotated[Texts, AfterValidator(_readable)] = Field(
+        [""], description="faults to bring about, each KIND@T[-END][:ARGUMENT], see docs/manual"
+    )
+    fault_seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(
+        0, description="seed of the faults' random numbers"
+    )
+
+    @property
+    def parsed_faults(self) -> list[Fault]:
+        """The faults, without the empty texts."""
+        return parse_faults(self.faults, PLANT_KINDS)
+
+    @classmethod
+    def layers(cls, selected: Mapping[str, str]) -> list[Path]:
+        """Add the mission, which tells where the arm starts, and the case, which disturbs it."""
+        return [
+            *super().layers(selected),
+            mission_file(selected["robot"], selected["mission"]),
+            named_file("cases", selected["case"]),
+        ]

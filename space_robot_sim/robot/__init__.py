@@ -1,0 +1,5 @@
+"""The robot as data."""
+
+from .robot import Robot
+
+__all__ = ["Robot"]

@@ -1,0 +1,129 @@
+"""The inertia matrix, bias force and accelerations of a `Robot`, in new arrays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..dynamics.aba import aba
+from ..dynamics.crba import crba
+from ..dynamics.kinematics import forward_kinematics, spatial_velocities
+from ..dynamics.model import Data
+from ..dynamics.rnea import rnea_bias
+
+if TYPE_CHECKING:
+    from .robot import Robot
+
+Array = NDArray[np.float64]
+
+
+def _vector(value: ArrayLike, size: int, name: str) -> Array:
+    array = np.ascontiguousarray(value, dtype=np.float64)
+    if array.shape != (size,):
+        raise ValueError(f"{name} must have shape ({size},), got {array.shape}")
+    return array
+
+
+def _quaternion(value: ArrayLike) -> Array:
+    array = _vector(value, 4, "quaternion_wxyz")
+    norm = float(np.linalg.norm(array))
+    if not abs(norm - 1.0) < 1e-6:
+        raise ValueError(f"quaternion_wxyz must have norm 1, got {norm}")
+    return array / norm
+
+
+def mass_matrix(robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike) -> Array:
+    """Return the inertia matrix H of (7)-(10).
+
+    Args:
+        robot: the robot's numbers.
+        quaternion_wxyz: (4,) base attitude, unit.
+        joint_positions: (n,) rad.
+
+    Returns:
+        (n+6, n+6), symmetric positive definite; generalised velocity ``[v0, w0, thetadot]``,
+        base part on inertial axes.
+
+    Raises:
+        ValueError: an argument has the wrong shape, or the quaternion is not unit.
+    """
+    n = robot.n
+    out, data = np.empty((n + 6, n + 6)), Data.allocate(n)
+    positions = _vector(joint_positions, n, "joint_positions")
+    forward_kinematics(robot.model, _quaternion(quaternion_wxyz), positions, data)
+    crba(robot.model, data, out)
+    return out
+
+
+def bias_force(
+    robot: Robot,
+    quaternion_wxyz: ArrayLike,
+    joint_positions: ArrayLike,
+    w0_inertial: ArrayLike,
+    joint_velocities: ArrayLike,
+) -> Array:
+    """Return the velocity-dependent force c of (20): ``H qdd + c = F``.
+
+    Args:
+        robot: the robot's numbers.
+        quaternion_wxyz: (4,) base attitude, unit.
+        joint_positions: (n,) rad.
+        w0_inertial: (3,) base angular velocity on inertial axes, rad/s.
+        joint_velocities: (n,) rad/s.
+
+    Returns:
+        (n+6,) force (N), moment about the base CoM (N m) on inertial axes, joint torques (N m).
+
+    Raises:
+        ValueError: an argument has the wrong shape, or the quaternion is not unit.
+    """
+    n = robot.n
+    out, data = np.empty(n + 6), Data.allocate(n)
+    positions = _vector(joint_positions, n, "joint_positions")
+    velocities = _vector(joint_velocities, n, "joint_velocities")
+    forward_kinematics(robot.model, _quaternion(quaternion_wxyz), positions, data)
+    spatial_velocities(robot.model, _vector(w0_inertial, 3, "w0_inertial"), velocities, data)
+    rnea_bias(robot.model, data, out)
+    return out
+
+
+def forward_dynamics(
+    robot: Robot,
+    quaternion_wxyz: ArrayLike,
+    joint_positions: ArrayLike,
+    w0_inertial: ArrayLike,
+    joint_velocities: ArrayLike,
+    force: ArrayLike,
+) -> Array:
+    """Return the acceleration ``qdd = H^-1 (F - c)`` of (7).
+
+    Args:
+        robot: the robot's numbers.
+        quaternion_wxyz: (4,) base attitude, unit.
+        joint_positions: (n,) rad.
+        w0_inertial: (3,) base angular velocity on inertial axes, rad/s.
+        joint_velocities: (n,) rad/s.
+        force: (n+6,) F: force (N), moment about the base CoM (N m) on inertial axes, joint
+            torques (N m).
+
+    Returns:
+        (n+6,) m/s2 and rad/s2, base part on inertial axes.
+
+    Raises:
+        ValueError: an argument has the wrong shape, or the quaternion is not unit.
+    """
+    n = robot.n
+    out = np.empty(n + 6)
+    aba(
+        robot.model,
+        _quaternion(quaternion_wxyz),
+        _vector(joint_positions, n, "joint_positions"),
+        _vector(w0_inertial, 3, "w0_inertial"),
+        _vector(joint_velocities, n, "joint_velocities"),
+        _vector(force, n + 6, "force"),
+        Data.allocate(n),
+        out,
+    )
+    return out

@@ -1,0 +1,71 @@
+"""Loops in compiled code around what is measured, as it is called in a flight."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_control.controller.kernels import controller_tick
+from space_robot_control.laws.compiled import LawCode
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Block
+from space_robot_sim.dynamics.aba import aba
+from space_robot_sim.plant.integrator import state_derivative
+from space_robot_sim.plant.plant import advance
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def plant_steps(
+    block: Block, command_delay_buffer: Array, torque: Array, tick: int, steps: int, period: float
+) -> float:
+    """Steps of a `Plant` from ``tick`` on under one torque; returns the fastest rate at the end."""
+    memory, fastest = block[0], 0.0
+    for k in range(tick, tick + steps):
+        fastest = advance(memory, command_delay_buffer, torque, k, period)
+    return fastest
+
+
+@kernel
+def forward_dynamics_calls(block: Block, force: Array, calls: int) -> None:
+    """``qdd = H^-1 (F - c)`` in the state of a `Plant`; ``force`` (n+6,)."""
+    memory = block[0]
+    x, stages, n = memory.x, memory.stages, memory.measured.joint_positions.size
+    out = stages.slope[0, 7 + n :]
+    for _ in range(calls):
+        aba(
+            memory.model, x[3:7], x[7 : 7 + n], x[10 + n : 13 + n], x[13 + n :], force,
+            stages.data, out,
+        )  # fmt: skip
+        force[0] = 1e-12 * out[0]  # the next call waits for this one
+
+
+@kernel
+def state_derivatives(block: Block, torque: Array, disturbance: Array, calls: int) -> None:
+    """``xdot`` in the state of a `Plant`; ``torque`` and ``disturbance`` (n+3,)."""
+    memory = block[0]
+    slope = memory.stages.slope[0]
+    for _ in range(calls):
+        state_derivative(
+            memory.model, memory.environment, memory.x, torque, disturbance, memory.stages, slope
+        )
+        torque[0] = 1e-12 * slope[slope.size - 1]
+
+
+@kernel
+def controller_ticks(
+    law: LawCode, block: Block, states: Block, references: Block, ticks: int, torque: Array,
+    period: float,
+) -> None:  # fmt: skip
+    """All that an on-board computer does in a tick, over the rows of a recorded flight."""
+    for i in range(ticks):
+        k = i % states.size
+        controller_tick(block, law, k, states[k : k + 1], references[k : k + 1], torque, period)
+
+
+@kernel
+def law_ticks(law: LawCode, signals: Block, ticks: int, period: float) -> None:
+    """A law's equation alone, over rows of recorded signals."""
+    for i in range(ticks):
+        law.run(signals[i % signals.size], law.gains[0], law.memory[0], period)

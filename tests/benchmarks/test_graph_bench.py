@@ -1,0 +1,83 @@
+"""The benchmarks of the real graph: that they measure; no time is asserted."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+from flights import ros_environment
+from paths import TESTS
+
+pytestmark = pytest.mark.ros
+
+
+@pytest.fixture(scope="module")
+def sections() -> dict[str, list[dict[str, Any]]]:
+    pytest.importorskip("rclpy")
+    sections = ("graph", "composed", "clock", "recorder", "start-up")
+    result = subprocess.run(
+        [sys.executable, str(TESTS / "benchmarks"), *sections, "--short", "--repetitions", "1",
+         "--json"],
+        capture_output=True, text=True, timeout=150.0, check=False, env=ros_environment(),
+    )  # fmt: skip
+    assert result.returncode == 0, result.stderr
+    found: dict[str, list[dict[str, Any]]] = json.loads(result.stdout)["sections"]
+    assert list(found) == list(sections)
+    return found
+
+
+def row(rows: list[dict[str, Any]], name: str) -> dict[str, Any]:
+    return next(row for row in rows if row["name"] == name)
+
+
+def test_the_graph_stands_beside_an_empty_and_a_naive_one(
+    sections: dict[str, list[dict[str, Any]]],
+) -> None:
+    rows = [row for row in sections["graph"] if row["name"] == "lockstep graph"]
+    assert [row["beside"] for row in rows] == [None, "empty graph", "two naive nodes"]
+    assert all(row["median"] > 0.0 for row in rows)
+
+
+def test_the_breakdown_of_a_tick_adds_up(sections: dict[str, list[dict[str, Any]]]) -> None:
+    rows = sections["graph"]
+    names = [row["name"] for row in rows]
+    parts = names[names.index("a tick") + 1 :]
+    assert {"plant: step plant", "controller: update controller"} <= set(parts)
+    total = sum(row(rows, name)["median"] for name in parts)
+    assert total == pytest.approx(row(rows, "a tick")["median"])
+
+
+def test_the_composed_graph_stands_beside_four_processes(
+    sections: dict[str, list[dict[str, Any]]],
+) -> None:
+    rows = sections["composed"]
+    assert [row["beside"] for row in rows] == [None, "four processes", None, None]
+    assert all(0.0 < row["median"] <= 100.0 for row in rows[2:])
+
+
+def test_the_clock_section_counts_answers(sections: dict[str, list[dict[str, Any]]]) -> None:
+    rows = sections["clock"]
+    for scheduling in ("usual", "FIFO"):
+        assert 0.0 <= row(rows, f"{scheduling}: ticks answered in time")["median"] <= 100.0
+        for what in ("a tick comes late by", "answer after"):
+            p50, p99, most = (
+                row(rows, f"{scheduling}: {what}, {label}")["median"]
+                for label in ("p50", "p99", "max")
+            )
+            assert 0.0 <= p50 <= p99 <= most
+
+
+def test_the_recorder_loses_nothing_and_nodes_are_weighed(
+    sections: dict[str, list[dict[str, Any]]],
+) -> None:
+    rows = sections["recorder"]
+    assert row(rows, "messages lost")["median"] == 0.0
+    for node in ("plant", "controller", "mission", "recorder"):
+        assert row(rows, f"{node}, memory")["median"] > 10.0
+
+
+def test_start_up_is_measured(sections: dict[str, list[dict[str, Any]]]) -> None:
+    assert all(row["median"] > 0.0 for row in sections["start-up"])

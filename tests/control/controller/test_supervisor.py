@@ -1,0 +1,267 @@
+"""Safe mode: finite commands whatever is measured, held, then none, and the way back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from closed_loop import GAINS, PERIOD, Loop, law_of
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from space_robot_control.controller.controller import Controller
+from space_robot_control.controller.supervisor import (
+    NOMINAL_FROM_ETA,
+    SAFE_BELOW_ETA,
+    Mode,
+    Supervisor,
+)
+from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
+from space_robot_msgs_py.samples import STATE_FIELDS, Reference, RobotState
+from space_robot_sim import Robot
+
+Array = NDArray[np.float64]
+
+AXES, HOLD = 9, 5
+REST = Reference.at_rest(6)
+"""The reference that asks for rest at zero."""
+
+
+def supervisor_of(robot: Robot, name: str = "tde_stc", hold_ticks: int = HOLD) -> Supervisor:
+    return Supervisor(Controller(robot, law_of(name), PERIOD), AXES, hold_ticks)
+
+
+def state_at(tick: int, eta: float = 1.0, scale: float = 1.0) -> RobotState:
+    """At rest, turned about x so far that the quaternion's first element is ``eta``."""
+    state = RobotState.allocate(6)
+    state.tick = tick
+    state.quaternion[:2] = scale * np.array([eta, np.sqrt(1.0 - eta**2)])
+    state.joint_positions[:] = 0.01
+    return state
+
+
+def with_nan(state: RobotState) -> RobotState:
+    state.joint_velocities[3] = np.nan
+    return state
+
+
+# Any stream of states
+
+numbers = st.lists(st.floats(width=64) | st.floats(-2.0, 2.0), min_size=31, max_size=31)
+unit = st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).filter(
+    lambda q: np.hypot(*q[:2]) > 1e-3
+)
+ticks = st.integers(1, 3) | st.integers(-100, 10_000)
+streams = st.lists(st.tuples(ticks, numbers, st.none() | unit), min_size=1, max_size=30)
+"""Step in ticks, all the measured numbers, and a unit quaternion in place of any."""
+
+
+def assert_safe(supervisor: Supervisor, state: RobotState) -> None:
+    """A finite command for the state's tick, none in safe mode; the reason is known."""
+    before = supervisor.rejected.total()
+    command = supervisor.answer(state, REST)
+    assert np.isfinite(command.torque).all()
+    assert command.tick == state.tick
+    nominal = supervisor.mode is Mode.NOMINAL
+    assert nominal == (supervisor.reason == "")
+    assert supervisor.rejected.total() - before == (not nominal)
+    if supervisor.mode is Mode.SAFE:
+        assert not command.torque.any()
+
+
+@settings(max_examples=150)
+@given(st.sampled_from(sorted(GAINS)), streams)
+@example("tde_stc", [(1, [0.0] * 4 + [1e300] * 27, [1.0, 0.0, 0.0, 0.0])] * 3)
+def test_whatever_is_measured_commands_are_finite_and_it_comes_back(
+    paper_robot: Robot, name: str, stream: list[tuple[int, list[float], list[float] | None]]
+) -> None:
+    supervisor, tick = supervisor_of(paper_robot, name), 0
+    for step, values, quaternion in stream:
+        tick = max(0, tick + step)
+        x = np.array(values)
+        if quaternion is not None:
+            x[:4] = np.array(quaternion) / np.linalg.norm(quaternion)
+        state = RobotState.allocate(6)
+        state.tick = tick
+        parts = (slice(4, 7), slice(4), slice(7, 10), slice(10, 13), slice(13, 19), slice(19, 25),
+                 slice(22, 31))  # fmt: skip
+        for name, part in zip(STATE_FIELDS, parts, strict=True):
+            getattr(state, name)[:] = x[part]
+        assert_safe(supervisor, state)
+    for k in range(1, 4):
+        assert_safe(supervisor, state_at(tick + k))
+        assert supervisor.mode is Mode.NOMINAL
+
+
+@given(st.lists(st.booleans(), min_size=1, max_size=60), st.integers(0, HOLD))
+def test_a_bad_state_is_answered_with_the_last_torque_for_a_while(
+    paper_robot: Robot, good: list[bool], hold_ticks: int
+) -> None:
+    """After ``hold_ticks`` of them in a row with none; a good one is answered by the law again."""
+    supervisor, bad, last = supervisor_of(paper_robot, hold_ticks=hold_ticks), 0, np.zeros(AXES)
+    for tick, is_good in enumerate(good):
+        state = state_at(tick)
+        command = supervisor.answer(state if is_good else with_nan(state), REST)
+        bad = 0 if is_good else bad + 1
+        if is_good:
+            assert supervisor.mode is Mode.NOMINAL
+            last = command.torque.copy()
+        else:
+            assert supervisor.mode is (Mode.HOLDING if bad <= hold_ticks else Mode.SAFE)
+            np.testing.assert_array_equal(command.torque, last if bad <= hold_ticks else 0.0 * last)
+    assert supervisor.rejected.total() == good.count(False)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "kind"),
+    [
+        (lambda s: s.omega_base.fill(np.nan), "state not finite"),
+        (lambda s: s.applied_torque.fill(-np.inf), "state not finite"),
+        (lambda s: s.quaternion.fill(np.inf), "state not finite"),
+        (lambda s: s.joint_positions.fill(1e200), "state too large"),
+        (lambda s: s.quaternion.__imul__(1.01), "quaternion not unit"),
+        (lambda s: s.quaternion.fill(0.0), "quaternion not unit"),
+    ],
+)  # fmt: skip
+def test_what_was_wrong_is_counted_and_held_over(
+    paper_robot: Robot, spoil: Callable[[RobotState], None], kind: str
+) -> None:
+    """An attitude of zeros is a broken sensor, not half a turn."""
+    supervisor = supervisor_of(paper_robot)
+    torque = supervisor.answer(state_at(0), REST).torque.copy()
+    state = state_at(1)
+    spoil(state)
+    np.testing.assert_array_equal(supervisor.answer(state, REST).torque, torque)
+    assert supervisor.rejected == {kind: 1}
+    assert supervisor.mode is Mode.HOLDING
+
+
+def test_a_bad_state_leaves_no_trace(paper_robot: Robot) -> None:
+    """Answers after it are those of a controller that has not been shown it."""
+    with_bad, without = (Supervised(paper_robot, "tde_stc", HOLD) for _ in range(2))
+    for loop in (with_bad, without):
+        loop.fly_supervised(100)
+    for bad in (with_nan(state_at(100)), state_at(100, scale=1.1)):
+        with_bad.supervisor.answer(bad, REST)
+    torques = with_bad.fly_supervised(50)[1]
+    np.testing.assert_array_equal(torques, without.fly_supervised(50)[1])
+
+
+# Near half a turn
+
+
+def test_near_half_a_turn_it_is_safe_until_well_away(paper_robot: Robot) -> None:
+    supervisor = supervisor_of(paper_robot)
+    between = 0.5 * (SAFE_BELOW_ETA + NOMINAL_FROM_ETA)
+    modes = []
+    etas = [0.5, between, 0.9 * SAFE_BELOW_ETA, between, 1.1 * NOMINAL_FROM_ETA, -between]
+    for tick, eta in enumerate(etas):
+        assert_safe(supervisor, state_at(tick, eta))
+        modes.append(supervisor.mode)
+    assert modes == [Mode.NOMINAL] * 2 + [Mode.SAFE] * 2 + [Mode.NOMINAL] * 2
+    assert supervisor.rejected == {"attitude near 180 degrees": 2}
+
+
+def test_a_single_bad_state_near_half_a_turn_is_held_over(paper_robot: Robot) -> None:
+    supervisor, between = supervisor_of(paper_robot), 0.5 * (SAFE_BELOW_ETA + NOMINAL_FROM_ETA)
+    modes = []
+    for state in (state_at(0, between), with_nan(state_at(1, between)), state_at(2, between)):
+        supervisor.answer(state, REST)
+        modes.append(supervisor.mode)
+    assert modes == [Mode.NOMINAL, Mode.HOLDING, Mode.NOMINAL]
+
+
+# Time
+
+
+@pytest.mark.parametrize("begin", [0, 50, 5000])
+def test_after_a_jump_in_time_it_answers_as_a_new_one(paper_robot: Robot, begin: int) -> None:
+    """Bit for bit: the plant has started anew, or states have long been missing."""
+    used, new = supervisor_of(paper_robot), supervisor_of(paper_robot)
+    for tick in range(1000, 1100):
+        used.answer(state_at(tick, 0.9), REST)
+    for tick in range(begin, begin + 60):
+        command = used.answer(state_at(tick, 0.8), REST).torque
+        np.testing.assert_array_equal(command, new.answer(state_at(tick, 0.8), REST).torque)
+
+
+def test_time_that_goes_back_while_holding_does_not_make_it_hold_for_longer(
+    paper_robot: Robot,
+) -> None:
+    supervisor = supervisor_of(paper_robot)
+    supervisor.answer(state_at(1000), REST)
+    for tick in (1001, 3):
+        supervisor.answer(with_nan(state_at(tick)), REST)
+    assert supervisor.mode is Mode.SAFE
+
+
+def test_standing_down_commands_nothing_and_forgets(paper_robot: Robot) -> None:
+    supervisor = supervisor_of(paper_robot)
+    for tick in range(40):
+        supervisor.answer(state_at(tick), REST)
+    command = supervisor.stand_down(40)
+    assert command.tick == 40
+    assert not command.torque.any()
+    assert not supervisor.answer(with_nan(state_at(41)), REST).torque.any()
+
+
+# In flight
+
+
+class Supervised(Loop):
+    """A loop in which a supervisor answers what a faulty sensor reports."""
+
+    def __init__(self, robot: Robot, name: str, hold_ticks: int) -> None:
+        super().__init__(robot, law_of(name))
+        self.supervisor = Supervisor(self.controller, AXES, hold_ticks)
+
+    def fly_supervised(self, ticks: int, blind: bool = False) -> tuple[Array, Array]:
+        """Errors and torques, as `fly`; the errors while blind are the last ones."""
+        errors, torques = [], []
+        for _ in range(ticks):
+            tick, state = self.plant.tick, self.plant.state
+            if not self.references.covers(tick):
+                self.references.add(self.mission.chunk(tick, 100))
+            seen = state
+            if blind:
+                seen = RobotState.allocate(6)
+                seen.tick, seen.quaternion[:] = tick, np.nan
+            command = self.supervisor.answer(seen, self.references.at(tick))
+            errors.append(self.controller.signals.error.copy())
+            torques.append(command.torque.copy())
+            self.plant.step(command)
+        return np.array(errors), np.array(torques)
+
+
+def test_supervised_flights_are_the_same_to_the_last_bit(paper_robot: Robot) -> None:
+    supervised, plain = (
+        Supervised(paper_robot, "tde_stc", HOLD),
+        Loop(paper_robot, law_of("tde_stc")),
+    )
+    for one, other in zip(supervised.fly_supervised(300), plain.fly(300), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("name", ["ctc", "tde_stc", "tde_tsmc"])
+@pytest.mark.parametrize("blind_ticks", [1, LONGEST_GAP - 1, LONGEST_GAP + 5, 300])
+def test_a_blind_flight_finds_back_without_a_jolt(
+    paper_robot: Robot, name: str, blind_ticks: int
+) -> None:
+    """Over a blink it holds; over 150 ms (100 of them without torque) it falls behind a little."""
+    loop = Supervised(paper_robot, name, hold_ticks=100)
+    loop.fly_supervised(2000)
+    before = loop.fly_supervised(1)[1][-1]
+    _, torques = loop.fly_supervised(blind_ticks, blind=True)
+    np.testing.assert_array_equal(torques[:100], np.broadcast_to(before, torques[:100].shape))
+    assert not torques[100:].any()
+    applied = loop.plant.state.applied_torque.copy()
+    errors, torques = loop.fly_supervised(4000)
+    assert loop.supervisor.mode is Mode.NOMINAL
+    if blind_ticks > LONGEST_GAP:  # it takes over from what is applied
+        np.testing.assert_allclose(torques[0], applied, atol=1e-9)
+    else:  # the law goes on, its estimate a few ticks old
+        np.testing.assert_allclose(torques[0], applied, atol=0.05)
+    assert np.abs(errors).max() < (1e-4 if blind_ticks < 100 else 1e-2)
+    assert np.abs(errors[-1]).max() < (1e-4 if blind_ticks < 100 else 2e-3)

@@ -1,0 +1,220 @@
+"""Every kind of fault on the real graph, with the reaction that is promised
+
+in docs/explanation/fault_handling.md.
+
+Faults that do not disturb one another share a flight, each in a stretch of its own. How often a
+fault by chance happens is known beforehand, so counters are compared exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from flights import Flown
+
+from space_robot_control.flight.faults import KINDS
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_sim.faults.grammar import parse_faults
+from space_robot_sim.faults.schedule import Schedule, ScheduledFault
+from space_robot_sim.plant.faults import PLANT_KINDS
+
+pytest.importorskip("rclpy")
+
+PERIOD = 0.0005
+SEED = 7
+Fly = Callable[..., Flown]
+
+FLIGHTS: dict[str, tuple[str, ...]] = {
+    "bad messages": (
+        "nan_state@0.1-0.2:0.05", "inf_state@0.2-0.3:0.05", "scaled_quaternion@0.3-0.4:0.05",
+        "stamp_back@0.4-0.45:0.1", "stamp_jump@0.5-0.55:0.1", "nan_command@0.6-0.7:0.05",
+        "inf_command@0.7-0.8:0.05",
+    ),
+    "bad links": (
+        "drop_state@0.05-0.1:0.1", "repeat_state@0.1-0.15:0.1", "drop_command@0.2-0.25:0.1",
+        "repeat_command@0.3-0.35:0.1", "delay_state@0.4-0.45:2", "jitter_state@0.5-0.55:3",
+        "delay_command@0.6-0.65:2", "jitter_command@0.7-0.75:3",
+    ),
+    "bad sensors": (
+        "noise_attitude@0.05-0.1:1e-6", "noise_gyro@0.15-0.2:1e-6",
+        "noise_joint_position@0.25-0.3:1e-6", "noise_joint_velocity@0.35-0.4:1e-6",
+        "quantise_attitude@0.45-0.5:1e-5", "quantise_gyro@0.55-0.6:1e-6",
+        "quantise_joint_position@0.65-0.7:1e-5", "quantise_joint_velocity@0.75-0.8:1e-6",
+    ),
+    "bad actuators": (
+        "saturate_base@0.1-0.2:0.001", "saturate_joints@0.3-0.4:0.01", "stuck_joint@0.6-0.9:3=15",
+    ),
+    "long silences": (
+        "scaled_quaternion@0.1-0.25", "drop_command@0.4-0.55", "drop_state@0.7-0.85",
+    ),
+}  # fmt: skip
+"""Flights of a second by their name; the silences last beyond `HOLD_TICKS`."""
+HOLD_TICKS = 100
+OPTIONS = (
+    "--duration", "1", "--seed", str(SEED), "--set", f"plant.hold_ticks={HOLD_TICKS}",
+    "--set", f"controller.hold_ticks={HOLD_TICKS}",
+)  # fmt: skip
+
+
+@dataclass
+class Seen:
+    """What a flight left behind."""
+
+    graph: dict[str, Any]
+    log: FlightLog
+    expected: dict[str, int]
+    """How often each kind of fault happens."""
+
+    def count(self, node: str, key: str) -> int:
+        """A counter of a node's last diagnostics; 0 where it is not told."""
+        return int(self.graph["nodes"][f"{node}_node"].get(key, 0))
+
+    def modes(self, node: str) -> list[str]:
+        """The node's modes that were worth an event."""
+        return [event["what"] for event in self.graph["events"] if event["node"] == f"{node}_node"]
+
+    def error(self, start_s: float, stop_s: float) -> float:
+        """Largest joint error in a stretch, rad."""
+        k = slice(round(start_s / PERIOD), round(stop_s / PERIOD))
+        desired = self.log.reference_joints[k, 0]
+        return float(np.abs(desired - self.log.joint_positions[k]).max())
+
+    def torque(self, start_s: float, stop_s: float) -> np.ndarray:
+        """Applied torque in a stretch."""
+        return self.log.applied_torque[round(start_s / PERIOD) + 1 : round(stop_s / PERIOD)]
+
+
+def matters(fault: ScheduledFault, tick: int) -> bool:
+    """Whether the controller uses what is spoilt: not the base's position and velocity."""
+    place = fault.choose(tick, 25)
+    return fault.kind.name not in ("nan_state", "inf_state") or 3 <= place < 7 or place >= 10
+
+
+@pytest.fixture(scope="module")
+def seen(fly: Fly) -> Callable[[str], Seen]:
+    def get(name: str) -> Seen:
+        texts = FLIGHTS[name]
+        flown = fly(*OPTIONS, *(word for text in texts for word in ("--fault", text)))
+        schedule = Schedule(parse_faults(texts, PLANT_KINDS), SEED, PERIOD)
+        expected = {
+            fault.kind.name: sum(
+                fault.happens_at(tick) and matters(fault, tick) for tick in range(2000)
+            )
+            for fault in schedule.faults
+        }
+        return Seen(flown.report["graph"], read_flight(flown.bag), expected)
+
+    return get
+
+
+Check = Callable[[Seen], bool]
+
+
+def tracks(start_s: float, stop_s: float, error: float) -> Check:
+    """The arm stays on its way."""
+    return lambda seen: seen.error(start_s, stop_s) < error
+
+
+def no_torque(start_s: float, stop_s: float) -> Check:
+    """Once a command has been held for its time, in a silence from ``start_s`` on."""
+    return lambda seen: bool(
+        np.all(seen.torque(start_s + HOLD_TICKS * PERIOD + 0.005, stop_s) == 0.0)
+    )
+
+
+def counts(node: str, key: str, *kinds: str) -> Check:
+    """A counter has exactly what was injected."""
+    return lambda seen: (
+        seen.count(node, key) == sum(seen.expected[kind] for kind in kinds) > len(kinds)
+    )
+
+
+MATRIX: list[tuple[str, str, str, Check]] = [
+    # fault, flight, reaction, how it shows
+    ("nan_state", "bad messages", "not used, counted",
+     counts("controller", "rejected: state not finite", "nan_state", "inf_state")),
+    ("nan_state", "bad messages", "last torque repeated", tracks(0.1, 0.2, 1e-5)),
+    ("inf_state", "bad messages", "last torque repeated", tracks(0.2, 0.3, 1e-5)),
+    ("scaled_quaternion", "bad messages", "not used, counted",
+     counts("controller", "rejected: quaternion not unit", "scaled_quaternion")),
+    ("stamp_back", "bad messages", "not used", tracks(0.4, 0.45, 1e-5)),
+    ("stamp_jump", "bad messages", "not used", tracks(0.5, 0.55, 1e-5)),
+    ("stamp_jump", "bad messages", "counted",
+     lambda seen: seen.count("controller", "rejected: stamp") > 0),
+    ("nan_command", "bad messages", "refused, counted",
+     counts("plant", "refused: not finite", "nan_command", "inf_command")),
+    ("nan_command", "bad messages", "last good held", tracks(0.6, 0.7, 1e-5)),
+    ("inf_command", "bad messages", "last good held", tracks(0.7, 0.8, 1e-5)),
+    ("drop_state", "bad links", "command held", tracks(0.05, 0.1, 1e-5)),
+    ("repeat_state", "bad links", "answered once", tracks(0.1, 0.15, 1e-5)),
+    ("drop_command", "bad links", "last good held", tracks(0.2, 0.25, 1e-5)),
+    ("repeat_command", "bad links", "refused as old, counted",
+     lambda seen: seen.count("plant", "refused: stamp") >= seen.expected["repeat_command"] > 0),
+    ("delay_state", "bad links", "estimate from the echo", tracks(0.4, 0.45, 1e-4)),
+    ("jitter_state", "bad links", "estimate from the echo", tracks(0.5, 0.55, 1e-4)),
+    ("delay_command", "bad links", "estimate from the echo", tracks(0.6, 0.65, 1e-4)),
+    ("jitter_command", "bad links", "older ones refused", tracks(0.7, 0.75, 1e-4)),
+    ("noise_attitude", "bad sensors", "flown through", tracks(0.05, 0.1, 1e-3)),
+    ("noise_gyro", "bad sensors", "flown through", tracks(0.15, 0.2, 1e-3)),
+    ("noise_joint_position", "bad sensors", "flown through", tracks(0.25, 0.3, 1e-3)),
+    ("noise_joint_velocity", "bad sensors", "flown through", tracks(0.35, 0.4, 1e-3)),
+    ("quantise_attitude", "bad sensors", "flown through", tracks(0.45, 0.5, 1e-3)),
+    ("quantise_gyro", "bad sensors", "flown through", tracks(0.55, 0.6, 1e-3)),
+    ("quantise_joint_position", "bad sensors", "flown through", tracks(0.65, 0.7, 1e-3)),
+    ("quantise_joint_velocity", "bad sensors", "flown through", tracks(0.75, 0.8, 1e-3)),
+    ("saturate_base", "bad actuators", "clipped, echoed",
+     lambda seen: bool(np.abs(seen.torque(0.1, 0.2)[:, :3]).max() == 0.001)),
+    ("saturate_joints", "bad actuators", "clipped, counted",
+     lambda seen: bool(np.abs(seen.torque(0.3, 0.4)[:, 3:]).max() == 0.01)
+     and seen.count("plant", "saturated_ticks") > 100),
+    ("stuck_joint", "bad actuators", "the others go on", tracks(0.6, 0.9, 0.5)),
+    ("scaled_quaternion", "long silences", "the controller goes safe, then back",
+     lambda seen: "safe: quaternion not unit" in " ".join(seen.modes("controller"))
+     and seen.modes("controller")[-1] == "nominal"),
+    ("scaled_quaternion", "long silences", "no torque after hold_ticks", no_torque(0.1, 0.25)),
+    ("drop_command", "long silences", "the plant goes safe, then back",
+     lambda seen: "safe: no good command, the torque is zero" in seen.modes("plant")
+     and seen.modes("plant")[-1] == "nominal"),
+    ("drop_command", "long silences", "no torque after hold_ticks", no_torque(0.4, 0.55)),
+    ("drop_state", "long silences", "no torque when states come again",
+     lambda seen: bool(np.all(seen.log.applied_torque[round(0.85 / PERIOD)] == 0.0))),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("fault", "flight", "reaction", "check"),
+    [pytest.param(*row, id=f"{row[0]}, {row[1]}: {row[2]}") for row in MATRIX],
+)
+def test_reaction(
+    seen: Callable[[str], Seen], fault: str, flight: str, reaction: str, check: Check
+) -> None:
+    this = seen(flight)
+    assert check(this), (this.expected, this.graph)
+    assert this.log.ticks == 2000
+    assert np.isfinite(this.log.applied_torque).all()
+
+
+def test_the_matrix_has_every_kind_of_the_plant() -> None:
+    assert {row[0] for row in MATRIX} == set(PLANT_KINDS)
+    assert set(KINDS) > set(PLANT_KINDS)
+
+
+@pytest.mark.parametrize("flight", FLIGHTS)
+def test_the_flight_recovers(seen: Callable[[str], Seen], flight: str) -> None:
+    """Whatever has happened, the arm is where it should be when the faults are over."""
+    this = seen(flight)
+    begin, end = this.error(0.9, 0.95), this.error(0.99, 1.0)
+    assert end < 2e-3 or end < begin
+
+
+def test_a_faulty_flight_repeats_to_the_bit(fly: Fly, seen: Callable[[str], Seen]) -> None:
+    first = seen("bad links").log
+    words = [word for text in FLIGHTS["bad links"] for word in ("--fault", text)]
+    again = read_flight(fly(*OPTIONS, *words, "--controller", "tde_stc").bag)
+    for column in ("quaternion", "joint_positions", "joint_velocities", "applied_torque"):
+        np.testing.assert_array_equal(getattr(again, column), getattr(first, column), column)

@@ -1,0 +1,52 @@
+"""Running ``space-robot`` in tests as a user would, in ROS domains of their own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from space_robot_msgs_py.ros.process_environment import DEFAULTS
+
+Start = Callable[..., "subprocess.Popen[str]"]
+"""Starts a node with parameters."""
+COMMAND = [sys.executable, "-m", "space_robot_control.cli.main"]
+
+
+def ros_environment() -> dict[str, str]:
+    """Discovery on this machine only; the orchestrator picks a free domain."""
+    environment = {**os.environ, **DEFAULTS}
+    environment.pop("ROS_DOMAIN_ID", None)
+    return environment
+
+
+def space_robot(
+    *arguments: str, timeout: float = 150.0, python_path: Path | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run ``space-robot`` as a user would."""
+    environment = ros_environment()
+    if python_path:
+        paths = [str(python_path), environment.get("PYTHONPATH", "")]
+        environment["PYTHONPATH"] = os.pathsep.join(path for path in paths if path)
+    return subprocess.run(
+        [*COMMAND, *arguments], capture_output=True, text=True, timeout=timeout, check=False,
+        env=environment,
+    )  # fmt: skip
+
+
+@dataclass
+class Flown:
+    """A finished graph flight."""
+
+    report: dict[str, Any]
+    bag: Path
+    standard_error: str
+
+    @property
+    def bag_report(self) -> dict[str, Any]:
+        """What the report says of the bag: without what happened in the graph."""
+        return {key: value for key, value in self.report.items() if key != "graph"}

@@ -1,0 +1,192 @@
+"""Descriptions edited in any way: one line, or a flight that is analyzed and shown; no traceback.
+
+``BAG_FUZZ_EXAMPLES=5000 pytest tests/control/test_description_fuzz.py`` looks further.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import shutil
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pytest
+from bags import redescribed
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from space_robot_control.analysis import analyze
+from space_robot_control.analysis.figures.figure_set import FigureSet
+from space_robot_control.analysis.report_tables import metrics_table, rms_table
+from space_robot_control.analysis.terminal import print_table
+from space_robot_control.cli.report_display import print_comparison
+from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.flight.replay.choice import ControllerChoice
+from space_robot_control.flight.replay.recording import Recording
+from space_robot_control.flight.simulate import simulate
+from space_robot_control.flight.terminal import terminal
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.errors import InputError
+
+EXAMPLES = os.environ.get("BAG_FUZZ_EXAMPLES")
+fuzzed = settings(
+    max_examples=int(EXAMPLES or 120),
+    derandomize=not EXAMPLES,
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+)
+
+MODULE = "this"
+"""Importing it prints, and it is in no one's way."""
+PLAN = FlightPlan(duration=0.02, swaps=["0.005:ctc"], case="3")
+
+scalars = st.one_of(
+    st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=12),
+    st.sampled_from([
+        0, -1, 1e300, 1e-300, 10**400, float("nan"), float("inf"), -0.0, 2**64,
+        "", "[/red]", "[bold", r"$\frac$", ":smile:", "_x", "a" * 400, "\x1b[31m", "\ud800", "\x00",
+        "<script>", f"{MODULE}:X", "0.1:this:X", "/etc/passwd", "../../x.yaml", "..", "ctc",
+        "tde_stc", "seven_joint", "nan", "0.01:ctc", "default",
+    ]),
+)  # fmt: skip
+values = st.recursive(
+    scalars,
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=9), st.dictionaries(st.text(max_size=9), inner, max_size=3)
+    ),
+    max_leaves=9,
+)
+edits = st.tuples(
+    st.sampled_from(["put", "put", "put", "delete", "add"]), st.floats(0, 1, exclude_max=True),
+    st.integers(0, 2**20), values,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("described") / "bag"
+    simulate(Flight(PLAN), path)
+    return path
+
+
+def places(value: Any) -> list[tuple[Any, Any]]:
+    """Every container in a value, with each of its keys, those near the top first."""
+    found, waiting = [], [value]
+    while waiting:
+        container = waiting.pop(0)
+        keys = container if isinstance(container, dict) else range(len(container))
+        for key in keys:
+            found.append((container, key))
+            if isinstance(container[key], (dict, list)):
+                waiting.append(container[key])
+    return found
+
+
+def edited(description: Any, changes: list[tuple[str, float, int, Any]]) -> Any:
+    for kind, depth, place, value in changes:
+        if not isinstance(description, (dict, list)) or not (there := places(description)):
+            return value
+        nearest = there[: max(1, int(len(there) * depth**3))]  # numbers of the robot are the most
+        container, key = nearest[place % len(nearest)]
+        if kind == "delete":
+            del container[key]
+        elif kind == "add" and isinstance(container, dict):
+            container[f"new_{place}"] = value
+        else:
+            container[key] = value
+    return description
+
+
+def check_one_line(error: InputError) -> None:
+    assert str(error).isprintable(), repr(str(error))
+
+
+def try_replay(bag: Path) -> None:
+    """As far as the controller's start."""
+    with TemporaryDirectory() as folder:
+        try:
+            choice = ControllerChoice(Recording(bag).flight, Path(folder))
+        except InputError as error:
+            check_one_line(error)
+        else:
+            assert choice.robot.n
+
+
+@fuzzed
+@given(st.lists(edits, min_size=1, max_size=3))
+def test_an_edited_description_is_told_or_followed(
+    bag: Path, changes: list[tuple[str, float, int, Any]]
+) -> None:
+    described = json.loads(json.dumps(Flight(PLAN).description))
+    redescribed(bag, json.dumps(edited(described, changes)))
+    log = read_flight(bag)
+    assert log.ticks == 40
+    assert all(text.isprintable() for text in log.damage)
+    report = analyze(log)
+    for console in (terminal(file=io.StringIO(), width=width) for width in (20, 100)):
+        print_table(rms_table(report), console)
+        print_table(metrics_table(report), console)
+        print_comparison({"[/red]": report, r"$\frac": report}, console)
+    try_replay(bag)
+    assert MODULE not in sys.modules
+
+
+@fuzzed
+@given(st.text(max_size=30) | st.sampled_from(["[" * 100_000, '{"a":' * 500 + "1" + "}" * 500]))
+def test_what_is_no_json_is_told(bag: Path, text: str) -> None:
+    redescribed(bag, text)
+    (told,) = read_flight(bag).damage
+    assert told.startswith("the description of the flight cannot be")
+    try_replay(bag)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"period": 0}, {"period": float("nan")}, {"period": "abc"}, {"period": 1e300},
+        {"period": True}, {"parameters": None}, {"parameters": []}, {"parameters": {"plant": 3}},
+        {"gains_used": None}, {"gains_used": {"h_bar": "x"}}, {"gains_used": {"h_bar": [[1]]}},
+        {"robot_file": []}, {"swaps": "0.1:ctc"}, {"swaps": [1]}, {"faults": None}, {"case": 3},
+        {"controller": ["tde_stc"]}, {"command_latency_ticks": "2"}, {"realtime": "no"},
+    ],
+)  # fmt: skip
+def test_each_wrong_key_is_named_in_a_line(bag: Path, changes: dict[str, Any]) -> None:
+    """Once tracebacks of `replay`, and of `analyze`."""
+    described = {**json.loads(json.dumps(Flight(PLAN).description)), **changes}
+    redescribed(bag, json.dumps(described))
+    (key,) = changes
+    log = read_flight(bag)
+    assert log.flight == {}
+    (told,) = log.damage
+    assert told.startswith(f"the description of the flight cannot be used: {key}")
+    assert told.isprintable()
+    analyze(log)
+    with pytest.raises(InputError, match=f"cannot be used: {key}"):
+        Recording(bag)
+
+
+def test_keys_of_newer_software_are_no_fault(bag: Path) -> None:
+    described = {**Flight(PLAN).description, "orbit": {"altitude": 4e5}}
+    redescribed(bag, json.dumps(described))
+    log = read_flight(bag)
+    assert (log.damage, log.flight["orbit"]) == ((), {"altitude": 4e5})
+
+
+MARKUP = (r"$\frac$", "[/red]", "$", "_x", ":smile:", "<b>&amp;", "[bold]", "\\", "{}", "%s", "夏")
+
+
+@pytest.mark.parametrize("name", MARKUP)
+def test_markup_in_names_is_drawn_as_it_is(bag: Path, tmp_path: Path, name: str) -> None:
+    described = json.loads(json.dumps(Flight(PLAN).description))
+    redescribed(bag, json.dumps({**described, "controller": name, "case": name, "gains": name}))
+    log = read_flight(shutil.copytree(bag, tmp_path / "bag"))
+    log.joint_names = (name, *log.joint_names[1:])
+    figure_set = FigureSet()
+    figure_set.add(name, log)
+    figure_set.save(tmp_path)
+    figure_set.add(f"{name} again", log)
+    figure_set.save(tmp_path)

@@ -1,0 +1,173 @@
+"""Flights where something failed, in bags whole and broken: no more is shown than there was."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bags import (
+    FLIGHT,
+    TIMEBASE,
+    Recorded,
+    assert_nothing_is_hidden,
+    chunks_of,
+    mcap_file,
+    messages_of,
+    record,
+)
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog
+from space_robot_msgs_py.bag.gaps import fill_gaps
+from space_robot_msgs_py.bag.mcap_storage import McapStorage
+from space_robot_msgs_py.bag.reader import read_flight, timebase_of
+from space_robot_msgs_py.bag.recorder import BagRecorder
+from space_robot_msgs_py.bag.rows import stamps_of
+from space_robot_msgs_py.samples import STATE_FIELDS
+from space_robot_msgs_py.wire.cdr import header_stamp_ns
+from space_robot_msgs_py.wire.clock import ClockCodec
+
+KEPT_BACK = (30, 31, 150, 250, 251, 252)
+"""Ticks whose state a fault keeps back."""
+NO_ANSWER = (60, 61, 299)
+FAULTY = {**FLIGHT, "faults": ["drop_state@0-1:0.1"]}
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
+    return record(tmp_path_factory.mktemp("whole") / "bag")
+
+
+def _faulty(recorded: Recorded, folder: Path, flight: dict[str, Any] = FAULTY) -> Path:
+    """The same flight with states kept back and answers missing, in chunks of 100 ticks."""
+    recorder, states = BagRecorder(folder, flight, TIMEBASE), 0
+    for topic, data in messages_of(recorded.folder):
+        if topic is topics.REFERENCE_JOINTS and states % 100 == 0:
+            recorder.flush()
+        states += topic is topics.JOINT_STATES
+        tick = header_stamp_ns(data) // TIMEBASE.period_ns
+        if topic in (topics.JOINT_STATES, topics.BASE_STATE) and tick in KEPT_BACK:
+            continue
+        if topic is topics.COMMAND and tick in (*KEPT_BACK, *NO_ANSWER):
+            continue
+        recorder.record(topic, data)
+    recorder.close()
+    return folder
+
+
+def _break(bag: Path, which: int) -> None:
+    start, length = chunks_of(bag)[which]
+    content = bytearray(mcap_file(bag).read_bytes())
+    content[start + length // 2] ^= 0x10
+    mcap_file(bag).write_bytes(content)
+
+
+def test_states_kept_back_are_filled_with_the_one_before(
+    recorded: Recorded, tmp_path: Path
+) -> None:
+    log = read_flight(_faulty(recorded, tmp_path / "bag"))
+    assert not any(log.lost.values())
+    assert log.unanswered == len(KEPT_BACK) + len(NO_ANSWER)
+    assert log.filled == len(KEPT_BACK)
+    assert log.whole.all()
+    before = np.arange(log.ticks)
+    for tick in KEPT_BACK:
+        before[tick] = before[tick - 1]
+    np.testing.assert_array_equal(log.joint_positions, recorded.log.joint_positions[before])
+    np.testing.assert_array_equal(log.reference_base, recorded.log.reference_base)
+
+
+@pytest.mark.parametrize("which", [0, 1, 2, 3])
+def test_nothing_is_filled_where_messages_are_gone(
+    recorded: Recorded, tmp_path: Path, which: int
+) -> None:
+    """Nobody knows then which ticks the fault has taken and which the break."""
+    bag = _faulty(recorded, tmp_path / "bag")
+    _break(bag, which)
+    log = read_flight(bag)
+    there = np.ones(400, np.bool_)
+    there[100 * which : 100 * which + 100] = False
+    there[list(KEPT_BACK)] = False
+    assert log.filled == 0
+    np.testing.assert_array_equal(np.isfinite(log.joint_positions[:, 0]), there[: log.ticks])
+    assert_nothing_is_hidden(log, recorded.log)
+    gone = 100 - sum(100 * which <= tick < 100 * which + 100 for tick in KEPT_BACK)
+    assert (log.lost["/joint_states"], log.lost["/base/state"]) == (gone, gone)
+
+
+def test_nothing_is_filled_where_the_recorder_lost_states(
+    recorded: Recorded, tmp_path: Path
+) -> None:
+    """By the publisher's count: one that was sent, and none of those that were kept back."""
+    recorder, sent = BagRecorder(tmp_path / "bag", FAULTY, TIMEBASE), dict.fromkeys(topics.ALL, 0)
+    for topic, data in messages_of(recorded.folder):
+        tick = header_stamp_ns(data) // TIMEBASE.period_ns
+        is_state = topic in (topics.JOINT_STATES, topics.BASE_STATE)
+        if is_state and tick in KEPT_BACK:
+            continue
+        sent[topic] += 1
+        if not (is_state and tick == 200):
+            recorder.record(topic, data, 0, topic.name.encode(), sent[topic])
+    recorder.close()
+    log = read_flight(tmp_path / "bag")
+    assert log.lost == {
+        topic.name: int(topic in (topics.JOINT_STATES, topics.BASE_STATE)) for topic in topics.ALL
+    }
+    assert log.filled == 0
+    assert np.flatnonzero(~log.whole).tolist() == sorted((*KEPT_BACK, 200))
+
+
+def test_a_filled_reference_is_at_rest() -> None:
+    log = FlightLog.allocate(6, ("a", "b"), TIMEBASE)
+    for name in (*STATE_FIELDS, *REFERENCE):
+        column = getattr(log, name)
+        column[:] = np.arange(1.0, column.size + 1.0).reshape(column.shape)
+    joints, base = log.reference_joints.copy(), log.reference_base.copy()
+    log.reference_joints[2:4] = log.reference_base[2:4] = np.nan
+    fill_gaps(log)
+    joints[2:4, 0], joints[2:4, 1:] = joints[1, 0], 0.0
+    base[2:4, :4], base[2:4, 4:] = base[1, :4], 0.0
+    np.testing.assert_array_equal(log.reference_joints, joints)
+    np.testing.assert_array_equal(log.reference_base, base)
+
+
+@pytest.mark.parametrize(
+    ("steps", "flight", "period_ns", "is_told"),
+    [
+        ([500_000] * 5, {}, 500_000, False),
+        ([1_000_000] * 5, {}, 1_000_000, True),  # flown with a multiple
+        ([1_000_000] * 5, {"faults": ["drop_state@0-1"]}, 500_000, False),  # each other kept back
+        ([750_000] * 5, {"faults": ["drop_state@0-1"]}, 750_000, True),
+        ([250_000] * 5, {"realtime": True}, 250_000, True),
+        ([500_000, 1_000_000, 500_000], {}, 500_000, False),
+        ([], {}, 500_000, False),
+    ],
+)
+def test_the_period_described_is_believed_if_the_stamps_allow(
+    steps: Sequence[int], flight: dict[str, Any], period_ns: int, is_told: bool
+) -> None:
+    stamps = np.cumsum([0, *steps]).tolist()
+    timebase, doubt = timebase_of(stamps, {"period": 0.0005, **flight})
+    assert (timebase.period_ns, bool(doubt)) == (period_ns, is_told)
+
+
+def test_bad_stamps_between_good_ones_are_kept_at_the_time_of_the_last_good_one(
+    tmp_path: Path,
+) -> None:
+    """In log time a bag rises, whatever was in its messages; and no good one is left out."""
+    recorder, codec, expected = BagRecorder(tmp_path / "bag", {}, TIMEBASE), ClockCodec(), []
+    for tick in range(0, 400, 20):
+        good_ns = tick * TIMEBASE.period_ns
+        bad = (10**6 * TIMEBASE.period_ns, good_ns + 123, 10**7 * TIMEBASE.period_ns)
+        for stamp_ns in (good_ns, *(bad[: tick // 20 % 4])):
+            recorder.record(topics.CLOCK, codec.encode(stamp_ns))
+            expected.append((stamp_ns, good_ns))
+    recorder.close()
+    (batch,) = McapStorage(tmp_path / "bag" / "bag_0.mcap").batches()
+    assert list(zip(stamps_of(batch).tolist(), batch.log_ns.tolist(), strict=True)) == expected
+    counted = recorder.accounting[topics.CLOCK.name]
+    assert (counted.received, counted.invalid_stamps) == (20, len(expected) - 20)
+    assert recorder.lost[topics.CLOCK.name] == 0

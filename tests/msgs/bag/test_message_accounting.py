@@ -1,0 +1,120 @@
+"""Counting many messages at once is counting each of them."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.message_accounting import LONGEST_JUMP, MessageAccounting
+
+steps = st.sampled_from([1, 1, 1, 1, 2, 5, 0, -1, -3, 19_999, 20_001, 10**12])
+batches = st.lists(st.lists(steps, max_size=12), max_size=6)
+
+
+@pytest.mark.parametrize("topic", [topics.JOINT_STATES, topics.CLOCK, topics.LAW])
+@given(st.integers(-5, 100_000), batches)
+def test_a_batch_counts_as_its_messages_one_by_one(
+    topic: topics.Topic, first: int, given_steps: list[list[int]]
+) -> None:
+    at_once, singly, tick = MessageAccounting(topic), MessageAccounting(topic), first
+    for batch in given_steps:
+        ticks = tick + np.cumsum([0, *batch], dtype=np.int64)[:-1]
+        tick += sum(batch)
+        assert at_once.take_all(ticks).tolist() == [singly.take(int(k)) for k in ticks]
+    for field in fields(MessageAccounting):
+        if field.name != "_guard":
+            assert getattr(at_once, field.name) == getattr(singly, field.name), field.name
+
+
+def test_events_may_come_whenever_they_like() -> None:
+    """Two of one tick are two, a long silence is no strange stamp, none at all is no loss."""
+    counted = MessageAccounting(topics.LAW)
+    assert counted.missing(1000) == 0
+    for tick in (0, 7, 7, 3 * LONGEST_JUMP, 9):
+        assert counted.take(tick)
+    assert (counted.received, counted.repeated, counted.invalid_stamps) == (5, 0, 0)
+    assert counted.missing(4 * LONGEST_JUMP) == 0
+
+
+@pytest.mark.parametrize("topic", [topics.JOINT_STATES, topics.COMMAND], ids=lambda t: t.name)
+@given(st.lists(st.integers(0, 60), max_size=80), st.integers(0, 5))
+def test_ticks_are_counted_as_a_set_has_them(
+    topic: topics.Topic, ticks: list[int], more: int
+) -> None:
+    """Late, twice, late and twice, in any order: against sets, which know nothing of holes."""
+    counted, came = MessageAccounting(topic), set[int]()
+    for tick in ticks:
+        assert counted.take(tick) == (tick not in came)
+        came.add(tick)
+    last = max(came, default=-1)
+    assert counted.received == len(came)
+    assert counted.repeated == len(ticks) - len(came)
+    assert counted.invalid_stamps == 0
+    assert counted.last == last
+    assert counted.missing(last + more) == len(set(range(last + more + 1)) - came)
+
+
+@given(st.integers(1, 30), st.sets(st.integers(0, 40), min_size=1))
+def test_messages_at_a_period_are_counted_as_a_set_has_them(period: int, places: set[int]) -> None:
+    """Of a topic with a message every few ticks, the smallest step seen is its period."""
+    counted, sent = MessageAccounting(topics.CLOCK), sorted(places)
+    for place in sent:
+        counted.take(period * place)
+    smallest = min((b - a for a, b in itertools.pairwise(sent)), default=1)
+    expected = set(range(sent[0], sent[-1] + 1, smallest))
+    assert counted.missing(period * 41) == max(0, len(expected) - len(sent))
+    assert counted.received == len(sent)
+
+
+@given(st.integers(2, 30), st.integers(2, 12), st.integers(2, 5), st.integers(1, 9))
+def test_a_stream_said_again_from_its_start_is_whole(
+    period: int, start: int, ahead: int, more: int
+) -> None:
+    """Who joins late hears the end of what was sent before, and then all of it once more."""
+    counted = MessageAccounting(topics.REFERENCE_JOINTS)
+    before = range(start, start + ahead)
+    again = range(start + ahead + more)
+    for place in before:
+        assert counted.take(period * place)
+    for place in again:
+        assert counted.take(period * place) == (place not in before)
+    assert (counted.received, counted.repeated) == (len(again), ahead)
+    assert counted.missing(period * 100) == counted.gaps == 0
+
+
+@pytest.mark.parametrize("topic", [topics.JOINT_STATES, topics.CLOCK], ids=lambda t: t.name)
+@given(st.integers(1, 30), st.integers(0, 12), st.integers(0, 100), st.integers(2, 12))
+def test_what_a_pause_passed_over_is_no_gap(
+    topic: topics.Topic, period: int, before: int, passed: int, after: int
+) -> None:
+    counted, period = MessageAccounting(topic), 1 if topic.per_tick else period
+    places = [*range(before), *range(before + passed, before + passed + after)]
+    for i, place in enumerate(places):
+        if i == before:
+            counted.pause()
+        assert counted.take(period * place)
+    assert counted.gaps == 0
+    lost = counted.last + 3 * period
+    assert counted.take(lost)
+    assert counted.gaps == 2
+
+
+@given(st.lists(st.integers(0, 500), unique=True, min_size=1).map(sorted), st.data())
+def test_bad_stamps_between_good_ones_are_counted_apart(
+    ticks: list[int], data: st.DataObject
+) -> None:
+    """They are strange, and the good ones are neither lost nor taken for repeated."""
+    counted, bad = MessageAccounting(topics.COMMAND), 0
+    for i, tick in enumerate(ticks):
+        for jump in data.draw(st.lists(st.sampled_from([10**6, 10**9]), max_size=3)) if i else ():
+            assert counted.take(tick + jump)
+            bad += 1
+        assert counted.take(tick)
+    assert (counted.received, counted.invalid_stamps) == (len(ticks), bad)
+    assert counted.missing(500) == len(set(range(501)) - set(ticks))

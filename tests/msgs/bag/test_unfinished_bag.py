@@ -1,0 +1,251 @@
+"""Bags that nobody finished: killed recorders, full disks, folders that went away."""
+
+from __future__ import annotations
+
+import errno
+import os
+import resource
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from rich.console import Console
+
+from space_robot_control.analysis import analyze
+from space_robot_control.analysis.report_tables import rms_table
+from space_robot_control.analysis.terminal import print_table
+from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.flight.simulate import simulate
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.bag.recorder import CHUNK_AGE_S, FLIGHT_KEY, BagRecorder
+from space_robot_msgs_py.errors import FlightError, InputError
+from space_robot_msgs_py.samples import Timebase
+
+TIMEBASE = Timebase(500_000)
+FLIGHT = {"controller": "tde_stc", "case": "1", "period": 0.0005}
+CHUNK_MESSAGES = 70
+Messages = list[tuple[topics.Topic, bytes]]
+
+
+@dataclass
+class Recorded:
+    """A finished bag of several chunks."""
+
+    folder: Path
+    content: bytes
+    log: FlightLog
+    kept: list[tuple[int, int]]
+    """Where each chunk ends in the file, and the last tick that was kept then."""
+
+
+def _file(bag: Path) -> Path:
+    return next(bag.glob("*.mcap"))
+
+
+@pytest.fixture(scope="module")
+def messages(tmp_path_factory: pytest.TempPathFactory) -> Messages:
+    """What the nodes send in 200 ticks."""
+    bag = tmp_path_factory.mktemp("flown") / "bag"
+    simulate(Flight(FlightPlan(duration=0.1)), bag)
+    with _file(bag).open("rb") as file:
+        sent = make_reader(file).iter_messages(log_time_order=False)
+        return [(topics.BY_NAME[channel.topic], message.data) for _, channel, message in sent]
+
+
+@pytest.fixture(scope="module")
+def recorded(messages: Messages, tmp_path_factory: pytest.TempPathFactory) -> Recorded:
+    bag = tmp_path_factory.mktemp("recorded") / "bag"
+    recorder = BagRecorder(bag, FLIGHT, TIMEBASE)
+    ticks = []
+    for start in range(0, len(messages), CHUNK_MESSAGES):
+        for topic, data in messages[start : start + CHUNK_MESSAGES]:
+            recorder.record(topic, data)
+        recorder.flush()
+        ticks.append(recorder.kept_tick)
+    recorder.close()
+    with _file(bag).open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    ends = [index.chunk_start_offset + index.chunk_length for index in summary.chunk_indexes]
+    kept = list(zip(ends, ticks, strict=True))
+    return Recorded(bag, _file(bag).read_bytes(), read_flight(bag), kept)
+
+
+@contextmanager
+def _file_size_limit(size: int) -> Iterator[None]:
+    """No file of this process grows beyond ``size``: to a writer the same as a full disk."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_cut_anywhere_every_whole_chunk_is_read(
+    recorded: Recorded, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    """Also where zeros or noise follow, as after a power cut."""
+    cut = data.draw(st.integers(0, len(recorded.content) - 1), label="cut")
+    tail = data.draw(st.sampled_from([b"", bytes(500), b"\xff" * 500]), label="tail")
+    bag = tmp_path_factory.mktemp("cut") / "bag"
+    bag.mkdir()
+    (bag / "bag_0.mcap").write_bytes(recorded.content[:cut] + tail)
+    if data.draw(st.booleans(), label="with metadata.yaml"):
+        shutil.copy(recorded.folder / "metadata.yaml", bag)
+    last = max((tick for end, tick in recorded.kept if end <= cut), default=-1)
+    if last == -1 and not tail:
+        with pytest.raises(InputError, match=str(bag)):
+            read_flight(bag)
+        return
+    try:
+        log = read_flight(bag)
+    except InputError:
+        assert last == -1
+        return
+    assert log.ticks - 1 == last or (tail and log.ticks - 1 > last)
+    for column in ("quaternion", "joint_positions", "applied_torque", "reference_joints"):
+        whole = getattr(recorded.log, column)[: log.ticks]
+        np.testing.assert_array_equal(getattr(log, column), whole)
+    assert log.flight == FLIGHT
+    assert log.unfinished.endswith(f"read up to t = {(log.ticks - 1) * 0.0005:.4f} s")
+    assert not any(log.lost.values())
+
+
+def test_whole_file_without_metadata_is_read_to_its_end(recorded: Recorded, tmp_path: Path) -> None:
+    """The recorder was killed between the two."""
+    shutil.copy(_file(recorded.folder), tmp_path)
+    log = read_flight(tmp_path)
+    assert log.ticks == recorded.log.ticks
+    assert log.unfinished
+    assert not recorded.log.unfinished
+
+
+def test_report_says_that_the_bag_was_not_finished(recorded: Recorded, tmp_path: Path) -> None:
+    shutil.copy(_file(recorded.folder), tmp_path)
+    report = analyze(read_flight(tmp_path))
+    console = Console(width=120)
+    with console.capture() as shown:
+        print_table(rms_table(report), console)
+    assert report["unfinished"] == "the bag was not finished: read up to t = 0.0995 s"
+    assert report["unfinished"] in shown.get()
+    assert analyze(recorded.log)["unfinished"] == ""
+
+
+def test_flight_is_described_from_the_beginning(tmp_path: Path) -> None:
+    BagRecorder(tmp_path / "bag", FLIGHT, TIMEBASE)
+    assert '"controller": "tde_stc"' in open_bag(tmp_path / "bag").custom_data()[FLIGHT_KEY]
+    with pytest.raises(InputError, match=r"no messages on /joint_states .* not finished"):
+        read_flight(tmp_path / "bag")
+
+
+def test_what_was_flushed_is_readable_while_the_recorder_runs(
+    messages: Messages, tmp_path: Path
+) -> None:
+    """Nothing stays in the library's or in Python's buffers."""
+    recorder = BagRecorder(tmp_path / "bag", FLIGHT, TIMEBASE)
+    for number, (topic, data) in enumerate(messages, 1):
+        recorder.record(topic, data)
+        if number % 100 == 0:
+            recorder.flush()
+            assert sum(open_bag(tmp_path / "bag").counts().values()) == number
+    assert read_flight(tmp_path / "bag").ticks == recorder.kept_tick + 1
+
+
+def test_open_chunk_ends_when_it_is_old_though_nothing_comes(
+    messages: Messages, tmp_path: Path
+) -> None:
+    recorder = BagRecorder(tmp_path / "bag", FLIGHT, TIMEBASE)
+    for topic, data in messages[:10]:
+        recorder.record(topic, data)
+    time.sleep(CHUNK_AGE_S)
+    recorder.flush_if_due()
+    assert sum(open_bag(tmp_path / "bag").counts().values()) == 10
+
+
+@pytest.mark.parametrize("limit", [2_000, 40_000, 80_000])
+def test_full_disk_keeps_what_fitted_and_stops_nobody(
+    messages: Messages, tmp_path: Path, limit: int
+) -> None:
+    bag = tmp_path / "bag"
+    with _file_size_limit(limit):
+        recorder = BagRecorder(bag, FLIGHT, TIMEBASE)
+        for number, (topic, data) in enumerate(messages, 1):
+            recorder.record(topic, data)
+            if number % CHUNK_MESSAGES == 0:
+                recorder.flush()
+        assert recorder.failure == os.strerror(errno.EFBIG)
+        with pytest.raises(FlightError) as raised:
+            recorder.close()
+        recorder.close()
+    assert f"messages not kept: {recorder.unkept}" in str(raised.value)
+    assert str(bag) in str(raised.value)
+    assert recorder.received == len(messages)
+    with _file(bag).open("rb") as file:  # a valid MCAP file, for any tool
+        readable = len(list(make_reader(file).iter_messages(log_time_order=False)))
+    assert readable == len(messages) - recorder.unkept
+    if recorder.kept_tick < 0:
+        assert "last tick kept: none" in str(raised.value)
+        with pytest.raises(InputError, match="not finished"):
+            read_flight(bag)
+    else:
+        assert f"last tick kept: tick {recorder.kept_tick} " in str(raised.value)
+        assert read_flight(bag).ticks == recorder.kept_tick + 1
+
+
+def test_full_disk_at_the_beginning_is_an_input_error(tmp_path: Path) -> None:
+    with _file_size_limit(100), pytest.raises(InputError, match="File too large"):
+        BagRecorder(tmp_path / "bag", FLIGHT, TIMEBASE)
+
+
+def test_full_disk_at_the_end_loses_no_message(messages: Messages, tmp_path: Path) -> None:
+    """No room for index and metadata: the messages are there all the same."""
+    bag = tmp_path / "bag"
+    recorder = BagRecorder(bag, FLIGHT, TIMEBASE)
+    for topic, data in messages:
+        recorder.record(topic, data)
+    recorder.flush()
+    with _file_size_limit(_file(bag).stat().st_size + 60), pytest.raises(FlightError):
+        recorder.close()
+    assert recorder.unkept == 0
+    assert not (bag / "metadata.yaml").exists()
+    assert read_flight(bag).ticks == 200
+
+
+def test_simulated_flight_onto_a_full_disk_fails_in_the_end(tmp_path: Path) -> None:
+    with _file_size_limit(50_000), pytest.raises(FlightError, match="last tick kept"):
+        simulate(Flight(FlightPlan(duration=0.1)), tmp_path / "bag")
+
+
+def test_removed_folder_is_noticed_and_nothing_written_in_its_place(
+    messages: Messages, tmp_path: Path
+) -> None:
+    bag = tmp_path / "bag"
+    recorder = BagRecorder(bag, FLIGHT, TIMEBASE)
+    for number, (topic, data) in enumerate(messages):
+        if number == 200:
+            recorder.flush()
+            shutil.rmtree(bag)
+            bag.mkdir()
+            (bag / "bag_0.mcap").touch()
+            recorder.flush()
+        recorder.record(topic, data)
+    assert "removed or moved" in recorder.failure
+    assert recorder.unkept == len(messages)
+    with pytest.raises(FlightError, match="last tick kept: none"):
+        recorder.close()
+    assert [file.name for file in bag.iterdir()] == ["bag_0.mcap"]
+    assert (bag / "bag_0.mcap").stat().st_size == 0

@@ -1,0 +1,89 @@
+"""Records: one memory, seen by Python and by kernels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, assign, nested, prefix, shaped
+
+Array = NDArray[np.float64]
+
+
+class Inner(Record):
+    matrix: Array = shaped(lambda n: (n + 1, 3))
+
+
+class Outer(Record):
+    vector: Array = shaped(lambda n: (2 * n,))
+    scalar: float = shaped(lambda n: ())
+    inner: Inner = nested(Inner)
+
+
+@kernel
+def fill(record: Outer) -> int:
+    record.vector[:] = 2.0
+    record.scalar = 3.0
+    record.inner.matrix[1, 2] = 4.0
+    return record.inner.matrix.shape[0]
+
+
+@pytest.mark.parametrize("n", [1, 6])
+def test_a_kernel_writes_what_python_reads(n: int) -> None:
+    block = Outer.block(n)
+    record: Outer = block[0]
+    view = record.vector
+    assert fill(record) == n + 1
+    np.testing.assert_array_equal(view, np.full(2 * n, 2.0))
+    assert block[0].scalar == 3.0
+    assert record.inner.matrix[1, 2] == 4.0
+    assert np.count_nonzero(record.inner.matrix) == 1
+
+
+def test_allocated_records_are_zero_and_share_nothing() -> None:
+    one, other = Outer.allocate(3), Outer.allocate(3)
+    fill(one)
+    assert not other.vector.any()
+    assert other.inner.matrix.shape == (4, 3)
+
+
+def test_assign_copies_arrays_and_records() -> None:
+    record, inner = Outer.allocate(2), Inner.allocate(2)
+    inner.matrix[:] = 5.0
+    assign(record, inner=inner, vector=[1.0, 2.0, 3.0, 4.0], scalar=6.0)
+    inner.matrix[:] = 0.0
+    assert record.inner.matrix.min() == 5.0
+    assert record.vector.tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert record.scalar == 6.0
+
+
+def test_assigning_to_an_unknown_field_is_an_error() -> None:
+    with pytest.raises(ValueError, match="no field of name mass"):
+        assign(Outer.allocate(2), mass=1.0)
+
+
+class Longer(Outer):
+    more: Array = shaped(lambda n: (n,))
+
+
+def test_a_record_begins_with_the_fields_of_its_base() -> None:
+    """Who knows the base alone reads and writes them in the same memory."""
+    block = Longer.block(4)
+    assert list(Longer.fields()) == ["vector", "scalar", "inner", "more"]
+    block[0].more[:] = 7.0
+    fill(prefix(block, Outer.dtype(4))[0])
+    np.testing.assert_array_equal(block[0].vector, np.full(8, 2.0))
+    assert block[0].inner.matrix[1, 2] == 4.0
+    assert block[0].more.tolist() == [7.0] * 4
+
+
+def test_a_view_is_the_same_memory() -> None:
+    block = Longer.block(3)
+    view = Longer.view(block)
+    view.more[:], view.inner.matrix[2, 0] = 1.5, 6.0
+    assert block[0].more.tolist() == [1.5] * 3
+    assert block[0].inner.matrix[2, 0] == 6.0
+    assert view.address == block.ctypes.data
+    assert not hasattr(view, "scalar"), "a copy of it would not be the same memory"

@@ -1,0 +1,127 @@
+"""Configuration by name, layers and overrides, gain sets, and what is said of bad ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from space_robot_control.controller.gains import build_law, gain_files, read_gains
+from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.laws import laws
+from space_robot_control.mission.settings import MissionNodeSettings
+from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.config.files import config_directory, named_file, node_parameters
+from space_robot_msgs_py.config.settings import leaves
+from space_robot_msgs_py.config.trees import flatten, merge, nest
+from space_robot_msgs_py.errors import InputError
+from space_robot_sim.plant.settings import PlantNodeSettings
+
+SCHEMAS = (PlantNodeSettings, ControllerNodeSettings, MissionNodeSettings, RecorderNodeSettings)
+
+
+def test_every_setting_has_a_description() -> None:
+    for schema in SCHEMAS:
+        for name, field in leaves(schema):
+            assert field.description, f"{schema.node}: {name}"
+
+
+def test_every_shipped_parameter_file_is_one() -> None:
+    for path in config_directory().rglob("*.yaml"):
+        if path.parent.name in ("robots", "qos") or path.name == "default_sets.yaml":
+            continue
+        for node in yaml.safe_load(path.read_text()):
+            assert node_parameters(path, node.strip("/").removesuffix("_node"))
+
+
+def test_a_node_waits_for_listeners_to_what_it_sends_alone() -> None:
+    assert PlantNodeSettings.resolve({"wait_for": ["a:/clock", "b", ""]}).wait_for[0] == "a:/clock"
+    for schema, entry, sent in (
+        (PlantNodeSettings, "recorder_node:/command", "/joint_states, /base/state, /clock"),
+        (ControllerNodeSettings, "plant_node:", "/command, /controller/telemetry, /controller/law"),
+    ):
+        with pytest.raises(InputError) as error:
+            schema.resolve({"wait_for": ["recorder_node", entry]})
+        assert str(error.value) == (
+            f"{schema.node} parameters: wait_for: {entry!r}: choose a topic it sends, {sent}, "
+            f"got ['recorder_node', {entry!r}]"
+        )
+
+
+def test_layers_and_overrides() -> None:
+    settings = PlantNodeSettings.resolve({"case": "4-1", "friction.viscous": 0.5})
+    assert settings.disturbance.scale == 2.0  # from the case
+    assert settings.payload.mass == 15.0
+    assert settings.friction.viscous == 0.5  # from the override
+    assert settings.friction.coulomb == 0.02
+    assert settings.initial_joints_deg[1] == 120.0  # from the mission
+
+
+def test_printed_gains_are_table_iv() -> None:
+    settings = ControllerNodeSettings.resolve({"gains": "printed"})
+    stc = build_law("tde_stc", settings, 9).gains
+    np.testing.assert_array_equal(stc.k_1, [0.02, 0.02, 0.02, 0.2, 0.2, 0.2, 0.4, 0.2, 0.2])
+    np.testing.assert_array_equal(stc.k_2, np.r_[[8e-5] * 3, [3e-3] * 3, 4e-3, 2e-3, 2e-3])
+    ctc = build_law("ctc", settings, 9).gains
+    np.testing.assert_array_equal(ctc.k_p, np.r_[7.5e6, [5e6] * 5, 5e4, 5e4, 8e3])
+    np.testing.assert_array_equal(ctc.k_d, np.r_[[5e4] * 6, 2e3, 8e3, 1e2])
+
+
+@pytest.mark.parametrize(("robot", "axes"), [("paper", 9), ("seven_joint", 10)])
+def test_every_law_has_tuned_and_default_gains(robot: str, axes: int) -> None:
+    for gain_set in ("tuned", "default"):
+        files = gain_files(robot, gain_set)
+        assert set(files) == set(laws())
+        for name, path in files.items():
+            read_gains(path, laws()[name], axes)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ({"h_bar": [1.0]}, "tde_stc.lambda: missing (slope of the sliding surface"),
+        ({"h_bar": [1.0, 2.0]}, "9 values (base x, y, z and the joints) or 1 were expected"),
+        ({"h_bar": [0.0]}, "finite values above 0 were expected, got [0.0]"),
+        ({"h_bar": ["x"]}, "numbers were expected, got ['x']"),
+        ({"k_9": [1.0]}, "unknown gain of tde_stc 'k_9'"),
+    ],
+)
+def test_bad_gains_name_file_key_and_value(
+    tmp_path: Path, content: dict[str, object], said: str
+) -> None:
+    path = tmp_path / "tde_stc.yaml"
+    path.write_text(yaml.safe_dump({"controller_node": {"ros__parameters": {"tde_stc": content}}}))
+    with pytest.raises(InputError) as caught:
+        read_gains(path, laws()["tde_stc"], 9)
+    assert said in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+def test_unknown_names_list_the_known_ones() -> None:
+    with pytest.raises(InputError, match=r"unknown case '7': choose one of 1, 2, 3, 4-1, 4-2"):
+        named_file("cases", "7")
+    with pytest.raises(InputError, match="unknown gain set 'best' of robot 'paper': choose"):
+        gain_files("paper", "best")
+    with pytest.raises(InputError, match="no gains for robot 'mine'"):
+        gain_files("mine.yaml", "default")
+
+
+def test_file_that_is_no_parameter_file(tmp_path: Path) -> None:
+    path = tmp_path / "case.yaml"
+    path.write_text("plant: {friction: 1}")
+    with pytest.raises(InputError, match="ros__parameters"):
+        PlantNodeSettings.resolve({"case": str(path)})
+
+
+def test_mission_of_another_robot_does_not_fit() -> None:
+    with pytest.raises(InputError, match="7 values, robot 'paper' has 6 joints"):
+        Flight(FlightPlan(mission="seven_joint"))
+
+
+def test_trees() -> None:
+    assert nest({"a.b": 1, "a.c": {"d.e": 2}}) == {"a": {"b": 1, "c": {"d": {"e": 2}}}}
+    assert merge({"a": {"b": 1, "c": 2}}, {"a": {"b": 3}}) == {"a": {"b": 3, "c": 2}}
+    assert dict(flatten({"a": {"b": 1}, "c": 2})) == {"a.b": 1, "c": 2}

@@ -1,0 +1,100 @@
+"""Locks of topics, nodes and domains: who holds them, and that they never meet."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from space_robot_msgs_py.ros import lifeline
+from space_robot_msgs_py.ros.locks import (
+    MOST_NOTES,
+    FileLock,
+    HeldError,
+    Holder,
+    domain_lock,
+    look,
+    node_lock,
+    nodes_in,
+    topic_lock,
+)
+
+HOLDER = """
+import sys, time
+from pathlib import Path
+from space_robot_msgs_py.ros.locks import FileLock
+lock = FileLock(Path(sys.argv[1]), "plant_node")
+print("ready", flush=True)
+time.sleep(60)
+"""
+NAMES = st.lists(st.from_regex(r"[a-z][a-z0-9_]{0,5}", fullmatch=True), min_size=1, max_size=3)
+KINDS: list[Callable[[int, str], Path]] = [topic_lock, node_lock, lambda d, name: domain_lock(d)]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Locks of the test's own."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    return tmp_path
+
+
+def test_notes_of_earlier_holders_are_found_the_newest_last() -> None:
+    path, notes = topic_lock(42, "/command"), [f"note{i}" for i in range(2 * MOST_NOTES)]
+    assert look(path) == (False, [])
+    for first, second in itertools.pairwise(notes):
+        lock = FileLock(path, "controller_node", [first, second])
+        assert look(path)[0]
+        lock.release()
+    is_held, found = look(path)
+    assert not is_held
+    assert len(found) == MOST_NOTES
+    assert found[-4:] == [notes[-3], notes[-2], notes[-2], notes[-1]]
+
+
+def test_killed_holder_is_named_and_leaves_the_lock_at_once() -> None:
+    path = node_lock(42, "/plant_node")
+    process = subprocess.Popen(
+        [sys.executable, "-c", HOLDER, str(path)], stdout=subprocess.PIPE, text=True,
+        env={**os.environ, lifeline.VARIABLE: "1234"},
+    )  # fmt: skip
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    holder = Holder(f"plant_node (pid {process.pid})", starter=1234)
+    with pytest.raises(HeldError, match=r"plant_node \(pid") as refused:
+        FileLock(path, "another")
+    assert refused.value.holder == holder
+    assert nodes_in(42) == [holder]
+    assert nodes_in(4) == nodes_in(421) == []
+    process.kill()
+    process.communicate()
+    assert nodes_in(42) == []
+    FileLock(path, "another").release()
+
+
+def test_looking_takes_nothing() -> None:
+    FileLock(node_lock(7, "/plant_node"), "plant_node").release()
+    assert nodes_in(7) == []
+    lock = FileLock(node_lock(7, "/plant_node"), "plant_node")
+    assert [node.name for node in nodes_in(7)] == [f"plant_node (pid {os.getpid()})"]
+    lock.release()
+
+
+@given(
+    st.tuples(st.sampled_from(KINDS), st.integers(0, 232), NAMES),
+    st.tuples(st.sampled_from(KINDS), st.integers(0, 232), NAMES),
+)
+def test_every_topic_and_node_of_every_domain_has_its_own_lock(
+    one: tuple[Callable[[int, str], Path], int, list[str]],
+    other: tuple[Callable[[int, str], Path], int, list[str]],
+) -> None:
+    paths = [kind(domain, "/" + "/".join(name)) for kind, domain, name in (one, other)]
+    same_names = one[2] == other[2] or one[0] is KINDS[2]
+    assert (paths[0] == paths[1]) == (one[:2] == other[:2] and same_names)

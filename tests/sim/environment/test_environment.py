@@ -1,0 +1,145 @@
+"""Friction, the disturbance (61) and the payload, against the numbers of the paper."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from pydantic import ValidationError
+from random_robots import random_robot
+
+from space_robot_sim.environment.disturbance import (
+    Disturbance,
+    DisturbanceSettings,
+    disturbance_torque,
+)
+from space_robot_sim.environment.friction import Friction, FrictionSettings, friction_torque
+from space_robot_sim.environment.payload import PayloadSettings, with_payload
+from space_robot_sim.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+def disturbance(n: int, scale: float, time: float) -> Array:
+    out = np.full(n + 3, np.nan)
+    disturbance_torque(Disturbance.build(n, DisturbanceSettings(scale=scale)), time, out)
+    return out
+
+
+def friction(joints: Friction, joint: int, rate: float) -> float:
+    """The friction of one joint that turns alone."""
+    velocities = np.zeros(joints.coulomb.size)
+    velocities[joint] = rate
+    out = np.full(velocities.size, np.nan)
+    friction_torque(joints, velocities, out)
+    assert not np.delete(out, joint).any()
+    return float(out[joint])
+
+
+def equation_61(n: int, k: float, t: float) -> Array:
+    """As printed, joints beyond the third like the fourth."""
+    pi = np.pi
+    base = 0.010 * k * (np.sin(pi * t) + np.sin(1.5 * pi * t))
+    inner = 0.005 * k * (np.sin(0.5 * pi * t) + np.sin(pi * t))
+    outer = 0.002 * k * np.sin(0.5 * pi * t)
+    return np.array([*[base] * 3, *[inner] * 3, *[outer] * 6][: n + 3])
+
+
+@given(st.integers(1, 9), st.sampled_from([0.0, 1.0, 2.0, 3.0]), st.floats(0.0, 30.0, width=32))
+def test_disturbance_is_equation_61(n: int, scale: float, time: float) -> None:
+    """At any time, for all cases' amplitudes and any number of joints."""
+    np.testing.assert_allclose(
+        disturbance(n, scale, time), equation_61(n, scale, time), rtol=1e-12, atol=1e-15
+    )
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+def test_disturbance_writes_nothing_behind_a_short_robots_array(n: int) -> None:
+    memory = np.full(n + 3 + 9, -7.0)
+    sines = Disturbance.build(n, DisturbanceSettings(scale=1.0))
+    disturbance_torque(sines, 0.5, memory[: n + 3])
+    np.testing.assert_allclose(memory[: n + 3], equation_61(n, 1.0, 0.5), rtol=1e-12)
+    np.testing.assert_array_equal(memory[n + 3 :], -7.0)
+
+
+def test_disturbance_at_given_times() -> None:
+    """Half a second into case 2, and two seconds into it, by hand."""
+    root = np.sqrt(0.5)
+    expected = [0.010 * (1 + root)] * 3 + [0.005 * (root + 1)] * 3 + [0.002 * root] * 3
+    np.testing.assert_allclose(disturbance(6, 1.0, 0.5), expected, rtol=1e-12)
+    np.testing.assert_allclose(disturbance(6, 3.0, 2.0), np.zeros(9), atol=1e-16)
+
+
+def test_without_a_scale_nothing_disturbs() -> None:
+    """Not even a negative zero."""
+    out = disturbance(6, 0.0, 1.234)
+    np.testing.assert_array_equal(out, np.zeros(9))
+    assert not np.signbit(out).any()
+
+
+@given(st.floats(-50.0, 50.0), st.integers(0, 3))
+def test_friction_opposes_the_motion(rate: float, joint: int) -> None:
+    """(27): the torque it takes from the joint has the sign of the rate, so power is lost."""
+    torque = friction(Friction.build(4, FrictionSettings()), joint, rate)
+    expected = 0.02 * (rate > 0) - 0.02 * (rate < 0) + 0.2 * rate
+    assert torque == pytest.approx(expected, rel=1e-14)
+    assert torque * rate >= 0.0
+    assert friction(Friction.build(4, FrictionSettings()), joint, -rate) == -torque
+
+
+@given(st.lists(st.floats(0.0, 9.0), min_size=8, max_size=8), st.sampled_from([-0.5, 0.0, 0.25]))
+def test_each_joint_has_its_own_friction(coefficients: list[float], rate: float) -> None:
+    """As a stuck joint has."""
+    joints = Friction.build(4, FrictionSettings())
+    joints.coulomb[:], joints.viscous[:] = coefficients[:4], coefficients[4:]
+    for joint in range(4):
+        coulomb, viscous = coefficients[joint], coefficients[4 + joint]
+        expected = coulomb * np.sign(rate) + viscous * rate
+        assert friction(joints, joint, rate) == expected
+
+
+def test_friction_at_rest_is_zero() -> None:
+    assert friction(Friction.build(2, FrictionSettings(coulomb=5.0)), 1, 0.0) == 0.0
+
+
+def test_payload_replaces_mass_and_inertia_of_the_last_link(paper_robot: Robot) -> None:
+    """Case 3's: 10 kg; the CoM vector and every other body unchanged."""
+    payload = PayloadSettings(mass=10.0, inertia=[1.2, 0.6, 1.0, 0.0, 0.0, 0.0])
+    loaded = with_payload(paper_robot, payload)
+    assert loaded.mass[-1] == 10.0
+    np.testing.assert_array_equal(loaded.inertia[-1], np.diag([1.2, 0.6, 1.0]))
+    np.testing.assert_array_equal(loaded.com, paper_robot.com)
+    np.testing.assert_array_equal(loaded.mass[:-1], paper_robot.mass[:-1])
+    np.testing.assert_array_equal(loaded.inertia[:-1], paper_robot.inertia[:-1])
+    assert loaded.model.mass[-1] == 10.0, "the compiled algorithms must see the payload"
+
+
+def test_payload_sits_on_the_last_link_of_any_robot() -> None:
+    robot = random_robot(np.random.default_rng(7), 2)
+    loaded = with_payload(robot, PayloadSettings(mass=99.0))
+    np.testing.assert_array_equal(loaded.mass, [*robot.mass[:2], 99.0])
+
+
+def test_no_payload_is_the_nominal_robot(paper_robot: Robot) -> None:
+    assert with_payload(paper_robot, PayloadSettings()) is paper_robot
+
+
+@pytest.mark.parametrize(
+    ("settings", "values"),
+    [
+        (FrictionSettings, {"coulomb": -0.1}),
+        (FrictionSettings, {"viscous": float("nan")}),
+        (DisturbanceSettings, {"scale": -1.0}),
+        (DisturbanceSettings, {"base_frequencies": [1.0]}),
+        (PayloadSettings, {"mass": -5.0}),
+        (PayloadSettings, {"inertia": [1.0, 1.0, 9.0, 0.0, 0.0, 0.0]}),
+        (PayloadSettings, {"weight": 5.0}),
+    ],
+)
+def test_settings_refuse_what_is_not_physical(
+    settings: type[FrictionSettings], values: dict[str, float]
+) -> None:
+    with pytest.raises(ValidationError, match=next(iter(values))):
+        settings(**values)

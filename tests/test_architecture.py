@@ -1,0 +1,120 @@
+"""The house as CONTRIBUTING.md describes it: imports lead downwards, and nothing in circles."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from import_graph import PACKAGES, cycles, edges, folders, imports, modules, strings
+
+ROOMS = {
+    "space_robot_msgs_py": (
+        "errors", "topics", "compiled", "samples", "config", "wire", "bag", "ros", "recorder_node",
+    ),
+    "space_robot_sim": (
+        "dynamics", "robot", "faults", "environment", "actuators", "sensors", "plant",
+        "plant_node",
+    ),
+    "space_robot_control": (
+        "laws", "controller", "controller_node", "mission", "mission_node", "flight", "analysis",
+        "campaign", "paper", "view", "cli",
+    ),
+}  # fmt: skip
+"""Of each package, from the ground up: a room imports only from rooms that stand before it."""
+LOOSE = {
+    "space_robot_msgs_py": {"errors", "topics", "samples", "recorder_node"},
+    "space_robot_sim": {"plant_node"},
+    "space_robot_control": {"controller_node", "mission_node"},
+}
+"""The rooms that are a module in the package's own folder; all others are folders."""
+PLANNED = {"view"}
+"""Rooms that need not be there yet."""
+UPPER = re.compile(r"space_robot_(sim|control)\b|\b(plant|controller|mission)_node\b")
+
+
+def place(module: str) -> tuple[int, int]:
+    """How high a module stands: its package, its room; a package's ``__init__`` above its rooms."""
+    package, _, rest = module.partition(".")
+    rooms = ROOMS[package]
+    room = rest.split(".")[0]
+    return PACKAGES.index(package), rooms.index(room) if room else len(rooms)
+
+
+def rule(importer: str, imported: str) -> str:
+    """The rule that an import breaks; empty if none."""
+    above, below = place(importer), place(imported)
+    if below[0] > above[0]:
+        return f"packages import only {' <- '.join(PACKAGES)}"
+    if below[0] == above[0] and below[1] > above[1]:
+        rooms = ROOMS[importer.split(".")[0]]
+        return f"a room imports only from rooms before it: {', '.join(rooms)}"
+    return ""
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_module_is_in_a_room(package: str) -> None:
+    names = {name.split(".")[1] for name in modules() if name.startswith(f"{package}.")}
+    assert names - set(ROOMS[package]) == set(), f"{package}: no room of the house"
+    assert set(ROOMS[package]) - names <= PLANNED, f"{package}: a room is missing"
+    loose = {file.stem for file in modules().values() if str(file.parent) == package}
+    assert loose - {"__init__"} == LOOSE[package], f"{package}: modules outside of rooms"
+
+
+def test_imports_lead_downwards() -> None:
+    broken = [
+        f"{modules()[importer]} imports {modules()[imported]}: {why}"
+        for importer, found in imports().items()
+        for imported in sorted(found)
+        if (why := rule(importer, imported))
+    ]
+    assert not broken, "\n" + "\n".join(broken)
+
+
+def test_no_files_import_one_another_in_circles() -> None:
+    found = cycles(imports())
+    assert not found, "no import cycle by file:\n" + "\n".join(edges(imports(), c) for c in found)
+
+
+def test_no_folders_import_one_another_in_circles() -> None:
+    between = folders(imports())
+    found = cycles(between)
+    assert not found, "no import cycle by folder:\n" + "\n".join(edges(between, c) for c in found)
+
+
+def test_the_ground_floor_names_no_upper_one() -> None:
+    """But for topics.py, which says who sends and who hears what."""
+    broken = [
+        f"{file}:{line} has {text!r}: {PACKAGES[0]} names no other package and no node above it"
+        for name, file in modules().items()
+        if name.startswith(PACKAGES[0]) and name != f"{PACKAGES[0]}.topics"
+        for line, text in strings(file)
+        if UPPER.search(text)
+    ]
+    assert not broken, "\n" + "\n".join(broken)
+
+
+def test_the_ground_floor_names_no_kind_of_fault() -> None:
+    from space_robot_control.flight.faults import KINDS
+
+    kinds = set(KINDS)
+    broken = [
+        f"{file}:{line} has {text!r}: a fault is known only where it is brought about"
+        for name, file in modules().items()
+        if name.startswith(PACKAGES[0])
+        for line, text in strings(file)
+        if text in kinds
+    ]
+    assert not broken, "\n" + "\n".join(broken)
+
+
+def test_the_rules_notice_what_they_forbid() -> None:
+    assert "packages" in rule("space_robot_sim.plant.loop", "space_robot_control.laws.ctc")
+    assert "room" in rule("space_robot_sim.dynamics.aba", "space_robot_sim.plant.plant")
+    assert "room" in rule("space_robot_sim.robot.robot", "space_robot_sim")
+    assert not rule("space_robot_sim.plant.plant", "space_robot_sim.dynamics.aba")
+    assert cycles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == [["a", "b", "c"]]
+    assert cycles({"a": {"b"}, "b": set()}) == []
+    found = [text for _, text in strings(Path(__file__))]
+    assert "space_robot_sim" in found
+    assert __doc__ not in found

@@ -1,0 +1,132 @@
+"""What must be touched for something new: no more than the table in CONTRIBUTING.md says."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bags import read_accounts
+from paths import CONFIG, ROOT
+
+import space_robot_control.cli as room_of_commands
+import space_robot_control.laws as room_of_laws
+import space_robot_msgs_py.wire as room_of_messages
+from space_robot_control.cli.main import cli, commands
+from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.flight.simulate import simulate
+from space_robot_control.laws import laws
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.recorder import BagRecorder
+from space_robot_msgs_py.wire.codec import Codec
+from space_robot_msgs_py.wire.definitions import decode
+from space_robot_msgs_py.wire.message import description
+from space_robot_sim import load_bag
+
+MODEL = "tde_stc"
+"""The law that the new one is a copy of."""
+
+
+@pytest.fixture
+def new_law(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A law's file as if it were in laws/, and the folder of its gains."""
+    folder, gains = tmp_path / "laws", tmp_path / "gains"
+    folder.mkdir()
+    gains.mkdir()
+    source = ROOT / f"space_robot_control/laws/{MODEL}.py"
+    (folder / "newest.py").write_text(source.read_text("utf-8").replace(f'"{MODEL}"', '"newest"'))
+    given = (CONFIG / f"gains/paper/tuned/{MODEL}.yaml").read_text("utf-8")
+    (gains / "newest.yaml").write_text(given.replace(MODEL, "newest"))
+    monkeypatch.setattr(room_of_laws, "__path__", [*room_of_laws.__path__, str(folder)])
+    laws.cache_clear()
+    yield gains
+    laws.cache_clear()
+    sys.modules.pop(f"{room_of_laws.__name__}.newest", None)
+
+
+def test_a_law_is_one_file_in_laws_and_one_of_gains(new_law: Path) -> None:
+    """It is found by its name, and flies in compiled code as the one it is a copy of."""
+    assert "newest" in laws()
+    own = simulate(Flight(FlightPlan(controller="newest", gains=str(new_law), duration=0.01)))
+    model = simulate(Flight(FlightPlan(controller=MODEL, gains="tuned", duration=0.01)))
+    assert own.commanded_torque is not None
+    assert model.commanded_torque is not None
+    np.testing.assert_array_equal(own.commanded_torque, model.commanded_torque)
+
+
+def test_a_law_stands_in_one_file_of_its_name() -> None:
+    for name, law in laws().items():
+        assert law.__module__ == f"{room_of_laws.__name__}.{name}"
+        assert importlib.import_module(law.__module__).__doc__
+
+
+NEWEST = '''"""/newest: how warm it is."""
+
+from .. import topics
+from .message import MessageDescription, Run
+
+
+class Newest(MessageDescription):
+    topic = topics.NEWEST
+
+    def content(self, rows=1):
+        return {"header": {"frame_id": "base"}}
+
+    def runs(self, message):
+        return (Run("temperature", (0,)),)
+'''
+
+
+def test_a_message_is_one_file_in_wire_and_one_line_in_topics(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is laid out, recorded, counted, and missed, as all others are."""
+    newest = topics.Topic("/newest", "sensor_msgs/msg/Temperature", 100, per_tick=True)
+    monkeypatch.setattr(topics, "NEWEST", newest, raising=False)
+    monkeypatch.setattr(topics, "ALL", (*topics.ALL, newest))
+    monkeypatch.setitem(topics.BY_NAME, newest.name, newest)
+    monkeypatch.setattr(room_of_messages, "__path__", [*room_of_messages.__path__, str(tmp_path)])
+    (tmp_path / "newest.py").write_text(NEWEST)
+    flight = Flight(FlightPlan(duration=0.01))
+    described = description(newest)
+    sys.modules.pop(f"{room_of_messages.__name__}.newest")
+    assert described is not None
+    codec = Codec(described.of_robot(flight.robot.joint_names, flight.timebase))
+    simulate(flight, tmp_path / "flown")
+    recorder = BagRecorder(tmp_path / "bag", flight.description, flight.timebase)
+    for name, data in open_bag(tmp_path / "flown").messages(*topics.ALL):
+        recorder.record(topics.BY_NAME[name], data)
+    for tick in range(20):
+        if tick != 9:
+            recorder.record(newest, codec.encode(flight.timebase.stamp_ns(tick), np.array([tick])))
+    recorder.close()
+    recorded = [data for _, data in open_bag(tmp_path / "bag").messages(newest)]
+    assert [decode(data, newest.type).temperature for data in recorded] == [
+        *range(9),
+        *range(10, 20),
+    ]
+    assert read_accounts(tmp_path / "bag")[newest.name]["missing"] == 1
+    assert load_bag(tmp_path / "bag").lost == {t.name: int(t is newest) for t in topics.ALL}
+
+
+def test_a_command_is_one_file_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "newest.py").write_text("import click\n\n@click.command()\ndef newest(): ...\n")
+    monkeypatch.setattr(room_of_commands, "__path__", [*room_of_commands.__path__, str(tmp_path)])
+    found = {command.name for command in commands()}
+    sys.modules.pop(f"{room_of_commands.__name__}.newest")
+    assert found == {*cli.commands, "newest"}
+
+
+def test_a_robot_is_one_file(tmp_path: Path) -> None:
+    """With a mission and gains of those that are there."""
+    text = (CONFIG / "robots/paper.yaml").read_text("utf-8")
+    (tmp_path / "newest.yaml").write_text(text)
+    plan = FlightPlan(
+        robot=str(tmp_path / "newest.yaml"), mission=str(CONFIG / "missions/paper.yaml"),
+        gains=str(CONFIG / "gains/paper/tuned"), duration=0.001,
+    )  # fmt: skip
+    assert simulate(Flight(plan)).ticks == 2
