@@ -34,6 +34,9 @@ REPORTS = 5
 """Reports of nodes looked at in a round: to read one takes a tenth of a millisecond."""
 AHEAD_OF_NEED = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
 """What was said of them while nothing was recorded is of the time after it, too."""
+PATIENCE_S = 0.002
+"""For which messages may wait longer, in a process of several nodes, until those rest. In ten times
+as long so much would queue up that the middleware handed it out at half the speed."""
 NEVER_NS = 1 << 63
 NICENESS = 5
 """Of the recorder's process: plant and controller go first where cores are short; the queues hold
@@ -73,7 +76,7 @@ class RecorderLoop:
         self.outputs: tuple[RawPublisher, ...] = ()
         group = PolledCallbackGroup()
         self._inputs = [RawSubscription(node, topic, group, QUEUE_DEPTH) for topic in topics.ALL]
-        self._pause = Wait(settings.drain_period)
+        self._pause = Wait(settings.drain_period, patience_s=PATIENCE_S)
         self._diagnostics = RawSubscription(node, topics.DIAGNOSTICS, group)
         self._told = False
         self._from_ns = 0
@@ -96,7 +99,9 @@ class RecorderLoop:
             self._recorder.pause()
 
     def step(self) -> Wait | None:
-        """Take what has come."""
+        """End a chunk, or take what has come: both at once would last longer than a tick."""
+        if self._recorder.flush_if_due():
+            return self._pause
         _, is_busy = self._take_round()
         return None if is_busy else self._pause
 
@@ -108,6 +113,7 @@ class RecorderLoop:
         told = last_arrival = time.monotonic()
         while time.monotonic() < min(last_arrival + SILENCE_S, told + DRAIN_S):
             is_timely, busy = self._take_round()
+            self._recorder.flush_if_due()
             if is_timely or self._recorder.is_behind:
                 last_arrival = time.monotonic()  # a round may last longer than the silence
             if not busy:
@@ -149,7 +155,6 @@ class RecorderLoop:
             taken, timely = self._take_some(entry)
             is_timely, waiting = is_timely or timely > 0, waiting or taken == TURN
         self._take_counts()
-        self._recorder.flush_if_due()
         self._tell_failure()
         return is_timely, waiting
 

@@ -21,6 +21,11 @@ class Wait(NamedTuple):
     """It is to be stepped as soon as one of these has a message."""
     is_brief: bool = False
     """Whether a message is expected at once, so that sleeping would cost more than looking."""
+    is_for_others: bool = False
+    """Whether it only gives way to the other nodes: it is over once those of its own process, if
+    there are any, have had their turns."""
+    patience_s: float = 0.0
+    """It may last so much longer while other nodes of the process have something to do."""
 
 
 class Loop(Protocol):

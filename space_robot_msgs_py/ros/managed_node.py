@@ -28,6 +28,8 @@ Schema = TypeVar("Schema", bound=NodeSettings)
 AUTOSTART = "autostart"
 DISCOVERY_S = 0.3
 LOOK_AGAIN_S = 0.3
+LOOK_PERIOD_S = 1.0
+"""To look for foreign publishers takes as long as the rest of a report."""
 PAUSE_S = 1e-3
 
 
@@ -49,6 +51,8 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         self.let_others_work: Callable[[], None] = lambda: time.sleep(PAUSE_S)
         """To be called by a loop that stands down while it waits for what another node does."""
         self._topics: list[str] = []
+        self._foreign, self._look_at = "", 0.0
+        """Foreign publishers when they were looked for last, and when to look again."""
         self._claim: Claim | None = None
         self._name: FileLock | None = None
         self.error: SpaceRobotError | None = None
@@ -80,8 +84,11 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         values = {**health.values, **sent, "service_calls": self.calls.count}
         if not self.is_active:
             return Health("inactive", values=values)
-        if health.level is Level.OK and (foreign := self._foreign_publishers()):
-            return Health(foreign, Level.WARN, values)
+        if (now := time.monotonic()) >= self._look_at:
+            self._look_at = now + LOOK_PERIOD_S
+            self._foreign = self._foreign_publishers()
+        if health.level is Level.OK and self._foreign:
+            return Health(self._foreign, Level.WARN, values)
         if health.level is Level.OK and self.calls.is_overloaded:
             return Health("more service calls than can be answered in flight", Level.WARN, values)
         return Health(health.mode, health.level, values)

@@ -6,6 +6,7 @@ As a rule a process hosts one node; a composed graph is several nodes in one pro
 from __future__ import annotations
 
 import faulthandler
+import os
 import signal
 import sys
 import textwrap
@@ -124,7 +125,11 @@ def run_nodes(*kinds: NodeKind[Any], arguments: list[str] | None = None) -> NoRe
         for node in nodes:
             node.destroy_node()
         rclpy.utilities.try_shutdown()
-    sys.exit(code)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # all is closed; what is left are threads of the middleware, which may crash (once in thousands
+    # of times) when they meet the ruins of an interpreter that ends in the usual way
+    os._exit(code)
 
 
 def _answer(schemas: Sequence[type[NodeSettings]], others: Sequence[str]) -> None:

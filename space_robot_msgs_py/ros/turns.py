@@ -20,6 +20,8 @@ REMIND_S = 5.0
 LONG_CALL_S = 0.1
 UPKEEP_GAP_S = 2e-3
 """Between one node's upkeep and another's, so that all of them together delay no tick."""
+UPKEEP_PATIENCE_S = 0.02
+"""Upkeep that is due waits so long for a moment in which no node has anything to do."""
 GLANCE_S = 1e-3
 """A node among several looks so often whether a message has come that is not expected at once."""
 NO_WAIT = Wait(0.0)
@@ -31,7 +33,7 @@ class Turns:
     def __init__(self, nodes: Sequence[ManagedNode[Any]]) -> None:
         """Take the nodes in the order of their turns."""
         self._nodes = nodes
-        self._seats = [Seat(node) for node in nodes]
+        self._seats = [Seat(node, is_alone=len(nodes) == 1) for node in nodes]
         self._upkeeps = [Upkeep(node) for node in nodes]
         self._due = [0.0] * len(nodes)
         """When each node's upkeep is due, by the monotonic clock."""
@@ -47,7 +49,8 @@ class Turns:
         if now >= self._upkeep_at:
             if not any(node.is_active for node in self._nodes):
                 return self._serve_inactive()
-            self._serve_one()
+            if now >= self._upkeep_at + UPKEEP_PATIENCE_S:
+                self._serve_one()
         is_idle = True
         for seat in self._seats:
             if seat.step(now):
@@ -80,12 +83,21 @@ class Turns:
         return due
 
     def _rest(self, now: float) -> bool:
-        """Wait until a node has something to do; False when the process has come to its end."""
+        """Do what can wait for others, or wait until a node has something to do.
+
+        Returns:
+            False when the process has come to its end.
+        """
+        if now >= self._upkeep_at:
+            self._serve_one()
+            return True
         if self._is_alone and self._seats[0].spins and self._seats[0].spin(now + SPIN_S):
             return not self._seats[0].is_complete
         seats = [seat for seat in self._seats if seat.node.is_active]
         until = min([seat.wake_at for seat in seats], default=self._upkeep_at)
         if (left := until - time.monotonic()) <= 0.0:
+            for seat in seats:
+                seat.glance_at = min(seat.glance_at, seat.wake_at)
             return True
         if inputs := [entry for seat in seats for entry in seat.wait.inputs]:
             self._waiter.wait(inputs, left)
@@ -105,9 +117,9 @@ class Turns:
 class Seat:
     """A node among those that take turns, and how far its loop is."""
 
-    def __init__(self, node: ManagedNode[Any]) -> None:
+    def __init__(self, node: ManagedNode[Any], is_alone: bool) -> None:
         """Take a node in any state."""
-        self.node = node
+        self.node, self._is_alone = node, is_alone
         self.wait = NO_WAIT
         """What its loop waits for."""
         self.wake_at = 0.0
@@ -157,7 +169,9 @@ class Seat:
 
     def _wait(self, wait: Wait, now: float) -> None:
         self.wait = wait
-        self.glance_at = self.wake_at = now + wait.seconds
+        is_short = wait.is_for_others and not self._is_alone
+        self.wake_at = now if is_short else now + wait.seconds
+        self.glance_at = self.wake_at if self._is_alone else self.wake_at + wait.patience_s
         self.spins = wait.is_brief and self._may_spin
         if wait.inputs:
             self.glance_at = 0.0 if wait.is_brief else min(now + GLANCE_S, self.wake_at)

@@ -24,30 +24,34 @@ class Served(Protocol):
 
 
 class Upkeep:
-    """Runs a node's service calls and reports its health, each when it is due."""
+    """Runs a node's service calls and reports its health, each when it is due.
+
+    In flight one of the two at a time: both take longer than a tick leaves free.
+    """
 
     def __init__(self, node: Served) -> None:
         self.node = node
         self._next_call = self._next_report = 0.0
 
     def run(self, timeout_s: float = 0.0) -> float:
-        """Run a service call that waits and report the health, if it is time.
+        """Run a service call that waits or report the health, if it is time.
 
         Args:
-            timeout_s: how long a call is waited for, which is then always looked for.
+            timeout_s: how long a call is waited for, where there is no flight that waits for this.
 
         Returns:
             When to be called again, by the monotonic clock.
         """
         now = time.monotonic()
-        if timeout_s or now >= self._next_call:
+        looks = timeout_s > 0.0 or self._next_call <= min(now, self._next_report)
+        if looks:
             has_run = self.node.calls.run_one(timeout_s)
             begin, now = now, time.monotonic()
             # after one call look for another soon, but let them take no more than their share;
             # the answer to a client that has gone takes the middleware 0.1 s
             pause = min((now - begin) / SERVICE_SHARE, LONGEST_PAUSE_S)
             self._next_call = now + (pause if has_run else PERIOD_S)
-        if now >= self._next_report:
+        if now >= self._next_report and (timeout_s or not looks):
             self._next_report = now + PERIOD_S
             self.node.report()
         return min(self._next_call, self._next_report)

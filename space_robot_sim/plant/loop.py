@@ -37,7 +37,7 @@ ASK_AGAIN_S = 0.2
 """Without an answer for this long the state is sent again (lockstep): well before a listener takes
 this plant for silent, and soon enough for one that believes a new time only after some states."""
 SPIN_BEFORE_DEADLINE_S = 100e-6
-GIVE_WAY_S = 100e-6
+GIVE_WAY = Wait(100e-6, is_for_others=True)
 FLUSH_S = 5.0
 """How long a flight's end waits for its listeners: one may be stopped, or dead."""
 STOPPED_FLUSH_S = 1.0
@@ -224,7 +224,7 @@ class PlantLoop:
             self._send_next()
         if self._must_give_way:  # behind: catch up, but never take the whole processor
             self._must_give_way = False
-            return Wait(GIVE_WAY_S)
+            return GIVE_WAY
         self._take_all()
         left = self._wall_clock.left(self._plant.tick)
         if left > SPIN_BEFORE_DEADLINE_S:

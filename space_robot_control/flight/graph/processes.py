@@ -23,6 +23,8 @@ from ..node_modules import MODULES
 
 PACKAGE = "space_robot"
 TAIL_LINES = 5
+ERROR = ": error: "
+"""Stands in a line that says why a process ends."""
 
 
 def has_ros2_run() -> bool:
@@ -101,10 +103,12 @@ class NodeProcess:
         return FlightError(f"{self.exit_summary()} before the flight did:\n{self.output_tail()}")
 
     def output_tail(self) -> str:
-        """The end of what it printed."""
+        """The end of what it printed, and errors of before, after which other nodes had ended."""
         self._output.seek(0)
         lines = self._output.read().decode(errors="replace").strip().splitlines()
-        return "\n".join(f"  {line}" for line in lines[-TAIL_LINES:]) or "  (it said nothing)"
+        errors = [line for line in lines[:-TAIL_LINES] if ERROR in line]
+        told = errors[-TAIL_LINES:] + lines[-TAIL_LINES:]
+        return "\n".join(f"  {line}" for line in told) or "  (it said nothing)"
 
     def signal(self, number: int) -> None:
         """Send a signal to the whole group: ``ros2 run`` would keep it to itself."""

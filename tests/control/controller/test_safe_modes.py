@@ -67,13 +67,16 @@ def test_dead_controller_leaves_the_plant_holding_then_without_torque(deaths: St
 
 
 def test_restarted_controller_takes_over_without_a_jolt(deaths: Story) -> None:
-    """From the echoed force, which is none; no step is larger than those of its next 10 ms."""
+    """From the echoed force, which is none: its first step is like those of its next 10 ms.
+
+    The force before the death would be a step of hundreds of times that.
+    """
     assert deaths.report["graph"]["restarts"] == 1
     torque = deaths.log.applied_torque
     safe = round(deaths.time_of("plant", "safe") / PERIOD)
     back = safe + int(np.argmax(np.abs(torque[safe + 400 :]).max(axis=1) > 0.0)) + 400
     steps = np.abs(np.diff(torque[back - 1 : back + 20], axis=0))
-    assert np.all(steps[0] <= steps[1:].max(axis=0))
+    assert np.all(steps[0] <= 3.0 * steps[1:].max(axis=0))
 
 
 def test_restarted_controller_flies_the_mission_on(deaths: Story) -> None:
