@@ -75,7 +75,7 @@ class MessageAccounting:
         else:
             step = tick - self.last
             self._pass_over(tick, self.unit)
-            self.unit = min(self.unit, step) if self.unit else step
+            self._note_step(step)
             self.last = tick
         self.received += 1
         return True
@@ -100,9 +100,11 @@ class MessageAccounting:
 
     def _take_late(self, tick: int) -> None:
         self._holes.remove(tick)
-        step = min(abs(tick - self.first), self.last - tick)
-        self.unit = min(self.unit, step) if self.unit else step
+        self._note_step(min(abs(tick - self.first), self.last - tick))
         self.first = min(self.first, tick)
+
+    def _note_step(self, step: int) -> None:
+        self.unit = min(self.unit, step) if self.unit else step
 
     @property
     def gaps(self) -> int:

@@ -108,17 +108,17 @@ def foreign_publishers(
 ) -> dict[str, list[str]]:
     """Full names of nodes other than this one that publish these topics; none: no entry.
 
-    By name, as discovery sees it now: a killed node of this one's name is no stranger. ``own``:
+    By name, as discovery sees it now: a killed node of this one's name is not foreign. ``own``:
     full names of further nodes that are none.
     """
     known = {node.get_fully_qualified_name(), *own}
-    strangers = {}
+    foreign = {}
     for topic in topic_names:
         infos = node.get_publishers_info_by_topic(topic)
         names = {_full_name(info) for info in infos} - known
         if names:
-            strangers[topic] = sorted(names)
-    return strangers
+            foreign[topic] = sorted(names)
+    return foreign
 
 
 def _full_name(info: TopicEndpointInfo) -> str:

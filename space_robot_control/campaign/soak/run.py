@@ -26,7 +26,7 @@ from ...flight.interruption import Interrupted
 from ...flight.plan import Flight, FlightPlan
 from .process_monitor import ProcessMonitor, shared_memory_files
 from .sampling import breaks_tracking, command_line, sample_flight
-from .verdict import Verdict, judge
+from .verdict import FlightVerdict, judge
 
 WARM_UP = 3
 """Flights after which this process should have what it needs."""
@@ -40,7 +40,7 @@ class Flown:
     plan: FlightPlan
     seconds: float
     """By the wall clock, start-up and judgement included."""
-    verdict: Verdict
+    verdict: FlightVerdict
     memory_mb: dict[str, float]
     """Largest resident set of each node."""
     own_memory_mb: float

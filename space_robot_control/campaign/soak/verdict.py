@@ -25,7 +25,7 @@ from ...flight.plan import Flight
 
 
 @dataclass
-class Verdict:
+class FlightVerdict:
     """The verdict on one flight."""
 
     wrong: list[str] = field(default_factory=list)
@@ -44,13 +44,13 @@ class Verdict:
         return not self.wrong
 
 
-def judge(flight: Flight, report: dict[str, Any] | None, bag: Path) -> Verdict:
+def judge(flight: Flight, report: dict[str, Any] | None, bag: Path) -> FlightVerdict:
     """Judge a flight by its report and its bag.
 
     ``report`` is what `orchestrator.fly` returned; None if it raised, and then only what can be
     read is told.
     """
-    verdict = Verdict()
+    verdict = FlightVerdict()
     kinds = [fault.kind.name for fault in parse_faults(flight.faults, KINDS)]
     if report is not None:
         verdict.restarts = report["graph"]["restarts"]

@@ -107,8 +107,8 @@ class Player:
             if time.monotonic() > until:
                 raise FlightError(f"{CONTROLLER} does not listen for {LISTENER_TIMEOUT_S:.0f} s")
             time.sleep(POLL_S)
-        if strangers := foreign_publishers(self.node, list(self._outs)):
-            topic, names = next(iter(strangers.items()))
+        if foreign := foreign_publishers(self.node, list(self._outs)):
+            topic, names = next(iter(foreign.items()))
             raise InputError(
                 f"{topic} is also published by {', '.join(names)}: take another domain"
             )
