@@ -3,7 +3,8 @@
 PYTHON ?= python3
 VENV := .venv
 PACKAGES := space_robot_control space_robot_msgs_py space_robot_sim
-PYTEST := $(VENV)/bin/python -m pytest --numprocesses 2 --dist loadfile
+# Three at a time for two processors: a flight by the wall clock leaves half of one free.
+PYTEST := $(VENV)/bin/python -m pytest --numprocesses 3 --dist loadfile
 # Tests of kernels that are short enough without a compiler.
 INTERPRETED := $(addprefix tests/,sim/dynamics sim/environment sim/robot sim/sensors sim/faults \
   control/laws $(addprefix control/controller/test_,tracking.py time_delay_estimation.py controller.py))
