@@ -3,8 +3,7 @@
 PYTHON ?= python3
 VENV := .venv
 PACKAGES := space_robot_control space_robot_msgs_py space_robot_sim
-# Three at a time for two processors: a flight by the wall clock leaves half of one free.
-PYTEST := $(VENV)/bin/python -m pytest --numprocesses 3 --dist loadfile
+PYTEST := $(VENV)/bin/python -m pytest --numprocesses 2 --dist loadfile
 # Tests of kernels that are short enough without a compiler.
 INTERPRETED := $(addprefix tests/,sim/dynamics sim/environment sim/robot sim/sensors sim/faults \
   control/laws $(addprefix control/controller/test_,tracking.py time_delay_estimation.py controller.py))
@@ -20,7 +19,7 @@ export PYTHONPYCACHEPREFIX := $(CURDIR)/$(VENV)/pycache
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
 
-.PHONY: help setup fly test quick coverage hooks lint bench mutation clean
+.PHONY: help setup fly test quick coverage hooks lint kernels bench mutation clean
 
 help:
 	@echo "make setup               .venv with the package and ROS 2 Jazzy"
@@ -30,6 +29,7 @@ help:
 	@echo "make coverage            which lines the tests run; twice as long as make test"
 	@echo "make hooks               from then on a commit passes style, types and the quick tests"
 	@echo "make lint                style and types only"
+	@echo "make kernels             compile the dynamics and the laws, once"
 	@echo "make bench [ARGS=...]    how fast it is, e.g. make bench ARGS='plant laws'; --help tells more"
 	@echo "make mutation [ARGS=...] small faults put in, one at a time: do the tests notice?"
 	@echo "make clean               delete .venv and what was built or cached here"
@@ -40,7 +40,8 @@ setup: $(VENV)/.flies
 fly: $(VENV)/.flies
 	@$(VENV)/bin/space-robot fly --controller tde_stc --case 1 $(ARGS)
 
-test: lint
+test: $(VENV)/.tests
+	@$(MAKE) --no-print-directory --jobs 2 lint kernels
 	$(PYTEST) $(ARGS)
 
 quick: $(VENV)/.tests
@@ -61,6 +62,10 @@ lint: $(VENV)/.tests
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
+
+# Else both test processes would begin with it.
+kernels: $(VENV)/.tests
+	$(VENV)/bin/python -c "from space_robot_control.flight.compilation import compile_kernels as c; c()"
 
 bench: $(VENV)/.tests
 	@$(VENV)/bin/python tests/benchmarks $(ARGS)

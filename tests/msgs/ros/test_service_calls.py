@@ -16,7 +16,7 @@ rclpy = pytest.importorskip("rclpy")
 from rcl_interfaces.srv import GetParameters  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 
-from space_robot_msgs_py.ros import service_calls  # noqa: E402
+from space_robot_msgs_py.ros import service_calls, upkeep  # noqa: E402
 from space_robot_msgs_py.ros.service_calls import ServiceCalls  # noqa: E402
 from space_robot_msgs_py.ros.upkeep import PERIOD_S, Upkeep  # noqa: E402
 
@@ -106,13 +106,17 @@ def test_what_comes_after_a_call_is_no_storm(
 
 
 class _Asked:
-    """A node that always has calls waiting, for `Upkeep`."""
+    """A node that always has calls waiting, for `Upkeep`, and the clock that both go by."""
 
     def __init__(self, took_s: float) -> None:
         self.took_s, self.count, self.calls = took_s, 0, self
+        self.now = 1000.0
+
+    def monotonic(self) -> float:
+        return self.now
 
     def run_one(self, timeout_s: float) -> bool:
-        time.sleep(self.took_s)
+        self.now += self.took_s
         self.count += 1
         return True
 
@@ -120,19 +124,52 @@ class _Asked:
         pass
 
 
-def calls_in_half_a_second(took_s: float) -> int:
-    node: Any = _Asked(took_s)
-    upkeep = Upkeep(node)
-    until = time.monotonic() + 0.5
-    while time.monotonic() < until:
-        upkeep.run()
-    return int(node.count)
+@pytest.fixture
+def calls_in_half_a_second(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], int]:
+    def count(took_s: float) -> int:
+        node: Any = _Asked(took_s)
+        monkeypatch.setattr(upkeep, "time", node)
+        served, begin = Upkeep(node), node.now
+        while node.now < begin + 0.5:
+            node.now = max(node.now + 1e-4, served.run())
+        return int(node.count)
+
+    return count
 
 
-def test_calls_take_a_tenth_of_the_loop_but_are_not_ten_a_second() -> None:
+def test_calls_take_a_tenth_of_the_loop_but_are_not_ten_a_second(
+    calls_in_half_a_second: Callable[[float], int],
+) -> None:
     assert 0.5 / PERIOD_S < calls_in_half_a_second(0.002) <= 0.5 * 0.1 / 0.002 + 2
 
 
-def test_long_calls_take_a_tenth_of_the_loop_too() -> None:
+def test_long_calls_take_a_tenth_of_the_loop_too(
+    calls_in_half_a_second: Callable[[float], int],
+) -> None:
     """As the answers to a client that has gone."""
     assert calls_in_half_a_second(0.04) <= 2
+
+
+def test_in_flight_a_report_never_comes_with_a_call() -> None:
+    """Both in one turn would last longer than a tick leaves free; neither starves the other."""
+    told: list[str] = []
+
+    class Asked(_Asked):
+        def run_one(self, timeout_s: float) -> bool:
+            told.append("call")
+            return True
+
+        def report(self) -> None:
+            told.append("report")
+
+    served: Any = Asked(0.0)
+    kept = Upkeep(served)
+    turns = []
+    until = time.monotonic() + 30.0
+    while told.count("report") < 3 and time.monotonic() < until:
+        before = len(told)
+        kept.run()
+        turns.append(len(told) - before)
+    assert max(turns) == 1
+    assert told.count("report") == 3
+    assert told.count("call") > 3
