@@ -33,14 +33,14 @@ TURN = 100
 REPORTS = 5
 """Reports of nodes looked at in a round: to read one takes a tenth of a millisecond."""
 AHEAD_OF_NEED = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
-"""What was said of them while nothing was recorded is of the time after it, too."""
+"""Topics of which messages that came while nothing was recorded are of the time after it, too."""
 PATIENCE_S = 0.002
 """For which messages may wait longer, in a process of several nodes, until those rest. In ten times
 as long so much would queue up that the middleware handed it out at half the speed."""
 NEVER_NS = 1 << 63
 NICENESS = 5
-"""Of the recorder's process: plant and controller go first where cores are short; the queues hold
-seconds of traffic."""
+"""The niceness of the recorder's process: plant and controller go first where cores are short; the
+queues hold seconds of traffic."""
 
 
 class RecorderLoop:

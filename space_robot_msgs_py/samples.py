@@ -1,4 +1,4 @@
-"""What the nodes tell one another, free of any wire format.
+"""Samples: states, commands and references, free of any wire format.
 
 Time is an integer tick everywhere; a stamp is tick times period (`Timebase`). Arrays are
 float64, allocated once by the owner and overwritten in place.
@@ -181,7 +181,7 @@ class LawInForce(NamedTuple):
     gains: Mapping[str, tuple[float, ...]]
     """A value an axis of each gain."""
     is_first: bool = False
-    """Whether the controller begins with it: a controller that was started again does so, too."""
+    """True if the controller begins with it: a controller that was started again does so, too."""
 
 
 def in_order(laws: Iterable[LawInForce]) -> tuple[LawInForce, ...]:

@@ -43,7 +43,7 @@ def remarks(report: Report) -> list[str]:
 
 
 def notes(report: Report) -> list[str]:
-    """Say of single metrics whence they count, or why there is none."""
+    """Say of single metrics from where they count, or why there is none."""
     missing = [f"no {key.replace('_', ' ')}: {why}" for key, why in report["unavailable"].items()]
     if settling := report["settling"]:
         return [f"settling is counted from the waypoint at {settling['after_s']:g} s", *missing]

@@ -50,7 +50,7 @@ class Controller:
         self._memory = memory
         self._command = Command(-1, np.zeros(robot.n + 3))
         self.signals = Signals.view(self.block["signals"])
-        """What the law saw at the last tick."""
+        """The signals that the law saw at the last tick."""
         self.law = law
 
     @property
@@ -101,7 +101,7 @@ class Controller:
 
 
 def unusable(status: int, tick: int, quaternion: Array) -> UnusableStateError:
-    """What to raise for a state of a ``status`` other than `USABLE`."""
+    """Return the error to raise for a state of a ``status`` other than `USABLE`."""
     if status == SINGULAR:
         return SingularAttitudeError(tick, float(quaternion[0]))
     if status == NOT_UNIT:

@@ -39,7 +39,7 @@ class LawSet:
             self._declare(law)
         self.chosen = next(iter(self._laws.values()))
         self._may_differ = True
-        """Whether law or gains may be others than at the last tick answered."""
+        """True if law or gains may be others than at the last tick answered."""
         self._changes = LawChanges()
         self._was_swapped = False
         self._swaps: list[Swap] = parse_swaps(settings.swaps, settings.period)

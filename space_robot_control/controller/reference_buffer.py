@@ -65,7 +65,7 @@ class ReferenceBuffer:
         return self._store(self._base, start, rows, only_missing)
 
     def covers(self, tick: int) -> bool:
-        """Whether both parts of a tick's row are here."""
+        """Tell if both parts of a tick's row are here."""
         i = tick % len(self._joints.ticks)
         return bool(self._joints.ticks[i] == tick and self._base.ticks[i] == tick)
 

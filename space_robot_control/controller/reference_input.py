@@ -45,7 +45,7 @@ class ReferenceInput:
         self.held = 0
         """Ticks for which a point before was held."""
         self.is_missing = False
-        """Whether the last one was."""
+        """True if the last one was."""
         self._until = 0.0
         """How long the reference that is needed now is waited for; 0: none is."""
         self._waits_since = 0.0
@@ -64,16 +64,16 @@ class ReferenceInput:
         )  # fmt: skip
         self.inputs = tuple(half.input for half in self._halves)
         self.wait = Wait(PATIENCE_S, self.inputs)
-        """What is waited for while `at` has no row."""
+        """The wait while `at` has no row."""
 
     @property
     def is_waited_for(self) -> bool:
-        """Whether a reference has been waited for in vain, for so long that it is worth a word."""
+        """True if a reference has been waited for in vain, for so long that it is worth a word."""
         return bool(self._waits_since) and time.monotonic() - self._waits_since > WAIT_TOLD_S
 
     @property
     def is_awaited(self) -> bool:
-        """Whether the tick that `at` had no row for may still get one."""
+        """True if the tick that `at` had no row for may still get one."""
         return self._until > 0.0
 
     def at(self, tick: int) -> Block | None:

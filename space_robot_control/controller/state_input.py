@@ -46,11 +46,11 @@ class StateInput:
         self._half_until = 0.0
         """How long that base is waited for; 0: it has not been looked for in vain yet."""
         self._bases: dict[int, tuple[bytes, tuple[int, int]]] = {}
-        """What unknown senders have sent, by tick, and its `SourceGuard.passed`."""
+        """States that unknown senders have sent, by tick, and their `SourceGuard.passed`."""
 
     @property
     def wait(self) -> Wait:
-        """What is waited for when `take` has found no whole state."""
+        """The wait when `take` has found no whole state."""
         return self._for_joints if self._half < 0 else self._for_base
 
     def take(self) -> int | None:

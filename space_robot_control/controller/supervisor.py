@@ -33,7 +33,7 @@ NOMINAL_FROM_ETA = 0.05
 
 
 class Mode(Enum):
-    """What is commanded."""
+    """The kind of command that is given."""
 
     NOMINAL = "nominal"
     HOLDING = "holding"
@@ -93,6 +93,6 @@ class Supervisor:
 
 
 def _is_unit(quaternion: Array) -> bool:
-    """Whether the controller would take it for an attitude."""
+    """Tell if the controller would take it for an attitude."""
     norm = math.hypot(*quaternion)
     return abs(norm * norm - 1.0) <= NORM_TOLERANCE

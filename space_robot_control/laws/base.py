@@ -1,4 +1,4 @@
-"""What every control law is: gains, a memory, and one equation."""
+"""A control law: gains, a memory, and one equation."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class ControlLaw(ABC):
 
     @classmethod
     def uses_time_delay_estimate(cls) -> bool:
-        """Whether the law adds N_hat."""
+        """True if the law adds N_hat."""
         return "h_bar" in cls.gains_type.fields()
 
     def reset(self) -> None:

@@ -18,7 +18,7 @@ class NotTrustedError(InputError):
 
 
 def is_plain(name: str) -> bool:
-    """Whether a name is looked up among what is shipped; else it is a path to somewhere."""
+    """True if a name is looked up among what is shipped; else it is a path to somewhere."""
     is_path = "/" in name or name.endswith((".yaml", ".yml")) or name in (".", "..")
     return name.isprintable() and not is_path and len(name) <= _LONGEST_NAME
 

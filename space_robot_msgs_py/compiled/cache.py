@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 
 ROOM_BYTES = 16 << 20
-"""What a whole cache needs, with room to spare."""
+"""Size that a whole cache needs, with room to spare."""
 
 
 @cache

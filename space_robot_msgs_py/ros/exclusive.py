@@ -17,7 +17,7 @@ from ..errors import InputError
 from .locks import FileLock, HeldError, look, node_lock, topic_lock
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
-"""What discovery calls the node of a publisher until its participant has said, if it ever does."""
+"""Name that discovery gives to a publisher's node until its participant has told its own."""
 
 
 class Claim:

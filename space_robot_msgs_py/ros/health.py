@@ -23,7 +23,7 @@ class Health:
     """A node's state at a moment."""
 
     mode: str
-    """What it does, in a word or two, then why: ``nominal``, ``safe: no state for 0.5 s``."""
+    """The mode in a word or two, then why: ``nominal``, ``safe: no state for 0.5 s``."""
     level: Level = Level.OK
     values: Mapping[str, float | int | str] = field(default_factory=dict)
     """FieldReader, by name with unit; ``tick`` is the last one dealt with."""

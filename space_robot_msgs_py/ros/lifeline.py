@@ -19,7 +19,7 @@ PATIENCE_S = 15.0
 
 
 def held() -> dict[str, str]:
-    """What the environment of a process says whose standard input this process holds."""
+    """Return what the environment of a process says whose standard input this process holds."""
     return {VARIABLE: str(os.getpid())}
 
 

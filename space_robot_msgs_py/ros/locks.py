@@ -104,7 +104,7 @@ def nodes_in(domain: int) -> list[Holder]:
 
 
 def look(path: Path) -> tuple[bool, list[str]]:
-    """Whether somebody holds a lock, and the notes of those who took it, the newest last."""
+    """Tell if somebody holds a lock, and the notes of those who took it, the newest last."""
     try:
         descriptor = _open(path)
     except InputError:

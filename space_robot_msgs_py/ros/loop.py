@@ -1,4 +1,4 @@
-"""What a node does, as a loop that its host steps: it never waits itself.
+"""A node's work, as a loop that its host steps: it never waits itself.
 
 So one host can run one node in a process, or step several in turn.
 """
@@ -13,16 +13,16 @@ from .health import Health
 
 
 class Wait(NamedTuple):
-    """What a loop waits for when it has nothing to do."""
+    """The time and the messages that a loop waits for when it has nothing to do."""
 
     seconds: float
     """After this long it is to be stepped in any case."""
     inputs: tuple[RawSubscription, ...] = ()
     """It is to be stepped as soon as one of these has a message."""
     is_brief: bool = False
-    """Whether a message is expected at once, so that sleeping would cost more than looking."""
+    """True if a message is expected at once, so that sleeping would cost more than looking."""
     is_for_others: bool = False
-    """Whether it only gives way to the other nodes: it is over once those of its own process, if
+    """True if it only gives way to the other nodes: it is over once those of its own process, if
     there are any, have had their turns."""
     patience_s: float = 0.0
     """It may last so much longer while other nodes of the process have something to do."""
@@ -41,7 +41,7 @@ class Loop(Protocol):
 
     @property
     def is_complete(self) -> bool:
-        """Whether the loop has come to its end, and with it the flight."""
+        """True if the loop has come to its end, and with it the flight."""
 
     def begin(self) -> None:
         """Get ready to be stepped: called whenever the node has become active."""

@@ -62,7 +62,7 @@ def declare_settings(node: Node, schema: type[Schema], changeable: tuple[str, ..
 
 
 def overrides(node: Node, names: Iterable[str]) -> dict[str, Any]:
-    """What the user gave for these parameters, on the command line or in a parameter file."""
+    """Return what the user gave for these parameters, on the command line or in a file."""
     given = parameter_overrides(node)
     return {name: _plain(given[name].value) for name in names if name in given}
 

@@ -93,7 +93,7 @@ class ServiceWaitSet:
 
 
 def parameter_overrides(node: Node) -> Mapping[str, Any]:
-    """What the user gave for a node, on the command line or in a parameter file."""
+    """Return what the user gave for a node, on the command line or in a parameter file."""
     return node._parameter_overrides
 
 

@@ -27,7 +27,7 @@ class ServiceCalls(SingleThreadedExecutor):
         self.count = 0
         """Calls run so far."""
         self.is_overloaded = False
-        """Whether calls come faster than they are run; beyond 1000 of a kind they are lost."""
+        """True if calls come faster than they are run; beyond 1000 of a kind they are lost."""
         self._busy_since: float | None = None
         """When the first of the calls ended after each of which another one waited."""
 

@@ -121,13 +121,13 @@ class Seat:
         """Take a node in any state."""
         self.node, self._is_alone = node, is_alone
         self.wait = NO_WAIT
-        """What its loop waits for."""
+        """The wait that its loop asked for last."""
         self.wake_at = 0.0
         """When it is to be stepped though no message has come, by the monotonic clock."""
         self.glance_at = 0.0
         """When it may be stepped at the earliest."""
         self.spins = False
-        """Whether it is better to look for its next message than to sleep."""
+        """True if it is better to look for its next message than to sleep."""
         self._may_spin = True
         self._loop: Loop | None = None
         """The loop while it is stepped."""
@@ -135,7 +135,7 @@ class Seat:
 
     @property
     def is_complete(self) -> bool:
-        """Whether its loop has come to its end."""
+        """True if its loop has come to its end."""
         return self._loop is not None and self._loop.is_complete
 
     def step(self, now: float) -> bool:

@@ -1,4 +1,4 @@
-"""What a node does between the steps of its loop: service calls, and reports of its health."""
+"""A node's work between the steps of its loop: service calls, and reports of its health."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LONGEST_PAUSE_S = 1.0
 
 
 class Served(Protocol):
-    """What `Upkeep` needs of a node."""
+    """The part of a node that `Upkeep` needs."""
 
     calls: ServiceCalls
 

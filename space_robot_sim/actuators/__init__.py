@@ -1,1 +1,1 @@
-"""What turns commands into torques: delay, limits."""
+"""Actuators turn commands into torques: delay, limits."""

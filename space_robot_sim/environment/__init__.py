@@ -1,1 +1,1 @@
-"""What acts on the robot besides its actuators: friction, disturbances, payload."""
+"""The environment acts on the robot beside its actuators: friction, disturbances, payload."""

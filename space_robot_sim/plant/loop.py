@@ -91,10 +91,10 @@ class PlantLoop:
         self._silence_s = settings.silence_timeout or math.inf
         self._controller_silent = False
         self._by_the_clock = False
-        """Whether the tick that is under way lasts its period by the wall clock."""
+        """True if the tick that is under way lasts its period by the wall clock."""
         self._must_give_way = False
         self._is_under_way = False
-        """Whether the tick's state has been measured."""
+        """True if the tick's state has been measured."""
         self._unsent: deque[SentState] = deque()
         """States of this tick that are still to be sent: in lockstep, once the one before has been
         answered."""
@@ -102,7 +102,7 @@ class PlantLoop:
         self._answered_by = NONE
         """Tick of the newest command that can come."""
         self._awaits = False
-        """Whether it is waited for, in lockstep."""
+        """True if it is waited for, in lockstep."""
         self._heard = self._heard_before = NONE
         """The newest tick that a command has come for: now, and at this tick's begin."""
         self._sent_at = self._awaited_since = 0.0

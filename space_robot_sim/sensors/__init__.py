@@ -1,1 +1,1 @@
-"""What is measured of the true state, and how measurements go wrong."""
+"""Sensors measure the true state, and their measurements go wrong."""

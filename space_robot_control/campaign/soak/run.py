@@ -82,7 +82,7 @@ class Soak:
     interrupted_by: int = 0
     """Signal that ended it; 0: its time was over."""
     shared_memory_files: tuple[int, int] = (0, 0)
-    """Of Fast DDS, at the start and at the end."""
+    """Files of Fast DDS, at the start and at the end."""
 
     def report(self) -> dict[str, Any]:
         """Return everything, for JSON and for the table."""

@@ -1,4 +1,4 @@
-"""One publisher a topic: a second is refused, a killed one's place is free, strangers are named."""
+"""One publisher a topic: a second is refused, a killed one's place is free, others are named."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Managed nodes: what each transition does, and what strangers are told."""
+"""Managed nodes: what each transition does, and what others are told."""
 
 from __future__ import annotations
 
