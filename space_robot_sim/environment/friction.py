@@ -11,7 +11,9 @@ from pydantic import Field
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.topics import BASE_AXES
 
+from ..faults.axes import About
 from ..faults.grammar import Argument, Kind
 from ..faults.schedule import Schedule, ScheduledFault, TemporaryChange
 
@@ -57,7 +59,7 @@ class StuckJoint:
     """Raises the Coulomb friction of a joint for a while."""
 
     KINDS: ClassVar[tuple[Kind, ...]] = (
-        Kind("stuck_joint", Argument("TORQUE", "N m", 0.0, 1e3, joint=True), None,
+        Kind("stuck_joint", Argument("TORQUE", "N m", 0.0, 1e3, about=About.JOINT), None,
              "a joint's Coulomb friction rises to TORQUE"),
     )  # fmt: skip
 
@@ -70,5 +72,6 @@ class StuckJoint:
 
 
 def _stick(coulomb: Array, fault: ScheduledFault) -> None:
-    joint = fault.joint - 1
-    coulomb[joint] = max(coulomb[joint], fault.value)
+    for axis in fault.axes:
+        joint = axis - len(BASE_AXES)
+        coulomb[joint] = max(coulomb[joint], fault.value)

@@ -14,35 +14,37 @@ from typing import NamedTuple
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 
+from .axes import About
+
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FAULT = re.compile(
     rf"(?P<kind>[^@]*)@(?P<start>{_NUMBER})(?:-(?P<stop>{_NUMBER}))?(?::(?P<argument>.+))?",
     re.ASCII,
 )
-_JOINT_AND_NUMBER = re.compile(r"(?P<joint>\d+)=(?P<number>.+)", re.ASCII)
+_AXIS_AND_NUMBER = re.compile(r"(?P<axis>(?!0+=).+)=(?P<number>[^=]+)", re.ASCII)
 
 
 class Argument(NamedTuple):
-    """A fault's number beside its time; it is about one joint if ``joint`` is set."""
+    """A fault's number beside its time; behind the axes it is about, if ``about`` is set."""
 
     symbol: str
     unit: str
     low: float
     high: float
     whole: bool = False
-    joint: bool = False
+    about: About | None = None
 
     @property
     def form(self) -> str:
         """The argument as it is written."""
-        return f"JOINT={self.symbol}" if self.joint else self.symbol
+        return f"{self.about.name}={self.symbol}" if self.about else self.symbol
 
     @property
     def allowed(self) -> str:
         """The values that may stand there, in words."""
         number = "a whole number" if self.whole else "a number"
-        joint = ", JOINT counted from 1" if self.joint else ""
-        return f"{self.form}, {number} from {self.low:g} to {self.high:g} ({self.unit}){joint}"
+        about = f", {self.about.value}" if self.about else ""
+        return f"{self.form}, {number} from {self.low:g} to {self.high:g} ({self.unit}){about}"
 
 
 class Kind(NamedTuple):
@@ -65,8 +67,8 @@ class Kind(NamedTuple):
         argument = f":{self.argument.form}"
         return text + (argument if self.default is None else f"[{argument}]")
 
-    def read(self, argument: str) -> tuple[int, float]:
-        """Return joint (from 1; 0 if none is named) and number of an argument's text.
+    def read(self, argument: str) -> tuple[str, float]:
+        """Return axis (empty if none is named) and number of an argument's text.
 
         Raises:
             InputError: says what is allowed instead.
@@ -74,23 +76,23 @@ class Kind(NamedTuple):
         if self.argument is None:
             if argument:
                 raise InputError(f"{self.name} takes no argument, got {argument!r}")
-            return 0, math.nan
+            return "", math.nan
         if not argument:
             if self.default is None:
                 raise InputError(f"{self.name} needs an argument: {self.argument.allowed}")
-            return 0, self.default
-        joint, number = 0, argument
-        if self.argument.joint:
-            match = _JOINT_AND_NUMBER.fullmatch(argument)
-            joint, number = (int(match["joint"]), match["number"]) if match else (0, "")
+            return "", self.default
+        axis, number = "", argument
+        if self.argument.about:
+            match = _AXIS_AND_NUMBER.fullmatch(argument)
+            axis, number = (match["axis"], match["number"]) if match else ("", "")
         try:
             value = float(number)
         except ValueError:
             value = math.nan
         fits = self.argument.low <= value <= self.argument.high
-        if not fits or (self.argument.whole and value % 1) or (self.argument.joint and not joint):
+        if not fits or (self.argument.whole and value % 1):
             raise InputError(f"argument {argument!r}: {self.argument.allowed} is allowed")
-        return joint, value
+        return axis, value
 
 
 Kinds = Mapping[str, Kind]
@@ -128,8 +130,8 @@ class Fault:
         return self.kind.read(self.argument)[1]
 
     @property
-    def joint(self) -> int:
-        """The joint it is about, from 1; 0 if it is about none."""
+    def axis(self) -> str:
+        """The axis, or group of axes, it is about, as given; empty if it is about none."""
         return self.kind.read(self.argument)[0]
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.errors import InputError
 
+from .axes import axes_of
 from .grammar import Fault, Kind
 
 Array = NDArray[np.float64]
@@ -26,13 +27,23 @@ class ScheduledFault:
     the same, and no fault's numbers depend on the faults beside it.
     """
 
-    def __init__(self, fault: Fault, index: int, seed: int, period: float) -> None:
-        """Place ``fault``, the ``index``-th of the flight.
+    def __init__(
+        self, fault: Fault, index: int, seed: int, period: float, axis_names: Sequence[str] = ()
+    ) -> None:
+        """Place ``fault``, the ``index``-th of the flight of a robot with these axes.
 
         Raises:
-            InputError: it ends before the first tick it could act at.
+            InputError: it ends before the first tick it could act at, or names an axis that is
+                not there.
         """
-        self.kind, self.value, self.joint = fault.kind, fault.value, fault.joint
+        self.kind, self.value = fault.kind, fault.value
+        self.axes: tuple[int, ...] = ()
+        """Places of the axes it is about: 0 to 2 of the base, then the joints."""
+        if fault.kind.argument and (about := fault.kind.argument.about):
+            try:
+                self.axes = axes_of(fault.axis, about, axis_names)
+            except InputError as error:
+                raise InputError(f"fault '{fault}': {error}") from None
         self.first = _tick_from(fault.start_s, period)
         """Tick from which it acts."""
         self.stop = _tick_from(fault.stop_s, period)
@@ -72,14 +83,17 @@ class ScheduledFault:
 class Schedule:
     """The faults of a flight in the order given, each seeded by ``seed`` and its place."""
 
-    def __init__(self, faults: Sequence[Fault], seed: int, period: float) -> None:
-        """Place all faults.
+    def __init__(
+        self, faults: Sequence[Fault], seed: int, period: float, axis_names: Sequence[str] = ()
+    ) -> None:
+        """Place all faults; ``axis_names``: those of the robot, for faults that name one.
 
         Raises:
             InputError: see `ScheduledFault`.
         """
         self.faults = [
-            ScheduledFault(fault, index, seed, period) for index, fault in enumerate(faults)
+            ScheduledFault(fault, index, seed, period, axis_names)
+            for index, fault in enumerate(faults)
         ]
 
     def of(self, *kinds: Kind) -> list[ScheduledFault]:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 from space_robot_msgs_py.config.validation import one_of
-from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
 
 from ..actuators import actuators
@@ -39,14 +38,12 @@ class PlantFaults:
         """Prepare ``faults`` for a flight of ``robot`` in ticks of ``period`` seconds.
 
         Raises:
-            InputError: a fault is not the plant's, names a joint that is not there, or its time
+            InputError: a fault is not the plant's, names an axis that is not there, or its time
                 holds no tick.
         """
         for fault in faults:
             one_of(fault.kind.name, PLANT_KINDS, "fault of the plant")
-            if fault.joint > robot.n:
-                raise InputError(f"fault '{fault}': robot {robot.name!r} has joints 1 to {robot.n}")
-        schedule = Schedule(faults, seed, period)
+        schedule = Schedule(faults, seed, period, robot.axis_names)
         self._any = bool(faults)
         self._of_actuators = [(part, cls(schedule)) for part, cls in actuators.FAULTS.items()]
         self._of_environment = [(part, cls(schedule)) for part, cls in environment.FAULTS.items()]

@@ -131,4 +131,4 @@ def _argument(rng: random.Random, kind: str, argument: Argument) -> str:
         return str(rng.randint(round(low), round(high)))
     # as often from 1e-8 to 1e-7 as from 1e-7 to 1e-6
     number = f"{low * (high / low) ** rng.random():.2g}"
-    return f"{rng.randint(1, JOINTS)}={number}" if argument.joint else number
+    return f"{rng.randint(1, JOINTS)}={number}" if argument.about else number

@@ -205,8 +205,11 @@ def test_no_faults_are_false(paper_robot: Robot) -> None:
 
 
 def test_faults_must_fit_the_plant(paper_robot: Robot) -> None:
-    with pytest.raises(InputError, match=r"'stuck_joint@1:7=2'.*'paper' has joints 1 to 6"):
-        plant_faults(paper_robot, "stuck_joint@1:7=2")
+    for joint in ("7", "base_x", "elbow", "all"):
+        allowed = "choose one of joint1, .*, joint6, 1 to 6, joints"
+        wrong = f"^fault 'stuck_joint@1:{joint}=2': no joint '{joint}': {allowed}$"
+        with pytest.raises(InputError, match=wrong):
+            plant_faults(paper_robot, f"stuck_joint@1:{joint}=2")
     kinds = by_name(Kind("kill_mission", None, None, "not of the plant", lasts=False))
     of_another = parse_faults(["kill_mission@1"], kinds)
     with pytest.raises(InputError, match="unknown fault of the plant 'kill_mission'"):
