@@ -54,3 +54,7 @@ class Data(Record):
     """``U_i / D_i`` of the articulated-body recursion."""
     u_over_d: Array = shaped(lambda n: (n + 1,))
     """``u_i / D_i`` of the articulated-body recursion."""
+    locked: Array = shaped(lambda n: (n + 1,))
+    """1 for joints that must not accelerate, 0 for free ones (row 0 is unused)."""
+    holding: Array = shaped(lambda n: (n + 1,))
+    """Torque that a brake takes up on each locked joint so that it does not accelerate, N m."""

@@ -1,4 +1,9 @@
-"""Friction in the joints, the last term of (27)."""
+"""Friction in the joints, the last term of (27), set-valued at rest.
+
+Coulomb's law gives a joint that turns ``f_C sign(thetadot)``, and one that stands any torque from
+``-f_C`` to ``f_C``: whatever holds it (Filippov 1988). Which joints stand is found in
+`space_robot_sim.plant.stick_slip`; here is what friction does once that is known.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +27,7 @@ Coefficient = Annotated[float, Field(ge=0.0, le=1e6)]
 
 
 class FrictionSettings(StrictModel):
-    """``f_f = f_C sign(thetadot) + f_V thetadot`` on every joint."""
+    """``f_f = f_C sign(thetadot) + f_V thetadot`` on every joint; ``|f_f| <= f_C`` at rest."""
 
     coulomb: Coefficient = Field(0.02, description="Coulomb friction f_C of each joint, N m")
     viscous: Coefficient = Field(0.2, description="viscous friction f_V of each joint, N m s/rad")
@@ -45,14 +50,20 @@ class Friction(Record):
 
 
 @kernel
-def friction_torque(friction: Friction, joint_velocities: Array, out: Array) -> None:
+def friction_torque(
+    friction: Friction, joint_velocities: Array, directions: Array, out: Array
+) -> None:
     """Write into ``out`` (n,) the torque ``f_f`` that opposes the motion of each joint, N m.
 
-    ``joint_velocities`` (n,) rad/s.
+    Args:
+        friction: of the joints.
+        joint_velocities: (n,) rad/s.
+        directions: (n,) 1 or -1, the sense in which a joint turns or begins to turn; 0 for one
+            that stands: what holds it is not told here.
+        out: (n,).
     """
     for i in range(out.size):
-        rate = joint_velocities[i]
-        out[i] = friction.coulomb[i] * np.sign(rate) + friction.viscous[i] * rate
+        out[i] = friction.coulomb[i] * directions[i] + friction.viscous[i] * joint_velocities[i]
 
 
 class StuckJoint:

@@ -1,4 +1,4 @@
-"""One tick of the plant: classical Runge-Kutta under zero-order hold of the actuators."""
+"""One step of classical Runge-Kutta under zero-order hold of the actuators."""
 
 from __future__ import annotations
 
@@ -29,13 +29,20 @@ class Stages(Record):
     """State at which the current stage is evaluated."""
     slope: Array = shaped(lambda n: (4, 2 * n + 13))
     """Time derivatives."""
+    end: Array = shaped(lambda n: (2 * n + 13,))
+    """State at the end of a step."""
     force: Array = shaped(lambda n: (n + 6,))
     """Generalised force, base part on inertial axes."""
     disturbance: Array = shaped(lambda n: (n + 3,))
     """f_d of (61), N m."""
     friction: Array = shaped(lambda n: (n,))
     """f_f of each joint, N m."""
+    directions: Array = shaped(lambda n: (n,))
+    """The sense in which each joint slides over the step, see `friction_torque`."""
+    held: Array = shaped(lambda n: (n,))
+    """1 for joints that came back to rest within the step in which they broke away."""
     data: Data = nested(Data)
+    """Its ``locked`` joints stand over the step."""
 
 
 @kernel
@@ -51,7 +58,7 @@ def state_derivative(
         x: (2n+13,) the state, see `Stages`.
         torque: (n+3,) N m, on the base's axes, which turn with it, then on the joints.
         disturbance: (n+3,) f_d, N m, about inertial axes, then on the joints.
-        stages: scratch.
+        stages: scratch; says which joints slide in which sense and which stand.
         out: (2n+13,).
     """
     n = model.mass.size - 1
@@ -63,7 +70,7 @@ def state_derivative(
     for k in range(3):
         force[k] = 0.0
         force[3 + k] -= disturbance[k]
-    friction_torque(environment.friction, joint_velocities, friction)
+    friction_torque(environment.friction, joint_velocities, stages.directions, friction)
     for i in range(n):
         force[6 + i] = torque[3 + i] - disturbance[3 + i] - friction[i]
     out[0:3] = v0
@@ -77,23 +84,23 @@ def rk4_step(
     model: Model, environment: Environment, x: Array, torque: Array, time: float, period: float,
     stages: Stages,
 ) -> None:  # fmt: skip
-    """Advance ``x`` in place from ``time`` by ``period``, s; the quaternion is made unit again.
+    """Write into ``stages.end`` the state ``period`` s after ``x`` at ``time``; quaternion unit.
 
-    ``torque`` (n+3,) N m is held, see `state_derivative`.
+    ``torque`` (n+3,) N m is held, see `state_derivative`; ``stages.slope[0]`` is the derivative
+    in ``x``.
     """
-    size = x.size
+    size, end = x.size, stages.end
     slope, stage, disturbance = stages.slope, stages.stage, stages.disturbance
-    stage[:] = x
-    for k in range(4):
-        step = 0.0 if k == 0 else (period if k == 3 else 0.5 * period)
+    for k in range(1, 4):
+        step = period if k == 3 else 0.5 * period
         if k != 2:  # the two stages in the middle are at one time
             disturbance_torque(environment.disturbance, time + step, disturbance)
-        if k > 0:
-            for i in range(size):
-                stage[i] = x[i] + step * slope[k - 1, i]
+        for i in range(size):
+            stage[i] = x[i] + step * slope[k - 1, i]
         state_derivative(model, environment, stage, torque, disturbance, stages, slope[k])
     for i in range(size):
-        x[i] += period / 6.0 * (slope[0, i] + 2.0 * (slope[1, i] + slope[2, i]) + slope[3, i])
-    norm = np.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5] + x[6] * x[6])
+        slopes = slope[0, i] + 2.0 * (slope[1, i] + slope[2, i]) + slope[3, i]
+        end[i] = x[i] + period / 6.0 * slopes
+    norm = np.sqrt(end[3] * end[3] + end[4] * end[4] + end[5] * end[5] + end[6] * end[6])
     for i in range(3, 7):
-        x[i] /= norm
+        end[i] /= norm

@@ -20,7 +20,8 @@ from ..environment.environment import Environment, EnvironmentSettings
 from ..environment.payload import with_payload
 from ..robot import Robot
 from ..sensors.measurement import measure
-from .integrator import Stages, rk4_step
+from .integrator import Stages
+from .stick_slip import integrate
 
 Array = NDArray[np.float64]
 Block = NDArray[Any]
@@ -38,6 +39,9 @@ class PlantSettings(ActuatorSettings, EnvironmentSettings):
     initial_quaternion: Annotated[list[float], Field(min_length=4, max_length=4)] = Field(
         [1.0, 0.0, 0.0, 0.0], description="base attitude at tick 0: w, x, y, z"
     )
+    substeps: Annotated[int, Field(ge=1, le=1000)] = Field(
+        1, description="integration steps in a tick; the command is held over all of them"
+    )
 
 
 class PlantMemory(Record):
@@ -47,6 +51,8 @@ class PlantMemory(Record):
     environment: Environment = nested(Environment)
     actuators: Actuators = nested(Actuators)
     stages: Stages = nested(Stages)
+    substeps: float = shaped(lambda n: ())
+    """Integration steps in a tick."""
     x: Array = shaped(lambda n: (2 * n + 13,))
     """The state, see `Stages`."""
     rotation: Array = shaped(lambda n: (3, 3))
@@ -86,7 +92,7 @@ class Plant:
         memory = self.memory
         assign(
             memory, model=self.robot.model, environment=Environment.build(n, settings),
-            actuators=Actuators.build(n, settings),
+            actuators=Actuators.build(n, settings), substeps=settings.substeps,
         )  # fmt: skip
         memory.x[3:7] = np.array(settings.initial_quaternion) / norm
         memory.x[7 : 7 + n] = np.radians(settings.initial_joints_deg)
@@ -149,10 +155,13 @@ def advance(
     """
     measured = memory.measured
     actuate(memory.actuators, command_delay_buffer, torque, tick, measured.applied_torque)
-    rk4_step(
-        memory.model, memory.environment, memory.x, measured.applied_torque, tick * period,
-        period, memory.stages,
-    )  # fmt: skip
+    substeps = int(memory.substeps)
+    step = period / substeps
+    for k in range(substeps):
+        integrate(
+            memory.model, memory.environment, memory.x, measured.applied_torque,
+            tick * period + k * step, step, memory.stages,
+        )  # fmt: skip
     measure(memory.x, memory.rotation, measured)
     fastest: float = fastest_rate(memory.x, measured.joint_positions.size)
     return fastest

@@ -43,7 +43,7 @@ def peers(options: Options) -> list[Result]:
 
     results = [
         row("mujoco", "mujoco", Target(1.0, 1.5, "ratio")),
-        row("mujoco, friction loss", "mujoco, friction loss"),
+        row("mujoco, friction loss", "mujoco, friction loss", Target(1.0, 1.5, "ratio")),
         row("aba", "pinocchio, 4 aba from Python", factor=4.0),
         row("aba in C++", "pinocchio, 4 aba in C++", factor=4.0 / BATCH),
     ]

@@ -33,7 +33,7 @@ def friction(joints: Friction, joint: int, rate: float) -> float:
     velocities = np.zeros(joints.coulomb.size)
     velocities[joint] = rate
     out = np.full(velocities.size, np.nan)
-    friction_torque(joints, velocities, out)
+    friction_torque(joints, velocities, np.sign(velocities), out)
     assert not np.delete(out, joint).any()
     return float(out[joint])
 
@@ -100,8 +100,11 @@ def test_each_joint_has_its_own_friction(coefficients: list[float], rate: float)
         assert friction(joints, joint, rate) == expected
 
 
-def test_friction_at_rest_is_zero() -> None:
-    assert friction(Friction.build(2, FrictionSettings(coulomb=5.0)), 1, 0.0) == 0.0
+def test_friction_of_a_joint_that_breaks_away_opposes_what_comes() -> None:
+    """Not yet turning, it has the whole Coulomb torque; one that stands has none of its own."""
+    joints, out = Friction.build(3, FrictionSettings(coulomb=5.0)), np.empty(3)
+    friction_torque(joints, np.zeros(3), np.array([0.0, 1.0, -1.0]), out)
+    np.testing.assert_array_equal(out, [0.0, 5.0, -5.0])
 
 
 def test_payload_replaces_mass_and_inertia_of_the_last_link(paper_robot: Robot) -> None:

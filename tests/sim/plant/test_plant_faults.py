@@ -119,14 +119,9 @@ def test_after_the_last_fault_the_plant_is_as_it_was(paper_robot: Robot) -> None
 
 @pytest.mark.parametrize("joint", range(1, 7))
 def test_a_stuck_joint_stops_and_comes_free_again(paper_robot: Robot, joint: int) -> None:
-    """Thrown first, then held while its motor and the other joints pull at it.
-
-    What is left is below what the friction does in one tick: the sign in Coulomb's law chatters.
-    """
+    """Thrown first, then held while its motor and the other joints pull at it."""
     friction = 15.0 if joint <= 3 else 3.0  # four times what its motor gives
-    plant, fresh = plant_of(paper_robot), plant_of(paper_robot)
-    fresh.step(Command(0, friction * np.eye(9)[2 + joint]))
-    of_one_tick = abs(fresh.state.joint_velocities[joint - 1])
+    plant = plant_of(paper_robot)
     faults = plant_faults(paper_robot, f"stuck_joint@0.25-1:{joint}={friction}")
     angles, rates = np.empty((2500, 6)), np.empty((2500, 6))
     for tick in range(2500):
@@ -135,10 +130,10 @@ def test_a_stuck_joint_stops_and_comes_free_again(paper_robot: Robot, joint: int
         angles[tick], rates[tick] = plant.state.joint_positions, plant.state.joint_velocities
     before, held, after = slice(500), slice(1000, 1500), slice(2000, 2500)
     swing = [float(np.ptp(angles[part, joint - 1])) for part in (before, held, after)]
-    assert swing[1] < 0.1 * min(swing[0], swing[2])
-    assert np.abs(rates[held, joint - 1]).max() < of_one_tick
-    others = np.delete(np.ptp(angles[held], axis=0), joint - 1)
-    assert others.max() > 10.0 * swing[1], "the others move on"
+    assert min(swing[0], swing[2]) > 1e-3
+    assert swing[1] == 0.0
+    assert not rates[held, joint - 1].any()
+    assert np.ptp(angles[held], axis=0).max() > 1e-3, "the others move on"
 
 
 def flight(robot: Robot, *texts: str, seed: int = 0, ticks: int = 400) -> list[list[float]]:

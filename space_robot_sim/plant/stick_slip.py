@@ -1,0 +1,152 @@
+"""Steps over which joints slide, stand, come to rest and break away, as Coulomb's law has it.
+
+Within a step no friction changes its sign: a joint that slides keeps its sense, one that stands is
+locked. Where a joint comes to rest the step is cut, at the root of its velocity; there, and at the
+begin of every step, those at rest are found that break away. The friction torques then solve the
+box-constrained complementarity problem of the joints at rest:
+
+    |f_i| <= f_C,   thetadd_i = 0 if |f_i| < f_C,   thetadd_i sign(f_i) >= 0 if |f_i| = f_C
+
+which has one solution since ``H^-1`` is positive definite. It is found by principal pivoting with
+the least index first, which cannot cycle (Murty 1974; with two bounds Judice & Pires 1992). What is
+at rest is known from the state alone: its velocity is zero to the last bit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+
+from ..dynamics.model import Model
+from ..environment.disturbance import disturbance_torque
+from ..environment.environment import Environment
+from .integrator import Stages, rk4_step, state_derivative
+
+Array = NDArray[np.float64]
+
+MOST_CUTS = 32
+"""Cuts of one step; joints of a real robot come to rest once or twice in it."""
+MOST_PIVOTS = 64
+MOST_TRIALS = 64
+AT_REST = 1e-16
+"""rad/s; a velocity that small where the step is cut is rounding."""
+NONE = -1
+
+
+@kernel
+def integrate(
+    model: Model, environment: Environment, x: Array, torque: Array, time: float, period: float,
+    stages: Stages,
+) -> None:  # fmt: skip
+    """Advance ``x`` (2n+13,) in place from ``time`` by ``period``, s.
+
+    ``torque`` (n+3,) N m is held, see `state_derivative`.
+    """
+    left = period
+    stages.held[:] = 0.0
+    for _ in range(MOST_CUTS):
+        slide_or_stand(model, environment, x, torque, time, stages)
+        rk4_step(model, environment, x, torque, time, left, stages)
+        joint = first_at_rest(x, stages)
+        if joint == NONE:
+            x[:] = stages.end
+            return
+        velocity = x.size - stages.directions.size + joint
+        if x[velocity] == 0.0:  # broke away and came back
+            stages.held[joint] = 1.0
+            continue
+        length = left
+        while joint != NONE:  # one that comes to rest still earlier is met on the way
+            velocity = x.size - stages.directions.size + joint
+            length = cut(model, environment, x, torque, time, length, velocity, stages)
+            stages.end[velocity] = 0.0
+            joint = first_at_rest(x, stages)
+        x[:] = stages.end
+        stages.held[:] = 0.0
+        time += length
+        left -= length
+    slide_or_stand(model, environment, x, torque, time, stages)
+    rk4_step(model, environment, x, torque, time, left, stages)
+    x[:] = stages.end
+
+
+@kernel
+def slide_or_stand(
+    model: Model, environment: Environment, x: Array, torque: Array, time: float, stages: Stages
+) -> None:
+    """Find which joints slide in which sense and which stand in ``x``, and its derivative.
+
+    They are written into ``stages.directions``, ``stages.data.locked`` and ``stages.slope[0]``.
+    """
+    directions, data, coulomb = stages.directions, stages.data, environment.friction.coulomb
+    n, derivative = directions.size, stages.slope[0]
+    first = x.size - n
+    for i in range(n):
+        directions[i] = np.sign(x[first + i])
+        data.locked[1 + i] = 1.0 if x[first + i] == 0.0 and coulomb[i] > 0.0 else 0.0
+    disturbance_torque(environment.disturbance, time, stages.disturbance)
+    for _ in range(MOST_PIVOTS):
+        state_derivative(model, environment, x, torque, stages.disturbance, stages, derivative)
+        changed = NONE
+        for i in range(n):
+            if x[first + i] != 0.0 or coulomb[i] == 0.0 or stages.held[i] != 0.0:
+                continue
+            if data.locked[1 + i] != 0.0:
+                if abs(data.holding[1 + i]) > coulomb[i]:
+                    data.locked[1 + i], directions[i] = 0.0, np.sign(data.holding[1 + i])
+                    changed = i
+            elif derivative[first + i] * directions[i] < 0.0:
+                data.locked[1 + i], directions[i] = 1.0, 0.0
+                changed = i
+            if changed != NONE:
+                break
+        if changed == NONE:
+            return
+
+
+@kernel
+def first_at_rest(x: Array, stages: Stages) -> int:
+    """Return the joint that came to rest first between ``x`` and ``stages.end``, or `NONE`."""
+    directions, end = stages.directions, stages.end
+    first, earliest, found = x.size - directions.size, 2.0, NONE
+    for i in range(directions.size):
+        before, after = x[first + i], end[first + i]
+        if after * directions[i] < 0.0:
+            share = before / (before - after)
+            if share < earliest:
+                earliest, found = share, i
+    return found
+
+
+@kernel
+def cut(
+    model: Model, environment: Environment, x: Array, torque: Array, time: float, length: float,
+    velocity: int, stages: Stages,
+) -> float:  # fmt: skip
+    """Return the time after which ``x[velocity]`` is zero, s, and leave that state in the stages.
+
+    It has changed its sign in ``stages.end``, which is ``length`` later. The root is found by the
+    Illinois variant of false position (Dowell & Jarratt 1971).
+    """
+    low, at_low = 0.0, x[velocity]
+    high, at_high = length, stages.end[velocity]
+    side = 0
+    for _ in range(MOST_TRIALS):
+        length = (low * at_high - high * at_low) / (at_high - at_low)
+        rk4_step(model, environment, x, torque, time, length, stages)
+        found = stages.end[velocity]
+        if abs(found) <= AT_REST or not low < length < high:
+            break
+        if found * at_high > 0.0:
+            high, at_high = length, found
+            if side == -1:
+                at_low *= 0.5
+            side = -1
+        else:
+            low, at_low = length, found
+            if side == 1:
+                at_high *= 0.5
+            side = 1
+    return length

@@ -1,0 +1,224 @@
+"""Coulomb friction as a set: joints that stand, slide, come to rest and break away."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from oracles import (
+    pinocchio_acceleration,
+    pinocchio_bias_force,
+    pinocchio_mass_matrix,
+    pinocchio_model,
+    rotation_of,
+)
+from random_robots import State, random_quaternion, random_robot
+from scipy.integrate import solve_ivp
+
+from space_robot_msgs_py.samples import Command
+from space_robot_sim.dynamics.attitude import quaternion_rate
+from space_robot_sim.dynamics.model import Data
+from space_robot_sim.environment.friction import FrictionSettings
+from space_robot_sim.plant.conservation import kinetic_energy, momentum
+from space_robot_sim.plant.plant import Plant, PlantSettings
+from space_robot_sim.plant.stick_slip import slide_or_stand
+from space_robot_sim.robot import Robot
+
+Array = NDArray[np.float64]
+
+PERIOD = 5e-4
+COULOMB = 0.7
+"""N m; large beside the torques below, so that much sticks."""
+
+
+def plant_of(robot: Robot, coulomb: float, viscous: float = 0.0, **more: Any) -> Plant:
+    friction = FrictionSettings(coulomb=coulomb, viscous=viscous)
+    given = {"initial_joints_deg": [30.0] * robot.n, "friction": friction, **more}
+    return Plant(robot, PlantSettings(**given), PERIOD)
+
+
+def place(plant: Plant, rng: np.random.Generator, rates: Array) -> State:
+    """Put the plant anywhere, its joints turning at ``rates``."""
+    n, x = plant.robot.n, plant.memory.x
+    x[3:7], x[7 : 7 + n] = random_quaternion(rng), rng.uniform(-3.0, 3.0, n)
+    x[7 + n : 13 + n], x[13 + n :] = rng.normal(size=6), rates
+    return state_of(plant)
+
+
+def state_of(plant: Plant) -> State:
+    n, x = plant.robot.n, plant.memory.x.copy()
+    return State(x[3:7], x[7 : 7 + n], x[7 + n : 10 + n], x[10 + n : 13 + n], x[13 + n :])
+
+
+def data_of(plant: Plant) -> Data:
+    """Scratch of the plant's dynamics; as an attribute NumPy gives the memory itself."""
+    stages: Any = plant.memory.stages
+    data: Data = stages["data"]
+    return data
+
+
+def solutions(robot: Robot, state: State, torque: Array, coulomb: float) -> list[Array]:
+    """All friction torques (n,) that obey Coulomb's law, found by trying every combination."""
+    n = robot.n
+    inverse = np.linalg.inv(pinocchio_mass_matrix(robot, state))
+    turned = rotation_of(state.quaternion).apply(torque[:3])
+    force = np.concatenate([np.zeros(3), turned, torque[3:]])
+    free = inverse @ (force - pinocchio_bias_force(robot, state))
+    found = []
+    choices = [(np.sign(rate),) if rate else (-1.0, 0.0, 1.0) for rate in state.rate]
+    for senses in map(np.array, itertools.product(*choices)):
+        friction = coulomb * senses
+        stands = senses == 0.0
+        joints = inverse[6:, 6:]
+        rest = free[6:] - joints[:, ~stands] @ friction[~stands]
+        friction[stands] = np.linalg.solve(joints[np.ix_(stands, stands)], rest[stands])
+        acceleration = free[6:] - joints @ friction
+        leaves = (state.rate == 0.0) & ~stands
+        if (np.abs(friction[stands]) <= coulomb + 1e-12).all() and (
+            acceleration[leaves] * senses[leaves] >= -1e-12
+        ).all():
+            found.append(friction)
+    assert n == state.rate.size
+    return found
+
+
+@given(st.sampled_from([1, 3, 6]), st.integers(0, 2**32 - 1))
+@settings(max_examples=40, deadline=None)
+def test_joints_stand_or_break_away_as_coulombs_law_has_it(n: int, seed: int) -> None:
+    """The friction of joints at rest and turning is the one solution there is."""
+    rng = np.random.default_rng(seed)
+    plant = plant_of(random_robot(rng, n), COULOMB)
+    rates = rng.normal(size=n) * rng.integers(0, 2, n)
+    state = place(plant, rng, 0.3 * rates)
+    torque = rng.normal(size=n + 3)
+    memory = plant.memory
+    slide_or_stand(memory.model, memory.environment, memory.x, torque, 0.0, memory.stages)
+    data, directions = data_of(plant), memory.stages.directions
+    friction = np.where(data.locked[1:] != 0.0, data.holding[1:], COULOMB * directions)
+    (expected,) = solutions(plant.robot, state, torque, COULOMB)
+    np.testing.assert_allclose(friction, expected, rtol=0.0, atol=1e-9)
+    accelerations = memory.stages.slope[0, 13 + n :]
+    assert not accelerations[data.locked[1:] != 0.0].any()
+
+
+@pytest.mark.parametrize("substeps", [1, 3])
+def test_a_joint_held_below_its_friction_stands_still(paper_robot: Robot, substeps: int) -> None:
+    """For 10 s, to the last bit, though the base is turned and the torque changes."""
+    plant = plant_of(paper_robot, 0.02, 0.2, substeps=substeps)
+    start = plant.state.joint_positions.copy()
+    for tick in range(20_000):
+        torque = np.full(9, 0.019 * np.sin(0.01 * tick))
+        torque[:3] *= 0.01
+        plant.step(Command(tick, torque))
+        assert not plant.state.joint_velocities.any()
+    np.testing.assert_array_equal(plant.state.joint_positions, start)
+    assert np.abs(plant.state.omega_base).max() < 1e-4
+
+
+def test_a_joint_comes_to_rest_when_and_where_it_should() -> None:
+    """Thrown, it stops: against SciPy's events on Pinocchio's dynamics, to rounding."""
+    rng = np.random.default_rng(5)
+    robot = random_robot(rng, 1)
+    plant = plant_of(robot, COULOMB)
+    place(plant, rng, np.array([0.003]))
+    plant.memory.x[8:14] *= 0.01
+    start = plant.memory.x.copy()
+    model = pinocchio_model(robot)
+    data = model.createData()
+
+    def derivative(_: float, x: Array) -> Array:
+        now = State(x[3:7] / np.linalg.norm(x[3:7]), x[7:8], x[8:11], x[11:14], x[14:])
+        force = np.array([0.0] * 6 + [-COULOMB])
+        rate = np.empty(4)
+        quaternion_rate(x[3:7], x[11:14], rate)
+        acceleration = pinocchio_acceleration(model, data, now, force)
+        return np.concatenate([x[8:11], rate, x[14:], acceleration])
+
+    def at_rest(_: float, x: Array) -> float:
+        return float(x[14])
+
+    at_rest.terminal = True  # type: ignore[attr-defined]
+    exact = solve_ivp(
+        derivative, (0.0, 1.0), start, "DOP853", events=at_rest, rtol=1e-12, atol=1e-14
+    )
+    stops_at = float(exact.t[-1])
+    assert stops_at / PERIOD > 2.0
+    assert abs(stops_at / PERIOD - round(stops_at / PERIOD)) > 0.01, "within a tick"
+    for tick in range(int(stops_at / PERIOD) + 2):
+        plant.step(Command(tick, np.zeros(4)))
+    assert plant.state.joint_velocities[0] == 0.0
+    np.testing.assert_allclose(plant.state.joint_positions, exact.y[7:8, -1], rtol=0.0, atol=1e-13)
+
+
+@given(st.sampled_from([1, 3, 6]), st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.2]))
+@settings(max_examples=25, deadline=None)
+def test_friction_never_adds_energy(n: int, seed: int, viscous: float) -> None:
+    """Nobody drives: whatever slides, stops or is dragged on, kinetic energy only falls."""
+    rng = np.random.default_rng(seed)
+    plant = plant_of(random_robot(rng, n), COULOMB, viscous)
+    place(plant, rng, rng.normal(size=n) * rng.choice([0.0, 1e-6, 1e-3, 0.1], n))
+    plant.step(Command(0, np.zeros(n + 3)))
+    before = kinetic_energy(plant.robot, plant.state)
+    linear, angular = momentum(plant.robot, plant.state)
+    for tick in range(1, 60):
+        plant.step(Command(tick, np.zeros(n + 3)))
+        after = kinetic_energy(plant.robot, plant.state)
+        assert after <= before * (1.0 + 1e-13)
+        before = after
+    for was, now in zip((linear, angular), momentum(plant.robot, plant.state), strict=True):
+        np.testing.assert_allclose(now, was, rtol=0.0, atol=1e-11 * (1.0 + np.abs(was).max()))
+
+
+def test_a_joint_that_is_driven_through_rest_turns_on(paper_robot: Robot) -> None:
+    """It does not stick where its motor is the stronger; the friction changes sides."""
+    plant = plant_of(paper_robot, 0.02)
+    plant.memory.x[18] = 1e-4
+    smooth = plant_of(paper_robot, 0.0)
+    torque = np.zeros(9)
+    torque[8] = -0.5
+    rates = np.empty((10, 2))
+    for tick in range(10):
+        for k, flown in enumerate((plant, smooth)):
+            flown.step(Command(tick, torque))
+            rates[tick, k] = flown.state.joint_velocities[5]
+    assert rates[0, 0] < 0.0
+    braked, free = (np.diff(rates, axis=0) / PERIOD).T
+    np.testing.assert_allclose(braked / free, 0.48 / 0.5, rtol=1e-2)  # the other joints stand
+
+
+def test_without_friction_nothing_stands(paper_robot: Robot) -> None:
+    """A joint at rest that is pulled ever so little begins to turn."""
+    plant = plant_of(paper_robot, 0.0)
+    plant.step(Command(0, np.full(9, 1e-9)))
+    assert plant.state.joint_velocities.all()
+
+
+def test_locked_joints_are_as_if_welded(seven_joint_robot: Robot) -> None:
+    """Articulated bodies with locked joints, against the constrained equations of motion."""
+    rng = np.random.default_rng(8)
+    plant = plant_of(seven_joint_robot, 1e3)
+    n = seven_joint_robot.n
+    rates = rng.normal(size=n) * np.array([1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0])
+    state = place(plant, rng, rates)
+    torque = rng.normal(size=n + 3)
+    memory = plant.memory
+    memory.environment.friction.coulomb[rates != 0.0] = 0.0
+    slide_or_stand(memory.model, memory.environment, memory.x, torque, 0.0, memory.stages)
+    mass = pinocchio_mass_matrix(seven_joint_robot, state)
+    stands = 6 + np.flatnonzero(rates == 0.0)
+    force = np.concatenate(
+        [np.zeros(3), rotation_of(state.quaternion).apply(torque[:3]), torque[3:]]
+    ) - pinocchio_bias_force(seven_joint_robot, state)
+    saddle = np.zeros((mass.shape[0] + stands.size,) * 2)
+    saddle[: n + 6, : n + 6] = mass
+    saddle[n + 6 + np.arange(stands.size), stands] = 1.0
+    saddle[stands, n + 6 + np.arange(stands.size)] = 1.0
+    solution = np.linalg.solve(saddle, np.concatenate([force, np.zeros(stands.size)]))
+    np.testing.assert_allclose(memory.stages.slope[0, 7 + n :], solution[: n + 6], atol=1e-9)
+    holding = data_of(plant).holding[1:][stands - 6]
+    np.testing.assert_allclose(holding, solution[n + 6 :], atol=1e-8)
