@@ -171,6 +171,12 @@ OPTIONS: dict[str, Decorator] = {
         "--mission", default="", help="Mission by name or path [default: the robot's]."),
     "duration": click.option(
         "--duration", type=float, help="Seconds to fly [default: the mission's]."),
+    "period": click.option(
+        "--period", type=float,
+        help="Length of a tick, s, of the plant's and all other nodes [default: 0.0005]."),
+    "substeps": click.option(
+        "--substeps", type=int,
+        help="Integration steps of the plant in a tick [default: 1]."),
     "bag": click.option(
         "--bag", type=click.Path(path_type=Path), help="Folder of the bag to write."),
     "compression": click.option(

@@ -31,6 +31,7 @@ NOT_TO_BE_SET = {
     "recorder.flight": "it is what the flight's options say",
     "recorder.robot": "use --robot",
     **{f"{node}.autostart": "the flight starts its nodes together" for node in NODES},
+    **{f"{node}.period": "use --period, which is for all nodes" for node in NODES},
 }
 """Parameters that the flight itself gives, and what to do instead."""
 
@@ -97,8 +98,9 @@ class FlightSettings(NamedTuple):
         periods = {node: getattr(self, node).period for node in NODES}
         if len(set(periods.values())) > 1:
             said = ", ".join(f"{node} {period:g}" for node, period in periods.items())
-            how = " ".join(f"--set {node}.period=S" for node in NODES)
-            raise InputError(f"the period must be the same for all nodes, got {said} s: use {how}")
+            raise InputError(
+                f"the period must be the same for all nodes, got {said} s: use --period"
+            )
 
 
 def check_may_be_set(parameters: Given) -> None:

@@ -37,6 +37,10 @@ class FlightPlan(StrictModel):
     robot: str = "paper"
     mission: str = ""
     duration: Annotated[float | None, Field(gt=0.0, le=1e6)] = None
+    period: float | None = None
+    """Length of a tick of every node, s (None: that of the files)."""
+    substeps: int | None = None
+    """Integration steps of the plant in a tick (None: that of the files)."""
     command_latency_ticks: int = 0
     friction: bool = True
     realtime: bool = False
@@ -70,8 +74,11 @@ class FlightPlan(StrictModel):
 
     def options(self) -> dict[str, dict[str, Any]]:
         """Return what the options, without ``parameters``, say to each node, by dotted name."""
+        period = {} if self.period is None else {"period": self.period}
         return {
             "plant": {
+                **period,
+                **({} if self.substeps is None else {"substeps": self.substeps}),
                 "robot": self.robot,
                 "mission": self.mission,
                 "case": self.case,
@@ -83,14 +90,16 @@ class FlightPlan(StrictModel):
                 **({} if self.friction else NO_FRICTION),
             },
             "controller": {
+                **period,
                 "robot": self.robot,
                 "controller": self.controller,
                 "gains": self.gains,
                 "fifo_priority": self.fifo_priority,
                 "swaps": self.swaps,
             },
-            "mission": {"robot": self.robot, "mission": self.mission},
+            "mission": {**period, "robot": self.robot, "mission": self.mission},
             "recorder": {
+                **period,
                 **({} if self.compression is None else {"compression": self.compression}),
                 **({} if self.split_size is None else {"split_size": int(self.split_size)}),
             },

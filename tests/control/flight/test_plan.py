@@ -101,8 +101,7 @@ def test_gains_are_parameters_as_at_the_node() -> None:
         ({"controller": {"tde_stc.k_9": [1.0]}}, "unknown gain of tde_stc 'k_9'"),
         ({"controller": {"pid.k_1": [1.0]}}, "unknown law 'pid' in controller parameters"),
         ({"plnt": {"hold_ticks": 5}}, "unknown node 'plnt'"),
-        ({"controller": {"period": 0.001}},
-         "the period must be the same for all nodes, got plant 0.0005, controller 0.001"),
+        ({"controller": {"period": 0.001}}, "controller.period cannot be set: use --period"),
         ({"plant": {"robot": "seven_joint", "mission": "seven_joint"}},
          "the robots of plant and controller must have the same joints"),
         ({"mission": {"robot": "seven_joint"}},
@@ -124,9 +123,19 @@ def test_every_parameter_that_is_refused_is_one() -> None:
 
 
 def test_one_period_for_all_is_flown() -> None:
-    flight = flight_of({node: {"period": 0.001} for node in NODES})
+    flight = Flight(FlightPlan(duration=0.05, period=0.001, substeps=4))
     assert (flight.period, flight.ticks) == (0.001, 50)
     assert flight.description["period"] == 0.001
+    assert all(flight.parameters[node]["period"] == 0.001 for node in NODES)
+    assert flight.plant.memory.substeps == 4
+
+
+def test_files_that_give_nodes_different_periods_are_refused(tmp_path: Path) -> None:
+    case = tmp_path / "slow.yaml"
+    case.write_text("plant_node: {ros__parameters: {period: 0.001}}\n")
+    with pytest.raises(InputError, match="got plant 0[.]001, controller"):
+        Flight(FlightPlan(case=str(case)))
+    assert Flight(FlightPlan(case=str(case), period=0.0005, duration=1.0)).ticks == 2000
 
 
 @pytest.mark.parametrize(
@@ -144,9 +153,8 @@ def test_simulate_refuses_what_needs_the_graph(parameters: Parameters, said: str
 
 def test_longer_than_a_flight_may_last() -> None:
     assert Flight(FlightPlan(duration=1e6)).ticks == 2 * 10**9
-    fine = {node: {"period": 1e-5} for node in NODES}
     with pytest.raises(InputError, match="duration must be at most 100000 s"):
-        Flight(FlightPlan(duration=1e6, parameters=fine))
+        Flight(FlightPlan(duration=1e6, period=1e-5))
 
 
 def test_a_heavy_plant_under_a_nominal_controller(tmp_path: Path) -> None:
@@ -198,7 +206,7 @@ _SPECIAL: dict[str, st.SearchStrategy[Any]] = {
     "compression": st.sampled_from(["none", "lz4", "zstd"]),
     "split_size": st.sampled_from([0, 100_000, "2M"]),
 }
-_NOT_ALONE = {"period", "waypoint_times", "waypoints_deg"}
+_NOT_ALONE = {"waypoint_times", "waypoints_deg"}
 
 
 def _values(name: str, field: Any) -> st.SearchStrategy[Any]:
