@@ -122,17 +122,22 @@ class TemporaryChange:
 
     def apply(
         self, tick: int, values: Array, change: Callable[[Array, ScheduledFault], None]
-    ) -> None:
-        """Let ``change`` spoil the sound ``values`` in place for each fault that acts at a tick."""
+    ) -> bool:
+        """Let ``change`` spoil the sound ``values`` in place for each fault that acts at a tick.
+
+        Returns:
+            Whether the values are others than at the last tick.
+        """
         acting = [fault for fault in self._faults if fault.acts_at(tick)]
         if acting == self._acting:
-            return
+            return False
         if not self._acting:
             self._sound = values.copy()
         values[:] = self._sound
         for fault in acting:
             change(values, fault)
         self._acting = acting
+        return True
 
 
 def _tick_from(seconds: float, period: float) -> float:

@@ -57,6 +57,8 @@ class PlantMemory(Record):
     """The state, see `Stages`."""
     rotation: Array = shaped(lambda n: (3, 3))
     """Scratch."""
+    given: Array = shaped(lambda n: (n + 3,))
+    """The torque given over the last interval, N m; `measured` has the one reported."""
     measured: State = nested(State)
     """The state as the sensors report it at the current tick."""
 
@@ -92,7 +94,7 @@ class Plant:
         memory = self.memory
         assign(
             memory, model=self.robot.model, environment=Environment.build(n, settings),
-            actuators=Actuators.build(n, settings), substeps=settings.substeps,
+            actuators=Actuators.build(n, settings, period), substeps=settings.substeps,
         )  # fmt: skip
         memory.x[3:7] = np.array(settings.initial_quaternion) / norm
         memory.x[7 : 7 + n] = np.radians(settings.initial_joints_deg)
@@ -154,12 +156,14 @@ def advance(
         The fastest rate then, see `fastest_rate`.
     """
     measured = memory.measured
-    actuate(memory.actuators, command_delay_buffer, torque, tick, measured.applied_torque)
+    actuate(
+        memory.actuators, command_delay_buffer, torque, tick, measured.applied_torque, memory.given
+    )
     substeps = int(memory.substeps)
     step = period / substeps
     for k in range(substeps):
         integrate(
-            memory.model, memory.environment, memory.x, measured.applied_torque,
+            memory.model, memory.environment, memory.x, memory.given,
             tick * period + k * step, step, memory.stages,
         )  # fmt: skip
     measure(memory.x, memory.rotation, measured)

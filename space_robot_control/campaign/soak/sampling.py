@@ -24,8 +24,11 @@ LIMITS = {
     "SIGMA": (1e-8, 1e-6),
     "STEP": (1e-8, 1e-6),
     "TORQUE": (0.01, 1.0),
+    "FACTOR": (0.995, 1.005),
     "noise_joint_velocity": (1e-7, 1e-5),
     "stuck_joint": (5.0, 20.0),
+    "torque_bias": (1e-5, 1e-3),
+    "drive_bias": (1e-5, 1e-3),
 }
 """Least and largest argument by its symbol, or by the kind of the fault."""
 LONGEST_S = {"saturate_base": 0.2, "saturate_joints": 0.2, "stuck_joint": 1.0}
@@ -130,5 +133,5 @@ def _argument(rng: random.Random, kind: str, argument: Argument) -> str:
     if argument.whole:
         return str(rng.randint(round(low), round(high)))
     # as often from 1e-8 to 1e-7 as from 1e-7 to 1e-6
-    number = f"{low * (high / low) ** rng.random():.2g}"
+    number = f"{low * (high / low) ** rng.random():.4g}"
     return f"{rng.randint(1, JOINTS)}={number}" if argument.about else number

@@ -48,6 +48,8 @@ FLIGHTS: dict[str, tuple[str, ...]] = {
     ),
     "bad actuators": (
         "saturate_base@0.1-0.2:0.001", "saturate_joints@0.3-0.4:0.01", "stuck_joint@0.6-0.9:3=15",
+        "torque_scale@0.45-0.5:all=0.99", "torque_bias@0.52-0.57:joint2=0.01",
+        "drive_scale@0.91-0.94:joints=1.02", "drive_bias@0.95-0.98:base_x=0.01",
     ),
     "long silences": (
         "scaled_quaternion@0.1-0.25", "drop_command@0.4-0.55", "drop_state@0.7-0.85",
@@ -173,6 +175,10 @@ MATRIX: list[tuple[str, str, str, Check]] = [
      lambda seen: bool(np.abs(seen.torque(0.3, 0.4)[:, 3:]).max() == 0.01)
      and seen.count("plant", "saturated_ticks") > 100),
     ("stuck_joint", "bad actuators", "the others go on", tracks(0.6, 0.9, 0.5)),
+    ("torque_scale", "bad actuators", "flown through", tracks(0.45, 0.5, 1e-2)),
+    ("torque_bias", "bad actuators", "flown through", tracks(0.52, 0.57, 1e-2)),
+    ("drive_scale", "bad actuators", "the estimate has it", tracks(0.91, 0.94, 1e-2)),
+    ("drive_bias", "bad actuators", "the estimate has it", tracks(0.95, 0.98, 1e-2)),
     ("scaled_quaternion", "long silences", "the controller goes safe, then back",
      lambda seen: "safe: quaternion not unit" in " ".join(seen.modes("controller"))
      and seen.modes("controller")[-1] == "nominal"),

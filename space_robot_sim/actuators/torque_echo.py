@@ -1,0 +1,123 @@
+"""The torque that is reported as applied, all that the flight software is told of it.
+
+    reported = scale * source + bias
+
+The source is the command within its limits, as a drive's computer has it, or the torque that is
+given, as a sensor on the shaft has it. A time-delay estimate is made of this echo, so its scale is
+critical: under ``reported = b * command``, ``given = a * command`` the error of the estimate obeys
+``b E - a H_S^-1 H_bar`` in place of ``E - H_S^-1 H_bar``, which grows where b exceeds 1 by more
+than the smallest eigenvalue of ``a H_S^-1 H_bar``. What the drives give (a) matters less.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, assign, shaped
+from space_robot_msgs_py.config.validation import StrictModel
+
+from ..faults.axes import About
+from ..faults.grammar import Argument, Kind
+from ..faults.schedule import Schedule, ScheduledFault, TemporaryChange
+from .per_axis import PER_AXIS, Numbers, per_axis
+
+Array = NDArray[np.float64]
+
+
+class TorqueEchoSettings(StrictModel):
+    """The torque that is reported as applied."""
+
+    torque_echo: Literal["command", "given"] = Field(
+        "command",
+        description="torque that is reported as applied: command, the one asked for within its "
+        "limits; given, the one that acts on the robot",
+    )
+    echo_scale: Numbers = Field(
+        [1.0], description=f"torque reported per torque of torque_echo; {PER_AXIS}"
+    )
+    echo_bias: Numbers = Field([0.0], description=f"torque reported beside it, N m; {PER_AXIS}")
+
+
+class TorqueEcho(Record):
+    """The report of one robot's torques, an axis each: base x, y, z (base frame), then joints."""
+
+    is_of_given: float = shaped(lambda n: ())
+    """1 if the torque given is reported, 0 if the command within its limits is."""
+    scale: Array = shaped(lambda n: (n + 3,))
+    """Torque reported per torque of its source."""
+    bias: Array = shaped(lambda n: (n + 3,))
+    """N m."""
+    is_exact: float = shaped(lambda n: ())
+    """1 if the source itself is reported, so that nothing else need be looked at; see `judge`."""
+
+    @classmethod
+    def build(cls, n: int, settings: TorqueEchoSettings) -> TorqueEcho:
+        """Read the settings for a robot of ``n`` joints.
+
+        Raises:
+            InputError: see `per_axis`.
+        """
+        echo = cls.allocate(n)
+        assign(
+            echo, is_of_given=settings.torque_echo == "given",
+            scale=per_axis(settings, "echo_scale", n), bias=per_axis(settings, "echo_bias", n),
+        )  # fmt: skip
+        judge(echo)
+        return echo
+
+
+def judge(echo: TorqueEcho) -> None:
+    """Set ``is_exact``; to be called when any of the numbers have changed."""
+    assign(echo, is_exact=not np.any((echo.scale - 1.0, echo.bias)))
+
+
+@kernel
+def report_torque(echo: TorqueEcho, given: Array, reported: Array) -> None:
+    """Write into ``reported`` (n+3,) what is told of ``given`` (n+3,), N m.
+
+    ``reported`` holds the command within its limits before.
+    """
+    if echo.is_of_given == 0.0 and echo.is_exact != 0.0:
+        return
+    for i in range(given.size):
+        source = reported[i] if echo.is_of_given == 0.0 else given[i]
+        reported[i] = source if echo.is_exact != 0.0 else echo.scale[i] * source + echo.bias[i]
+
+
+TORQUE_SCALE = Kind(
+    "torque_scale", Argument("FACTOR", "1", 1e-3, 1e3, about=About.AXIS), None,
+    "the torque given is FACTOR times the one reported",
+)  # fmt: skip
+TORQUE_BIAS = Kind(
+    "torque_bias", Argument("TORQUE", "N m", -1e6, 1e6, about=About.AXIS), None,
+    "the torque given is TORQUE more than the one reported",
+)  # fmt: skip
+
+
+class WrongEcho:
+    """Lets some axes report a wrong torque for a while; what is given stays right."""
+
+    KINDS: ClassVar[tuple[Kind, ...]] = (TORQUE_SCALE, TORQUE_BIAS)
+
+    def __init__(self, schedule: Schedule) -> None:
+        self._scale = TemporaryChange(schedule.of(TORQUE_SCALE))
+        self._bias = TemporaryChange(schedule.of(TORQUE_BIAS))
+
+    def apply(self, tick: int, part: TorqueEcho) -> None:
+        """Make the report as wrong as it should be from ``tick`` to the next."""
+        is_scaled = self._scale.apply(tick, part.scale, _divide)
+        if self._bias.apply(tick, part.bias, _subtract) or is_scaled:
+            judge(part)
+
+
+def _divide(scale: Array, fault: ScheduledFault) -> None:
+    scale[list(fault.axes)] /= fault.value
+
+
+def _subtract(bias: Array, fault: ScheduledFault) -> None:
+    bias[list(fault.axes)] -= fault.value
