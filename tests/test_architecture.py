@@ -17,8 +17,8 @@ ROOMS = {
         "plant_node",
     ),
     "space_robot_control": (
-        "laws", "controller", "controller_node", "mission", "mission_node", "flight", "analysis",
-        "campaign", "paper", "view", "cli",
+        "laws", "controller", "controller_node", "mission", "mission_node", "tuning", "flight",
+        "analysis", "campaign", "paper", "view", "cli",
     ),
 }  # fmt: skip
 """Of each package, from the ground up: a room imports only from rooms that stand before it."""

@@ -91,6 +91,9 @@ def test_commands_and_options_exist(document: Path) -> None:
     for name, *words in commands(document.read_text("utf-8")):
         command = cli.commands.get(name)
         assert command is not None, f"space-robot {name}"
+        if isinstance(command, click.Group) and words:
+            command = command.commands.get(words[0])
+            assert command is not None, f"space-robot {name} {words[0]}"
         known = {
             option
             for parameter in command.params

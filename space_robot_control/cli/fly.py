@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from .options import OPTIONS, flight_options, plan_flight
+from .options import OPTIONS, flight_options, plan_flight, remark_on_gains
 
 
 def _list_faults(context: click.Context, given: Sequence[str]) -> Sequence[str]:
@@ -65,7 +65,7 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     from space_robot_msgs_py.errors import FlightError
 
     from ..analysis import analyze
-    from ..flight.bag_path import default_bag
+    from ..flight.bag_path import check_bag_path, default_bag
     from ..flight.graph.orchestrator import fly as fly_graph
     from ..flight.terminal import echo_json
     from .failure import failed_report, report_of
@@ -73,6 +73,8 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
 
     flight = plan_flight(**options)
     bag = bag or default_bag(flight)
+    check_bag_path(bag)
+    remark_on_gains(flight)
     try:
         report = fly_graph(flight, bag, analyze)
     except FlightError as error:

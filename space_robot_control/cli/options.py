@@ -231,6 +231,17 @@ def plan_flight(**options: Any) -> Flight:
     return Flight(validate(FlightPlan, options, "options"))
 
 
+def remark_on_gains(flight: Flight) -> None:
+    """Say on standard error if the gains leave the time-delay estimate too little margin."""
+    from ..tuning.warning import margin_remarks
+
+    flown = [flight.law, *(law for _, law in flight.swaps)]
+    corner = flight.controller_settings.acceleration_filter_hz
+    remarks = margin_remarks(flown, flight.plant.robot, flight.mission_settings, corner)
+    for remark in remarks:
+        click.echo(remark, err=True)
+
+
 OUTPUT = file_option("--output", help="File to write the JSON to as well.")
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from .options import OPTIONS, flight_options, plan_flight
+from .options import OPTIONS, flight_options, plan_flight, remark_on_gains
 
 
 @click.command()
@@ -41,6 +41,7 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
         check_bag_path(bag)
         if remark := room_remark(flight, bag):
             click.echo(remark, err=True)
+    remark_on_gains(flight)
     compile_kernels()
     period, analysis, began = flight.period, Analysis(), time.monotonic()
     with flight_progress(flight.ticks * period, flight.controller.law.name) as show:

@@ -142,6 +142,8 @@ class Flight:
         """The parameters of every node over its files, by dotted name."""
         self.orchestrator_faults = parse_faults(plan.faults_of(PROCESS_KINDS), KINDS)
         self._check_composed()
+        self.laws = laws
+        """All that the gain set covers, by name: the first is in force at the start."""
         self.law = next(iter(laws.values()))
         """In force at the start."""
         self.plant = Plant(self.robot, settings.plant, self.period)

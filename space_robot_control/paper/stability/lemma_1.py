@@ -18,6 +18,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.dynamics.rho_space import RhoSpaceModel, rho_space_into
 from space_robot_sim.robot import Robot
 
+from ...tuning.spectrum import contraction_matrix
 from .check import Check
 
 Array = NDArray[np.float64]
@@ -59,11 +60,6 @@ class Contraction:
     def radius_below_one(self) -> Check:
         """The condition that the recursion (68) needs at a fixed configuration."""
         return Check(self.radius.max, 1.0)
-
-
-def contraction_matrix(inertia: Array, h_bar: Array) -> Array:
-    """(69): ``W = E - H_S^-1 h_bar`` of ``inertia`` (..., m, m) and the diagonal ``h_bar`` (m,)."""
-    return np.eye(len(h_bar)) - np.linalg.solve(inertia, np.diag(h_bar))
 
 
 def inertia_along(robot: Robot, log: FlightLog, ticks: NDArray[np.intp]) -> Array:

@@ -15,11 +15,12 @@ from random_robots import Case, State, cases
 from space_robot_control.analysis.generalised_motion import mean_acceleration
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
-from space_robot_control.paper.stability.lemma_1 import contraction, contraction_matrix
+from space_robot_control.paper.stability.lemma_1 import contraction
 from space_robot_control.paper.stability.time_delay_error import (
     error_derivative,
     time_delay_error,
 )
+from space_robot_control.tuning.spectrum import contraction_matrix
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim import Robot
 

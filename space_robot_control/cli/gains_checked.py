@@ -1,0 +1,86 @@
+"""The findings of ``space-robot gains check``: made from a flight that is only planned."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from space_robot_msgs_py.config.validation import validate
+from space_robot_msgs_py.errors import InputError
+from space_robot_sim.dynamics.attitude import SINGULAR_ETA
+
+from ..controller.gains import available_laws
+from ..flight.node_settings import FlightSettings
+from ..flight.plan import Flight, FlightPlan
+from ..tuning.gain_check import GainCheck, check_gains
+from ..tuning.inertia import inertia_along
+
+ALL = "all"
+
+
+@dataclass(frozen=True)
+class Checked:
+    """The laws looked at on a flight's robot and mission."""
+
+    flight: Flight
+    checks: list[GainCheck]
+
+    @property
+    def is_sound(self) -> bool:
+        """True if every law is."""
+        return all(check.is_sound for check in self.checks)
+
+
+def checked(options: dict[str, Any]) -> Checked:
+    """Look at the laws that a command's options name.
+
+    Raises:
+        InputError: they name what there is not, or a base that no law can hold.
+    """
+    plan, every = validate(FlightPlan, options, "options"), options["controller"] == ALL
+    if every:
+        plan = plan.model_copy(update={"controller": _first_law(plan)})
+    flight = Flight(plan)
+    laws = flight.laws.values() if every else [flight.law]
+    quaternion = flight.mission.chunk(0, 1).base[0, :4]
+    if abs(quaternion[0]) <= SINGULAR_ETA:
+        raise InputError("base_quaternion: turned by 180 degrees, where the laws are singular")
+    inertia = inertia_along(flight.plant.robot, flight.mission_settings)
+    corner = flight.controller_settings.acceleration_filter_hz
+    return Checked(flight, [check_gains(law, inertia, quaternion, corner) for law in laws])
+
+
+def _first_law(plan: FlightPlan) -> str:
+    settings = FlightSettings.resolve(plan.options(), plan.parameters).controller
+    names = available_laws(settings)
+    if not names:
+        raise InputError(f"gains {settings.gains!r} have no file for any law of this project")
+    return names[0]
+
+
+def report_of(found: Checked) -> dict[str, Any]:
+    """Return the findings as data for JSON."""
+    flight = found.flight
+    return {
+        **{key: flight.description[key] for key in ("robot", "mission", "case", "gains")},
+        "axes": flight.robot.axis_names,
+        "is_sound": found.is_sound,
+        "laws": {check.law: dict(_of_law(check)) for check in found.checks},
+    }
+
+
+def _of_law(check: GainCheck) -> Iterable[tuple[str, Any]]:
+    yield "is_sound", check.is_sound
+    if spectrum := check.spectrum:
+        yield from (
+            ("smallest_eigenvalue", spectrum.smallest),
+            ("largest_eigenvalue", spectrum.largest),
+            ("spectral_radius", spectrum.radius),
+            ("spectral_norm", spectrum.norm),
+            ("torque_scale_margin", spectrum.margin),
+            ("largest_torque_scale", spectrum.largest_scale),
+        )
+    yield "noise_gain", np.asarray(check.noise_gain).tolist()

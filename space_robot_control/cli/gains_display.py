@@ -1,0 +1,65 @@
+"""The findings of ``space-robot gains check`` as tables."""
+
+from __future__ import annotations
+
+from rich.console import Console
+
+from ..analysis.tables import Column, Table, Verdict
+from ..analysis.terminal import print_table
+from ..flight.terminal import say
+from ..tuning.gain_check import GainCheck
+from ..tuning.spectrum import LEAST_MARGIN
+from .gains_checked import Checked
+
+
+def print_checks(found: Checked, console: Console) -> None:
+    """Print margins, noise gains and what they mean."""
+    what = found.flight.description
+    say(
+        console,
+        f"robot {what['robot']}, mission {what['mission']}, case {what['case']}, "
+        f"gains {what['gains']}",
+    )
+    if any(check.spectrum for check in found.checks):
+        print_table(_margins(found.checks), console)
+    print_table(_noise_gains(found), console)
+
+
+def _margins(checks: list[GainCheck]) -> Table:
+    columns = [
+        Column("", is_label=True), Column("smallest", spec=".4f"), Column("largest", spec=".4f"),
+        Column("radius"), Column("margin"),
+    ]  # fmt: skip
+    rows = []
+    for check in checks:
+        if spectrum := check.spectrum:
+            small = "good" if spectrum.is_sound else "bad"
+            word = "sound" if spectrum.margin >= LEAST_MARGIN else "small"
+            rows.append([
+                check.law, spectrum.smallest, spectrum.largest,
+                Verdict(f"{spectrum.radius:.4f} < 1", *_holds(spectrum.contracts)),
+                Verdict(f"{spectrum.margin:.2%}", word if spectrum.contracts else "none", small),
+            ])  # fmt: skip
+    table = Table.of("Eigenvalues of H_S^-1 h_bar along the mission", columns, rows)
+    note = (
+        "The margin is the share by which the torque reported may exceed the one commanded "
+        "until the time-delay estimate diverges."
+    )
+    return Table(table.title, table.columns, table.groups, [note])
+
+
+def _holds(value: bool) -> tuple[str, str]:
+    return ("holds", "good") if value else ("fails", "bad")
+
+
+def _noise_gains(found: Checked) -> Table:
+    columns = [
+        Column("", is_label=True), *(Column(check.law, spec=".3g") for check in found.checks)
+    ]  # fmt: skip
+    names = found.flight.robot.axis_names
+    rows = [
+        [name, *(float(check.noise_gain[axis]) for check in found.checks)]
+        for axis, name in enumerate(names)
+    ]
+    title = "Torque that noise on the rate of an axis becomes, N m per rad/s"
+    return Table.of(title, columns, rows)

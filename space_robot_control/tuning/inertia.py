@@ -1,0 +1,108 @@
+"""The semi-floating inertia H_S (28) in many configurations at once.
+
+The base floats freely, so its translation is eliminated: what is left of the kinetic energy is
+that about the robot's common CoM,
+
+    H_r = sum_i  Jw_i^T I_i Jw_i + m_i (Jv_i - Jv_c)^T (Jv_i - Jv_c),    H_S = J^-T H_r J^-1,
+
+with the Jacobians of body i's angular velocity and CoM, Jv_c their mean weighted by mass, and
+J = blkdiag(J0, E) of (22). `rho_space_into` has the same matrix from composite bodies, one
+configuration a call; this one needs no compiled code, whose loading would make a command wait.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_sim.robot import Robot
+
+from ..mission.mission import Mission, MissionSettings
+
+Array = NDArray[np.float64]
+
+SAMPLING = 0.05
+"""s between two configurations looked at; a leg of a mission takes seconds."""
+
+
+def sampled_mission(robot: Robot, settings: MissionSettings, step: float = SAMPLING) -> Mission:
+    """Return the mission in ticks of ``step`` s, to be looked at rather than flown.
+
+    Raises:
+        InputError: the waypoints do not fit the times or the joints.
+    """
+    return Mission(robot.n, settings, step)
+
+
+def inertia_along(robot: Robot, settings: MissionSettings, step: float = SAMPLING) -> Array:
+    """Return H_S (K, m, m) of ``robot`` along a mission's reference, every ``step`` s.
+
+    Args:
+        robot: with its payload, if it carries one.
+        settings: of the mission; its last waypoint is looked at too.
+        step: s.
+
+    Raises:
+        InputError: the waypoints do not fit the times or the joints.
+    """
+    mission = sampled_mission(robot, settings, step)
+    chunk = mission.chunk(0, int(np.ceil(mission.duration / step - 1e-9)) + 1)
+    return inertia_in_rho(chunk.base[0, :4], semi_floating_inertia(robot, chunk.joints[:, 0]))
+
+
+def attitude_jacobian(quaternion: Array) -> Array:
+    """Return ``J0 = (eta E + skew(eps)) / 2`` of (1), (3, 3): epsdot = J0 omega_base."""
+    w, x, y, z = quaternion
+    return 0.5 * np.array([[w, -z, y], [z, w, -x], [-y, x, w]])
+
+
+def inertia_in_rho(quaternion: Array, inertia: Array) -> Array:
+    """Return ``J^-T H_r J^-1`` (K, m, m) of ``inertia`` (K, m, m) at one attitude of the base."""
+    inverse = np.eye(inertia.shape[-1])
+    inverse[:3, :3] = np.linalg.inv(attitude_jacobian(quaternion))
+    moved: Array = inverse.T @ inertia @ inverse
+    return moved
+
+
+def semi_floating_inertia(robot: Robot, joint_positions: Array) -> Array:
+    """Return H_r (K, m, m) about the base's axes for ``joint_positions`` (K, n), rad."""
+    count, n = joint_positions.shape
+    rotation = np.broadcast_to(np.eye(3), (count, 3, 3))
+    joint = np.zeros((count, 3))
+    angular = np.zeros((n + 1, count, 3, n + 3))
+    linear = np.zeros_like(angular)
+    axes, joints = [], []
+    for body in range(n + 1):
+        if body:
+            i = body - 1
+            twist = _about(np.array(robot.alpha[i]), axis=0)
+            joint = joint + rotation @ np.array([robot.a[i], 0.0, 0.0])
+            rotation = rotation @ twist
+            joint = joint + rotation @ np.array([0.0, 0.0, robot.d[i]])
+            rotation = rotation @ _about(joint_positions[:, i], axis=2)
+            axes.append(rotation[:, :, 2])
+            joints.append(joint)
+        com = joint + rotation @ robot.com[body]
+        angular[body, :, :, :3] = np.eye(3)
+        linear[body, :, :, :3] = np.cross(np.eye(3), com[:, np.newaxis, :]).swapaxes(1, 2)
+        for column, (axis, origin) in enumerate(zip(axes, joints, strict=True), start=3):
+            angular[body, :, :, column] = axis
+            linear[body, :, :, column] = np.cross(axis, com - origin)
+        # from here on in the body's own axes, where its inertia is constant
+        angular[body] = rotation.swapaxes(1, 2) @ angular[body]
+    linear -= np.tensordot(robot.mass / robot.mass.sum(), linear, axes=1)
+    turning = angular.swapaxes(2, 3) @ robot.inertia[:, np.newaxis] @ angular
+    moving = linear.swapaxes(2, 3) @ (robot.mass[:, np.newaxis, np.newaxis, np.newaxis] * linear)
+    total: Array = (turning + moving).sum(axis=0)
+    return total
+
+
+def _about(angle: Array, axis: int) -> Array:
+    """Return the rotation (..., 3, 3) by ``angle`` (...), rad, about the axis x (0) or z (2)."""
+    rotation = np.zeros((*angle.shape, 3, 3))
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    rotation[..., axis, axis] = 1.0
+    rotation[..., first, first] = rotation[..., second, second] = np.cos(angle)
+    rotation[..., second, first] = np.sin(angle)
+    rotation[..., first, second] = -np.sin(angle)
+    return rotation

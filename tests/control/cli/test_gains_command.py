@@ -1,0 +1,85 @@
+"""``space-robot gains``: what it prints and refuses."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+from space_robot_control.cli.main import cli
+from space_robot_msgs_py.errors import InputError, SpaceRobotError
+
+
+def run(*arguments: str, columns: int = 80) -> Result:
+    return CliRunner(env={"COLUMNS": str(columns)}).invoke(cli, ["gains", *arguments])
+
+
+def report(*arguments: str) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(run("check", *arguments, "--json").stdout)
+    return found
+
+
+def test_table_iv_is_not_sound() -> None:
+    result = run("check", "--json")
+    assert isinstance(result.exception, SpaceRobotError)
+    assert result.exception.exit_code == 1
+    assert "tde_smc, tde_stc, tde_tsmc" in str(result.exception)
+    found = json.loads(result.stdout)
+    assert found["is_sound"] is False
+    assert list(found["laws"]) == ["ctc", "ctc_smc", "tde_smc", "tde_stc", "tde_tsmc"]
+    stc = found["laws"]["tde_stc"]
+    assert stc["torque_scale_margin"] == pytest.approx(0.0031, abs=5e-5)
+    assert stc["spectral_radius"] == pytest.approx(0.997, abs=5e-4)
+    assert stc["spectral_norm"] == pytest.approx(1.029, abs=5e-4)
+    # h_bar sigma / delta, and J0 = E / 2 on either side of the base
+    assert stc["noise_gain"][3:6] == pytest.approx([5.0 / 5e-4 + 5.0] * 3)
+    assert stc["noise_gain"][:3] == pytest.approx([0.25 * (50.0 / 5e-4 + 50.0)] * 3)
+
+
+def test_laws_with_a_model_are_sound() -> None:
+    result = run("check", "--controller", "ctc")
+    assert result.exit_code == 0
+    assert "H_S^-1 h_bar" not in result.stdout
+    assert report("--controller", "ctc")["laws"]["ctc"].keys() == {"is_sound", "noise_gain"}
+
+
+def test_parameters_count_as_in_a_flight() -> None:
+    one = report("--controller", "tde_stc", "--set", "controller.tde_stc.h_bar=[0.5]")
+    two = report("--controller", "tde_stc", "--set", "controller.tde_stc.h_bar=[1.0]")
+    smallest = [found["laws"]["tde_stc"]["smallest_eigenvalue"] for found in (one, two)]
+    assert smallest[1] == pytest.approx(2.0 * smallest[0])
+    heavy = report("--controller", "tde_stc", "--case", "4-2")["laws"]["tde_stc"]
+    assert heavy["torque_scale_margin"] == pytest.approx(0.0023, abs=5e-5)
+
+
+def test_tables_fit_a_terminal() -> None:
+    text = run("check", "--robot", "seven_joint").stdout
+    for words in ("radius", "margin", "wrist_roll", "tde_tsmc", "small"):
+        assert words in text
+    assert "…" not in text
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--controller", "nothing"), "unknown controller 'nothing'"),
+        (("--gains", "nothing"), "unknown gain set 'nothing'"),
+        (("--robot", "nothing"), "unknown robot 'nothing'"),
+        (("--set", "controller.tde_stc.h_bar=[0.0]"), "values above 0"),
+        (("--set", "mission.base_quaternion=[0.0, 1.0, 0.0, 0.0]"), "180 degrees"),
+    ],
+)
+def test_bad_input_is_told(options: tuple[str, ...], said: str) -> None:
+    error = run("check", *options).exception
+    assert isinstance(error, InputError)
+    assert said in str(error)
+
+
+def test_a_flight_says_it_on_standard_error_alone() -> None:
+    runner = CliRunner()
+    result = runner.invoke(cli, ["simulate", "--duration", "0.01", "--json"])
+    assert result.exit_code == 0
+    json.loads(result.stdout)
+    assert "warning: tde_stc: h_bar leaves 0.31% of margin" in result.stderr
