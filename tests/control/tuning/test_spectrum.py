@@ -9,12 +9,11 @@ from closed_loop import H_BAR
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot_control.controller.reference_buffer import ReferenceBuffer
 from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.flight.simulate import simulate
 from space_robot_control.tuning.inertia import inertia_along, semi_floating_inertia
 from space_robot_control.tuning.spectrum import Spectrum, eigenvalues, spectrum
 from space_robot_msgs_py.errors import DivergedError
-from space_robot_msgs_py.samples import Command
 from space_robot_sim.robot import Robot
 
 
@@ -93,19 +92,12 @@ def test_wrong_masses_move_eigenvalues_no_further_than_said(seed: int, share: fl
     assert np.all(found >= nominal / (1.0 + share) * (1.0 - 1e-9))
 
 
-def fly(controller: str, reported: float, given_torque: float = 1.0) -> float:
-    """Case 1, with a share of the command given and one reported; the largest error of an axis."""
-    flight, worst = Flight(FlightPlan(controller=controller)), 0.0
-    references, command = ReferenceBuffer(flight.robot.n), Command(0, np.zeros(9))
-    for tick in range(flight.ticks):
-        if not references.covers(tick):
-            references.add(flight.mission.chunk(tick, 1000))
-        torque = flight.controller.update(flight.plant.state, references.at(tick)).torque
-        command.tick, command.torque[:] = tick, given_torque * torque
-        flight.plant.step(command)
-        flight.plant.state.applied_torque[:] = reported * torque
-        worst = max(worst, float(np.max(np.abs(flight.controller.signals.error))))
-    return worst
+def fly(controller: str = "tde_stc", **plant: float) -> float:
+    """The largest error of any axis in case 1, with parameters of the plant."""
+    parameters = {"plant": {name: [value] for name, value in plant.items()}}
+    log = simulate(Flight(FlightPlan(controller=controller, parameters=parameters)))
+    assert log.telemetry is not None
+    return float(np.max(np.abs(log.telemetry[:, 3])))
 
 
 def test_margin_of_table_iv() -> None:
@@ -119,14 +111,14 @@ def test_margin_of_table_iv() -> None:
 @pytest.mark.parametrize("controller", ["tde_smc", "tde_stc"])
 def test_a_torque_reported_too_large_by_more_than_the_margin_diverges(controller: str) -> None:
     with pytest.raises(DivergedError):
-        fly(controller, reported=1.01)
-    assert fly(controller, reported=1.005) < 1e-3
+        fly(controller, echo_scale=1.01)
+    assert fly(controller, echo_scale=1.005) < 1e-3
 
 
 def test_a_torque_not_given_as_commanded_does_no_harm_if_the_command_is_reported() -> None:
-    assert fly("tde_stc", reported=1.0, given_torque=0.99) < 1e-6
-    assert fly("tde_stc", reported=1.0, given_torque=1.5) < 1e-6
+    assert fly(drive_scale=0.99) < 1e-6
+    assert fly(drive_scale=1.5) < 1e-6
 
 
 def test_a_torque_reported_too_small_costs_accuracy_but_does_not_diverge() -> None:
-    assert 1e-4 < fly("tde_stc", reported=0.99) < 1e-2
+    assert 1e-4 < fly(echo_scale=0.99) < 1e-2
