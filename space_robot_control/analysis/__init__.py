@@ -4,6 +4,7 @@
 |---|---|
 | `metrics` | RMS in both definitions, maxima, chatter |
 | `spectrum` | power above 100 Hz |
+| `ripple` | torque that the task does not ask for, and its spectrum |
 | `settling` | time until the error stays small after a motion |
 | `actuation` | saturation, latency, commands that were not applied |
 | `estimate_error` | error of the time-delay estimate |

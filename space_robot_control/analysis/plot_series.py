@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from space_robot_msgs_py.errors import InputError
 from .described import robot_of
 from .metrics import error_columns, torque_columns, tracking_error
 from .pointing import PointingError, pointing_error
+from .ripple import RippleSpectrum, ripple_spectrum
 from .waypoints import junction_ticks
 
 Array = NDArray[np.float64]
@@ -70,15 +72,17 @@ class PlotSeries(NamedTuple):
     """None where the robot is not known."""
     latency_ms: Array | None
     """(K,) of every answer, by the wall clock; None for flights without any."""
+    ripple: RippleSpectrum | None
+    """None where the robot is not known, or the flight is too short."""
 
     @classmethod
     def of(cls, log: FlightLog) -> Self:
         """Compute them from a whole flight or an excerpt."""
         error, axes = tracking_error(log), log.axes
-        try:
+        pointing = ripple = None
+        with suppress(InputError):
             pointing = pointing_error(log, robot_of(log))
-        except InputError:
-            pointing = None
+            ripple = ripple_spectrum(log, robot_of(log))
         latency = None
         if log.latency_s is not None:
             known = log.latency_s[np.isfinite(log.latency_s)]
@@ -90,6 +94,7 @@ class PlotSeries(NamedTuple):
             BaseTorque.of(log),
             pointing,
             latency,
+            ripple,
         )
 
 

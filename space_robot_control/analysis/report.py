@@ -18,6 +18,7 @@ from .described import estimator, robot_of, torque_limits
 from .estimate_error import EstimateError
 from .metrics import Chatter, Maxima, Rms, tracking_error
 from .pointing import Pointing
+from .ripple import Ripple
 from .settling import Settling
 
 DESCRIBED = ("controller", "case", "gains", "robot")
@@ -117,6 +118,7 @@ _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
     "rms": lambda log: Rms(log.axes),
     "maxima": lambda log: Maxima(log.axes),
     "chatter": lambda log: Chatter(log.axes, log.timebase.period),
+    "ripple": lambda log: Ripple(log, robot_of(log)),
     "settling": Settling,
     "saturation": lambda log: Saturation(torque_limits(log)),
     "latency": lambda log: Latency(log.timebase.period),

@@ -21,6 +21,10 @@ DEFINITIONS = {
     "maximum": "largest absolute value on any axis of the column",
     "variation per s": "how far the torque moves up and down in a second, mean over the axes",
     "power > 100 Hz": "share of the torque's power above 100 Hz, mean over the axes: chatter",
+    "ripple": "root mean square, above 2 Hz, of the torque beside the one that inverse dynamics "
+    "asks for along the reference, mean over the axes: limit cycles, noise and switching",
+    "ripple's peak": "frequency at which the ripple's spectrum is highest, and the root mean "
+    "square of what is within 0.5 Hz of it",
     "settled after": "time from the last waypoint after which the error stays to the end within "
     f"{BAND:g} (rad on joints; on the attitude's quaternion, where it is 4.1 arcsec)",
     "saturation": "ticks at which a torque was at the actuator's limit",
@@ -51,19 +55,19 @@ class Line(NamedTuple):
 
 
 def rms_table(report: Report) -> Table:
-    """Tabulate RMS and chatter of a flight; its remarks stand below."""
+    """Tabulate RMS, chatter and ripple of a flight; its remarks stand below."""
     title = f"{flown(report)}: {report['ticks']} ticks, {report['duration_s']:g} s"
     columns = (
-        Column(is_label=True), Column("unit"), Column("RMS, mean of axes"),
-        Column("RMS, eq. (64)"), Column("variation per s", spec=".3g"),
-        Column("power > 100 Hz", spec=".2e"),
+        Column(is_label=True), Column("unit"), Column("RMS, mean\nof axes"),
+        Column("RMS, eq.\n(64)"), Column("variation\nper s", spec=".3g"),
+        Column("power >\n100 Hz", spec=".2e"), Column("ripple", spec=".2e"),
     )  # fmt: skip
-    chatter = report["chatter"].values()
+    rough = *report["chatter"].values(), (report["ripple"] or {}).get("rms", {})
     rows: list[list[Any]] = []
     for key, value in report["rms"]["mean_axis"].items():
         spec = ".4f" if "torque" in key else ".3e"
         rms = f"{value:{spec}}", f"{report['rms']['eq64'][key]:{spec}}"
-        rows.append([key, unit_of(key), *rms, *(measure.get(key, "") for measure in chatter)])
+        rows.append([key, unit_of(key), *rms, *(measure.get(key, "") for measure in rough)])
     return Table(title, columns, [Group(rows)], remarks(report))
 
 
@@ -105,7 +109,7 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
 
     Args:
         reports: of `analyze`.
-        brief: without RMS and chatter, which a table of their own shows.
+        brief: without what `rms_table` shows.
     """
     each, one = partial(_each_key, reports), partial(_line, reports)
     found: list[Line] = []
@@ -114,6 +118,8 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
         found += each("RMS, eq. (64)", ("rms", "eq64"), unit_of)
         found += each("variation per s", ("chatter", "total_variation_per_s"), "N m/s")
         found += each("power > 100 Hz", ("chatter", "power_above_100_hz"))
+        found += each("ripple", ("ripple", "rms"), "N m")
+    found += each("ripple's peak", ("ripple", "peak"), text=_peak)
     found += each("maximum", ("maxima",), unit_of)
     found += each("settled after", ("settling", "settled_s"), "s", text=_settled)
     found.append(one("saturation", "ticks at a limit", "", _saturated))
@@ -177,6 +183,10 @@ def _angle(value: float) -> str:
     arcsec = value / ARCSEC
     readable = f"{arcsec:.3g} arcsec" if arcsec < 3600 else f"{arcsec / 3600:.3g} deg"
     return f"{value:.3g} rad\n{readable}"
+
+
+def _peak(value: dict[str, float] | None) -> str:
+    return f"{value['frequency_hz']:.4g} Hz\n{value['rms']:.2e} N m" if value else NONE
 
 
 def _settled(value: float | None) -> str:

@@ -1,4 +1,4 @@
-"""The inertia matrix, bias force and accelerations of a `Robot`, in new arrays."""
+"""The inertia matrix, bias force, accelerations and torques of a `Robot`, in new arrays."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..dynamics.aba import aba
 from ..dynamics.crba import crba
+from ..dynamics.inverse_dynamics import inverse_dynamics_along
 from ..dynamics.kinematics import forward_kinematics, spatial_velocities
 from ..dynamics.model import Data
 from ..dynamics.rnea import rnea_bias
 
 if TYPE_CHECKING:
+    from space_robot_msgs_py.compiled.records import Block
+
     from .robot import Robot
 
 Array = NDArray[np.float64]
@@ -126,4 +129,21 @@ def forward_dynamics(
         Data.allocate(n),
         out,
     )
+    return out
+
+
+def inverse_dynamics(robot: Robot, references: Block) -> Array:
+    """Return the torque that each desired motion asks of a robot whose base floats freely.
+
+    Args:
+        robot: the robot's numbers.
+        references: (N,) array of a `space_robot_msgs_py.samples.Reference` each, of unit
+            quaternions.
+
+    Returns:
+        (N, n+3) N m, on the base's axes, which turn with it, then on the joints.
+    """
+    n = robot.n
+    out = np.empty((len(references), n + 3))
+    inverse_dynamics_along(robot.model, references, Data.allocate(n), np.empty((2, 3)), out)
     return out

@@ -6,10 +6,11 @@ worker processes. The same log gives the same bytes.
 
 from .base_torque import chatter, junctions
 from .overlay import errors_and_torques, latency_histogram, pointing
+from .ripple import ripple
 from .single_flight import control_results, desired_joints
 from .style import save_figure
 
 __all__ = [
     "chatter", "control_results", "desired_joints", "errors_and_torques", "junctions",
-    "latency_histogram", "pointing", "save_figure",
+    "latency_histogram", "pointing", "ripple", "save_figure",
 ]  # fmt: skip

@@ -16,6 +16,7 @@ from ..plot_series import PlotSeries
 from ..words import flown
 from .base_torque import chatter, junctions
 from .overlay import errors_and_torques, latency_histogram, pointing
+from .ripple import ripple
 from .single_flight import control_results, desired_joints
 from .style import save_figure
 
@@ -102,6 +103,7 @@ class FigureSet:
             yield "control_results", caption, errors_and_torques(flights)
         yield "junctions", "Base torque x where two motions meet", junctions(torques)
         yield "chatter", "A stretch of base torque, and its spectrum", chatter(torques)
+        yield "ripple", "Spectrum of the torques' ripple", ripple(flights)
         caption = "The end effector's pointing error in the inertial frame"
         yield "pointing", caption, pointing(flights)
         yield "latency", "Time from a state's sending to its command's", latency_histogram(flights)

@@ -38,10 +38,10 @@ def errors_and_torques(flights: Mapping[str, PlotSeries]) -> Figure:
     """
     errors = _panels(
         flights, lambda series: series.errors,
-        lambda key: f"|{_words(key)} error|{'' if key == 'attitude' else ' (rad)'}", True,
+        lambda key: f"|{words(key)} error|{'' if key == 'attitude' else ' (rad)'}", True,
     )  # fmt: skip
     torques = _panels(
-        flights, lambda series: series.torques, lambda key: f"|{_words(key)}| (N m)", False
+        flights, lambda series: series.torques, lambda key: f"|{words(key)}| (N m)", False
     )
     return _draw([errors, torques], list(flights))
 
@@ -140,7 +140,7 @@ def _panels(
     return [_Panel(found, label(key), is_logarithmic) for key, found in curves.items()]
 
 
-def _words(key: str) -> str:
+def words(key: str) -> str:
     """Write ``joints_1_3`` as in a label: joints 1-3."""
     word, _, axes = key.partition("_")
     if not axes or not axes[0].isdigit():

@@ -23,6 +23,7 @@ PATHS: dict[str, tuple[str, ...]] = {
     "maximum": ("maxima",),
     "variation per s": ("chatter", "total_variation_per_s"),
     "power > 100 Hz": ("chatter", "power_above_100_hz"),
+    "ripple": ("ripple", "rms"),
     "settled after": ("settling", "settled_s"),
 }
 """Groups with a line for every key below."""
@@ -43,7 +44,7 @@ def numbered(value: Any, counter: itertools.count[int]) -> Any:
 
 @pytest.fixture(scope="module")
 def reports() -> list[dict[str, Any]]:
-    log = simulate(Flight(FlightPlan(duration=0.2)))
+    log = simulate(Flight(FlightPlan(duration=1.0)))
     log.latency_s = np.linspace(1e-4, 3e-4, log.ticks)
     log.flight["parameters"]["plant"] |= {"base_torque_limit": 1.0, "joint_torque_limit": 1.0}
     report = analyze(log)
@@ -67,6 +68,9 @@ def test_every_line_is_its_figure(reports: list[dict[str, Any]]) -> None:
             for key in path:
                 values = values[key]
             texts |= {(group, key): f"{value:.4g}" for key, value in values.items()}
+        for key, peak in r["ripple"]["peak"].items():
+            text = f"{peak['frequency_hz']:.4g} Hz\n{peak['rms']:.2e} N m"
+            texts["ripple's peak", key] = text
         share = r["saturation"]["share"]
         texts["saturation", "ticks at a limit"] = f"{r['saturation']['ticks']} ({share:.2%})"
         for name in ("p50", "p99", "max"):
@@ -95,7 +99,7 @@ def test_every_line_is_its_figure(reports: list[dict[str, Any]]) -> None:
 
 
 def test_brief_leaves_out_what_another_table_shows(reports: list[dict[str, Any]]) -> None:
-    left_out = [*PATHS][:2] + [*PATHS][3:5]
+    left_out = [*PATHS][:2] + [*PATHS][3:6]
     assert lines(reports, brief=True) == [
         line for line in lines(reports) if line.group not in left_out
     ]
@@ -117,7 +121,7 @@ def test_a_figure_that_a_flight_does_not_have_is_a_dash(reports: list[dict[str, 
     found = by_label(lines([other, reports[0]]))
     for label in (
         ("saturation", "ticks at a limit"), ("latency", "p99"), ("estimate error", "base max"),
-        ("pointing", "RMS"),
+        ("pointing", "RMS"), ("ripple", "base_torque"),
     ):  # fmt: skip
         assert found[label].texts[0] == NONE
         assert found[label].texts[1] != NONE

@@ -49,7 +49,7 @@ def test_blocks_make_the_whole(n: int, seed: int, cuts: list[int]) -> None:
     assert_close(whole, analyzed(log, cuts))
 
 
-FLOWN = simulate(Flight(FlightPlan(duration=0.2, case="3")))
+FLOWN = simulate(Flight(FlightPlan(duration=1.0, case="3")))
 
 
 @settings(max_examples=20)

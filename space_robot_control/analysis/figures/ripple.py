@@ -1,0 +1,55 @@
+"""The spectrum of the torques' ripple, law beside law."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..metrics import torque_columns
+from ..plot_series import PlotSeries
+from .overlay import words
+from .style import Look, house_style, legend_above, page, scattered
+
+
+@house_style()
+def ripple(flights: Mapping[str, PlotSeries]) -> Figure:
+    """Draw the spectral density of the ripple, a panel a group of axes (the mean over them).
+
+    Args:
+        flights: by name.
+    """
+    known = {name: s.ripple for name, s in flights.items() if s.ripple is not None}
+    if not known:
+        return page(12.0, "None of these flights has a known robot and is long enough for ripple.")
+    columns = [torque_columns(spectrum.mean_square.shape[1]) for spectrum in known.values()]
+    groups = {key: axes for column in columns for key, axes in column.items()}
+    figure = page(18.0 + 55.0 * len(groups))
+    panels = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
+    names = list(flights)
+    for panel, key in zip(panels, groups, strict=True):
+        for (name, spectrum), column in zip(known.items(), columns, strict=True):
+            if key not in column:
+                continue
+            frequency = spectrum.frequency
+            density = spectrum.group(column[key]) / (frequency[1] - frequency[0])
+            look = Look.of(names.index(name))
+            panel.plot(
+                frequency, np.where(density > 0.0, density, np.nan), color=look.colour,
+                linestyle=look.dashes, marker=look.marker, linewidth=0.7,
+                markevery=_marks(frequency, names.index(name), len(names)),
+            )  # fmt: skip
+        panel.set(xscale="log", yscale="log", ylabel=f"PSD of {words(key)} ((N m)²/Hz)")
+    panels[-1].set_xlabel("frequency (Hz)")
+    panels[-1].xaxis.set_major_formatter("{x:g}")
+    figure.align_ylabels()
+    legend_above(figure, names, dashed=True)
+    return figure
+
+
+def _marks(frequency: np.ndarray, index: int, count: int) -> list[int]:
+    """Choose the frequencies to mark, evenly along the logarithmic axis."""
+    even = np.geomspace(frequency[0], frequency[-1], 1000)
+    marks: list[int] = np.searchsorted(frequency, even[scattered(1000, index, count)]).tolist()
+    return marks
