@@ -19,9 +19,9 @@ from space_robot_sim.robot import Robot
 from ..laws import ControlLaw
 from .controller import Controller
 from .gains import PARAMETERS, build_laws, check_gains, gain_lengths, gain_range
-from .law_changes import LawChanges
+from .law_choice import LawChoice
 from .settings import ControllerNodeSettings
-from .swaps import Swap, parse_swaps
+from .swaps import parse_swaps
 
 
 class LawSet:
@@ -37,14 +37,12 @@ class LawSet:
         self._laws = build_laws(settings, axes)
         for law in self._laws.values():
             self._declare(law)
-        self.chosen = next(iter(self._laws.values()))
-        self._may_differ = True
-        """True if law or gains may be others than at the last tick answered."""
-        self._changes = LawChanges()
-        self._was_swapped = False
-        self._swaps: list[Swap] = parse_swaps(settings.swaps, settings.period)
-        for swap in self._swaps:
-            one_of(swap.name, self._laws, "controller", " of swaps")
+        swaps = [
+            (tick, self._laws[one_of(name, self._laws, "controller", " of swaps")])
+            for tick, name in parse_swaps(settings.swaps, settings.period)
+        ]
+        self.choice = LawChoice(next(iter(self._laws.values())), swaps)
+        """The law in force."""
         descriptor = node.describe_parameter("controller")
         descriptor.additional_constraints = f"one of {', '.join(self._laws)}"
         node.set_descriptor("controller", descriptor)
@@ -57,27 +55,14 @@ class LawSet:
             controller = Controller(robot, law, self._settings.period)
             controller.update(rest, Reference.at_rest(robot.n))
 
-    def change_at(self, tick: int) -> LawChange | None:
-        """Choose the law of the swaps that are due; what is in force, if not as before.
-
-        Called once for each tick that is answered.
-        """
-        while self._swaps and self._swaps[0].tick <= tick:
-            self.chosen = self._laws[self._swaps.pop(0).name]
-            self._may_differ = self._was_swapped = True
-        if not self._may_differ:
-            return None
-        self._may_differ = False
-        return self._changes.at(tick, self.chosen)
-
     def tell(self, change: LawChange) -> None:
         """Log a change, and let the parameter ``controller`` follow a planned swap."""
         when = (
             f"from tick {change.law.tick} on (t = {change.law.tick * self._settings.period:.4f} s)"
         )
         self._node.log(f"controller: {change}, {when}")
-        if self._was_swapped:
-            self._was_swapped = False
+        if self.choice.was_swapped:
+            self.choice.was_swapped = False
             name = Parameter("controller", value=change.law.name)  # type: ignore[no-untyped-call]
             self._node.set_parameters([name])
 
@@ -104,7 +89,7 @@ class LawSet:
     def _on_set(self, parameters: list[Any]) -> SetParametersResult:
         """Check all changes first, then make them; the loop sees them at its next tick."""
         gains = {name: law.gain_values for name, law in self._laws.items()}
-        chosen = self.chosen
+        chosen = self.choice.chosen
         try:
             for parameter in parameters:
                 law_name, _, gain = parameter.name.partition(".")
@@ -118,5 +103,5 @@ class LawSet:
             return SetParametersResult(successful=False, reason=str(error))
         for name, law in self._laws.items():
             law.gain_values = gains[name]
-        self.chosen, self._may_differ = chosen, True
+        self.choice.choose(chosen)
         return SetParametersResult(successful=True)

@@ -11,18 +11,15 @@ from space_robot_msgs_py.ros.endpoints import RawPublisher, flush
 from space_robot_msgs_py.ros.health import Health, Level
 from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
-from space_robot_msgs_py.wire.codecs import CommandCodec
-from space_robot_msgs_py.wire.controller_law import LawCodec
-from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
-from space_robot_msgs_py.wire.stamp_guard import StampGuard
 from space_robot_sim.robot import Robot
 
+from .answering import Answering, Standing
 from .controller import Controller
 from .law_set import LawSet
 from .reference_input import ReferenceInput
 from .settings import ControllerNodeSettings
 from .state_input import StateInput
-from .supervisor import Mode, Supervisor
+from .supervisor import Mode
 
 FLUSH_S = 1.0
 LOOK_AHEAD_S = 0.02
@@ -46,22 +43,20 @@ class ControllerLoop:
         self._laws = LawSet(node, settings, robot.n + 3)
         self._laws.warm_up(robot)
         self._controller = Controller(
-            robot, self._laws.chosen, settings.period, settings.acceleration_filter_hz
+            robot, self._laws.choice.chosen, settings.period, settings.acceleration_filter_hz
         )
-        self._supervisor = Supervisor(self._controller, robot.n + 3, settings.hold_ticks)
-        self._stamps = StampGuard(settings.longest_jump)
+        self._answering = Answering(self._controller, self._laws.choice, settings, robot)
         timebase = settings.timebase
         self._states = StateInput(node, robot, timebase)
         self._references = ReferenceInput(node, robot, timebase, settings.reference_timeout)
-        self._commands = CommandCodec(robot.axis_names, timebase)
-        self._telemetry = TelemetryCodec(robot.axis_names)
-        self._law = LawCodec(timebase)
         self._command_out = RawPublisher(node, topics.COMMAND)
-        self._telemetry_out = RawPublisher(node, topics.TELEMETRY)
-        self._law_out = RawPublisher(node, topics.LAW)
-        self.outputs = (self._command_out, self._telemetry_out, self._law_out)
+        self._out = {
+            topics.COMMAND: self._command_out,
+            topics.TELEMETRY: RawPublisher(node, topics.TELEMETRY),
+            topics.LAW: RawPublisher(node, topics.LAW),
+        }
+        self.outputs = tuple(self._out.values())
         self.wait_for = settings.wait_for
-        self._answered, self._answer = -1, b""
         self._unanswered = -1
         """A state's tick whose reference has not come yet; -1: none."""
         self._state_at = time.monotonic()
@@ -80,11 +75,16 @@ class ControllerLoop:
                 self._look_ahead(time.monotonic())
                 return self._states.wait
             tick = found
-            if tick == self._answered:  # the plant asked again: the same answer
-                self._command_out.publish(self._answer)
+            last = self._answering.stamps.last
+            standing = self._answering.judge(tick)
+            if standing is Standing.ANSWERED:  # the plant asked again: the same answer
+                self._command_out.publish(self._answering.answer)
                 return None
-            if tick != self._stamps.last and not self._believe(tick):
+            if standing is Standing.REFUSED:
+                self._states.reject("stamp")
                 return None
+            if tick != last:
+                self._believe(tick, last)
         reference = self._references.at(tick)
         if reference is None:
             is_awaited = self._references.is_awaited
@@ -97,15 +97,17 @@ class ControllerLoop:
 
     def stand_down(self) -> None:
         """Answer one more state, with no torque: the plant holds that."""
-        if self._answered >= 0 and self._node.count_publishers(topics.JOINT_STATES.name):
+        answering, answered = self._answering, self._answering.answered
+        if answered >= 0 and self._node.count_publishers(topics.JOINT_STATES.name):
             until = time.monotonic() + STAND_DOWN_S
             tick = self._unanswered
-            while tick <= self._answered and time.monotonic() < until:
+            while tick <= answered and time.monotonic() < until:
                 self._node.let_others_work()
                 found = self._states.take()
-                tick = self._answered if found is None else found
-            if tick > self._answered:
-                self._command_out.publish(self._commands.encode(self._supervisor.stand_down(tick)))
+                tick = answered if found is None else found
+            if tick > answered:
+                none = answering.supervisor.stand_down(tick)
+                self._command_out.publish(answering.encode(none))
         flush(self.outputs, FLUSH_S)
 
     def close(self) -> None:
@@ -114,11 +116,11 @@ class ControllerLoop:
 
     def health(self) -> Health:
         """Tell the mode, the law, and what was rejected."""
-        supervisor, references = self._supervisor, self._references
+        supervisor, references = self._answering.supervisor, self._references
         rejected = self._states.rejected + references.rejected + supervisor.rejected
         silence = time.monotonic() - self._state_at
         values: dict[str, float | int | str] = {
-            "tick": self._answered,
+            "tick": self._answering.answered,
             "controller": self._controller.law.name,
             "references_held": references.held,
             **{f"rejected: {reason}": count for reason, count in rejected.items()},
@@ -127,7 +129,7 @@ class ControllerLoop:
             values |= entry.counts("rejected")
         if references.is_waited_for:
             return Health("waiting for the reference: no mission sends it", Level.WARN, values)
-        if self._answered < 0:
+        if self._answering.answered < 0:
             return Health("waiting for the first state", values=values)
         if supervisor.mode is not Mode.NOMINAL:
             level = Level.ERROR if supervisor.mode is Mode.SAFE else Level.WARN
@@ -146,38 +148,22 @@ class ControllerLoop:
             self._look_ahead_at = now + LOOK_AHEAD_S
 
     def _answer_tick(self, tick: int, reference: Block) -> None:
-        controller = self._controller
-        change = self._laws.change_at(tick)
-        if change:
-            self._law_out.publish(self._law.encode(change.law))
-            if controller.law is not self._laws.chosen:
-                controller.law = self._laws.chosen
-        state = self._states.state
-        state.tick = tick
-        mode = self._supervisor.mode
-        command = self._supervisor.answer(state, reference)
-        self._answer = self._commands.encode(command)
-        self._command_out.publish(self._answer)
-        self._answered = tick
-        if self._supervisor.mode is not mode:
-            self._node.report()
-        if change:
-            self._laws.tell(change)
-        if tick % self._settings.telemetry_decimation == 0:
-            self._telemetry_out.publish(self._telemetry.encode(tick, controller.telemetry()))
+        answering = self._answering
+        mode = answering.supervisor.mode
+        for topic, message in answering.messages(tick, self._states.state, reference):
+            self._out[topic].publish(message)
+            if topic is topics.COMMAND and answering.supervisor.mode is not mode:
+                self._node.report()
+        if answering.change:
+            self._laws.tell(answering.change)
 
-    def _believe(self, tick: int) -> bool:
-        """Judge a state's stamp: it fits, or begins a new time; then its sender is followed."""
-        stamps, last = self._stamps, self._stamps.last
-        if not stamps.passes(tick):
-            self._states.reject("stamp")
-            return False
+    def _believe(self, tick: int, last: int) -> None:
+        """Follow the sender of a state whose stamp is believed; it may begin a new time."""
         self._states.follow()
         references = self._references.buffer
-        if stamps.is_new_time:
+        if self._answering.stamps.is_new_time:
             references.begin(tick)
             if last >= 0:
                 self._node.log(f"a new time begins at tick {tick}, after {last}")
         references.now = tick
         self._state_at = time.monotonic()
-        return True

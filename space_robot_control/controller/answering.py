@@ -1,0 +1,87 @@
+"""What a controller does with a state that has come: answer it, once, or leave it alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from enum import Enum
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.law_history import LawChange
+from space_robot_msgs_py.compiled.records import Block
+from space_robot_msgs_py.samples import Command, RobotState
+from space_robot_msgs_py.wire.codecs import CommandCodec
+from space_robot_msgs_py.wire.controller_law import LawCodec
+from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
+from space_robot_msgs_py.wire.stamp_guard import StampGuard
+from space_robot_sim.robot import Robot
+
+from .controller import Controller
+from .law_choice import LawChoice
+from .settings import ControllerNodeSettings
+from .supervisor import Supervisor
+
+
+class Standing(Enum):
+    """How a state stands by its stamp."""
+
+    ANSWERED = "answered"
+    """It was the last one answered: the plant asks again."""
+    NEW = "new"
+    """It is to be answered."""
+    REFUSED = "refused"
+    """Its stamp is not believed."""
+
+
+class Answering:
+    """Answers states, never a tick anew, with the messages of the controller. Knows no ROS."""
+
+    def __init__(
+        self, controller: Controller, laws: LawChoice, settings: ControllerNodeSettings,
+        robot: Robot,
+    ) -> None:  # fmt: skip
+        """Answer with ``controller`` under the laws chosen, as the node's settings say."""
+        self._controller, self._laws = controller, laws
+        self.supervisor = Supervisor(controller, robot.n + 3, settings.hold_ticks)
+        self.stamps = StampGuard(settings.longest_jump)
+        self._commands = CommandCodec(robot.axis_names, settings.timebase)
+        self._telemetry = TelemetryCodec(robot.axis_names)
+        self._law = LawCodec(settings.timebase)
+        self._telemetry_decimation = settings.telemetry_decimation
+        self.answered = -1
+        """The tick answered last; -1: none."""
+        self.answer = b""
+        """The command for it, as it was sent."""
+        self.change: LawChange | None = None
+        """The change of law or gains that came with it, if any."""
+
+    def judge(self, tick: int) -> Standing:
+        """Tell how a state of ``tick`` that has come stands."""
+        if tick == self.answered:
+            return Standing.ANSWERED
+        if tick == self.stamps.last or self.stamps.passes(tick):
+            return Standing.NEW
+        return Standing.REFUSED
+
+    def messages(
+        self, tick: int, state: RobotState, reference: Block
+    ) -> Iterator[tuple[topics.Topic, bytes]]:
+        """Answer a state that is `Standing.NEW`; the messages to send, each to be sent at once.
+
+        The command goes out before the telemetry is written.
+        """
+        controller, laws = self._controller, self._laws
+        self.change = laws.change_at(tick)
+        if self.change:
+            yield topics.LAW, self._law.encode(self.change.law)
+            if controller.law is not laws.chosen:
+                controller.law = laws.chosen
+        state.tick = tick
+        self.answer = self.encode(self.supervisor.answer(state, reference))
+        self.answered = tick
+        yield topics.COMMAND, self.answer
+        if tick % self._telemetry_decimation == 0:
+            yield topics.TELEMETRY, self._telemetry.encode(tick, controller.telemetry())
+
+    def encode(self, command: Command) -> bytes:
+        """Return a command's message."""
+        return self._commands.encode(command)
