@@ -133,7 +133,7 @@ def test_one_period_for_all_is_flown() -> None:
 def test_files_that_give_nodes_different_periods_are_refused(tmp_path: Path) -> None:
     case = tmp_path / "slow.yaml"
     case.write_text("plant_node: {ros__parameters: {period: 0.001}}\n")
-    with pytest.raises(InputError, match="got plant 0[.]001, controller"):
+    with pytest.raises(InputError, match=r"got plant 0\.001, controller"):
         Flight(FlightPlan(case=str(case)))
     assert Flight(FlightPlan(case=str(case), period=0.0005, duration=1.0)).ticks == 2000
 
