@@ -12,17 +12,23 @@ class Check(NamedTuple):
 
     value: float
     limit: float
+    applies: bool = True
+    """False if what the limit presumes was not so: then the inequality says nothing."""
 
     @property
     def holds(self) -> bool | None:
-        """Strictly below; None if a number is not known."""
+        """Strictly below; None if a number is not known, or the limit does not apply."""
+        if not self.applies:
+            return None
         if math.isnan(self.value) or math.isnan(self.limit):
             return None
         return self.value < self.limit
 
     @property
     def verdict(self) -> str:
-        """In a word."""
+        """In a word or two."""
+        if not self.applies:
+            return "not applicable"
         return {True: "holds", False: "fails", None: "open"}[self.holds]
 
 

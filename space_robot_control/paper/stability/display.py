@@ -15,7 +15,7 @@ from .lyapunov import Certificate
 from .study import Study
 from .super_twisting import SuperTwisting
 
-TONES = {"holds": "good", "fails": "bad", "open": "open"}
+TONES = {"holds": "good", "fails": "bad", "open": "open", "not applicable": "open"}
 
 
 def print_study(study: Study, console: Console) -> None:
@@ -91,7 +91,7 @@ def _lemma_1(study: Study) -> Table:
     ]  # fmt: skip
     heads = ("", "min", "max", "at t (s)", "below 1")
     columns = [Column(head, is_label=not head) for head in heads]
-    return Table.of("Lemma 1: W = E - H_S^-1 h_bar (69)", columns, rows)
+    return Table.of("Lemma 1: W = E - H_S^-1 H̄ (69)", columns, rows)
 
 
 def _time_delay_error(study: Study) -> Table:
@@ -173,8 +173,7 @@ def _reaching(names: Sequence[str], twisting: SuperTwisting) -> Table:
 def _closing(study: Study, twisting: SuperTwisting) -> str:
     axes = len(twisting.gains)
     bounded = sum(check.holds is True for check in twisting.k_2_above_beta)
-    pairs = zip(twisting.certificates, twisting.reaching_beta, strict=True)
-    kept = sum(c is not None and bool(beta <= c.beta) for c, beta in pairs)
+    kept = sum(check.applies for check in twisting.reaching_time)
     sentences = [
         f"K_2 > beta holds on {bounded} of {axes} axes. The conditions are sufficient, not "
         "necessary: where one fails nothing is proven. None of these flights diverged."
@@ -186,6 +185,7 @@ def _closing(study: Study, twisting: SuperTwisting) -> str:
             "and K_1 |s|^1/2 in u is infinitely steep at s = 0, so beta depends on the gains."
         )
     sentences.append(
-        f"The bound (56) presumes |d eps/dt| <= its beta, which was so on {kept} of {axes} axes."
+        f"The bound (56) presumes |d eps/dt| <= its beta, which was so on {kept} of {axes} axes: "
+        "on the others it says nothing."
     )
     return "\n".join(sentences)

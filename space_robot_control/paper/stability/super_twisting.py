@@ -96,9 +96,20 @@ class SuperTwisting:
 
     @property
     def reaching_time(self) -> tuple[Check, ...]:
-        """(56): the measured reaching time below its bound; open if the flight was too short."""
+        """(56): the measured reaching time below its bound; open if the flight was too short.
+
+        The bound presumes ``|epsdot| <= beta``: it does not apply where the flight exceeded that.
+        """
         pairs = zip(self.certificates, self.initial_values, strict=True)
         bounds = [c.reaching_time(value) if c else np.nan for c, value in pairs]
         flown = self.reaching.time[-1]
         missed = np.isnan(self.reaching.measured) & (flown >= np.array(bounds))
-        return checks(np.where(missed, np.inf, self.reaching.measured), bounds)
+        measured = np.where(missed, np.inf, self.reaching.measured)
+        kept = [
+            c is not None and bool(beta <= c.beta)
+            for c, beta in zip(self.certificates, self.reaching_beta, strict=True)
+        ]
+        return tuple(
+            check._replace(applies=applies)
+            for check, applies in zip(checks(measured, bounds), kept, strict=True)
+        )

@@ -41,12 +41,17 @@ def time_delay_flights() -> list[Result]:
     ]
 
 
-def test_all_claims_hold(time_delay_flights: list[Result]) -> None:
-    """Torques within 1 %, errors below the printed ones, 5 and 100 times smoother, at most x3."""
-    judged = claims(time_delay_flights, cells(time_delay_flights))
-    assert len(judged) == 6
-    for claim in judged:
-        assert claim.holds, claim
+def test_verdicts_on_the_claims(time_delay_flights: list[Result]) -> None:
+    """Torques within 1 %, errors below the printed ones, 5 and 100 times smoother; and what fails.
+
+    Tuned TDE-TSMC is the smoother one, and payload and disturbance more than double an error.
+    """
+    tuned = fly(Planned(Row("tde_tsmc", "1"), Variant("tuned", True), shown=False), None, None)
+    judged = claims([*time_delay_flights, tuned], cells(time_delay_flights))
+    assert [claim.holds for claim in judged] == [True] * 4 + [False, True, False, False, False]
+    smoothest, *growth = judged[4:]
+    assert smoothest.value == pytest.approx(0.95, rel=0.01)
+    assert [claim.value for claim in growth] == pytest.approx([1.86, 2.41, 2.38, 3.97], rel=0.02)
 
 
 def test_torques_of_the_time_delay_laws_in_every_cell(time_delay_flights: list[Result]) -> None:
@@ -69,14 +74,14 @@ def test_errors_are_below_the_printed_ones_in_every_cell(time_delay_flights: lis
 
 
 def test_tde_smc_chatters_as_the_prototype_did(time_delay_flights: list[Result]) -> None:
-    """103, 2.5 and 0.33 N m/s."""
+    """103, 2.6 and 0.33 N m/s."""
     variation = {
         r.row.controller: r.chatter["total_variation_per_s"]["base_torque"]
         for r in time_delay_flights
         if r.chatter is not None
     }
     assert variation["tde_smc"] == pytest.approx(103.0, rel=0.05)
-    assert variation["tde_tsmc"] == pytest.approx(2.5, rel=0.05)
+    assert variation["tde_tsmc"] == pytest.approx(2.6, rel=0.05)
     assert variation["tde_stc"] == pytest.approx(0.33, rel=0.05)
 
 
