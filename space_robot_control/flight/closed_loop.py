@@ -10,6 +10,7 @@ from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import DivergedError
 from space_robot_sim.plant.plant import RATE_LIMIT, Plant, advance
+from space_robot_sim.sensors.sensors import sense
 
 from ..controller.controller import Controller, unusable
 from ..controller.kernels import USABLE, controller_tick
@@ -32,6 +33,17 @@ def close_loop(plant: Plant, controller: Controller, log: FlightLog, start: int,
     if not isinstance(law, CompiledLaw):
         _close_loop_in_python(plant, controller, rows)
         return
+    while start < stop:
+        end = int(min(stop, plant.next_change))
+        _close_loop_compiled(plant, controller, law, log, start, end)
+        start = end
+
+
+def _close_loop_compiled(
+    plant: Plant, controller: Controller, law: CompiledLaw, log: FlightLog, start: int, stop: int
+) -> None:
+    """Fly ticks in which nothing but compiled code has to do anything, and begin ``stop``."""
+    rows = log.rows(start - log.first_tick, stop - log.first_tick)
     assert rows.commanded_torque is not None
     assert rows.telemetry is not None
     states = np.empty(rows.ticks, plant.state.block.dtype)
@@ -41,11 +53,12 @@ def close_loop(plant: Plant, controller: Controller, log: FlightLog, start: int,
         plant.period,
     )  # fmt: skip
     rows.put(start, states[: tick - start + (status != USABLE)])
-    plant.state.tick = tick
+    plant.state.tick = plant.truth.tick = tick
     if status != USABLE:
         raise unusable(status, tick, plant.state.quaternion)
     if not fastest <= RATE_LIMIT:
         raise plant.diverged(fastest)
+    plant.begin_tick(tick)
 
 
 def measured_ticks(plant: Plant, error: Exception) -> int:
@@ -77,7 +90,8 @@ def fly_ticks(
 ) -> tuple[int, float, int]:  # fmt: skip
     """Fly from the tick ``start`` on, a tick for each reference; the loop of `close_loop`.
 
-    ``state`` is the plant's; ``states``, ``torques`` and ``telemetry`` are filled, a row a tick.
+    The sensors have measured ``start``, and not yet the tick reached. ``state`` is what they
+    measure; ``states``, ``torques`` and ``telemetry`` are filled, a row a tick.
 
     Returns:
         The tick reached, the fastest rate there, and the status of its state.
@@ -85,6 +99,8 @@ def fly_ticks(
     plant, fastest = plant_block[0], 0.0
     for k in range(references.size):
         tick, torque, signals_row = start + k, torques[k], telemetry[k]
+        if k > 0:
+            sense(plant.sensors, plant.truth, tick, period, plant.measured)
         states[k] = state[0]
         status = controller_tick(
             controller_block, law, tick, state, references[k : k + 1], torque, period

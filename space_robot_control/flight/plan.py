@@ -12,7 +12,7 @@ from space_robot_msgs_py.bag.mcap_file import Compression
 from space_robot_msgs_py.config.validation import StrictModel, one_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.faults.grammar import Kinds, parse_faults
-from space_robot_sim.plant.faults import PLANT_KINDS, PlantFaults
+from space_robot_sim.plant.faults import PART_KINDS, PLANT_KINDS
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import MOST_TICKS
 
@@ -147,9 +147,6 @@ class Flight:
         self.law = next(iter(laws.values()))
         """In force at the start."""
         self.plant = Plant(self.robot, settings.plant, self.period)
-        PlantFaults(
-            settings.plant.parsed_faults, settings.plant.fault_seed, self.robot, self.period
-        )  # checks them before anything starts
         self.mission = Mission(self.robot.n, settings.mission, self.period)
         self.controller = Controller(
             self._robots.controller, self.law, self.period,
@@ -186,8 +183,12 @@ class Flight:
         Raises:
             InputError: it asks for something that only nodes have.
         """
-        if self.faults:
-            asked = f"faults {self.faults}"
+        needed = [
+            text for text, fault in zip(self.faults, parse_faults(self.faults, KINDS), strict=True)
+            if fault.kind.name not in PART_KINDS
+        ]  # fmt: skip
+        if needed:
+            asked = f"faults {needed}"
         elif self.plant_settings.realtime:
             asked = "realtime"
         elif self.plant_settings.fifo_priority or self.controller_settings.fifo_priority:

@@ -67,6 +67,12 @@ FAULTS: dict[str, type[PartFault]] = {
 """The faults of each field of `Actuators`."""
 
 
+def reports_given(actuators: Actuators) -> bool:
+    """Return whether sound actuators report exactly the torque that they give."""
+    echo = actuators.torque_echo
+    return bool(echo.is_exact and (echo.is_of_given or actuators.drive.is_exact))
+
+
 @kernel
 def actuate(
     actuators: Actuators, command_delay_buffer: Array, command: Array, tick: int, reported: Array,

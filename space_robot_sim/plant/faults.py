@@ -1,75 +1,127 @@
-"""All faults of one flight that the plant brings about, and the catalogue of their kinds."""
+"""All faults of one flight that the plant brings about, and the catalogue of their kinds.
+
+Those of parts (sensors, actuators, environment) the plant has itself; those of messages act on the
+way between plant and controller.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+import math
+from typing import Annotated, Any
 
-from space_robot_msgs_py.config.validation import one_of
+from pydantic import AfterValidator, Field
+
+from space_robot_msgs_py.config.settings import Texts
+from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.samples import RobotState
 
 from ..actuators import actuators
 from ..environment import environment
 from ..faults.corruption import Corruption
-from ..faults.grammar import Fault, by_name
+from ..faults.grammar import Fault, by_name, parse_faults
 from ..faults.link import COMMAND_LINK, STATE_LINK, Link
 from ..faults.schedule import Schedule
 from ..robot import Robot
-from ..sensors import faults as sensors
-from .plant import Plant
+from ..sensors import sensors
 
-PLANT_KINDS = by_name(
-    *STATE_LINK, *COMMAND_LINK, *Corruption.KINDS,
-    *(kind for fault in sensors.FAULTS for kind in fault.FIELDS),
-    *(kind for fault in actuators.FAULTS.values() for kind in fault.KINDS),
-    *(kind for fault in environment.FAULTS.values() for kind in fault.KINDS),
-)  # fmt: skip
+PARTS = {
+    "sensors": sensors.FAULTS,
+    "actuators": actuators.FAULTS,
+    "environment": environment.FAULTS,
+}
+"""The faults of each field of the plant's memory, by its own fields."""
+MESSAGE_KINDS = by_name(*STATE_LINK, *COMMAND_LINK, *Corruption.KINDS)
+"""The kinds of faults of messages between plant and controller."""
+PART_KINDS = by_name(
+    *(kind for faults in PARTS.values() for fault in faults.values() for kind in fault.KINDS)
+)
+"""The kinds of faults of sensors, actuators and environment."""
+PLANT_KINDS = by_name(*MESSAGE_KINDS.values(), *PART_KINDS.values())
 """All kinds of faults that the plant brings about."""
 
 
-class PlantFaults:
-    """The faults of one flight; false if there are none: then nothing of this need be called.
+def _readable(texts: list[str]) -> list[str]:
+    parse_faults(texts, PLANT_KINDS)
+    return texts
 
-    In the order of a tick: `apply` before the step, `measure` and `states` on the way to the
-    controller, `commands` and `corruption` on the way back.
-    """
 
-    def __init__(self, faults: Sequence[Fault], seed: int, robot: Robot, period: float) -> None:
-        """Prepare ``faults`` for a flight of ``robot`` in ticks of ``period`` seconds.
+class FaultSettings(StrictModel):
+    """Faults of the plant, and their random numbers."""
+
+    faults: Annotated[Texts, AfterValidator(_readable)] = Field(
+        [""], description="faults to bring about, each KIND@T[-END][:ARGUMENT], see docs/manual"
+    )
+    fault_seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(
+        0, description="seed of the random numbers of faults and sensors"
+    )
+
+    @property
+    def parsed_faults(self) -> list[Fault]:
+        """The faults, without the empty texts."""
+        return parse_faults(self.faults, PLANT_KINDS)
+
+    def schedule(self, robot: Robot, period: float) -> Schedule:
+        """Place the faults in a flight of ``robot`` in ticks of ``period`` seconds.
 
         Raises:
-            InputError: a fault is not the plant's, names an axis that is not there, or its time
-                holds no tick.
+            InputError: a fault names an axis that is not there, or its time holds no tick.
         """
-        for fault in faults:
-            one_of(fault.kind.name, PLANT_KINDS, "fault of the plant")
-        schedule = Schedule(faults, seed, period, robot.axis_names)
-        self._any = bool(faults)
-        self._of_actuators = [(part, cls(schedule)) for part, cls in actuators.FAULTS.items()]
-        self._of_environment = [(part, cls(schedule)) for part, cls in environment.FAULTS.items()]
-        self.sensors = sensors.SensorFaults(schedule, robot.n)
+        return Schedule(self.parsed_faults, self.fault_seed, period, robot.axis_names)
+
+
+class PartFaults:
+    """The faults of a plant's parts."""
+
+    def __init__(self, schedule: Schedule) -> None:
+        """Prepare those that ``schedule`` has."""
+        self._faults = [
+            (group, part, fault(schedule))
+            for group, faults in PARTS.items() for part, fault in faults.items()
+        ]  # fmt: skip
+        self._schedule = schedule
+        acting = schedule.of(*PART_KINDS.values())
+        self._turns = sorted({tick for fault in acting for tick in (fault.first, fault.stop)})
+        """Ticks at which something begins or ends."""
+
+    def are_in(self, group: str) -> bool:
+        """Return whether any part of a group ("sensors", ...) fails at some time."""
+        kinds = [kind for fault in PARTS[group].values() for kind in fault.KINDS]
+        return bool(self._schedule.of(*kinds))
+
+    def apply(self, tick: int, memory: Any) -> float:
+        """Make the parts in a plant's memory fail as they should from ``tick`` on.
+
+        Returns:
+            The next tick at which that changes (inf: it does not).
+        """
+        if self._turns:
+            for group, part, fault in self._faults:
+                fault.apply(tick, getattr(getattr(memory, group), part))
+        return next((turn for turn in self._turns if turn > tick), math.inf)
+
+
+class MessageFaults:
+    """The faults of the messages of one flight.
+
+    In the order of a tick: `measure` and `states` on the way to the controller, `corruption` and
+    `commands` on the way back.
+    """
+
+    def __init__(self, schedule: Schedule, n: int) -> None:
+        """Prepare those that ``schedule`` has, for a robot of ``n`` joints."""
         self.corruption = Corruption(schedule)
         self.states: Link[Any] = Link(schedule, STATE_LINK)
         """Both messages of a tick are one item."""
         self.commands: Link[Any] = Link(schedule, COMMAND_LINK)
-
-    def __bool__(self) -> bool:
-        return self._any
-
-    def apply(self, plant: Plant) -> None:
-        """Make actuators and environment fail as they should from the plant's tick to the next."""
-        memory = plant.memory
-        for part, fault in self._of_actuators:
-            fault.apply(plant.tick, getattr(memory.actuators, part))
-        for part, fault in self._of_environment:
-            fault.apply(plant.tick, getattr(memory.environment, part))
+        self._measured = RobotState.allocate(n)
 
     def measure(self, state: RobotState) -> RobotState:
-        """Return what to send in place of the true ``state``, which is left alone; reused.
+        """Return what to send in place of the measured ``state``, which is left alone; reused.
 
         Its ``tick`` is the stamp to write on it, which may be wrong.
         """
-        measured = self.sensors.measure(state)
+        measured = self._measured
+        measured.block[:] = state.block
         self.corruption.spoil_state(measured, state.tick)
         measured.tick = self.corruption.stamp(state.tick)
         return measured

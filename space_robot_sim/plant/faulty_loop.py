@@ -1,4 +1,4 @@
-"""The plant node's loop with injected faults on sensors, actuators and both links."""
+"""The plant node's loop with injected faults of the messages to and from the controller."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from space_robot_msgs_py.ros.health import Health
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 
 from ..faults.link import awaited_stamp
-from .faults import PlantFaults
+from .faults import MessageFaults
 from .loop import NONE, PlantLoop, SentState
 from .settings import PlantNodeSettings
 
@@ -23,8 +23,7 @@ class FaultyPlantLoop(PlantLoop):
         """See `PlantLoop`; ``settings.faults`` says what fails."""
         super().__init__(node, settings)
         robot = self._plant.robot
-        faults = settings.parsed_faults
-        self._faults = PlantFaults(faults, settings.fault_seed, robot, settings.period)
+        self._faults = MessageFaults(settings.schedule(robot, settings.period), robot.n)
         self._asked = NONE
         """Tick of the newest state that a controller can have answered."""
 
@@ -49,7 +48,6 @@ class FaultyPlantLoop(PlantLoop):
         for command in faults.commands.arrivals(plant.tick):
             guard.offered.tick, guard.offered.torque[:] = command.stamp, command.item
             guard.accept(plant.tick)
-        faults.apply(plant)
         super()._end_tick()
 
     def _deliver(self) -> None:

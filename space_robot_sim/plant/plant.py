@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any
 
 import numpy as np
@@ -13,15 +14,18 @@ from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import Command, RobotState, State
 
-from ..actuators.actuators import Actuators, ActuatorSettings, actuate
+from ..actuators.actuators import Actuators, ActuatorSettings, actuate, reports_given
 from ..actuators.command_delay import command_delay_buffer
 from ..dynamics.model import Model
 from ..environment.environment import Environment, EnvironmentSettings
 from ..environment.payload import with_payload
 from ..robot import Robot
-from ..sensors.measurement import measure
+from ..sensors.noise import Draws
+from ..sensors.sensors import Sensors, SensorSettings, arrays_of_draws, sense
+from .faults import FaultSettings, PartFaults
 from .integrator import Stages
 from .stick_slip import integrate
+from .truth import write_truth
 
 Array = NDArray[np.float64]
 Block = NDArray[Any]
@@ -30,7 +34,7 @@ RATE_LIMIT = 1e4
 """rad/s; a body that turns faster has left the physics (a diverged loop)."""
 
 
-class PlantSettings(ActuatorSettings, EnvironmentSettings):
+class PlantSettings(ActuatorSettings, EnvironmentSettings, SensorSettings, FaultSettings):
     """Settings of the plant's world, beside the robot's own file."""
 
     initial_joints_deg: list[float] = Field(
@@ -50,6 +54,7 @@ class PlantMemory(Record):
     model: Model = nested(Model)
     environment: Environment = nested(Environment)
     actuators: Actuators = nested(Actuators)
+    sensors: Sensors = nested(Sensors)
     stages: Stages = nested(Stages)
     substeps: float = shaped(lambda n: ())
     """Integration steps in a tick."""
@@ -57,8 +62,8 @@ class PlantMemory(Record):
     """The state, see `Stages`."""
     rotation: Array = shaped(lambda n: (3, 3))
     """Scratch."""
-    given: Array = shaped(lambda n: (n + 3,))
-    """The torque given over the last interval, N m; `measured` has the one reported."""
+    truth: State = nested(State)
+    """The true state at the current tick, and the torque given over the interval before it."""
     measured: State = nested(State)
     """The state as the sensors report it at the current tick."""
 
@@ -66,15 +71,16 @@ class PlantMemory(Record):
 class Plant:
     """Integrates the robot at a fixed period; a command is held over one tick.
 
-    `state` is what the sensors report at the current tick; `step` applies a command until the
-    next one. Momentum and energy follow from `state` alone (`space_robot_sim.plant.conservation`).
+    `truth` is the true state at the current tick, `state` what the sensors tell of it; `step`
+    applies a command until the next one. Parts fail as ``settings.faults`` says. Momentum and
+    energy follow from `truth` alone (`space_robot_sim.plant.conservation`).
     """
 
     def __init__(self, robot: Robot, settings: PlantSettings, period: float) -> None:
         """Place the robot at rest.
 
         Raises:
-            InputError: the initial configuration does not fit the robot.
+            InputError: initial configuration, sensors or faults do not fit the robot or period.
         """
         n = robot.n
         if len(settings.initial_joints_deg) != n:
@@ -98,10 +104,26 @@ class Plant:
         )  # fmt: skip
         memory.x[3:7] = np.array(settings.initial_quaternion) / norm
         memory.x[7 : 7 + n] = np.radians(settings.initial_joints_deg)
+        self.truth = RobotState(0, self.block["truth"])
         self.state = RobotState(0, self.block["measured"])
-        # at rest: what `measure` would say, without waiting for compiled code
-        self.state.quaternion[:] = memory.x[3:7]
-        self.state.joint_positions[:] = memory.x[7 : 7 + n]
+        # at rest: what `write_truth` would say, without waiting for compiled code
+        self.truth.quaternion[:] = memory.x[3:7]
+        self.truth.joint_positions[:] = memory.x[7 : 7 + n]
+        sensors = Sensors.build(n, settings, period, memory.truth)
+        self._part_faults = PartFaults(settings.schedule(robot, period))
+        if self._part_faults.are_in("sensors"):
+            assign(sensors, are_ideal=False)
+        assign(memory, sensors=sensors)
+        self._is_ideal = bool(sensors.are_ideal)
+        self.measures_truth = (
+            self._is_ideal and reports_given(memory.actuators)
+            and not self._part_faults.are_in("actuators")
+        )  # fmt: skip
+        """True if `state` can never differ from `truth`."""
+        self._draws = Draws(settings.fault_seed, arrays_of_draws(memory.sensors))
+        self.next_change = math.inf
+        """The first tick to come that needs `begin_tick`: compiled code may fly up to there."""
+        self.begin_tick(0)
 
     @property
     def tick(self) -> int:
@@ -126,10 +148,26 @@ class Plant:
             DivergedError: the state is no longer finite, or turns faster than `RATE_LIMIT`.
         """
         tick = self.state.tick
-        fastest = step(self.block, self.command_delay_buffer, command.torque, tick, self.period)
-        self.state.tick = tick + 1
+        goes_on = tick + 1 < self.next_change
+        fastest = step(
+            self.block, self.command_delay_buffer, command.torque, tick, self.period, goes_on
+        )
+        self.state.tick = self.truth.tick = tick + 1
         if not fastest <= RATE_LIMIT:
             raise self.diverged(fastest)
+        if not goes_on:
+            self.begin_tick(tick + 1)
+
+    def begin_tick(self, tick: int) -> None:
+        """Begin ``tick``, whose true state is known: faults begin and end, the sensors measure."""
+        self.state.tick = self.truth.tick = tick
+        self.next_change = self._part_faults.apply(tick, self.memory)
+        if not self._is_ideal:
+            self.next_change = min(self.next_change, self._draws.refill(tick))
+        if self.measures_truth and tick == 0:  # what `sense` would say, without compiled code
+            self.state.block[:] = self.truth.block
+        else:
+            measure(self.block, tick, self.period)
 
     def diverged(self, fastest: float) -> DivergedError:
         """Return the error for a fastest rate after a step of ``fastest``, rad/s."""
@@ -139,11 +177,22 @@ class Plant:
 
 @kernel
 def step(
-    block: Block, command_delay_buffer: Array, torque: Array, tick: int, period: float
-) -> float:
-    """Call `advance` from Python."""
-    fastest: float = advance(block[0], command_delay_buffer, torque, tick, period)
+    block: Block, command_delay_buffer: Array, torque: Array, tick: int, period: float,
+    goes_on: bool,
+) -> float:  # fmt: skip
+    """Call `advance` from Python and, if ``goes_on``, let the sensors measure the next tick."""
+    memory = block[0]
+    fastest: float = advance(memory, command_delay_buffer, torque, tick, period)
+    if goes_on:
+        sense(memory.sensors, memory.truth, tick + 1, period, memory.measured)
     return fastest
+
+
+@kernel
+def measure(block: Block, tick: int, period: float) -> None:
+    """Call `sense` from Python."""
+    memory = block[0]
+    sense(memory.sensors, memory.truth, tick, period, memory.measured)
 
 
 @kernel
@@ -152,22 +201,23 @@ def advance(
 ) -> float:
     """Fly from ``tick`` to the next under the command ``torque`` (n+3,), N m, given at ``tick``.
 
+    The sensors have not measured the next tick then: see `sense`.
+
     Returns:
         The fastest rate then, see `fastest_rate`.
     """
-    measured = memory.measured
-    actuate(
-        memory.actuators, command_delay_buffer, torque, tick, measured.applied_torque, memory.given
-    )
+    truth, measured = memory.truth, memory.measured
+    given = truth.applied_torque
+    actuate(memory.actuators, command_delay_buffer, torque, tick, measured.applied_torque, given)
     substeps = int(memory.substeps)
     step = period / substeps
     for k in range(substeps):
         integrate(
-            memory.model, memory.environment, memory.x, memory.given,
-            tick * period + k * step, step, memory.stages,
+            memory.model, memory.environment, memory.x, given, tick * period + k * step, step,
+            memory.stages,
         )  # fmt: skip
-    measure(memory.x, memory.rotation, measured)
-    fastest: float = fastest_rate(memory.x, measured.joint_positions.size)
+    write_truth(memory.x, memory.rotation, truth)
+    fastest: float = fastest_rate(memory.x, truth.joint_positions.size)
     return fastest
 
 

@@ -6,23 +6,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, ClassVar
 
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.files import mission_file, named_file
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 
-from ..faults.grammar import Fault, parse_faults
-from .faults import PLANT_KINDS
 from .plant import PlantSettings
 
 MOST_TICKS = 10**10
 """No flight is longer."""
-
-
-def _readable(texts: list[str]) -> list[str]:
-    parse_faults(texts, PLANT_KINDS)
-    return texts
 
 
 class PlantNodeSettings(PlantSettings, NodeSettings):
@@ -58,17 +51,6 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         [""],
         description="who must listen before the first tick: NODE:TOPIC, or NODE to all it sends",
     )
-    faults: Annotated[Texts, AfterValidator(_readable)] = Field(
-        [""], description="faults to bring about, each KIND@T[-END][:ARGUMENT], see docs/manual"
-    )
-    fault_seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = Field(
-        0, description="seed of the faults' random numbers"
-    )
-
-    @property
-    def parsed_faults(self) -> list[Fault]:
-        """The faults, without the empty texts."""
-        return parse_faults(self.faults, PLANT_KINDS)
 
     @classmethod
     def layers(cls, selected: Mapping[str, str]) -> list[Path]:

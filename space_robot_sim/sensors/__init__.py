@@ -1,1 +1,1 @@
-"""Sensors measure the true state, and their measurements go wrong."""
+"""Sensors measure the true state, each with errors of its own; and they fail."""

@@ -189,6 +189,7 @@ def _tuned() -> str:
 _LAWS = st.sampled_from(sorted(laws()))
 _AXES = st.lists(st.floats(1e-3, 1e3) | st.integers(1, 100), min_size=9, max_size=9)
 _QUATERNION = st.lists(st.integers(1, 3) | st.floats(0.1, 1.0), min_size=4, max_size=4)
+_AXIS = st.lists(st.integers(1, 3) | st.floats(0.1, 1.0), min_size=3, max_size=3)
 _SPECIAL: dict[str, st.SearchStrategy[Any]] = {
     "controller": _LAWS,
     "gains": st.sampled_from(["default", "tuned", "printed"]),
@@ -201,6 +202,24 @@ _SPECIAL: dict[str, st.SearchStrategy[Any]] = {
     "initial_joints_deg": st.lists(st.integers(-90, 90) | st.floats(-9, 9), min_size=6, max_size=6),
     "initial_quaternion": _QUATERNION,
     "base_quaternion": _QUATERNION,
+    "star_tracker.boresight": _AXIS,
+    "star_tracker.rate": st.sampled_from([0, 2.5, 100]),
+    "star_tracker.delay": st.floats(0.0, 0.03),
+    "gyro.initial_bias": _AXIS,
+    "gyro.scale_factor_error": _AXIS,
+    **dict.fromkeys(
+        (
+            "drive_scale",
+            "drive_bias",
+            "drive_lag",
+            "drive_step",
+            "drive_dead_band",
+            "echo_scale",
+            "echo_bias",
+        ),
+        st.lists(st.integers(0, 3) | st.floats(0.0, 1.0), min_size=1, max_size=1),
+    ),
+    "torque_echo": st.sampled_from(["command", "given"]),
     "waypoint_times": st.just([0, 1.5, 3]),
     "waypoints_deg": st.lists(st.integers(-90, 90), min_size=18, max_size=18),
     "compression": st.sampled_from(["none", "lz4", "zstd"]),

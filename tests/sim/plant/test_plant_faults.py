@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from random_samples import assert_same
 
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import STATE_FIELDS, Command
-from space_robot_sim.faults.grammar import Kind, by_name, parse_fault, parse_faults
+from space_robot_sim.faults.grammar import parse_fault, parse_faults
 from space_robot_sim.faults.link import awaited_stamp
 from space_robot_sim.faults.schedule import Schedule, ScheduledFault
-from space_robot_sim.plant.faults import PLANT_KINDS, PlantFaults
+from space_robot_sim.plant.faults import PLANT_KINDS, MessageFaults
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.plant.settings import PlantNodeSettings
 from space_robot_sim.robot import Robot
@@ -27,13 +28,15 @@ def scheduled(text: str, period: float = PERIOD, seed: int = 0) -> ScheduledFaul
     return ScheduledFault(parse_fault(text, PLANT_KINDS), 0, seed, period)
 
 
-def plant_faults(robot: Robot, *texts: str, seed: int = 0) -> PlantFaults:
-    return PlantFaults(parse_faults(texts, PLANT_KINDS), seed, robot, PERIOD)
-
-
-def plant_of(robot: Robot, **settings: float) -> Plant:
+def plant_of(robot: Robot, *faults: str, seed: int = 0, **settings: float) -> Plant:
     start = {"initial_joints_deg": [0.0, 120.0, 220.0, 0.0, -10.0, 0.0]}
-    return Plant(robot, PlantSettings.model_validate({**start, **settings}), PERIOD)
+    given = {**start, "faults": list(faults), "fault_seed": seed, **settings}
+    return Plant(robot, PlantSettings.model_validate(given), PERIOD)
+
+
+def message_faults(robot: Robot, *texts: str, seed: int = 0) -> MessageFaults:
+    settings = PlantSettings(faults=list(texts), fault_seed=seed)
+    return MessageFaults(settings.schedule(robot, PERIOD), robot.n)
 
 
 @given(st.integers(0, 10**7), st.integers(1, 10**5), st.sampled_from([1e-4, 5e-4, 1e-3, 0.01]))
@@ -58,9 +61,9 @@ def test_draws_depend_on_seed_place_and_tick_alone(seed: int, tick: int) -> None
     early, late = scheduled("drop_state@0:0.5", seed=seed), scheduled("drop_state@0.01", seed=seed)
     early.choose(3, 10)
     assert early.choose(tick, 1000) == late.choose(tick, 1000)
-    texts = ["noise_gyro@0:1", "noise_gyro@0:1"]
+    texts = ["drop_state@0:1", "drop_state@0:1"]
     one, two = Schedule(parse_faults(texts, PLANT_KINDS), seed, PERIOD).faults
-    assert (one.noise(tick, 3) != two.noise(tick, 3)).all()
+    assert one.choose(tick, 10**9) != two.choose(tick, 10**9)
 
 
 def memory_of(plant: Plant) -> tuple[list[float], list[float]]:
@@ -75,12 +78,10 @@ def test_actuators_fail_in_time_and_are_restored_exactly(paper_robot: Robot) -> 
         "saturate_base@0.005-0.01:2", "saturate_base@0.0075-0.015:1", "saturate_joints@0.01:3",
         "stuck_joint@0.005-0.01:2=20", "stuck_joint@0.005-0.0075:6=0.001",
     ]  # fmt: skip
-    plant = plant_of(paper_robot, joint_torque_limit=7.0)
+    plant = plant_of(paper_robot, *texts, joint_torque_limit=7.0)
     sound, coulomb = memory_of(plant)
     assert sound == [math.inf] * 3 + [7.0] * 6
-    faults = plant_faults(paper_robot, *texts)
     for tick in range(40):
-        faults.apply(plant)
         base = min(2.0 if 10 <= tick < 20 else math.inf, 1.0 if 15 <= tick < 30 else math.inf)
         joints = 3.0 if tick >= 20 else 7.0
         stuck = [coulomb[0], 20.0 if 10 <= tick < 20 else coulomb[1], *coulomb[2:]]
@@ -92,27 +93,21 @@ def test_actuators_fail_in_time_and_are_restored_exactly(paper_robot: Robot) -> 
 
 def test_a_fault_never_makes_an_actuator_stronger_nor_a_joint_freer(paper_robot: Robot) -> None:
     """Limits and friction that are worse than the fault's stay; 0 is the lowest limit of all."""
-    plant = plant_of(paper_robot, base_torque_limit=0.5, joint_torque_limit=7.0)
+    texts = ["saturate_base@0.0005:2", "saturate_joints@0.0005:9", "stuck_joint@0.0005:2=1"]
+    plant = plant_of(paper_robot, *texts, base_torque_limit=0.5, joint_torque_limit=7.0)
     plant.block[0].actuators.torque_limit.limit[4] = 0.0
     plant.block[0].environment.friction.coulomb[1] = 3.0
     worst = memory_of(plant)
-    texts = ["saturate_base@0:2", "saturate_joints@0:9", "stuck_joint@0:2=1"]
-    faults = plant_faults(paper_robot, *texts)
     for tick in range(3):
-        faults.apply(plant)
-        assert memory_of(plant) == worst
         plant.step(Command(tick, TORQUE))
+        assert memory_of(plant) == worst
 
 
 def test_after_the_last_fault_the_plant_is_as_it_was(paper_robot: Robot) -> None:
-    plant = plant_of(paper_robot)
-    sound = memory_of(plant)
     texts = ["saturate_base@0-0.005:0", "saturate_joints@0-0.005:1", "stuck_joint@0-0.005:1=9"]
-    faults = plant_faults(paper_robot, *texts)
-    faults.apply(plant)
-    assert memory_of(plant) != sound
+    plant, sound = plant_of(paper_robot, *texts), memory_of(plant_of(paper_robot))
     for tick in range(11):
-        faults.apply(plant)
+        assert (memory_of(plant) == sound) is (tick >= 10)
         plant.step(Command(tick, TORQUE))
     assert memory_of(plant) == sound
 
@@ -121,11 +116,9 @@ def test_after_the_last_fault_the_plant_is_as_it_was(paper_robot: Robot) -> None
 def test_a_stuck_joint_stops_and_comes_free_again(paper_robot: Robot, joint: int) -> None:
     """Thrown first, then held while its motor and the other joints pull at it."""
     friction = 15.0 if joint <= 3 else 3.0  # four times what its motor gives
-    plant = plant_of(paper_robot)
-    faults = plant_faults(paper_robot, f"stuck_joint@0.25-1:{joint}={friction}")
+    plant = plant_of(paper_robot, f"stuck_joint@0.25-1:{joint}={friction}")
     angles, rates = np.empty((2500, 6)), np.empty((2500, 6))
     for tick in range(2500):
-        faults.apply(plant)
         plant.step(Command(tick, np.where(np.arange(9) < 3, 0.0, 0.2 * TORQUE)))
         angles[tick], rates[tick] = plant.state.joint_positions, plant.state.joint_velocities
     before, held, after = slice(500), slice(1000, 1500), slice(2000, 2500)
@@ -138,7 +131,8 @@ def test_a_stuck_joint_stops_and_comes_free_again(paper_robot: Robot, joint: int
 
 def flight(robot: Robot, *texts: str, seed: int = 0, ticks: int = 400) -> list[list[float]]:
     """Applied torques under a spring on what was measured, over both links."""
-    plant, faults = plant_of(robot), plant_faults(robot, *texts, seed=seed)
+    plant = plant_of(robot, *texts, seed=seed)
+    faults = message_faults(robot, *texts, seed=seed)
     held, log, answered = Command(-1, np.zeros(9)), [], -1
     for tick in range(ticks):
         measured = faults.measure(plant.state)
@@ -153,7 +147,6 @@ def flight(robot: Robot, *texts: str, seed: int = 0, ticks: int = 400) -> list[l
         for parcel in faults.commands.arrivals(tick):
             if parcel.stamp > held.tick and np.isfinite(parcel.item.torque).all():
                 held = parcel.item
-        faults.apply(plant)
         plant.step(held)
         log.append(plant.state.applied_torque.tolist())
     return log
@@ -186,17 +179,12 @@ def test_faults_that_do_nothing_change_nothing(paper_robot: Robot) -> None:
 
 def test_measurements_carry_the_wrong_stamp_and_the_truth_its_own(paper_robot: Robot) -> None:
     plant = plant_of(paper_robot)
-    measured = plant_faults(paper_robot, "stamp_jump@0", "nan_state@0").measure(plant.state)
+    faults = message_faults(paper_robot, "stamp_jump@0", "nan_state@0")
+    measured = faults.measure(plant.state)
     assert measured.tick == 1_000_000
     assert plant.tick == 0
     assert all(np.isfinite(getattr(plant.state, name)).all() for name in STATE_FIELDS)
     assert not all(np.isfinite(getattr(measured, name)).all() for name in STATE_FIELDS)
-
-
-def test_no_faults_are_false(paper_robot: Robot) -> None:
-    assert not plant_faults(paper_robot)
-    assert not plant_faults(paper_robot, "", " ")
-    assert plant_faults(paper_robot, "drop_state@0:0")
 
 
 def test_faults_must_fit_the_plant(paper_robot: Robot) -> None:
@@ -204,11 +192,32 @@ def test_faults_must_fit_the_plant(paper_robot: Robot) -> None:
         allowed = "choose one of joint1, .*, joint6, 1 to 6, joints"
         wrong = f"^fault 'stuck_joint@1:{joint}=2': no joint '{joint}': {allowed}$"
         with pytest.raises(InputError, match=wrong):
-            plant_faults(paper_robot, f"stuck_joint@1:{joint}=2")
-    kinds = by_name(Kind("kill_mission", None, None, "not of the plant", lasts=False))
-    of_another = parse_faults(["kill_mission@1"], kinds)
-    with pytest.raises(InputError, match="unknown fault of the plant 'kill_mission'"):
-        PlantFaults(of_another, 0, paper_robot, PERIOD)
+            plant_of(paper_robot, f"stuck_joint@1:{joint}=2")
+
+
+def test_a_plant_changes_when_its_parts_begin_or_cease_to_fail(paper_robot: Robot) -> None:
+    """Compiled code may fly on over all ticks between; messages are not the plant's affair."""
+    texts = ("stuck_joint@0.01-0.02:1=9", "saturate_base@0.02:1", "drop_state@0.005")
+    plant, changes = plant_of(paper_robot, *texts), set()
+    for tick in range(50):
+        changes.add(plant.next_change)
+        plant.step(Command(tick, 0.0 * TORQUE))
+    assert changes == {20, 40, math.inf}
+
+
+def test_truth_and_measurement_are_told_apart(paper_robot: Robot) -> None:
+    """Equal with sound sensors; a plant with noise flies the same truth."""
+    sound, noisy = plant_of(paper_robot), plant_of(paper_robot, "noise_gyro@0.005:1")
+    assert sound.measures_truth
+    assert not noisy.measures_truth
+    for tick in range(20):
+        assert_same(sound.state, sound.truth)
+        assert_same(noisy.truth, sound.truth)
+        off = np.abs(noisy.state.omega_base - noisy.truth.omega_base)
+        assert (off > 0.0).all() if tick >= 10 else (off == 0.0).all()
+        assert sound.state.tick == sound.truth.tick == noisy.truth.tick == tick
+        for plant in (sound, noisy):
+            plant.step(Command(tick, TORQUE))
 
 
 def test_settings_take_faults_and_refuse_bad_ones() -> None:

@@ -1,0 +1,32 @@
+"""The true state as a sample: what sensors without any error would report."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.samples import State
+
+from ..dynamics.attitude import rotate_back, rotation_matrix
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def write_truth(x: Array, rotation: Array, truth: State) -> None:
+    """Write the plant's state into ``truth``; the torque in there is left alone.
+
+    Args:
+        x: (2n+13,) the state, see `space_robot_sim.plant.integrator.Stages`.
+        rotation: (3, 3) scratch.
+        truth: angular velocity on base axes.
+    """
+    n = truth.joint_positions.size
+    truth.base_position[:] = x[:3]
+    truth.quaternion[:] = x[3:7]
+    truth.joint_positions[:] = x[7 : 7 + n]
+    truth.base_velocity[:] = x[7 + n : 10 + n]
+    rotation_matrix(truth.quaternion, rotation)
+    rotate_back(rotation, x[10 + n : 13 + n], truth.omega_base)
+    truth.joint_velocities[:] = x[13 + n :]

@@ -1,0 +1,122 @@
+"""An encoder on each joint: its angle in whole steps, its rate measured or differenced."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, assign, shaped
+from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.samples import State
+
+from ..faults.grammar import Kind
+from ..faults.schedule import BLOCK_TICKS
+from .faults import (
+    SIGMA_RAD,
+    SIGMA_RAD_PER_S,
+    STEP_RAD,
+    STEP_RAD_PER_S,
+    Change,
+    SensorFault,
+    add_noise,
+    coarsen,
+)
+from .noise import in_steps, row_of
+
+Array = NDArray[np.float64]
+Sigma = Annotated[float, Field(ge=0.0, le=1e3)]
+
+MOST_DIFFERENCED = 256
+"""Ticks over which a rate can be differenced."""
+
+
+class EncoderSettings(StrictModel):
+    """The encoders of all joints; by default without error."""
+
+    bits: Annotated[int, Field(ge=0, le=32)] = Field(
+        0, description="steps of a turn are two to this power (0: angles without steps)"
+    )
+    noise: Sigma = Field(0.0, description="white noise of each angle, rad")
+    difference_ticks: Annotated[int, Field(ge=0, le=MOST_DIFFERENCED)] = Field(
+        0, description="joint rates are differences of angles over so many ticks (0: measured)"
+    )
+    velocity_noise: Sigma = Field(0.0, description="white noise of each joint rate, rad/s")
+    velocity_step: Sigma = Field(
+        0.0, description="distance of two values of a joint rate, rad/s (0: none)"
+    )
+
+
+class Encoders(Record):
+    """The numbers of one robot's encoders, and the angles they have told.
+
+    The angle told is ``step round((theta + sigma n) / step)``, the rate, if it is differenced over
+    N ticks, the difference of angles told N ticks apart over N periods.
+    """
+
+    sigma: Array = shaped(lambda n: (n,))
+    """White noise of each angle, rad."""
+    step: Array = shaped(lambda n: (n,))
+    """Distance of two angles, rad (0: none)."""
+    difference_ticks: float = shaped(lambda n: ())
+    """N; 0: rates are measured."""
+    velocity_sigma: Array = shaped(lambda n: (n,))
+    """White noise of each rate, rad/s."""
+    velocity_step: Array = shaped(lambda n: (n,))
+    """Distance of two rates, rad/s (0: none)."""
+    draws: Array = shaped(lambda n: (BLOCK_TICKS, 2, n))
+    """Standard normal numbers, a row a tick: of the angles, of the rates."""
+    told: Array = shaped(lambda n: (MOST_DIFFERENCED, n))
+    """The last angles told, by tick modulo `MOST_DIFFERENCED`, rad."""
+
+    @classmethod
+    def build(cls, n: int, settings: EncoderSettings, period: float, truth: State) -> Encoders:
+        """Read the settings; before tick 0 the robot was at rest at ``truth``."""
+        encoders = cls.allocate(n)
+        step = 2.0 * np.pi / 2.0**settings.bits if settings.bits else 0.0
+        at_rest = truth.joint_positions
+        assign(
+            encoders, sigma=settings.noise, step=step, difference_ticks=settings.difference_ticks,
+            velocity_sigma=settings.velocity_noise, velocity_step=settings.velocity_step,
+            told=step * np.floor(at_rest / step + 0.5) if step else at_rest,
+        )  # fmt: skip
+        return encoders
+
+
+@kernel
+def read_encoders(
+    encoders: Encoders, truth: State, tick: int, period: float, measured: State
+) -> None:
+    """Write the angles and rates told of all joints into ``measured``."""
+    draws, lag = encoders.draws[row_of(tick)], int(encoders.difference_ticks)
+    now, then = (
+        encoders.told[tick % MOST_DIFFERENCED],
+        encoders.told[(tick - lag) % MOST_DIFFERENCED],
+    )
+    for i in range(now.size):
+        angle = truth.joint_positions[i] + encoders.sigma[i] * draws[0, i]
+        angle = in_steps(angle, encoders.step[i])
+        rate = (angle - then[i]) / (lag * period) if lag > 0 else truth.joint_velocities[i]
+        rate = in_steps(rate + encoders.velocity_sigma[i] * draws[1, i], encoders.velocity_step[i])
+        now[i] = angle
+        measured.joint_positions[i] = angle
+        measured.joint_velocities[i] = rate
+
+
+class EncoderFault(SensorFault):
+    """Encoders that are noisier or coarser."""
+
+    CHANGES: ClassVar[Mapping[str, Mapping[Kind, Change]]] = {
+        "sigma": {Kind("noise_joint_position", SIGMA_RAD, None,
+                       "noise on the measured joint angles"): add_noise},
+        "velocity_sigma": {Kind("noise_joint_velocity", SIGMA_RAD_PER_S, None,
+                                "noise on the measured joint velocities"): add_noise},
+        "step": {Kind("quantise_joint_position", STEP_RAD, None,
+                      "the measured joint angles come in steps"): coarsen},
+        "velocity_step": {Kind("quantise_joint_velocity", STEP_RAD_PER_S, None,
+                               "the measured joint velocities come in steps"): coarsen},
+    }  # fmt: skip

@@ -1,0 +1,114 @@
+"""A gyro on each base axis: white noise, a bias that walks, a scale error, whole steps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, assign, shaped
+from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.samples import State
+
+from ..faults.grammar import Kind
+from ..faults.schedule import BLOCK_TICKS
+from .faults import SIGMA_RAD_PER_S, STEP_RAD_PER_S, Change, SensorFault, add_noise, coarsen
+from .noise import in_steps, row_of
+
+Array = NDArray[np.float64]
+Sigma = Annotated[float, Field(ge=0.0, le=1e3)]
+OnAxes = Annotated[
+    list[Annotated[float, Field(ge=-10.0, le=10.0)]], Field(min_length=3, max_length=3)
+]
+
+
+class GyroSettings(StrictModel):
+    """A gyro; by default without error."""
+
+    noise: Sigma = Field(0.0, description="white noise of each sample, whatever the period, rad/s")
+    angle_random_walk: Sigma = Field(
+        0.0, description="density sigma_v of the white noise on the rate, rad/s^1/2"
+    )
+    rate_random_walk: Sigma = Field(
+        0.0, description="density sigma_u of the white noise that drives the bias, rad/s^3/2"
+    )
+    initial_bias: OnAxes = Field(
+        [0.0, 0.0, 0.0], description="bias at tick 0 on base x, y, z, rad/s"
+    )
+    scale_factor_error: OnAxes = Field(
+        [0.0, 0.0, 0.0], description="e of (1 + e) times the true rate, on base x, y, z"
+    )
+    step: Sigma = Field(0.0, description="distance of two values, rad/s (0: none)")
+
+
+class Gyro(Record):
+    """The numbers of one gyro.
+
+    A period h after the last sample the bias b and the measured rate are (Farrenkopf 1978;
+    Crassidis and Junkins, Optimal Estimation of Dynamic Systems)
+
+        b_k = b_k-1 + sigma_u h^1/2 n_u
+        measured_k = (1 + e) omega_k + (b_k + b_k-1) / 2 + sigma n_v
+        sigma^2 = sigma_v^2 / h + sigma_u^2 h / 12
+
+    with standard normal n_u, n_v. The noise of each sample adds to this sigma in quadrature.
+    """
+
+    sigma: Array = shaped(lambda n: (3,))
+    """White noise of each sample, rad/s."""
+    angle_random_walk: float = shaped(lambda n: ())
+    """sigma_v, rad/s^1/2."""
+    rate_random_walk: float = shaped(lambda n: ())
+    """sigma_u, rad/s^3/2."""
+    offset: Array = shaped(lambda n: (3,))
+    """Bias that stands still, rad/s."""
+    bias: Array = shaped(lambda n: (3,))
+    """Bias that walks, rad/s: b without the offset."""
+    scale: Array = shaped(lambda n: (3,))
+    """1 + e."""
+    step: Array = shaped(lambda n: (1,))
+    """rad/s (0: none)."""
+    draws: Array = shaped(lambda n: (BLOCK_TICKS, 6))
+    """Standard normal numbers, a row a tick: n_v (3), n_u (3)."""
+
+    @classmethod
+    def build(cls, n: int, settings: GyroSettings, period: float, truth: State) -> Gyro:
+        """Read the settings."""
+        gyro = cls.allocate(n)
+        assign(
+            gyro, sigma=settings.noise, angle_random_walk=settings.angle_random_walk,
+            rate_random_walk=settings.rate_random_walk, offset=settings.initial_bias,
+            scale=1.0 + np.array(settings.scale_factor_error), step=settings.step,
+        )  # fmt: skip
+        return gyro
+
+
+@kernel
+def read_gyro(gyro: Gyro, truth: State, tick: int, period: float, measured: State) -> None:
+    """Write the measured rate of the base into ``measured``; the bias walks from tick to tick."""
+    draws = gyro.draws[row_of(tick)]
+    sigma_v, sigma_u = gyro.angle_random_walk, gyro.rate_random_walk
+    white = sigma_v * sigma_v / period + sigma_u * sigma_u * period / 12.0
+    walk = sigma_u * np.sqrt(period) if tick > 0 else 0.0
+    for i in range(3):
+        before = gyro.bias[i]
+        gyro.bias[i] = before + walk * draws[3 + i]
+        bias = gyro.offset[i] + 0.5 * (gyro.bias[i] + before)
+        noise = np.sqrt(white + gyro.sigma[i] * gyro.sigma[i]) * draws[i]
+        rate = gyro.scale[i] * truth.omega_base[i] + bias + noise
+        measured.omega_base[i] = in_steps(rate, gyro.step[0])
+
+
+class GyroFault(SensorFault):
+    """A gyro that is noisier or coarser."""
+
+    CHANGES: ClassVar[Mapping[str, Mapping[Kind, Change]]] = {
+        "sigma": {Kind("noise_gyro", SIGMA_RAD_PER_S, None,
+                       "noise on the measured base rate"): add_noise},
+        "step": {Kind("quantise_gyro", STEP_RAD_PER_S, None,
+                      "the measured base rate comes in steps"): coarsen},
+    }  # fmt: skip

@@ -1,0 +1,50 @@
+"""The sensors' random numbers: drawn block by block in Python, read by kernels from an array."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+
+from ..faults.schedule import BLOCK_TICKS
+
+Array = NDArray[np.float64]
+
+
+class Draws:
+    """Fills the sensors' arrays of standard normal numbers, (256, size) each, a row a tick.
+
+    The numbers are a function of seed, sensor and tick alone: a flight repeats exactly, in any
+    number of processes, and no sensor's numbers depend on the sensors beside it.
+    """
+
+    def __init__(self, seed: int, arrays: Mapping[str, Array]) -> None:
+        """``arrays``: to be filled, by the sensor's name."""
+        self._keys = [((seed, zlib.crc32(name.encode())), a) for name, a in arrays.items()]
+        self._block = -1
+
+    def refill(self, tick: int) -> int:
+        """See that the row of ``tick`` is drawn; return the first tick that needs other rows."""
+        block = tick // BLOCK_TICKS
+        if block != self._block:
+            for key, array in self._keys:
+                rng = np.random.default_rng((*key, block))
+                array[:] = rng.standard_normal(array.shape)
+            self._block = block
+        return (block + 1) * BLOCK_TICKS
+
+
+@kernel
+def row_of(tick: int) -> int:
+    """Return the row of a tick in its block of random numbers."""
+    return tick % BLOCK_TICKS
+
+
+@kernel
+def in_steps(value: float, step: float) -> float:
+    """Round ``value`` to the nearest whole multiple of ``step``; a step of 0 is none."""
+    return step * np.floor(value / step + 0.5) if step > 0.0 else value

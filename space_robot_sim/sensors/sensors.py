@@ -1,0 +1,86 @@
+"""All sensors of one robot: a new one is a line in each list."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
+from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.samples import State
+
+from ..faults.schedule import PartFault
+from .encoders import EncoderFault, Encoders, EncoderSettings, read_encoders
+from .gyro import Gyro, GyroFault, GyroSettings, read_gyro
+from .star_tracker import StarTracker, StarTrackerFault, StarTrackerSettings, track_stars
+
+Array = NDArray[np.float64]
+
+
+class SensorSettings(StrictModel):
+    """Settings of the sensors."""
+
+    star_tracker: StarTrackerSettings = StarTrackerSettings()
+    gyro: GyroSettings = GyroSettings()
+    encoders: EncoderSettings = EncoderSettings()
+
+
+class Sensors(Record):
+    """The sensors of one robot, as the plant's kernels read them."""
+
+    star_tracker: StarTracker = nested(StarTracker)
+    gyro: Gyro = nested(Gyro)
+    encoders: Encoders = nested(Encoders)
+    are_ideal: float = shaped(lambda n: ())
+    """1 if they tell the truth."""
+
+    @classmethod
+    def build(cls, n: int, settings: SensorSettings, period: float, truth: State) -> Sensors:
+        """Read the numbers of the settings for a robot of ``n`` joints, at rest at ``truth``.
+
+        Raises:
+            InputError: they do not fit one another or the period.
+        """
+        sensors = cls.allocate(n)
+        assign(
+            sensors,
+            star_tracker=StarTracker.build(n, settings.star_tracker, period, truth),
+            gyro=Gyro.build(n, settings.gyro, period, truth),
+            encoders=Encoders.build(n, settings.encoders, period, truth),
+            are_ideal=all(getattr(settings, name) == default for name, default in IDEAL),
+        )
+        return sensors
+
+
+def arrays_of_draws(sensors: Sensors) -> dict[str, Array]:
+    """Return the array of each sensor that random numbers are drawn into."""
+    return {name: getattr(sensors, name).draws for name, _ in IDEAL}
+
+
+IDEAL = [(name, getattr(SensorSettings(), name)) for name in SensorSettings.model_fields]
+"""The settings of each sensor without error."""
+
+FAULTS: dict[str, type[PartFault]] = {
+    "star_tracker": StarTrackerFault, "gyro": GyroFault, "encoders": EncoderFault,
+}  # fmt: skip
+"""The faults of each field of `Sensors`."""
+
+
+@kernel
+def sense(sensors: Sensors, truth: State, tick: int, period: float, measured: State) -> None:
+    """Write into ``measured`` what the sensors tell of ``truth`` at ``tick``; call it once a tick.
+
+    The torque in ``measured`` is left alone; position and velocity of the base have no error.
+    """
+    measured.base_position[:] = truth.base_position
+    measured.base_velocity[:] = truth.base_velocity
+    if sensors.are_ideal == 1.0:
+        measured.quaternion[:] = truth.quaternion
+        measured.omega_base[:] = truth.omega_base
+        measured.joint_positions[:] = truth.joint_positions
+        measured.joint_velocities[:] = truth.joint_velocities
+    else:
+        track_stars(sensors.star_tracker, truth, tick, measured)
+        read_gyro(sensors.gyro, truth, tick, period, measured)
+        read_encoders(sensors.encoders, truth, tick, period, measured)

@@ -1,0 +1,168 @@
+"""A star tracker: the base's attitude, noisy, now and then, and late."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, assign, shaped
+from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import State
+
+from ..faults.grammar import Argument, Kind
+from ..faults.schedule import BLOCK_TICKS
+from .faults import SIGMA_RAD, Change, SensorFault, add_noise, coarsen
+from .noise import in_steps, row_of
+
+Array = NDArray[np.float64]
+Angle = Annotated[float, Field(ge=0.0, le=1.0)]
+
+MOST_UNDER_WAY = 64
+"""Measurements that have been taken and are not released yet."""
+
+
+class StarTrackerSettings(StrictModel):
+    """A star tracker; by default without error, at every tick."""
+
+    noise_across: Angle = Field(
+        0.0, description="standard deviation about each axis across the boresight, rad"
+    )
+    noise_about: Angle = Field(0.0, description="standard deviation about the boresight, rad")
+    boresight: Annotated[list[float], Field(min_length=3, max_length=3)] = Field(
+        [0.0, 0.0, 1.0], description="axis of its optics in the base frame"
+    )
+    rate: Annotated[float, Field(ge=0.0, le=1e5)] = Field(
+        0.0, description="measurements a second, to a whole number of ticks (0: one a tick)"
+    )
+    delay: Annotated[float, Field(ge=0.0, le=100.0)] = Field(
+        0.0, description="time from exposure to release, s, to a whole number of ticks"
+    )
+    step: Angle = Field(
+        0.0, description="rotation that the last digit of the quaternion stands for, rad"
+    )
+
+
+class StarTracker(Record):
+    """The numbers of one star tracker, and its measurements.
+
+    The noise is a small rotation on base axes, ``n`` (3,) being standard normal numbers and ``b``
+    the boresight: ``sigma_across n + (sigma_about - sigma_across) (b . n) b``, so that it has the
+    standard deviation ``sigma_about`` about ``b`` and ``sigma_across`` about all axes across it.
+    """
+
+    sigma: Array = shaped(lambda n: (2,))
+    """rad: across the boresight, about it."""
+    boresight: Array = shaped(lambda n: (3,))
+    """Unit vector on base axes."""
+    interval: float = shaped(lambda n: ())
+    """Ticks between two measurements; the first is taken at tick 0."""
+    delay: float = shaped(lambda n: ())
+    """Ticks from a measurement to its release."""
+    step: Array = shaped(lambda n: (1,))
+    """The quaternion's numbers come in steps of half of it, rad (0: none)."""
+    draws: Array = shaped(lambda n: (BLOCK_TICKS, 3))
+    """Standard normal numbers, a row a tick."""
+    taken: Array = shaped(lambda n: (MOST_UNDER_WAY,))
+    """1 for each measurement under way that could be taken."""
+    under_way: Array = shaped(lambda n: (MOST_UNDER_WAY, 4))
+    """Measurements not released yet, by number modulo `MOST_UNDER_WAY`."""
+    held: Array = shaped(lambda n: (4,))
+    """The measurement released last."""
+
+    @classmethod
+    def build(
+        cls, n: int, settings: StarTrackerSettings, period: float, truth: State
+    ) -> StarTracker:
+        """Read the settings; before tick 0 the robot was at rest at ``truth``.
+
+        Raises:
+            InputError: the settings do not fit one another or the period.
+        """
+        norm = float(np.linalg.norm(settings.boresight))
+        if not 1e-3 <= norm <= 1e3:
+            raise InputError(f"star_tracker.boresight must have a norm near 1, got {norm:g}")
+        if settings.rate * period > 1.0 + 1e-9:
+            raise InputError(
+                f"star_tracker.rate must be at most one measurement a tick, "
+                f"{1.0 / period:g} Hz, got {settings.rate:g}"
+            )
+        interval = max(1, round(1.0 / (settings.rate * period))) if settings.rate else 1
+        delay = round(settings.delay / period)
+        if delay // interval >= MOST_UNDER_WAY:
+            raise InputError(
+                f"star_tracker.delay holds {delay // interval} measurements, "
+                f"at most {MOST_UNDER_WAY - 1} can be under way: measure at a lower rate"
+            )
+        tracker = cls.allocate(n)
+        assign(
+            tracker, sigma=[settings.noise_across, settings.noise_about], step=settings.step,
+            boresight=np.array(settings.boresight) / norm, interval=interval, delay=delay,
+            held=truth.quaternion,
+        )  # fmt: skip
+        return tracker
+
+
+@kernel
+def track_stars(tracker: StarTracker, truth: State, tick: int, measured: State) -> None:
+    """Write into ``measured`` the attitude that is released last at ``tick``.
+
+    Measurement k shows the attitude of tick ``k interval``, is released ``delay`` ticks later and
+    held until the next one. The robot was at rest before tick 0, so the first is there at once.
+    """
+    interval, delay = int(tracker.interval), int(tracker.delay)
+    if tick % interval == 0:
+        place = (tick // interval) % MOST_UNDER_WAY
+        tracker.taken[place] = 1.0
+        expose(tracker, truth.quaternion, tracker.draws[row_of(tick)], tracker.under_way[place])
+        if tick == 0:
+            tracker.held[:] = tracker.under_way[place]
+    exposed = tick - delay
+    if exposed >= 0 and exposed % interval == 0:
+        place = (exposed // interval) % MOST_UNDER_WAY
+        if tracker.taken[place] == 1.0:
+            tracker.held[:] = tracker.under_way[place]
+    measured.quaternion[:] = tracker.held
+
+
+@kernel
+def expose(tracker: StarTracker, quaternion: Array, draws: Array, out: Array) -> None:
+    """Write into ``out`` (4,) what is measured of ``quaternion`` (4,), with ``draws`` (3,)."""
+    across, about, boresight = tracker.sigma[0], tracker.sigma[1], tracker.boresight
+    along = draws[0] * boresight[0] + draws[1] * boresight[1] + draws[2] * boresight[2]
+    x = across * draws[0] + (about - across) * along * boresight[0]
+    y = across * draws[1] + (about - across) * along * boresight[1]
+    z = across * draws[2] + (about - across) * along * boresight[2]
+    out[:] = quaternion
+    angle = np.sqrt(x * x + y * y + z * z)
+    if angle > 0.0:  # times the quaternion of the rotation x, y, z
+        cosine, sine = np.cos(0.5 * angle), np.sin(0.5 * angle) / angle
+        x, y, z = sine * x, sine * y, sine * z
+        a, b, c, d = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
+        out[0] = a * cosine - b * x - c * y - d * z
+        out[1] = a * x + b * cosine + c * z - d * y
+        out[2] = a * y + c * cosine + d * x - b * z
+        out[3] = a * z + d * cosine + b * y - c * x
+    step = 0.5 * tracker.step[0]
+    if step > 0.0:
+        for i in range(4):
+            out[i] = in_steps(out[i], step)
+        norm = np.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2] + out[3] * out[3])
+        for i in range(4):
+            out[i] /= norm
+
+
+class StarTrackerFault(SensorFault):
+    """A star tracker that is noisier or coarser."""
+
+    CHANGES: ClassVar[Mapping[str, Mapping[Kind, Change]]] = {
+        "sigma": {Kind("noise_attitude", SIGMA_RAD, None,
+                       "the measured attitude is turned by SIGMA about each axis"): add_noise},
+        "step": {Kind("quantise_attitude", Argument("STEP", "rad", 1e-12, 1.0), None,
+                      "the measured quaternion's numbers come in steps of STEP / 2"): coarsen},
+    }  # fmt: skip

@@ -1,0 +1,91 @@
+"""Messages that are corrupted: which numbers, how often, and their stamps."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from random_robots import random_quaternion
+from random_samples import random_sample
+
+from space_robot_msgs_py.samples import STATE_FIELDS, Command, RobotState
+from space_robot_sim.faults.corruption import STAMP_BACK_TICKS, STAMP_JUMP_TICKS, Corruption
+from space_robot_sim.faults.grammar import parse_faults
+from space_robot_sim.faults.schedule import Schedule
+from space_robot_sim.plant.faults import PLANT_KINDS
+
+PERIOD = 5e-4
+N = 6
+
+
+def schedule(*texts: str, seed: int = 0) -> Schedule:
+    return Schedule(parse_faults(texts, PLANT_KINDS), seed, PERIOD)
+
+
+def a_state(tick: int, seed: int = 1) -> RobotState:
+    state = random_sample(N, seed, tick)
+    state.quaternion[:] = random_quaternion(np.random.default_rng(seed))
+    return state
+
+
+def changed(measured: RobotState, state: RobotState) -> set[str]:
+    names = list(STATE_FIELDS)
+    return {n for n in names if (getattr(measured, n) != getattr(state, n)).any()}
+
+
+def spoilt(*texts: str, ticks: int = 400, seed: int = 0) -> list[RobotState]:
+    corruption = Corruption(schedule(*texts, seed=seed))
+    states = [a_state(tick) for tick in range(ticks)]
+    for state in states:
+        corruption.spoil_state(state, state.tick)
+    return states
+
+
+@pytest.mark.parametrize(("kind", "test"), [("nan_state", np.isnan), ("inf_state", np.isposinf)])
+def test_one_measured_number_is_not_finite(kind: str, test: Any) -> None:
+    """Any of them, never the echo of the torque, nothing else."""
+    seen = set()
+    for state in spoilt(f"{kind}@0"):
+        (name,) = changed(state, a_state(state.tick))
+        values = getattr(state, name)
+        assert test(values).sum() == 1
+        assert np.isfinite(values).sum() == values.size - 1
+        seen.add((name, int(np.argmax(test(values)))))
+    assert len(seen) == 3 + 4 + 3 + 3 + 2 * N
+    assert "applied_torque" not in {name for name, _ in seen}
+
+
+def test_corruption_with_a_probability() -> None:
+    hit = [not np.isfinite(np.concatenate([s.base_position, s.quaternion, s.base_velocity,
+           s.omega_base, s.joint_positions, s.joint_velocities])).all()
+           for s in spoilt("nan_state@0:0.3", ticks=2000)]  # fmt: skip
+    assert np.mean(hit) == pytest.approx(0.3, abs=0.05)
+    assert not any(changed(s, a_state(s.tick)) for s in spoilt("nan_state@0:0", "inf_state@0:0"))
+
+
+def test_a_scaled_quaternion_is_off_by_a_tenth_both_ways() -> None:
+    norms = [np.linalg.norm(state.quaternion) for state in spoilt("scaled_quaternion@0")]
+    assert {round(float(norm), 12) for norm in norms} == {0.9, 1.1}
+
+
+def test_stamps_go_back_or_far_ahead_and_never_below_zero() -> None:
+    back, ahead = Corruption(schedule("stamp_back@0")), Corruption(schedule("stamp_jump@0"))
+    steps = {tick - back.stamp(tick) for tick in range(100, 500)}
+    assert steps == set(range(1, STAMP_BACK_TICKS + 1))
+    assert all(0 <= back.stamp(tick) < max(tick, 1) for tick in range(20))
+    assert {ahead.stamp(tick) - tick for tick in range(100)} == {STAMP_JUMP_TICKS}
+    plain = Corruption(schedule("stamp_back@0:0", "stamp_jump@5"))
+    assert [plain.stamp(tick) for tick in range(100)] == list(range(100))
+
+
+@pytest.mark.parametrize(("kind", "test"), [("nan_command", np.isnan), ("inf_command", np.isinf)])
+def test_one_commanded_torque_is_not_finite(kind: str, test: Any) -> None:
+    corruption, seen = Corruption(schedule(f"{kind}@0.1")), set()
+    for tick in range(400):
+        command = Command(tick, np.ones(N + 3))
+        corruption.spoil_command(command, tick)
+        assert test(command.torque).sum() == (tick >= 200)
+        assert (command.torque == 1.0).sum() == N + 3 - (tick >= 200)
+        seen |= set(np.flatnonzero(test(command.torque)).tolist())
+    assert seen == set(range(N + 3))
