@@ -64,8 +64,8 @@ def test_the_page_on_stability_has_the_numbers_of_its_command() -> None:
         f"| Lemma 1, spectral norm of W below 1 | fails: {lemma['spectral_norm']['max']:.3f} |",
         f"| the same with the spectral radius | holds: {lemma['spectral_radius']['max']:.3f} |",
         "| `K_2 > beta`, also circle criterion (73) | fails on every axis, by factors of "
-        f"{min(excess):.0f} to {max(excess):.0f}; without friction by {min(without_friction):.0f} to "
-        f"{max(without_friction):.0f} |",
+        f"{min(excess):.0f} to {max(excess):.0f}; without friction by "
+        f"{min(without_friction):.0f} to {max(without_friction):.0f} |",
         "| `K_1^2 > 4 K_2` | holds on every axis |",
         f"| LMI (51) with the M of (48) | fails: largest eigenvalue {min(eigenvalues):.2f} to "
         f"{max(eigenvalues):.2f}, with beta = gamma = 0 |",

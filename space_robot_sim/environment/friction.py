@@ -31,6 +31,11 @@ class FrictionSettings(StrictModel):
 
     coulomb: Coefficient = Field(0.02, description="Coulomb friction f_C of each joint, N m")
     viscous: Coefficient = Field(0.2, description="viscous friction f_V of each joint, N m s/rad")
+    set_valued: bool = Field(
+        True,
+        description="a joint at rest is held by up to f_C (false: sign(thetadot) inside the "
+        "integration step, which chatters by itself, as in simple simulators)",
+    )
 
 
 class Friction(Record):
@@ -40,12 +45,17 @@ class Friction(Record):
     """f_C, N m."""
     viscous: Array = shaped(lambda n: (n,))
     """f_V, N m s/rad."""
+    set_valued: float = shaped(lambda n: ())
+    """0 for the sign alone, 1 for friction that holds joints at rest."""
 
     @classmethod
     def build(cls, n: int, settings: FrictionSettings) -> Friction:
         """Give each of ``n`` joints the same friction."""
         friction = cls.allocate(n)
-        assign(friction, coulomb=settings.coulomb, viscous=settings.viscous)
+        assign(
+            friction, coulomb=settings.coulomb, viscous=settings.viscous,
+            set_valued=settings.set_valued,
+        )  # fmt: skip
         return friction
 
 
@@ -63,7 +73,9 @@ def friction_torque(
         out: (n,).
     """
     for i in range(out.size):
-        out[i] = friction.coulomb[i] * directions[i] + friction.viscous[i] * joint_velocities[i]
+        rate = joint_velocities[i]
+        direction = directions[i] if friction.set_valued != 0.0 else np.sign(rate)
+        out[i] = friction.coulomb[i] * direction + friction.viscous[i] * rate
 
 
 class StuckJoint:

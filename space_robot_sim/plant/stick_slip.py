@@ -10,6 +10,8 @@ box-constrained complementarity problem of the joints at rest:
 which has one solution since ``H^-1`` is positive definite. It is found by principal pivoting with
 the least index first, which cannot cycle (Murty 1974; with two bounds Judice & Pires 1992). What is
 at rest is known from the state alone: its velocity is zero to the last bit.
+
+Friction that is not set-valued has no directions, so that no joint stands and no step is cut.
 """
 
 from __future__ import annotations
@@ -81,17 +83,17 @@ def slide_or_stand(
     They are written into ``stages.directions``, ``stages.data.locked`` and ``stages.slope[0]``.
     """
     directions, data, coulomb = stages.directions, stages.data, environment.friction.coulomb
-    n, derivative = directions.size, stages.slope[0]
+    n, derivative, sticks = directions.size, stages.slope[0], environment.friction.set_valued
     first = x.size - n
     for i in range(n):
-        directions[i] = np.sign(x[first + i])
-        data.locked[1 + i] = 1.0 if x[first + i] == 0.0 and coulomb[i] > 0.0 else 0.0
+        directions[i] = sticks * np.sign(x[first + i])
+        data.locked[1 + i] = sticks if x[first + i] == 0.0 and coulomb[i] > 0.0 else 0.0
     disturbance_torque(environment.disturbance, time, stages.disturbance)
     for _ in range(MOST_PIVOTS):
         state_derivative(model, environment, x, torque, stages.disturbance, stages, derivative)
         changed = NONE
         for i in range(n):
-            if x[first + i] != 0.0 or coulomb[i] == 0.0 or stages.held[i] != 0.0:
+            if x[first + i] != 0.0 or coulomb[i] * sticks == 0.0 or stages.held[i] != 0.0:
                 continue
             if data.locked[1 + i] != 0.0:
                 if abs(data.holding[1 + i]) > coulomb[i]:

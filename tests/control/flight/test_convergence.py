@@ -63,3 +63,17 @@ def test_joints_4_to_6_err_as_with_a_plant_of_256_steps_a_tick() -> None:
     assert errors(stc)[2] == pytest.approx(1.14e-8, rel=0.05)
     assert errors(tsmc)[2] == pytest.approx(2.05e-9, rel=0.05)
     assert 0.005 / 3.0 < variation_of_joint_6(stc) < 0.015
+
+
+@pytest.mark.parametrize(
+    ("substeps", "error", "variation"),
+    [(1, 3.46e-8, 1.601), (4, 1.71e-8, 0.100), (16, 1.30e-8, 0.0154)],
+)
+def test_the_sign_inside_the_step_chatters_in_proportion_to_it(
+    substeps: int, error: float, variation: float
+) -> None:
+    """Friction that is not set-valued, under TDE-STC: it nears the figures above step by step."""
+    plan = FlightPlan(substeps=substeps).with_parameters("plant", {"friction.set_valued": False})
+    log = simulate(Flight(plan))
+    assert errors(log)[2] == pytest.approx(error, rel=0.01)
+    assert variation_of_joint_6(log) == pytest.approx(variation, rel=0.01)
