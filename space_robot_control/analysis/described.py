@@ -21,8 +21,8 @@ from space_robot_sim.plant.settings import PlantNodeSettings
 from space_robot_sim.robot import Robot
 
 from ..controller.gains import build_law
+from ..controller.navigation.low_pass import low_pass_weight
 from ..controller.settings import ControllerNodeSettings
-from ..controller.time_delay_estimation import low_pass_weight
 from ..laws.trust import check_file, check_law
 from .actuation import TorqueLimits
 from .estimate_error import HBar

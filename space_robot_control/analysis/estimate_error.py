@@ -44,7 +44,7 @@ class DelayedEstimate:
 
         Args:
             smoothing: weight of a new pair in the low-pass, see
-                `time_delay_estimation.low_pass_weight`; 0: no low-pass.
+                `low_pass_weight`; 0: no low-pass.
             rest: whether the rows begin at the flight's start, at rest; else the low-pass begins
                 at the first row.
         """

@@ -21,7 +21,9 @@ from .kernels import (
     apply_transfer,
     compute_signals,
 )
-from .time_delay_estimation import low_pass_weight
+from .navigation.low_pass import low_pass_weight
+from .navigation.navigation import Navigation
+from .navigation.settings import NavigationFilterSettings
 
 Array = NDArray[np.float64]
 
@@ -37,9 +39,21 @@ class Controller:
     """
 
     def __init__(
-        self, robot: Robot, law: ControlLaw, period: float, acceleration_filter_hz: float = 0.0
-    ) -> None:
-        """``acceleration_filter_hz``: corner of the low-pass of the time-delay pair (0: none)."""
+        self, robot: Robot, law: ControlLaw, period: float, acceleration_filter_hz: float = 0.0,
+        navigation: NavigationFilterSettings | None = None,
+    ) -> None:  # fmt: skip
+        """Build it for a robot and a law.
+
+        Args:
+            robot: the nominal one.
+            law: in force at the beginning.
+            period: s.
+            acceleration_filter_hz: corner of the low-pass of the time-delay pair (0: none).
+            navigation: settings of the navigation filter (None: the laws see what is measured).
+
+        Raises:
+            InputError: settings that do not fit the period.
+        """
         self.period = period
         self.block = ControllerMemory.block(robot.n)
         """The controller's `ControllerMemory`, for compiled loops."""
@@ -47,6 +61,8 @@ class Controller:
         assign(memory, model=robot.model, last_jacobian_inverse=2.0 * np.eye(3))
         assign(memory, transfer_ticks=max(1, round(TRANSFER_S / period)))
         assign(memory.pair, smoothing=low_pass_weight(acceleration_filter_hz, period))
+        if navigation:
+            assign(memory, navigation=Navigation.build(robot.n, navigation, period))
         self._memory = memory
         self._command = Command(-1, np.zeros(robot.n + 3))
         self.signals = Signals.view(self.block["signals"])

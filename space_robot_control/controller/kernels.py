@@ -14,6 +14,7 @@ from space_robot_sim.dynamics.rho_space import rho_space_into
 
 from ..laws import Signals
 from ..laws.compiled import LawCode
+from .navigation.navigation import Navigation, navigate
 from .time_delay_estimation import TimeDelayPair, follows, observe, time_delay_estimate
 from .tracking import force_from_torque, measured_rate, torque_from_force, tracking_errors
 
@@ -57,6 +58,7 @@ class ControllerMemory(Record):
     """Length of a transfer."""
     transfer_left: float = shaped(lambda n: ())
     """Ticks until ``transfer`` has faded; -1: the law takes over at this tick."""
+    navigation: Navigation = nested(Navigation)
 
 
 @kernel
@@ -90,18 +92,25 @@ def compute_signals(
     block: Block, tick: int, state: Block, reference: Block, h_bar: Array, uses_model: bool,
     period: float,
 ) -> int:  # fmt: skip
-    """Turn a measured state and its reference into the law's signals.
+    """Turn a measured state, or what navigation makes of it, and its reference into signals.
 
     Args: see `controller_tick`; ``h_bar`` is empty for a law without time-delay estimate.
 
     Returns:
-        `USABLE`, or why the state is not: then nothing was done.
+        `USABLE`, or why the state is not: then nothing was done, but that navigation may have taken
+        a measured state that was usable.
     """
     memory, measured = block[0], state[0]
     signals, rate = memory.signals, memory.rate
     status: int = status_of(measured)
     if status != USABLE:
         return status
+    if memory.navigation.is_filtered == 1.0:
+        navigate(memory.navigation, tick, measured, period)
+        measured = memory.navigation.estimate
+        status = status_of(measured)
+        if status != USABLE:
+            return status
     near, dot = memory.quaternion, 0.0
     for k in range(4):
         dot += measured.quaternion[k] * near[k]

@@ -9,8 +9,6 @@ arrive late or saturate.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,11 +37,6 @@ class TimeDelayPair(Record):
     """F_S over the last interval."""
     acceleration: Array = shaped(lambda n: (n + 3,))
     """Mean rhodd over the last interval."""
-
-
-def low_pass_weight(corner_hz: float, period: float) -> float:
-    """Weight of a new sample in a first-order low-pass; 0 (for none) where ``corner_hz`` is 0."""
-    return 1.0 - math.exp(-2.0 * math.pi * corner_hz * period)
 
 
 @kernel

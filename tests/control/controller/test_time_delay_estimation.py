@@ -10,10 +10,10 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 from random_robots import JOINTS
 
+from space_robot_control.controller.navigation.low_pass import low_pass_weight
 from space_robot_control.controller.time_delay_estimation import (
     LONGEST_GAP,
     TimeDelayPair,
-    low_pass_weight,
     observe,
     time_delay_estimate,
 )
