@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller
+from space_robot_control.controller.navigation.settings import NavigationFilterSettings
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
 from space_robot_control.laws import ControlLaw, find_law
 from space_robot_control.mission.mission import Mission, MissionSettings
@@ -42,13 +43,16 @@ def law_of(name: str) -> ControlLaw:
 class Loop:
     """Plant, controller and mission in one process; a test may bend what passes between them."""
 
-    def __init__(self, robot: Robot, law: ControlLaw, degrees: Any = None, **plant: Any) -> None:
+    def __init__(
+        self, robot: Robot, law: ControlLaw, degrees: Any = None,
+        navigation: NavigationFilterSettings | None = None, **plant: Any,
+    ) -> None:  # fmt: skip
         waypoints = PAPER_DEG if degrees is None else degrees
         flat = np.asarray(waypoints, dtype=float).ravel().tolist()
         plant = {"initial_joints_deg": flat[: robot.n], **plant}
         mission = MissionSettings(waypoint_times=[0.0, 15.0, 30.0], waypoints_deg=flat)
         self.plant = Plant(robot, PlantSettings(**plant), PERIOD)
-        self.controller = Controller(robot, law, PERIOD)
+        self.controller = Controller(robot, law, PERIOD, navigation=navigation)
         self.mission = Mission(robot.n, mission, PERIOD)
         self.references = ReferenceBuffer(robot.n)
         self.own_output_as_applied = False

@@ -186,6 +186,10 @@ OPTIONS: dict[str, Decorator] = {
         "--split-size", metavar="SIZE",
         help="Go on in another file of the bag after so many bytes, as 500K, 100M, 2G "
         "[default: one file]."),
+    "navigation": click.option(
+        "--navigation", type=click.Choice(["direct", "filtered"]),
+        help="What the laws see: measurements, or what the navigation filter makes of them "
+        "[default: direct]."),
     "latency": click.option(
         "--command-latency-ticks", type=int, default=0, show_default=True,
         help="Ticks by which the plant applies commands late."),

@@ -43,8 +43,9 @@ class ControllerLoop:
         self._laws = LawSet(node, settings, robot.n + 3)
         self._laws.warm_up(robot)
         self._controller = Controller(
-            robot, self._laws.choice.chosen, settings.period, settings.acceleration_filter_hz
-        )
+            robot, self._laws.choice.chosen, settings.period, settings.acceleration_filter_hz,
+            settings.filter_settings,
+        )  # fmt: skip
         self._answering = Answering(self._controller, self._laws.choice, settings, robot)
         timebase = settings.timebase
         self._states = StateInput(node, robot, timebase)

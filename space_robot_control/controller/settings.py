@@ -9,6 +9,8 @@ from pydantic import Field
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 
+from .navigation.settings import Mode, NavigationFilterSettings, completed
+
 
 class ControllerNodeSettings(NodeSettings):
     """Parameters of controller_node; the gains stand beside them as ``<law>.<gain>``."""
@@ -31,6 +33,10 @@ class ControllerNodeSettings(NodeSettings):
     acceleration_filter_hz: Annotated[float, Field(ge=0.0, le=1e5)] = Field(
         0.0, description="corner of the low-pass of the time-delay estimate's pair, Hz (0: none)"
     )
+    navigation: Mode = Field(
+        "direct", description="what the laws see: direct (what is measured) or filtered"
+    )
+    navigation_filter: NavigationFilterSettings = NavigationFilterSettings()
     hold_ticks: Annotated[int, Field(ge=0, le=10**6)] = Field(
         200, description="bad states over which the last torque is repeated; then it is zero"
     )
@@ -47,3 +53,8 @@ class ControllerNodeSettings(NodeSettings):
         [""],
         description="who must listen before the first command: NODE:TOPIC, or NODE to all it sends",
     )
+
+    @property
+    def filter_settings(self) -> NavigationFilterSettings | None:
+        """The numbers of the navigation filter, complete; None: there is none."""
+        return completed(self.navigation_filter) if self.navigation == "filtered" else None

@@ -49,7 +49,7 @@ def _step_plant() -> None:
 def _answer_and_exchange() -> None:
     """The controller's entry under every law, and the messages."""
     for law in laws():
-        flight = Flight(FlightPlan(controller=law))
+        flight = Flight(FlightPlan(controller=law, navigation="filtered"))
         states = StateCodec(flight.robot.joint_names, flight.timebase)
         commands = CommandCodec(flight.robot.axis_names, flight.timebase)
         state = RobotState.allocate(flight.robot.n)

@@ -18,6 +18,7 @@ from space_robot_sim.plant.settings import MOST_TICKS
 
 from ..controller.controller import Controller
 from ..controller.gains import build_laws
+from ..controller.navigation.settings import Mode
 from ..controller.swaps import parse_swaps
 from ..mission.mission import Mission
 from .faults import KINDS, PROCESS_KINDS
@@ -41,6 +42,8 @@ class FlightPlan(StrictModel):
     """Length of a tick of every node, s (None: that of the files)."""
     substeps: int | None = None
     """Integration steps of the plant in a tick (None: that of the files)."""
+    navigation: Mode | None = None
+    """What the laws see (None: what the files say)."""
     command_latency_ticks: int = 0
     friction: bool = True
     realtime: bool = False
@@ -96,6 +99,7 @@ class FlightPlan(StrictModel):
                 "gains": self.gains,
                 "fifo_priority": self.fifo_priority,
                 "swaps": self.swaps,
+                **({} if self.navigation is None else {"navigation": self.navigation}),
             },
             "mission": {**period, "robot": self.robot, "mission": self.mission},
             "recorder": {
@@ -150,7 +154,7 @@ class Flight:
         self.mission = Mission(self.robot.n, settings.mission, self.period)
         self.controller = Controller(
             self._robots.controller, self.law, self.period,
-            settings.controller.acceleration_filter_hz,
+            settings.controller.acceleration_filter_hz, settings.controller.filter_settings,
         )  # fmt: skip
         self.ticks = self._ticks()
 
@@ -217,6 +221,14 @@ class Flight:
         return {name: row.tolist() for name, row in self.law.gain_values.items()}
 
     @property
+    def _navigation(self) -> dict[str, Any]:
+        """The numbers of the navigation filter, whichever file or option they are of."""
+        settings = self.controller_settings.filter_settings
+        if settings is None:
+            return {}
+        return {"navigation": "filtered", "navigation_filter": settings.model_dump()}
+
+    @property
     def description(self) -> dict[str, Any]:
         """The flight as a bag tells it; enough to fly it again.
 
@@ -237,6 +249,7 @@ class Flight:
             "command_latency_ticks": plant.command_latency_ticks,
             "friction": self.has_friction,
             "realtime": plant.realtime,
+            **self._navigation,
             "seed": plant.fault_seed,
             **({"faults": self.faults} if self.faults else {}),
             **({"swaps": swaps} if swaps else {}),

@@ -1,4 +1,4 @@
-"""Settings of the navigation filter."""
+"""Settings of navigation: whether there is a filter, and its numbers."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from pydantic import Field
 from space_robot_msgs_py.config.validation import StrictModel
 
 Mode = Literal["direct", "filtered"]
+AS_THE_SENSORS = -1.0
+"""In place of a number: as the sensors' own settings say."""
 
-Sigma = Annotated[float, Field(gt=0.0, le=1e3)]
+Sigma = Annotated[float, Field(ge=-1.0, le=1e3)]
 Corner = Annotated[float, Field(ge=0.0, le=1e5)]
 
 
@@ -18,33 +20,67 @@ class NavigationFilterSettings(StrictModel):
     """The sensors as the filter believes them to be, and how much it smooths."""
 
     tracker_across: Sigma = Field(
-        1e-5, description="star tracker's noise about each axis across the boresight, rad"
+        AS_THE_SENSORS,
+        description="star tracker's noise about axes across the boresight, rad (-1: the sensors')",
     )
-    tracker_about: Sigma = Field(8e-5, description="its noise about the boresight, rad")
+    tracker_about: Sigma = Field(
+        AS_THE_SENSORS, description="its noise about the boresight, rad (-1: the sensors')"
+    )
     tracker_boresight: Annotated[list[float], Field(min_length=3, max_length=3)] = Field(
-        [0.0, 0.0, 1.0], description="its boresight in the base frame"
+        [0.0, 0.0, 0.0], description="its boresight in the base frame (0, 0, 0: the sensors')"
     )
-    tracker_delay: Annotated[float, Field(ge=0.0, le=100.0)] = Field(
-        0.1, description="time from its measurement to the report, s"
+    tracker_delay: Annotated[float, Field(ge=-1.0, le=2.0)] = Field(
+        AS_THE_SENSORS, description="time from its measurement to its report, s (-1: the sensors')"
     )
-    gyro_angle_walk: Sigma = Field(3e-7, description="gyro's angle random walk, rad/s^1/2")
-    gyro_rate_walk: Annotated[float, Field(ge=0.0, le=1e3)] = Field(
-        1e-9, description="gyro's rate random walk, rad/s^3/2"
+    gyro_angle_walk: Sigma = Field(
+        AS_THE_SENSORS, description="gyro's angle random walk, rad/s^1/2 (-1: the sensors')"
+    )
+    gyro_rate_walk: Sigma = Field(
+        AS_THE_SENSORS, description="gyro's rate random walk, rad/s^3/2 (-1: the sensors')"
     )
     gyro_bias: Sigma = Field(
-        1e-6, description="standard deviation of the gyro's bias at the beginning, rad/s"
+        AS_THE_SENSORS,
+        description="standard deviation of its bias at the beginning, rad/s (-1: the sensors')",
     )
     gate: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
-        10.0, description="standard deviations beyond which a tracker is not believed (0: none)"
+        10.0, description="standard deviations beyond which the tracker is not believed (0: none)"
     )
     rate_filter_hz: Corner = Field(
         100.0, description="corner of each of two low-passes of the base's rate, Hz (0: none)"
     )
-    joint_angle_noise: Sigma = Field(1e-7, description="noise of a joint's angle, rad")
-    joint_rate_noise: Annotated[float, Field(ge=0.0, le=1e3)] = Field(
-        0.0,
-        description="noise of a joint's rate, rad/s (0: it is differenced, so not used)",
+    joint_angle_noise: Sigma = Field(
+        AS_THE_SENSORS, description="noise of a joint's angle, rad (-1: the sensors')"
+    )
+    joint_rate_noise: Sigma = Field(
+        AS_THE_SENSORS,
+        description="noise of a joint's rate, rad/s (0: it is not used; -1: the sensors')",
     )
     joint_bandwidth_hz: Corner = Field(
         150.0, description="bandwidth of the filter of joint angles and rates, Hz (0: none)"
     )
+
+
+FINE = {
+    "tracker_across": 1e-5,
+    "tracker_about": 8e-5,
+    "tracker_boresight": [0.0, 0.0, 1.0],
+    "tracker_delay": 0.1,
+    "gyro_angle_walk": 3e-7,
+    "gyro_rate_walk": 1e-9,
+    "gyro_bias": 1e-6,
+    "joint_angle_noise": 1e-7,
+    "joint_rate_noise": 0.0,
+}
+"""Good sensors."""
+
+
+def completed(settings: NavigationFilterSettings) -> NavigationFilterSettings:
+    """Return the settings with numbers for all that the sensors are to say."""
+    given = settings.model_dump()
+    return settings.model_copy(
+        update={name: value for name, value in FINE.items() if not _is_given(given[name])}
+    )
+
+
+def _is_given(value: float | list[float]) -> bool:
+    return any(value) if isinstance(value, list) else value >= 0.0

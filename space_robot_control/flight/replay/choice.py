@@ -75,7 +75,9 @@ class ControllerChoice:
         law = find_law(str(named))
         self.law_name = law.name
         is_same_law = law.name == flight.get("controller", law.name)
-        self.parameters: dict[str, Any] = {**flown, **self._robot(flown)}
+        self.parameters: dict[str, Any] = {
+            **flown, **self._robot(flown), **recorded_navigation(flight)
+        }  # fmt: skip
         """The node's parameters, by dotted name."""
         recorded_gains = flight.get("gains_used", {})
         if recorded_gains and is_same_law and not gains:
@@ -165,6 +167,12 @@ def recorded_parameters(flight: Mapping[str, Any]) -> dict[str, Any]:
         names = ("controller", "gains", "robot", "swaps", "period")
         recorded = {name: flight[name] for name in names if name in flight}
     return {name: value for name, value in recorded.items() if name not in OF_THE_GRAPH}
+
+
+def recorded_navigation(flight: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the numbers of the navigation filter that flew, as parameters."""
+    recorded = flight.get("navigation_filter", {})
+    return {f"navigation_filter.{name}": value for name, value in recorded.items()}
 
 
 def _same(now: Mapping[str, Any], recorded: Mapping[str, Any]) -> bool:

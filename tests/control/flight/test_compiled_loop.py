@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from closed_loop import PERIOD, Loop, law_of
 
+from space_robot_control.controller.navigation.settings import NavigationFilterSettings
 from space_robot_control.flight.closed_loop import close_loop
 from space_robot_control.laws import ControlLaw, LawGains, Signals, per_axis
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -37,14 +38,16 @@ def closed(loop: Loop, stretches: list[int]) -> FlightLog:
 
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("latency", [0, 3])
+@pytest.mark.parametrize("navigation", [None, NavigationFilterSettings()])
 def test_compiled_flight_is_the_one_of_single_steps(
-    paper_robot: Robot, name: str, latency: int
+    paper_robot: Robot, name: str, latency: int, navigation: NavigationFilterSettings | None
 ) -> None:
-    """Bit for bit, in one stretch or in several."""
-    single = Loop(paper_robot, law_of(name), command_latency_ticks=latency)
+    """Bit for bit, in one stretch or in several, with and without navigation filter."""
+    options = {"navigation": navigation, "command_latency_ticks": latency}
+    single = Loop(paper_robot, law_of(name), **options)
     errors, torques = single.fly(TICKS)
     for stretches in ([0, TICKS], [0, 1, 100, TICKS]):
-        loop = Loop(paper_robot, law_of(name), command_latency_ticks=latency)
+        loop = Loop(paper_robot, law_of(name), **options)
         log = closed(loop, stretches)
         assert log.telemetry is not None
         np.testing.assert_array_equal(log.commanded_torque, torques)

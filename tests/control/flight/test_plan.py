@@ -56,6 +56,7 @@ def test_a_parameter_is_the_same_as_its_option() -> None:
     pairs: list[tuple[Parameters, dict[str, Any]]] = [
         ({"controller": {"controller": "ctc"}}, {"controller": "ctc"}),
         ({"controller": {"gains": "tuned"}}, {"gains": "tuned"}),
+        ({"controller": {"navigation": "filtered"}}, {"navigation": "filtered"}),
         ({"controller": {"swaps": ["0.01:ctc"]}}, {"swaps": ["0.01:ctc"]}),
         ({"plant": {"case": 3}}, {"case": "3"}),
         ({"plant": {"realtime": True}}, {"realtime": True}),
@@ -224,6 +225,8 @@ _SPECIAL: dict[str, st.SearchStrategy[Any]] = {
     "waypoints_deg": st.lists(st.integers(-90, 90), min_size=18, max_size=18),
     "compression": st.sampled_from(["none", "lz4", "zstd"]),
     "split_size": st.sampled_from([0, 100_000, "2M"]),
+    "navigation": st.sampled_from(["direct", "filtered"]),
+    "navigation_filter.tracker_boresight": st.sampled_from([[0, 0, 0], [1, 0, 2.5]]),
 }
 _NOT_ALONE = {"waypoint_times", "waypoints_deg"}
 
@@ -292,7 +295,9 @@ def test_all_that_is_made_of_a_plan_agrees(parameters: Parameters) -> None:
     assert theirs.block.tobytes() == flight.plant.block.tobytes()
     assert theirs.command_delay_buffer.shape == flight.plant.command_delay_buffer.shape
     robot = Robot.from_yaml(named_file("robots", controller.robot))
-    loop = Controller(robot, law, controller.period, controller.acceleration_filter_hz)
+    loop = Controller(
+        robot, law, controller.period, controller.acceleration_filter_hz, controller.filter_settings
+    )
     assert loop.block.tobytes() == flight.controller.block.tobytes()
     assert law.gains_block.tobytes() == flight.controller.law.gains_block.tobytes()
     reference = Mission(6, mission, mission.period).chunk(0, 100)
