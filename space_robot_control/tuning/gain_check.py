@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..controller.time_delay_estimation import low_pass_weight
+from ..controller.navigation.low_pass import low_pass_weight
 from ..laws import ControlLaw
 from .inertia import attitude_jacobian
 from .spectrum import Spectrum, spectrum

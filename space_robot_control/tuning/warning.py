@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.robot import Robot
 
-from ..controller.time_delay_estimation import low_pass_weight
+from ..controller.navigation.low_pass import low_pass_weight
 from ..laws import ControlLaw
 from ..mission.mission import MissionSettings
 from .inertia import inertia_along
