@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import shlex
+from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
-from .options import flight_options
+from .options import OPTIONS, flight_options
 
 
 @click.group()
@@ -48,3 +51,66 @@ def check(as_json: bool, **options: Any) -> None:
     if not found.is_sound:
         names = ", ".join(check.law for check in found.checks if not check.is_sound)
         raise SpaceRobotError(f"{names}: h_bar leaves too little margin in torque scale")
+
+
+@gains.command()
+@OPTIONS["robot"]
+@OPTIONS["mission"]
+@click.option(
+    "--case", "cases", multiple=True, default=["1"], show_default=True, metavar="CASE",
+    help="A case that is to be flown, with its payload; may be repeated.",
+)  # fmt: skip
+@click.option(
+    "--margin", type=click.FloatRange(0.0, 0.5, min_open=True), default=0.05, show_default=True,
+    help="Share by which the torque reported may exceed the one commanded.",
+)  # fmt: skip
+@click.option(
+    "--mass-uncertainty", type=click.FloatRange(0.0, 0.9), default=0.2, show_default=True,
+    help="Share by which each mass and inertia may be wrong.",
+)  # fmt: skip
+@click.option(
+    "--bandwidth", type=click.FloatRange(0.0, 1e4, min_open=True), metavar="W",
+    help="Poles of all laws, rad/s [default: a quarter of the estimate's].",
+)  # fmt: skip
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path, file_okay=False), required=True,
+    metavar="DIR", help="Folder of the set, for --gains.",
+)  # fmt: skip
+@click.pass_context
+def tune(context: click.Context, /, output: Path, **options: Any) -> None:
+    """Make a gain set for all five laws, by a method without search or luck.
+
+    h_bar from the inertia along the mission, so that the time-delay estimate contracts with the
+    margin asked for, whichever of the masses are wrong; a low-pass for it; poles below its lag;
+    switching gains from the errors that are left. Nothing is flown. The method is told step by
+    step in the docs, its numbers in the files.
+
+    \b
+    Examples:
+      space-robot gains tune -o my_gains
+      space-robot gains tune --robot seven_joint --case 1 --case 2 --margin 0.03 -o my_gains
+      space-robot fly --gains my_gains
+    """
+    from ..flight.terminal import terminal
+    from ..tuning.method import Wishes
+    from .gains_tuned import tuned_set, write_set
+
+    wishes = Wishes(options["margin"], options["mass_uncertainty"], options["bandwidth"])
+    with terminal(stderr=True).status("tuning") as status:
+        tuned = tuned_set(
+            options["robot"], options["mission"], options["cases"], wishes,
+            lambda text: status.update(text),
+        )  # fmt: skip
+    for path in write_set(tuned, _command(context), output):
+        click.echo(f"wrote {path}", err=True)
+
+
+def _command(context: click.Context) -> str:
+    """Return the command line with the options that were given."""
+    words = []
+    for option in context.command.params:
+        value = context.params[str(option.name)]
+        if context.get_parameter_source(str(option.name)) != ParameterSource.DEFAULT:
+            values = value if isinstance(value, tuple) else (value,)
+            words += [word for each in values for word in (option.opts[0], str(each))]
+    return shlex.join(["space-robot", "gains", "tune", *words])

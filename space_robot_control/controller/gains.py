@@ -16,7 +16,7 @@ from space_robot_msgs_py.config.yaml_text import check_file, is_folder
 from space_robot_msgs_py.errors import InputError
 
 from ..laws import ControlLaw, find_law, laws
-from .settings import ControllerNodeSettings
+from .settings import OF_THE_SET, ControllerNodeSettings
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
         chosen = read_yaml(folder / DEFAULT_SETS)
         return {law: folder / name / f"{law}.yaml" for law, name in chosen.items()}
     one_of(gain_set, ["default", *sets], "gain set", f" of robot {short(Path(robot).stem)}")
-    return {file.stem: file for file in sorted((folder / gain_set).glob("*.yaml"))}
+    return _files(folder / gain_set)
 
 
 def gains_as_path(gain_set: str, robot: str) -> str:
@@ -72,10 +72,15 @@ def _shipped_sets(robot: str) -> list[str]:
 
 
 def _gains_folder(path: Path) -> dict[str, Path]:
-    files = {file.stem: file for file in sorted(path.glob("*.yaml"))} if is_folder(path) else {}
+    files = _files(path) if is_folder(path) else {}
     if not files:
         raise InputError(f"{short(str(path))}: no folder with gain files (<law>.yaml)")
     return files
+
+
+def _files(folder: Path) -> dict[str, Path]:
+    files = sorted(file for file in folder.glob("*.yaml") if file.name != OF_THE_SET)
+    return {file.stem: file for file in files}
 
 
 def read_gains(path: Path, law: type[ControlLaw], axes: int) -> dict[str, Array]:

@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, ClassVar
 
 from pydantic import Field
 
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.config.files import config_directory
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
+from space_robot_msgs_py.config.yaml_text import is_folder
 
 from .navigation.settings import Mode, NavigationFilterSettings, completed
+
+OF_THE_SET = "controller.yaml"
+"""A file of a gain set with the controller's parameters that belong to its gains; need not be."""
+
+
+def set_file(robot: str, gains: str) -> list[Path]:
+    """Return the `OF_THE_SET` of a gain set (name, or path to a folder), if it has one."""
+    is_path = "/" in gains
+    folder = Path(gains) if is_path else config_directory() / "gains" / Path(robot).stem / gains
+    return [file for file in (folder / OF_THE_SET,) if is_folder(folder) and file.is_file()]
 
 
 class ControllerNodeSettings(NodeSettings):
     """Parameters of controller_node; the gains stand beside them as ``<law>.<gain>``."""
 
     node: ClassVar[str] = "controller"
+    selectors: ClassVar[tuple[str, ...]] = ("robot", "gains")
     sends: ClassVar[tuple[topics.Topic, ...]] = (topics.COMMAND, topics.TELEMETRY, topics.LAW)
 
     controller: str = Field(
@@ -58,3 +73,8 @@ class ControllerNodeSettings(NodeSettings):
     def filter_settings(self) -> NavigationFilterSettings | None:
         """The numbers of the navigation filter, complete; None: there is none."""
         return completed(self.navigation_filter) if self.navigation == "filtered" else None
+
+    @classmethod
+    def layers(cls, selected: Mapping[str, str]) -> list[Path]:
+        """Add what the gain set says to the controller itself."""
+        return [*super().layers(selected), *set_file(selected["robot"], selected["gains"])]

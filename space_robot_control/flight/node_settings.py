@@ -6,14 +6,15 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.config.files import node_parameters
 from space_robot_msgs_py.config.settings import NodeSettings
-from space_robot_msgs_py.config.trees import Tree, flatten, nest
+from space_robot_msgs_py.config.trees import Tree, flatten, merge, nest
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.settings import PlantNodeSettings
 
 from ..controller.gains import gains_as_path, split_gains
-from ..controller.settings import ControllerNodeSettings
+from ..controller.settings import ControllerNodeSettings, set_file
 from ..laws import ControlLaw
 from ..mission.settings import MissionNodeSettings
 
@@ -69,6 +70,10 @@ class FlightSettings(NamedTuple):
         own, gains = split_gains(given["controller"])
         controller = ControllerNodeSettings.resolve(own)
         path = gains_as_path(controller.gains, controller.robot)
+        for file in set_file(controller.robot, path):  # as if given: a bag is to tell of it
+            of_the_set = dict(flatten(node_parameters(file, "controller")))
+            given["controller"] = {**of_the_set, **given["controller"]}
+            controller = ControllerNodeSettings.resolve(merge(nest(of_the_set), own))
         settings = cls(
             plant,
             controller.model_copy(update={"gains": path}),

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
 
 from space_robot_control.cli.main import cli
+from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.flight.simulate import simulate
+from space_robot_control.laws import laws
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
 
 
@@ -83,3 +88,66 @@ def test_a_flight_says_it_on_standard_error_alone() -> None:
     assert result.exit_code == 0
     json.loads(result.stdout)
     assert "warning: tde_stc: h_bar leaves 0.31% of margin" in result.stderr
+
+
+def tune(folder: Path, *options: str) -> Result:
+    return run("tune", *options, "-o", str(folder))
+
+
+def test_a_tuned_set_flies_and_is_sound(tmp_path: Path) -> None:
+    folder = tmp_path / "set"
+    result = tune(folder, "--case", "1", "--case", "4-2")
+    assert result.exit_code == 0, result.exception
+    assert result.stdout == ""
+    names = {"ctc", "ctc_smc", "tde_smc", "tde_stc", "tde_tsmc", "controller"}
+    assert {file.stem for file in folder.iterdir()} == names
+    assert run("check", "--gains", str(folder)).exit_code == 0
+    flight = Flight(FlightPlan(gains=str(folder), duration=0.1))
+    assert flight.controller_settings.acceleration_filter_hz == pytest.approx(99.3, rel=0.01)
+    assert list(flight.laws) == sorted(laws(), key=lambda name: (name != "tde_stc", name))
+    simulate(flight)
+
+
+def test_what_the_set_says_to_the_controller_is_in_the_bag_and_may_be_overruled(
+    tmp_path: Path,
+) -> None:
+    tune(tmp_path)
+    flight = Flight(FlightPlan(gains=str(tmp_path)))
+    corner = flight.controller_settings.acceleration_filter_hz
+    assert flight.description["parameters"]["controller"]["acceleration_filter_hz"] == corner > 0.0
+    given = {"controller": {"acceleration_filter_hz": 7.0}}
+    over = Flight(FlightPlan(gains=str(tmp_path), parameters=given))
+    assert over.controller_settings.acceleration_filter_hz == 7.0
+    alone = ControllerNodeSettings.resolve({"gains": str(tmp_path)})  # as a node by itself has it
+    assert alone.acceleration_filter_hz == corner
+
+
+def test_the_same_command_writes_the_same_bytes(tmp_path: Path) -> None:
+    texts = []
+    for _ in range(2):
+        tune(tmp_path / "set", "--robot", "seven_joint")
+        texts.append({file.name: file.read_bytes() for file in (tmp_path / "set").iterdir()})
+    assert texts[0] == texts[1]
+    command = f"space-robot gains tune --robot seven_joint -o {tmp_path / 'set'}"
+    assert texts[0]["ctc.yaml"].decode().splitlines()[0] == f"# Made by `{command}`."
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--robot", "nothing"), "unknown robot 'nothing'"),
+        (("--case", "nothing"), "unknown case 'nothing'"),
+        (("--mission", "nothing"), "unknown mission 'nothing'"),
+        (("--bandwidth", "1000"), "bandwidth must be at most"),
+    ],
+)
+def test_what_cannot_be_tuned_is_told(options: tuple[str, ...], said: str, tmp_path: Path) -> None:
+    error = tune(tmp_path / "set", *options).exception
+    assert isinstance(error, InputError)
+    assert said in str(error)
+    assert not (tmp_path / "set").exists()
+
+
+@pytest.mark.parametrize("option", ["--margin", "--mass-uncertainty", "--bandwidth"])
+def test_numbers_out_of_range_are_refused(option: str, tmp_path: Path) -> None:
+    assert tune(tmp_path, option, "-1").exit_code == 2

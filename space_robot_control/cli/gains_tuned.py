@@ -1,0 +1,69 @@
+"""The gain set of ``space-robot gains tune``: from options to files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from space_robot_msgs_py.errors import InputError
+from space_robot_sim.dynamics.attitude import SINGULAR_ETA
+from space_robot_sim.environment.payload import with_payload
+
+from ..analysis.files import make_folder, whole_file
+from ..flight.node_settings import FlightSettings
+from ..flight.plan import FlightPlan
+from ..flight.robots import Robots
+from ..tuning.demand import demand
+from ..tuning.gain_file import gain_files
+from ..tuning.inertia import inertia_along
+from ..tuning.method import Tuned, Wishes, tune
+
+
+def tuned_set(
+    robot: str, mission: str, cases: Sequence[str], wishes: Wishes, step: Callable[[str], None]
+) -> Tuned:
+    """Make the set.
+
+    Args:
+        robot: its name or path; it is the nominal one.
+        mission: its name or path; empty: the robot's.
+        cases: names or paths of the environments to be flown in.
+        wishes: of the user.
+        step: told what is being done.
+
+    Raises:
+        InputError: something named is not there, or the wishes do not go together.
+    """
+    plans = [FlightPlan(robot=robot, mission=mission, case=case) for case in cases]
+    settings = [FlightSettings.resolve(plan.options(), {}) for plan in plans]
+    nominal, reference = Robots(settings[0]).plant, settings[0].mission
+    eta = reference.base_quaternion[0] / float(np.linalg.norm(reference.base_quaternion))
+    if abs(eta) <= SINGULAR_ETA:
+        raise InputError("base_quaternion: turned by 180 degrees, where the laws are singular")
+    if len(reference.waypoint_times) < 2:
+        raise InputError("the mission has a single waypoint: there is nothing to tune for")
+    inertias = []
+    for case, own in zip(cases, settings, strict=True):
+        step(f"inertia, case {case}")
+        loaded = with_payload(nominal, own.plant.payload)
+        inertias.append(inertia_along(loaded, reference))
+    step("forces along the mission")
+    asked = demand(nominal, reference, [own.plant for own in settings])
+    return tune(np.concatenate(inertias), asked, wishes, settings[0].plant.period)
+
+
+def write_set(tuned: Tuned, command: str, folder: Path) -> list[Path]:
+    """Write the files of a set.
+
+    Raises:
+        InputError: the folder cannot be made or written.
+    """
+    make_folder(folder)
+    paths = []
+    for name, text in gain_files(tuned, command).items():
+        with whole_file(folder / name, replace=True) as file:
+            file.write(text.encode())
+        paths.append(folder / name)
+    return paths

@@ -1,0 +1,155 @@
+"""A gain set for all five laws by one method, step by step.
+
+1. **Shape of h_bar.** ``d_i``, the smallest inertia of axis i when all others are free,
+   ``1 / (H_S^-1)_ii``, along the mission and with every payload. Among diagonal matrices that is
+   within a factor m of the best one can do for the ratio of the extreme eigenvalues of
+   ``H_S^-1 h_bar`` (van der Sluis 1969).
+2. **Size of h_bar.** The smallest ``h_bar = alpha d`` that leaves the margin in torque scale (see
+   `spectrum`) with masses wrong by mu: ``alpha min(lambda) / (1 + mu) = margin``. Smallest, for
+   noise grows with it.
+3. **Low-pass of the time-delay pair.** The largest eigenvalue may then exceed 1 or even 2. With a
+   low-pass of weight w the estimate's error fades by ``1 - w lambda`` a tick; w is the largest
+   that keeps this from changing sign, ``w alpha max(lambda) / (1 - mu) <= 1``, and that keeps the
+   noise ``w h_bar v / delta`` (see `gain_check`) within the ripple allowed.
+4. **Bandwidth.** With its low-pass the estimate follows after ``T = delta / w`` and the lag of the
+   navigation: an axis gets its wanted acceleration with a pole at ``margin / T`` rad/s in the
+   slowest direction. Poles at W on top of it: ``s^3 / p + s^2 + 2 W s + W^2``, whose pair has a
+   damping of 0.7 for ``W = p / 4``.
+5. **Errors of the estimate.** Between two ticks it is off by what it cannot know yet:
+   ``h_bar eps = T dF_S/dt + (1 - b) F_S``, with b the share of the torque that is reported, taken
+   wrong by half of the margin. F_S is that of inverse dynamics along the mission.
+6. **Laws.** ``K_P = W^2``, ``K_D = 2 W``, ``lambda = W``. The rate of eps within the bandwidth is
+   ``L = W eps``. TDE-SMC: ``g = h_bar eps``, the least that can hold the surface. TDE-STC: Levant's
+   (1998) ``K_2 = 1.1 L``, and ``K_1 = 2.2 L^1/2``, for the paper's ``K_1^2 > 4 K_2``. TDE-TSMC:
+   ``K_1 = L^1/2``, which balances eps at ``|s| = eps / W``. CTC-SMC: g is what the nominal model
+   does not know of, and its boundary layer the one of Slotine and Li (1991, 7.2): inside, s fades
+   with W and not faster in any direction, ``Delta = g / (W d')`` with ``d'`` shaped like h_bar and
+   ``H_S^-1 d' <= E``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.errors import InputError
+
+from .demand import Demand
+from .spectrum import eigenvalues
+
+Array = NDArray[np.float64]
+
+SEPARATION = 4.0
+"""How many times faster the estimate is than the poles on top of it; see step 4."""
+DIGITS = 3
+"""Significant digits of a gain: fewer than machines differ in."""
+
+
+@dataclass(frozen=True)
+class Wishes:
+    """What the set is to stand."""
+
+    margin: float
+    """Share by which the reported torque may exceed the commanded one."""
+    mass_uncertainty: float
+    """Share by which every mass and inertia may be wrong."""
+    bandwidth: float | None = None
+    """rad/s; None: what the estimate's lag allows."""
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """A gain set, and the numbers of the method behind it."""
+
+    wishes: Wishes
+    corner_hz: float
+    """Corner of the low-pass of the time-delay pair, Hz."""
+    delay: float
+    """T of step 4, s."""
+    bandwidth: float
+    """W, rad/s."""
+    smallest: float
+    """Smallest and..."""
+    largest: float
+    """...largest eigenvalue of ``H_S^-1 h_bar`` with nominal masses and every payload."""
+    error: Array
+    """(m,) eps of step 5, rad/s2 (eps: 1/s2)."""
+    gains: Mapping[str, Mapping[str, Array]]
+    """By law and name, (m,) each."""
+
+
+def tune(inertia: Array, asked: Demand, wishes: Wishes, period: float, lag: float = 0.0) -> Tuned:
+    """Make a set.
+
+    Args:
+        inertia: (K, m, m) H_S in all configurations, with all payloads.
+        asked: of the mission.
+        wishes: of the user.
+        period: delta, s.
+        lag: by which the navigation's rates and torques come late, s.
+
+    Raises:
+        InputError: the wishes do not go together.
+    """
+    margin, share = wishes.margin, wishes.mass_uncertainty
+    shape = axis_inertia(inertia)
+    found = eigenvalues(inertia, shape)
+    low, high = float(found.min()), float(found.max())
+    size = margin * (1.0 + share) / low
+    weight = min(1.0, (1.0 - share) / (size * high))
+    corner = low_pass_corner(weight, period)
+    delay = period / weight + lag
+    fastest = margin / delay / SEPARATION
+    bandwidth = fastest if wishes.bandwidth is None else wishes.bandwidth
+    if bandwidth > 2.0 * fastest:
+        raise InputError(
+            f"bandwidth must be at most {2.0 * fastest:.3g} rad/s, half of the pole of an estimate "
+            f"with this margin and lag, got {bandwidth:g}"
+        )
+    h_bar = size * shape
+    gap = delay * asked.slope + 0.5 * margin * asked.peak
+    error = gap / h_bar
+    layer = shape * (1.0 - share) / high
+    unknown = asked.unknown + share * asked.nominal
+    ones = np.ones_like(shape)
+    rough = bandwidth * error
+    slope, poles = bandwidth * ones, {"k_p": bandwidth**2 * ones, "k_d": 2.0 * bandwidth * ones}
+    gains = {
+        "ctc": poles,
+        "ctc_smc": {"lambda": slope, "g": unknown, "delta": unknown / (bandwidth * layer)},
+        "tde_smc": {"h_bar": h_bar, "lambda": slope, "g": gap},
+        "tde_tsmc": {"h_bar": h_bar, **poles, "k_1": np.sqrt(rough)},
+        "tde_stc": {
+            "h_bar": h_bar, "lambda": slope, "k_1": 2.2 * np.sqrt(rough), "k_2": 1.1 * rough
+        },
+    }  # fmt: skip
+    rounded = {
+        law: {name: significant(values) for name, values in own.items()}
+        for law, own in gains.items()
+    }
+    return Tuned(
+        wishes, float(significant(corner)), delay, bandwidth, size * low, size * high, error,
+        rounded,
+    )  # fmt: skip
+
+
+def axis_inertia(inertia: Array) -> Array:
+    """Return (m,) d_i of step 1 of ``inertia`` (K, m, m)."""
+    free = 1.0 / np.diagonal(np.linalg.inv(inertia), axis1=1, axis2=2)
+    smallest: Array = free.min(axis=0)
+    return smallest
+
+
+def low_pass_corner(weight: float, period: float) -> float:
+    """Return the corner, Hz, of the low-pass of a ``weight``; 0 (none) for 1."""
+    return 0.0 if weight >= 1.0 else -math.log(1.0 - weight) / (2.0 * math.pi * period)
+
+
+def significant(values: Array | float) -> Array:
+    """Round to `DIGITS` significant digits."""
+    rounded: Array = np.vectorize(lambda value: float(f"{value:.{DIGITS}g}"))(values)
+    return rounded
