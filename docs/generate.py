@@ -36,7 +36,8 @@ NODES: dict[str, type[NodeSettings]] = {
 ROS_TYPES = {bool: "bool", int: "integer", float: "double", str: "string"}
 EXAMPLES = {
     "P": "0.1", "TICKS": "2", "SIGMA": "1e-5", "STEP": "1e-5", "TORQUE": "0.5",
-    "JOINT=TORQUE": "3=20", "SECONDS": "1.5", "AXIS=FACTOR": "all=0.99",
+    "JOINT": "3", "BASE_AXIS=RATE": "base_x=1e-5", "JOINT=TORQUE": "3=20", "SECONDS": "1.5",
+    "AXIS=FACTOR": "all=0.99",
     "AXIS=TORQUE": "base_x=0.01",
 }  # fmt: skip
 """An argument as it may be given, by the form of the kind."""

@@ -2,24 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
 from .options import OPTIONS, flight_options, plan_flight, remark_on_gains
-
-
-def _list_faults(context: click.Context, given: Sequence[str]) -> Sequence[str]:
-    if list(given) == ["list"]:
-        from space_robot_sim.faults.grammar import help_lines
-
-        from ..flight.faults import KINDS
-
-        click.echo("\n".join(help_lines(KINDS)))
-        context.exit()
-    return given
 
 
 @click.command()
@@ -36,12 +24,6 @@ def _list_faults(context: click.Context, given: Sequence[str]) -> Sequence[str]:
     default=0,
     help="Ask for SCHED_FIFO for plant and controller; for machines with cores to spare.",
 )
-@click.option(
-    "--fault", "faults", multiple=True, metavar="KIND@T[-END][:ARG]",
-    help="Inject a fault at T simulated seconds; may be repeated; --fault list lists all kinds.",
-    callback=lambda context, option, given: _list_faults(context, given),
-)  # fmt: skip
-@click.option("--seed", type=int, default=0, help="Seed of the faults' random numbers.")
 @click.option("--restart-controller", is_flag=True, help="Start a dead or hung controller again.")
 @click.option("--domain", type=int, help="ROS domain [default: ROS_DOMAIN_ID, or a free one].")
 def fly(as_json: bool, bag: Path | None, **options: Any) -> None:

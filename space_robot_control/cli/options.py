@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -154,6 +154,18 @@ TRUST = click.option(
     help="Import the module:Class and read the files that the bag names: runs the bag's code.",
 )  # fmt: skip
 
+
+def _list_faults(context: click.Context, given: Sequence[str]) -> Sequence[str]:
+    if list(given) == ["list"]:
+        from space_robot_sim.faults.grammar import help_lines
+
+        from ..flight.faults import KINDS
+
+        click.echo("\n".join(help_lines(KINDS)))
+        context.exit()
+    return given
+
+
 OPTIONS: dict[str, Decorator] = {
     "controller": click.option(
         "--controller", default="tde_stc", show_default=True,
@@ -161,6 +173,9 @@ OPTIONS: dict[str, Decorator] = {
     "case": click.option(
         "--case", default="1", show_default=True,
         help="1, 2, 3, 4-1, 4-2, or a path to a case's YAML."),
+    "sensors": click.option(
+        "--sensors", default="ideal", show_default=True,
+        help="ideal, fine, tactical, coarse, white_l1, white_l2, or a path to a YAML file."),
     "gains": click.option(
         "--gains", default="default", show_default=True,
         help="printed, tuned, default (printed where it flies), or a path."),
@@ -199,6 +214,12 @@ OPTIONS: dict[str, Decorator] = {
     "swap": click.option(
         "--swap", "swaps", multiple=True, metavar="T:LAW",
         help="Swap to LAW at T simulated seconds; may be repeated."),
+    "fault": click.option(
+        "--fault", "faults", multiple=True, metavar="KIND@T[-END][:ARG]", callback=_list_faults,
+        help="Inject a fault at T simulated seconds; may be repeated; --fault list lists all "
+        "kinds."),
+    "seed": click.option(
+        "--seed", type=int, default=0, help="Seed of the random numbers of faults and sensors."),
     "set": click.option(
         "--set", "parameters", multiple=True, metavar="NODE.PARAM=VALUE", callback=_parameters,
         help="Any parameter of a node, as plant.hold_ticks=40; may be repeated."),

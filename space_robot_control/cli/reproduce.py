@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from .options import OPTIONS
+
 
 @click.command()
 @click.option(
@@ -33,11 +35,12 @@ import click
     is_flag=True,
     help="Only the gains each law flies by default, and figures as SVG only: half the time.",
 )
+@OPTIONS["sensors"]
 @click.option("--jobs", type=click.IntRange(1, 256), help="Processes [default: one a core].")
 @click.option("--json", "as_json", is_flag=True, help="Print table_v.json.")
 def reproduce(
-    out: Path, only: tuple[str, ...], duration: float | None, brief: bool, jobs: int | None,
-    as_json: bool,
+    out: Path, only: tuple[str, ...], duration: float | None, brief: bool, sensors: str,
+    jobs: int | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Fly Table V of the paper and compare: tables, Figures 5 to 9, one page with it all.
 
@@ -50,6 +53,8 @@ def reproduce(
       space-robot reproduce --out table_v --only tde_stc/1 --only tde_smc/1
       space-robot reproduce --json | jq '.claims[] | [.text, .value, .holds]'
     """
+    from space_robot_msgs_py.config.files import named_file
+
     from ..flight.compilation import compile_kernels
     from ..flight.progress import counting_progress
     from ..paper.reproduction.flights import ROWS, Row
@@ -59,10 +64,12 @@ def reproduce(
 
     rows = [Row.parse(text) for text in dict.fromkeys(only)] or list(ROWS)
     check_folder(out)
+    named_file("sensors", sensors)
     compile_kernels()
     with counting_progress("flights") as progress:
         record = run(
-            rows, out, duration=duration, brief=brief, jobs=jobs or cores(), progress=progress
+            rows, out, duration=duration, brief=brief, sensors=sensors, jobs=jobs or cores(),
+            progress=progress,
         )  # fmt: skip
     if as_json:
         click.echo(json.dumps(record, indent=1))

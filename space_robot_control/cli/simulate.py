@@ -21,6 +21,8 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
       space-robot simulate --controller tde_tsmc
       space-robot simulate --no-friction --case 2 --json
       space-robot simulate --bag flights/in_process
+      space-robot simulate --sensors fine --seed 3
+      space-robot simulate --fault torque_scale@2:base=0.99 --fault noise_gyro@0:1e-6
     """
     from contextlib import closing
 

@@ -35,6 +35,7 @@ class FlightPlan(StrictModel):
     controller: str = "tde_stc"
     case: str = "1"
     gains: str = "default"
+    sensors: str = "ideal"
     robot: str = "paper"
     mission: str = ""
     duration: Annotated[float | None, Field(gt=0.0, le=1e6)] = None
@@ -51,7 +52,7 @@ class FlightPlan(StrictModel):
     faults: list[str] = Field(default_factory=list)
     """The faults, each as ``KIND@T[-END][:ARGUMENT]``, see `space_robot_control.flight.faults`."""
     seed: Annotated[int, Field(ge=0)] = 0
-    """Seed of the faults' random numbers."""
+    """Seed of the random numbers of faults and sensors."""
     swaps: list[str] = Field(default_factory=list)
     """Laws to swap to in flight, each as ``T:LAW``."""
     restart_controller: bool = False
@@ -85,6 +86,7 @@ class FlightPlan(StrictModel):
                 "robot": self.robot,
                 "mission": self.mission,
                 "case": self.case,
+                "sensors": self.sensors,
                 "realtime": self.realtime,
                 "command_latency_ticks": self.command_latency_ticks,
                 "fifo_priority": self.fifo_priority,
@@ -241,6 +243,7 @@ class Flight:
         return {
             "controller": self.law.name,
             "case": plant.case,
+            "sensors": plant.sensors,
             "gains": controller.gains,
             "robot": self.robot.name,
             "mission": mission.mission or Path(mission.robot).stem,

@@ -15,6 +15,7 @@ class About(Enum):
 
     AXIS = "AXIS a name, a joint counted from 1, base, joints or all"
     JOINT = "JOINT a name, counted from 1, or joints"
+    BASE_AXIS = "BASE_AXIS a name, or base"
 
 
 def axes_of(name: str, about: About, axis_names: Sequence[str]) -> tuple[int, ...]:
@@ -31,14 +32,18 @@ def axes_of(name: str, about: About, axis_names: Sequence[str]) -> tuple[int, ..
         InputError: the robot has no such axis; it says which there are.
     """
     base, every = len(BASE_AXES), range(len(axis_names))
-    first = base if about is About.JOINT else 0
+    of_base, of_joints = {"base": tuple(every[:base])}, {"joints": tuple(every[base:])}
     numbers = {str(1 + axis - base): (axis,) for axis in every[base:]}
-    groups = {"joints": tuple(every[base:])}
-    if about is About.AXIS:
-        groups = {"base": tuple(every[:base]), **groups, "all": tuple(every)}
-    names = {axis_names[axis]: (axis,) for axis in every[first:]}
+    meant, groups = {
+        About.AXIS: (every, {**of_base, **of_joints, "all": tuple(every)}),
+        About.JOINT: (every[base:], of_joints),
+        About.BASE_AXIS: (every[:base], of_base),
+    }[about]
+    numbers = {} if about is About.BASE_AXIS else numbers
+    names = {axis_names[axis]: (axis,) for axis in meant}
     found = {**numbers, **groups, **names}.get(name)
     if found is None:
-        allowed = ", ".join((*names, f"1 to {len(numbers)}", *groups))
-        raise InputError(f"no {about.name.lower()} {short(name)}: choose one of {allowed}")
+        counted = [f"1 to {len(numbers)}"] if numbers else []
+        what, allowed = about.name.lower().replace("_", " "), ", ".join((*names, *counted, *groups))
+        raise InputError(f"no {what} {short(name)}: choose one of {allowed}")
     return found

@@ -25,7 +25,10 @@ _AXIS_AND_NUMBER = re.compile(r"(?P<axis>(?!0+=).+)=(?P<number>[^=]+)", re.ASCII
 
 
 class Argument(NamedTuple):
-    """A fault's number beside its time; behind the axes it is about, if ``about`` is set."""
+    """A fault's number beside its time; behind the axes it is about, if ``about`` is set.
+
+    Without a ``symbol`` there is no number: the axes alone are given.
+    """
 
     symbol: str
     unit: str
@@ -37,11 +40,14 @@ class Argument(NamedTuple):
     @property
     def form(self) -> str:
         """The argument as it is written."""
-        return f"{self.about.name}={self.symbol}" if self.about else self.symbol
+        names = [self.about.name] if self.about else []
+        return "=".join([*names, *([self.symbol] if self.symbol else [])])
 
     @property
     def allowed(self) -> str:
         """The values that may stand there, in words."""
+        if self.about and not self.symbol:
+            return self.about.value
         number = "a whole number" if self.whole else "a number"
         about = f", {self.about.value}" if self.about else ""
         return f"{self.form}, {number} from {self.low:g} to {self.high:g} ({self.unit}){about}"
@@ -81,6 +87,8 @@ class Kind(NamedTuple):
             if self.default is None:
                 raise InputError(f"{self.name} needs an argument: {self.argument.allowed}")
             return "", self.default
+        if not self.argument.symbol:
+            return argument, math.nan
         axis, number = "", argument
         if self.argument.about:
             match = _AXIS_AND_NUMBER.fullmatch(argument)

@@ -22,7 +22,7 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
     """Parameters of plant_node."""
 
     node: ClassVar[str] = "plant"
-    selectors: ClassVar[tuple[str, ...]] = ("robot", "mission", "case")
+    selectors: ClassVar[tuple[str, ...]] = ("robot", "mission", "case", "sensors")
     sends: ClassVar[tuple[topics.Topic, ...]] = (
         topics.JOINT_STATES, topics.BASE_STATE, topics.CLOCK,
     )  # fmt: skip
@@ -31,6 +31,7 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         "", description="a mission of config/missions (empty: the robot's), or a path"
     )
     case: str = Field("1", description="a case of config/cases, or a path to its YAML")
+    sensors: str = Field("ideal", description="of config/sensors, or a path to their YAML")
     ticks: Annotated[int, Field(ge=0, le=MOST_TICKS)] = Field(
         0, description="ticks to fly, then exit (0: until stopped)"
     )
@@ -54,9 +55,10 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
 
     @classmethod
     def layers(cls, selected: Mapping[str, str]) -> list[Path]:
-        """Add the mission, which tells where the arm starts, and the case, which disturbs it."""
+        """Add the mission (where the arm starts), the case (what disturbs it), and the sensors."""
         return [
             *super().layers(selected),
             mission_file(selected["robot"], selected["mission"]),
             named_file("cases", selected["case"]),
+            named_file("sensors", selected["sensors"]),
         ]

@@ -13,9 +13,11 @@ from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.samples import State
+from space_robot_msgs_py.topics import BASE_AXES
 
-from ..faults.grammar import Kind
-from ..faults.schedule import BLOCK_TICKS
+from ..faults.axes import About
+from ..faults.grammar import Argument, Kind
+from ..faults.schedule import BLOCK_TICKS, ScheduledFault
 from .faults import (
     SIGMA_RAD,
     SIGMA_RAD_PER_S,
@@ -68,6 +70,8 @@ class Encoders(Record):
     """White noise of each rate, rad/s."""
     velocity_step: Array = shaped(lambda n: (n,))
     """Distance of two rates, rad/s (0: none)."""
+    stuck: Array = shaped(lambda n: (n,))
+    """1 for each joint whose angle told stands still."""
     draws: Array = shaped(lambda n: (BLOCK_TICKS, 2, n))
     """Standard normal numbers, a row a tick: of the angles, of the rates."""
     told: Array = shaped(lambda n: (MOST_DIFFERENCED, n))
@@ -91,30 +95,40 @@ class Encoders(Record):
 def read_encoders(
     encoders: Encoders, truth: State, tick: int, period: float, measured: State
 ) -> None:
-    """Write the angles and rates told of all joints into ``measured``."""
+    """Write the angles and rates told of all joints into ``measured``.
+
+    A stuck encoder tells the angle of the tick before, and no rate.
+    """
     draws, lag = encoders.draws[row_of(tick)], int(encoders.difference_ticks)
-    now, then = (
-        encoders.told[tick % MOST_DIFFERENCED],
-        encoders.told[(tick - lag) % MOST_DIFFERENCED],
-    )
+    before = encoders.told[(tick - 1) % MOST_DIFFERENCED]
+    then = encoders.told[(tick - lag) % MOST_DIFFERENCED]
+    now = encoders.told[tick % MOST_DIFFERENCED]
     for i in range(now.size):
         angle = truth.joint_positions[i] + encoders.sigma[i] * draws[0, i]
         angle = in_steps(angle, encoders.step[i])
         rate = (angle - then[i]) / (lag * period) if lag > 0 else truth.joint_velocities[i]
         rate = in_steps(rate + encoders.velocity_sigma[i] * draws[1, i], encoders.velocity_step[i])
+        if encoders.stuck[i] == 1.0:
+            angle, rate = before[i], 0.0
         now[i] = angle
         measured.joint_positions[i] = angle
         measured.joint_velocities[i] = rate
 
 
+def _hold(stuck: Array, fault: ScheduledFault) -> None:
+    stuck[[axis - len(BASE_AXES) for axis in fault.axes]] = 1.0
+
+
 class EncoderFault(SensorFault):
-    """Encoders that are noisier or coarser."""
+    """Encoders that are noisier or coarser, or stuck."""
 
     CHANGES: ClassVar[Mapping[str, Mapping[Kind, Change]]] = {
         "sigma": {Kind("noise_joint_position", SIGMA_RAD, None,
                        "noise on the measured joint angles"): add_noise},
         "velocity_sigma": {Kind("noise_joint_velocity", SIGMA_RAD_PER_S, None,
                                 "noise on the measured joint velocities"): add_noise},
+        "stuck": {Kind("encoder_stuck", Argument("", "", 0.0, 0.0, about=About.JOINT), None,
+                       "the measured joint angle stands, its rate is zero"): _hold},
         "step": {Kind("quantise_joint_position", STEP_RAD, None,
                       "the measured joint angles come in steps"): coarsen},
         "velocity_step": {Kind("quantise_joint_velocity", STEP_RAD_PER_S, None,

@@ -14,8 +14,9 @@ from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.samples import State
 
-from ..faults.grammar import Kind
-from ..faults.schedule import BLOCK_TICKS
+from ..faults.axes import About
+from ..faults.grammar import Argument, Kind
+from ..faults.schedule import BLOCK_TICKS, ScheduledFault
 from .faults import SIGMA_RAD_PER_S, STEP_RAD_PER_S, Change, SensorFault, add_noise, coarsen
 from .noise import in_steps, row_of
 
@@ -103,12 +104,18 @@ def read_gyro(gyro: Gyro, truth: State, tick: int, period: float, measured: Stat
         measured.omega_base[i] = in_steps(rate, gyro.step[0])
 
 
+def _add_bias(offset: Array, fault: ScheduledFault) -> None:
+    offset[list(fault.axes)] += fault.value
+
+
 class GyroFault(SensorFault):
-    """A gyro that is noisier or coarser."""
+    """A gyro that is noisier or coarser, or has another bias."""
 
     CHANGES: ClassVar[Mapping[str, Mapping[Kind, Change]]] = {
         "sigma": {Kind("noise_gyro", SIGMA_RAD_PER_S, None,
                        "noise on the measured base rate"): add_noise},
+        "offset": {Kind("gyro_bias", Argument("RATE", "rad/s", -10.0, 10.0, about=About.BASE_AXIS),
+                        None, "RATE is measured beside the base's rate about an axis"): _add_bias},
         "step": {Kind("quantise_gyro", STEP_RAD_PER_S, None,
                       "the measured base rate comes in steps"): coarsen},
     }  # fmt: skip

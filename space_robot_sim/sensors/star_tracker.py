@@ -16,7 +16,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import State
 
 from ..faults.grammar import Argument, Kind
-from ..faults.schedule import BLOCK_TICKS
+from ..faults.schedule import BLOCK_TICKS, ScheduledFault
 from .faults import SIGMA_RAD, Change, SensorFault, add_noise, coarsen
 from .noise import in_steps, row_of
 
@@ -66,6 +66,8 @@ class StarTracker(Record):
     """Ticks from a measurement to its release."""
     step: Array = shaped(lambda n: (1,))
     """The quaternion's numbers come in steps of half of it, rad (0: none)."""
+    blind: Array = shaped(lambda n: (1,))
+    """1 while no measurement can be taken."""
     draws: Array = shaped(lambda n: (BLOCK_TICKS, 3))
     """Standard normal numbers, a row a tick."""
     taken: Array = shaped(lambda n: (MOST_UNDER_WAY,))
@@ -113,14 +115,15 @@ def track_stars(tracker: StarTracker, truth: State, tick: int, measured: State) 
     """Write into ``measured`` the attitude that is released last at ``tick``.
 
     Measurement k shows the attitude of tick ``k interval``, is released ``delay`` ticks later and
-    held until the next one. The robot was at rest before tick 0, so the first is there at once.
+    held until the next one; while the tracker is blind, none is taken. The robot was at rest
+    before tick 0, so the first is there at once.
     """
     interval, delay = int(tracker.interval), int(tracker.delay)
     if tick % interval == 0:
         place = (tick // interval) % MOST_UNDER_WAY
-        tracker.taken[place] = 1.0
+        tracker.taken[place] = 1.0 - tracker.blind[0]
         expose(tracker, truth.quaternion, tracker.draws[row_of(tick)], tracker.under_way[place])
-        if tick == 0:
+        if tick == 0 and tracker.taken[place] == 1.0:
             tracker.held[:] = tracker.under_way[place]
     exposed = tick - delay
     if exposed >= 0 and exposed % interval == 0:
@@ -157,12 +160,18 @@ def expose(tracker: StarTracker, quaternion: Array, draws: Array, out: Array) ->
             out[i] /= norm
 
 
+def _blind(blind: Array, fault: ScheduledFault) -> None:
+    blind[:] = 1.0
+
+
 class StarTrackerFault(SensorFault):
-    """A star tracker that is noisier or coarser."""
+    """A star tracker that is noisier or coarser, or blind."""
 
     CHANGES: ClassVar[Mapping[str, Mapping[Kind, Change]]] = {
         "sigma": {Kind("noise_attitude", SIGMA_RAD, None,
                        "the measured attitude is turned by SIGMA about each axis"): add_noise},
+        "blind": {Kind("tracker_blind", None, None,
+                       "no attitude is measured, the last one is held"): _blind},
         "step": {Kind("quantise_attitude", Argument("STEP", "rad", 1e-12, 1.0), None,
                       "the measured quaternion's numbers come in steps of STEP / 2"): coarsen},
     }  # fmt: skip

@@ -5,6 +5,8 @@ from __future__ import annotations
 import random
 import shlex
 
+from space_robot_msgs_py.topics import BASE_AXES
+from space_robot_sim.faults.axes import About
 from space_robot_sim.faults.grammar import Argument, Kind, parse_faults
 
 from ...flight.faults import KINDS, NODE_OF
@@ -24,6 +26,7 @@ LIMITS = {
     "SIGMA": (1e-8, 1e-6),
     "STEP": (1e-8, 1e-6),
     "TORQUE": (0.01, 1.0),
+    "RATE": (1e-8, 1e-6),
     "FACTOR": (0.995, 1.005),
     "noise_joint_velocity": (1e-7, 1e-5),
     "stuck_joint": (5.0, 20.0),
@@ -31,7 +34,10 @@ LIMITS = {
     "drive_bias": (1e-5, 1e-3),
 }
 """Least and largest argument by its symbol, or by the kind of the fault."""
-LONGEST_S = {"saturate_base": 0.2, "saturate_joints": 0.2, "stuck_joint": 1.0}
+LONGEST_S = {
+    "saturate_base": 0.2, "saturate_joints": 0.2, "stuck_joint": 1.0, "tracker_blind": 0.02,
+    "encoder_stuck": 0.02,
+}  # fmt: skip
 """Longest time of a fault that takes too much to be flown with for long."""
 SILENCING = ("drop_state", "drop_command")
 SILENCE_S = 0.3
@@ -40,9 +46,9 @@ EARLIEST_S = {"kill_recorder": 1.5}
 """Before that the bag may hold nothing yet: its first chunk ends after 0.25 s of the wall clock."""
 BREAKING = (
     "kill_controller", "stop_controller", "kill_mission", "stop_mission",
-    "saturate_base", "saturate_joints", "stuck_joint",
+    "saturate_base", "saturate_joints", "stuck_joint", "tracker_blind", "encoder_stuck",
 )  # fmt: skip
-"""Faults that take the torque or the reference away."""
+"""Faults that take the torque, the reference or a measurement away."""
 
 
 def sample_flight(seed: int, index: int, duration_s: float = 5.0) -> FlightPlan:
@@ -129,9 +135,17 @@ def _fault(rng: random.Random, kind: Kind, duration_s: float) -> str:
 
 
 def _argument(rng: random.Random, kind: str, argument: Argument) -> str:
+    if not argument.symbol:
+        return _axis(rng, argument)
     low, high = LIMITS.get(kind, LIMITS[argument.symbol])
     if argument.whole:
         return str(rng.randint(round(low), round(high)))
     # as often from 1e-8 to 1e-7 as from 1e-7 to 1e-6
     number = f"{low * (high / low) ** rng.random():.4g}"
-    return f"{rng.randint(1, JOINTS)}={number}" if argument.about else number
+    return f"{_axis(rng, argument)}={number}" if argument.about else number
+
+
+def _axis(rng: random.Random, argument: Argument) -> str:
+    if argument.about is About.BASE_AXIS:
+        return rng.choice(BASE_AXES)
+    return str(rng.randint(1, JOINTS))

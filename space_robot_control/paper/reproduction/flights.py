@@ -120,13 +120,15 @@ class Result:
     """Known of the flights that are compared."""
 
 
-def fly(planned: Planned, duration: float | None, figures: FigureFolder | None) -> Result:
+def fly(
+    planned: Planned, duration: float | None, figures: FigureFolder | None, sensors: str = "ideal"
+) -> Result:
     """Fly one row in one variant; if it is shown it is also drawn into ``figures``."""
     row, variant, _ = planned
     flight = Flight(
         FlightPlan(
             controller=row.controller, case=row.case, gains=variant.gains, robot=ROBOT,
-            friction=variant.friction, duration=duration,
+            friction=variant.friction, duration=duration, sensors=sensors,
         )
     )  # fmt: skip
     told = parameters(flight)

@@ -51,6 +51,7 @@ def reproduce(
     *,
     duration: float | None = None,
     brief: bool = False,
+    sensors: str = "ideal",
     jobs: int = 1,
     progress: Callable[[int], Callable[[], None]] = lambda total: lambda: None,
 ) -> dict[str, Any]:
@@ -61,6 +62,7 @@ def reproduce(
         folder: made or renewed at the end, whole; an older reproduction there is replaced.
         duration: s to fly (None: the mission's 30 s, which is what Table V is about).
         brief: fly only what Table V asks for, see `plan`; figures as SVG only.
+        sensors: of config/sensors, or a path; Table V is about ideal ones.
         jobs: processes at work.
         progress: called with the number of flights, gives what is called after each.
 
@@ -78,8 +80,8 @@ def reproduce(
         figures.path.mkdir(parents=True)
         planned = list(plan(rows, brief))
         with processes(jobs) as pool:
-            results = _fly_and_draw(pool, planned, duration, figures, progress)
-        record = _write(rows, results, duration or FULL_DURATION, brief, figures)
+            results = _fly_and_draw(pool, planned, duration, figures, sensors, progress)
+        record = _write(rows, results, duration or FULL_DURATION, brief, sensors, figures)
         if folder.exists():
             shutil.rmtree(folder)
         work.rename(folder)
@@ -91,12 +93,13 @@ def _fly_and_draw(
     planned: Sequence[Planned],
     duration: float | None,
     figures: FigureFolder,
+    sensors: str,
     progress: Callable[[int], Callable[[], None]],
 ) -> list[Result]:
     """Return the results in the order of ``planned``."""
     # first those the comparisons wait for, last those that take the shortest
     order = sorted(planned, key=lambda flight: (not flight.compared, not flight.shown))
-    futures = {flight: pool.submit(fly, flight, duration, figures) for flight in order}
+    futures = {flight: pool.submit(fly, flight, duration, figures, sensors) for flight in order}
     done = progress(len(planned))  # may start a thread: not before the processes are forked
     for future in futures.values():
         future.add_done_callback(lambda _: done())
@@ -113,6 +116,7 @@ def _write(
     results: Sequence[Result],
     duration: float,
     brief: bool,
+    sensors: str,
     figures: FigureFolder,
 ) -> dict[str, Any]:
     folder, comparison = figures.path.parent, cells(results)
@@ -125,6 +129,7 @@ def _write(
         "machine": f"{platform.system()} {platform.machine()}",
         "duration_s": duration,
         "brief": brief,
+        "sensors": sensors,
     }
     told = {
         f"{r.row.controller}, case {r.row.case}, {r.variant.gains} gains": r.parameters

@@ -35,8 +35,10 @@ def arguments(draw: st.DrawFn, kind: Kind) -> str:
         return ""
     if argument.whole:
         return str(draw(st.integers(int(argument.low), int(argument.high))))
-    number = repr(draw(st.floats(argument.low, argument.high)))
     axes = st.integers(1, 99).map(str) | st.sampled_from(["base_x", "joint2", "joints", "a=b"])
+    if not argument.symbol:
+        return draw(axes)
+    number = repr(draw(st.floats(argument.low, argument.high)))
     return f"{draw(axes)}={number}" if argument.about else number
 
 
@@ -63,6 +65,7 @@ def test_a_fault_is_its_text(fault: Fault) -> None:
         ("noise_gyro@1-3:1e-4", Fault(KINDS["noise_gyro"], 1.0, 3.0, "1e-4"), "", 1e-4),
         ("noise_gyro@1e-3-2e-3:0", Fault(KINDS["noise_gyro"], 0.001, 0.002, "0"), "", 0.0),
         ("stuck_joint@5:3=20", Fault(KINDS["stuck_joint"], 5.0, math.inf, "3=20"), "3", 20.0),
+        ("encoder_stuck@5:3", Fault(KINDS["encoder_stuck"], 5.0, math.inf, "3"), "3", math.nan),
         ("delay_state@0", Fault(KINDS["delay_state"], 0.0, math.inf, ""), "", 1.0),
         ("kill_controller@2", Fault(KINDS["kill_controller"], 2.0, math.inf, ""), "", math.nan),
         ("stop_controller@2:1.5", Fault(KINDS["stop_controller"], 2.0, math.inf, "1.5"), "", 1.5),
@@ -100,6 +103,9 @@ def test_given_texts(text: str, fault: Fault, axis: str, value: float) -> None:
         ("stuck_joint@2:20", "JOINT=TORQUE, .* counted from 1"),
         ("stuck_joint@2:0=20", "JOINT=TORQUE, .* counted from 1"),
         ("stuck_joint@2:3=x", "JOINT=TORQUE, .* counted from 1"),
+        ("encoder_stuck@2", "encoder_stuck needs an argument: JOINT a name, counted from 1"),
+        ("gyro_bias@2:1e-5", "BASE_AXIS=RATE, .* BASE_AXIS a name, or base"),
+        ("tracker_blind@2:1", "tracker_blind takes no argument, got '1'"),
         ("kill_controller@2:1", "kill_controller takes no argument, got '1'"),
         ("kill_controller@2-3", "kill_controller has no end: kill_controller@T"),
         ("stop_controller@2-3", "stop_controller has no end"),

@@ -45,6 +45,18 @@ def test_an_axis_that_is_not_there_is_named_with_those_that_are(name: str) -> No
         axes_of(name, About.AXIS, PAPER)
 
 
+@pytest.mark.parametrize(("name", "axes"), [("base_y", (1,)), ("base", (0, 1, 2))])
+def test_axes_of_the_base_alone(name: str, axes: tuple[int, ...]) -> None:
+    assert axes_of(name, About.BASE_AXIS, PAPER) == axes
+
+
+@pytest.mark.parametrize("name", ["1", "joint_1", "joints", "all"])
+def test_a_joint_is_no_base_axis(name: str) -> None:
+    allowed = "choose one of base_x, base_y, base_z, base$"
+    with pytest.raises(InputError, match=f"^no base axis '{name}': {allowed}"):
+        axes_of(name, About.BASE_AXIS, PAPER)
+
+
 @pytest.mark.parametrize("name", ["base", "base_x", "all"])
 def test_a_base_axis_is_no_joint(name: str) -> None:
     with pytest.raises(InputError, match=f"^no joint '{name}': choose one of joint_1, .*, joints$"):
