@@ -155,7 +155,9 @@ TRUST = click.option(
 )  # fmt: skip
 
 
-def _list_faults(context: click.Context, given: Sequence[str]) -> Sequence[str]:
+def _list_faults(
+    context: click.Context, option: click.Parameter, given: Sequence[str]
+) -> Sequence[str]:
     if list(given) == ["list"]:
         from space_robot_sim.faults.grammar import help_lines
 
