@@ -33,6 +33,7 @@ def cli() -> None:
       space-robot gains tune -o my_gains            a set for a robot and a mission, by a method
       space-robot analyze flights/<bag>...          metrics of recorded flights
       space-robot replay flights/<bag>              its states to a live controller, compared
+      space-robot sweep --navigation filtered       laws over grades of sensors
       space-robot reproduce                         the paper's Table V and figures, flown again
       space-robot soak --minutes 5                  random flights with faults
     """

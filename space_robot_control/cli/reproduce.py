@@ -55,10 +55,10 @@ def reproduce(
     """
     from space_robot_msgs_py.config.files import named_file
 
+    from ..campaign.processes import cores
     from ..flight.compilation import compile_kernels
     from ..flight.progress import counting_progress
     from ..paper.reproduction.flights import ROWS, Row
-    from ..paper.reproduction.processes import cores
     from ..paper.reproduction.reproduce import check_folder
     from ..paper.reproduction.reproduce import reproduce as run
 

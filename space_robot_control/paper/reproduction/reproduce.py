@@ -17,11 +17,11 @@ from space_robot_msgs_py.errors import InputError
 from ...analysis.figures.figure_set import FigureFolder
 from ...analysis.tables import as_csv, as_markdown, as_records
 from ...analysis.template import template
+from ...campaign.processes import processes
 from ...flight.software import commit, versions
 from .claims import claims, claims_table
 from .figures import figure_groups, start_comparisons
 from .flights import Planned, Result, Row, fly, plan
-from .processes import processes
 from .table import cells, cells_table, chatter, chatter_table, variant_tables
 
 TABLE = "table_v"

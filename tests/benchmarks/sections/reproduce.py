@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from space_robot_control.campaign.processes import cores
 from space_robot_control.paper.reproduction.flights import ROWS
-from space_robot_control.paper.reproduction.processes import cores
 from space_robot_control.paper.reproduction.reproduce import reproduce as run
 
 from ..measure import Options, interleave

@@ -1,0 +1,87 @@
+"""Flies a sweep in processes side by side."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+
+from space_robot_msgs_py.errors import FlightError
+
+from ...analysis import Analysis
+from ...flight.plan import Flight
+from ...flight.simulate import fly_blocks
+from ..processes import processes
+from .scenario import Draw, Sweep
+
+
+class Row(NamedTuple):
+    """A flight of a sweep and what came of it."""
+
+    draw: Draw
+    failure: str
+    """Why it ended early; empty if it did not."""
+    metrics: dict[str, float]
+    """Mean-axis RMS of errors and torques, and of the torques' ripple; none of a failed flight."""
+
+    def as_record(self) -> dict[str, Any]:
+        """Return it as a flat dictionary."""
+        law, sensors, number = self.draw
+        return {
+            "controller": law.controller, "gains": law.gains, "sensors": sensors, "draw": number,
+            "failure": self.failure, **self.metrics,
+        }  # fmt: skip
+
+
+def sweep(
+    study: Sweep,
+    jobs: int = 1,
+    progress: Callable[[int], Callable[[], None]] = lambda total: lambda: None,
+) -> list[Row]:
+    """Fly every flight of ``study``; the rows do not depend on the number of processes.
+
+    Args:
+        study: the flights.
+        jobs: processes at work.
+        progress: called with the number of flights, gives what is called after each.
+
+    Raises:
+        InputError: an option that cannot be; nothing is flown then.
+    """
+    for draw in study.flights():
+        if not draw.number:
+            Flight(study.plan(draw, None))
+    draws = list(study.flights())
+    with processes(jobs) as pool:
+        futures = [pool.submit(fly, study, draw) for draw in draws]
+        done = progress(len(draws))  # may start a thread: not before the processes are forked
+        for future in futures:
+            future.add_done_callback(lambda _: done())
+        return [future.result() for future in futures]
+
+
+def fly(study: Sweep, draw: Draw) -> Row:
+    """Fly one flight of ``study``."""
+    with tempfile.TemporaryDirectory(prefix="space-robot-sweep-") as folder:
+        robot = None
+        if content := study.robot_file(draw.number):
+            robot = Path(folder) / f"{content['robot']['name']}.yaml"
+            robot.write_text(yaml.safe_dump(content), "utf-8")
+        flight = Flight(study.plan(draw, None if robot is None else str(robot)))
+        analysis = Analysis()
+        try:
+            for block in fly_blocks(flight):
+                analysis.add(block)
+        except FlightError as error:
+            return Row(draw, str(error), {})
+    return Row(draw, "", metrics(analysis.report()))
+
+
+def metrics(report: dict[str, Any]) -> dict[str, float]:
+    """Return the figures of merit of a flight's report by name."""
+    found: dict[str, float] = dict(report["rms"]["mean_axis"])
+    ripple = (report["ripple"] or {}).get("rms", {})
+    return found | {f"ripple_{group}": value for group, value in ripple.items()}

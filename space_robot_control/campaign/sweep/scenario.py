@@ -1,0 +1,95 @@
+"""The flights of a sweep: every law with all sensors under every draw of the robot's masses."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from space_robot_msgs_py.config.files import named_file
+from space_robot_msgs_py.config.validation import StrictModel, read_yaml
+
+from ...flight.plan import FlightPlan
+
+
+class Law(NamedTuple):
+    """A control law with a gain set."""
+
+    controller: str
+    gains: str
+
+    @classmethod
+    def parse(cls, text: str) -> Law:
+        """From ``LAW`` or ``LAW=GAINS``."""
+        controller, _, gains = text.partition("=")
+        return cls(controller, gains or "default")
+
+    @property
+    def title(self) -> str:
+        """For a person."""
+        return f"{self.controller}, {self.gains.rstrip('/').rpartition('/')[2]}"
+
+
+class Draw(NamedTuple):
+    """One flight of a sweep."""
+
+    law: Law
+    sensors: str
+    number: int
+    """The same robot and noise for all laws and sensors."""
+
+
+class Sweep(StrictModel):
+    """What a sweep flies."""
+
+    laws: list[Law]
+    sensors: list[str]
+    draws: Annotated[int, Field(ge=1, le=100_000)] = 1
+    """Flights of every law with every sensors."""
+    spread: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
+    """Largest relative error of every mass and inertia; 0: the nominal robot."""
+    seed: Annotated[int, Field(ge=0, le=2**30)] = 0
+    common: dict[str, Any] = Field(default_factory=dict)
+    """Options of `FlightPlan` that all flights share."""
+
+    def flights(self) -> Iterator[Draw]:
+        """Yield every flight: laws of one sensors and draw follow one another."""
+        for sensors in self.sensors:
+            for index in range(self.draws):
+                for law in self.laws:
+                    yield Draw(law, sensors, index)
+
+    def plan(self, draw: Draw, robot: str | None) -> FlightPlan:
+        """Return the plan of a flight; ``robot`` is the file of the plant's own robot, if any."""
+        law, sensors, number = draw
+        plan = FlightPlan(
+            controller=law.controller, gains=law.gains, sensors=sensors, seed=self.seed + number,
+            **self.common,
+        )  # fmt: skip
+        if robot is None:
+            return plan
+        # the plant's alone: controller and mission keep the nominal one
+        mission = plan.mission or plan.robot
+        return plan.with_parameters("plant", {"robot": robot, "mission": mission})
+
+    def robot_file(self, index: int) -> dict[str, Any] | None:
+        """Return the robot of a draw as its file has it: every mass and inertia off by a factor.
+
+        A body's inertia is scaled as a whole, so it stays one that a body can have. None: the
+        nominal robot.
+        """
+        if not self.spread:
+            return None
+        content: dict[str, Any] = copy.deepcopy(
+            read_yaml(named_file("robots", self.common.get("robot", "paper")))
+        )
+        bodies = [content["robot"]["base"], *content["robot"]["links"]]
+        rng = np.random.default_rng((self.seed, index))
+        factors = rng.uniform(1.0 - self.spread, 1.0 + self.spread, (len(bodies), 2)).tolist()
+        for body, (mass, inertia) in zip(bodies, factors, strict=True):
+            body["mass"] = mass * body["mass"]
+            body["inertia"] = [inertia * value for value in body["inertia"]]
+        return content

@@ -1,0 +1,112 @@
+"""The rows of a sweep summed up: medians and spread, as tables and as a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ...analysis.figures.style import Look, grid, house_style, legend_above, page, plain
+from ...analysis.tables import Column, Group, Table
+from .run import Row
+from .scenario import Law
+
+SHOWN = {
+    "attitude": ("attitude", ""),
+    "joints_1_3": ("joints 1-3", "rad"),
+    "joints_4_6": ("joints 4-6", "rad"),
+    "ripple_base_torque": ("base ripple", "N m"),
+    "ripple_torque_1_3": ("ripple 1-3", "N m"),
+    "ripple_torque_4_6": ("ripple 4-6", "N m"),
+}
+"""Heading and unit of the figures that tables show, by name."""
+DRAWN = ("attitude", "ripple_base_torque", "joints_4_6", "ripple_torque_4_6")
+
+
+class Cell(NamedTuple):
+    """All flights of a law with some sensors."""
+
+    law: Law
+    sensors: str
+    flights: int
+    failed: int
+    metrics: dict[str, tuple[float, float, float]]
+    """5 %, 50 % and 95 % of those that did not fail, by name; none if all did."""
+
+
+def cells(rows: Sequence[Row]) -> list[Cell]:
+    """Sum up the rows by sensors and law, in their order."""
+    found: dict[tuple[str, Law], list[Row]] = {}
+    for row in rows:
+        found.setdefault((row.draw.sensors, row.draw.law), []).append(row)
+    return [_cell(law, sensors, own) for (sensors, law), own in found.items()]
+
+
+def _cell(law: Law, sensors: str, rows: Sequence[Row]) -> Cell:
+    flown = [row.metrics for row in rows if not row.failure]
+    metrics = {}
+    for name in flown[0] if flown else ():
+        low, middle, high = np.quantile([m[name] for m in flown], (0.05, 0.5, 0.95)).tolist()
+        metrics[name] = low, middle, high
+    return Cell(law, sensors, len(rows), len(rows) - len(flown), metrics)
+
+
+def summary_table(found: Sequence[Cell]) -> Table:
+    """Tabulate the medians, a group a grade of sensors."""
+    columns = (
+        Column("law", is_label=True), Column("gains", is_label=True),
+        *(Column(name, unit, ".2g") for name, unit in SHOWN.values()),
+        Column("failed"),
+    )  # fmt: skip
+    groups: dict[str, list[list[Any]]] = {}
+    for cell in found:
+        middles = [cell.metrics[name][1] if name in cell.metrics else None for name in SHOWN]
+        row = [cell.law.controller, cell.law.gains, *middles, f"{cell.failed} of {cell.flights}"]
+        groups.setdefault(cell.sensors, []).append(row)
+    return Table(
+        "Medians of errors and ripple",
+        (Column("sensors", is_label=True), *columns),
+        [Group([[name, *row] for row in rows]) for name, rows in groups.items()],
+    )
+
+
+def as_records(found: Sequence[Cell]) -> list[dict[str, Any]]:
+    """Return a dictionary a cell, ready for JSON."""
+    return [
+        {
+            "controller": cell.law.controller, "gains": cell.law.gains, "sensors": cell.sensors,
+            "flights": cell.flights, "failed": cell.failed,
+            "metrics": {
+                name: dict(zip(("low", "median", "high"), values, strict=True))
+                for name, values in cell.metrics.items()
+            },
+        }
+        for cell in found
+    ]  # fmt: skip
+
+
+@house_style()
+def figure(found: Sequence[Cell]) -> Figure:
+    """Draw errors (left) and ripple (right) of every law by sensors; bars from 5 % to 95 %."""
+    sensors = list(dict.fromkeys(cell.sensors for cell in found))
+    laws = list(dict.fromkeys(cell.law for cell in found))
+    sheet = page(130.0)
+    legend_above(sheet, [law.title for law in laws], dashed=False)
+    for axes, name in zip(grid(sheet, len(DRAWN), 2, shared=False), DRAWN, strict=True):
+        for number, law in enumerate(laws):
+            look, shift = Look.of(number), 0.09 * (number - 0.5 * (len(laws) - 1))
+            own = [c for c in found if c.law == law and name in c.metrics]
+            places = [sensors.index(c.sensors) + shift for c in own]
+            low, middle, high = np.array([c.metrics[name] for c in own]).reshape(-1, 3).T
+            axes.errorbar(
+                places, middle, yerr=(middle - low, high - middle), color=look.colour,
+                marker=look.marker, linestyle="none", markersize=4,
+            )  # fmt: skip
+        heading, unit = SHOWN[name]
+        axes.set_yscale("log")
+        axes.set_ylabel(f"{heading} ({unit})" if unit else f"{heading} error")
+        axes.set_xticks(range(len(sensors)), [plain(name) for name in sensors])
+        axes.set_xlim(-0.5, len(sensors) - 0.5)
+    return sheet

@@ -1,0 +1,101 @@
+"""``space-robot sweep``: laws beside one another over grades of sensors."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .options import OUTPUT, flight_options, folder_option, put_json
+
+
+@click.command()
+@click.option(
+    "--law", "laws", multiple=True, metavar="LAW[=GAINS]",
+    help="Law with its gain set, by name or path; repeatable [default: the five laws].",
+)  # fmt: skip
+@click.option(
+    "--sensors", multiple=True, metavar="NAME",
+    help="Sensors of config/sensors, or a path; repeatable "
+    "[default: ideal, fine, tactical, coarse].",
+)  # fmt: skip
+@click.option(
+    "--draws", type=click.IntRange(1, 100_000), default=1, show_default=True,
+    help="Flights of every law with every sensors.",
+)  # fmt: skip
+@click.option(
+    "--spread", type=click.FloatRange(0.0, 1.0, max_open=True), default=0.0, show_default=True,
+    help="Largest relative error of the plant's masses and inertias; no law is told.",
+)  # fmt: skip
+@click.option("--seed", type=click.IntRange(0, 2**30), default=0, help="Seed of the draws.")
+@click.option("--jobs", type=click.IntRange(1, 256), help="Processes [default: one a core].")
+@folder_option("--out", help="Folder for table.csv, summary.md and the figure (PNG and SVG).")
+@flight_options(
+    "case", "robot", "mission", "duration", "navigation", "latency", "friction", "set", "json"
+)
+@OUTPUT
+def sweep(
+    laws: tuple[str, ...],
+    sensors: tuple[str, ...],
+    draws: int,
+    spread: float,
+    seed: int,
+    jobs: int | None,
+    out: Path | None,
+    as_json: bool,
+    output: Path | None,
+    **common: Any,
+) -> None:
+    """Fly every law with every grade of sensors, and compare errors and ripple.
+
+    Errors are those of the truth. All laws fly the same draws of masses and noise. Exit code 0
+    also if flights diverge: the table says how many.
+
+    \b
+    Examples:
+      space-robot sweep --navigation filtered
+      space-robot sweep --law tde_stc --law tde_tsmc=tuned --sensors white_l1 --case 3
+      space-robot sweep --draws 15 --spread 0.2 --out sweep --json
+    """
+    from space_robot_msgs_py.config.validation import validate
+
+    from ..analysis.figures.style import save_figure
+    from ..analysis.files import check_writable, make_folder, write_text
+    from ..analysis.tables import Column, Table, as_csv, as_markdown
+    from ..analysis.terminal import print_table
+    from ..campaign.processes import cores
+    from ..campaign.sweep import Law, Sweep
+    from ..campaign.sweep import sweep as run
+    from ..campaign.sweep.summary import as_records, cells, figure, summary_table
+    from ..flight.compilation import compile_kernels
+    from ..flight.progress import counting_progress
+    from ..flight.terminal import terminal
+    from ..laws import laws as all_laws
+
+    given = {
+        "laws": [Law.parse(text) for text in dict.fromkeys(laws or sorted(all_laws()))],
+        "sensors": list(dict.fromkeys(sensors or ("ideal", "fine", "tactical", "coarse"))),
+        "draws": draws, "spread": spread, "seed": seed, "common": common,
+    }  # fmt: skip
+    study = validate(Sweep, given, "options")
+    if out:
+        make_folder(out)
+        check_writable(out / "table.csv")
+    compile_kernels()
+    with counting_progress("flights") as progress:
+        rows = run(study, jobs or cores(), progress)
+    found = cells(rows)
+    table = summary_table(found)
+    if out:
+        records = [row.as_record() for row in rows]
+        names = list(dict.fromkeys(name for record in records for name in record))
+        flights = Table.of(
+            "", [Column(name) for name in names], [[r.get(n) for n in names] for r in records]
+        )
+        write_text(as_csv(flights), out / "table.csv")
+        write_text(as_markdown("Laws over grades of sensors", [table]), out / "summary.md")
+        save_figure(figure(found), out / "sensors")
+    put_json({"cells": as_records(found)}, as_json, output)
+    if not as_json:
+        print_table(table, terminal())

@@ -1,0 +1,104 @@
+"""Sweeps: the same draws for all laws, in any number of processes; what they sum up."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from space_robot_control.campaign.sweep import Law, Sweep, sweep
+from space_robot_control.campaign.sweep.run import Row
+from space_robot_control.campaign.sweep.scenario import Draw
+from space_robot_control.campaign.sweep.summary import as_records, cells, figure, summary_table
+from space_robot_control.cli.main import cli
+from space_robot_control.flight.plan import Flight
+from space_robot_msgs_py.errors import InputError
+
+STC, CTC = Law("tde_stc", "default"), Law("ctc", "default")
+
+
+def study(**options: Any) -> Sweep:
+    given = {"laws": [STC, CTC], "sensors": ["ideal"], "common": {"duration": 0.2}, **options}
+    return Sweep(**given)
+
+
+def test_the_rows_do_not_depend_on_the_number_of_processes() -> None:
+    plan = study(draws=2, spread=0.2, sensors=["ideal", "fine"])
+    one, two = sweep(plan, jobs=1), sweep(plan, jobs=2)
+    assert one == two
+    assert [row.draw for row in one] == list(plan.flights())
+    first, other, *_ = [row.metrics["attitude"] for row in one if row.draw.law == CTC]
+    assert first != other
+
+
+def test_all_laws_fly_the_same_robot_and_noise() -> None:
+    plan = study(draws=3, spread=0.2, seed=5)
+    seeds = [plan.plan(Draw(law, "fine", 2), None).seed for law in (STC, CTC)]
+    assert seeds == [7, 7]
+    assert plan.robot_file(2) == plan.robot_file(2) != plan.robot_file(1)
+    longer = study(draws=9, spread=0.2, seed=5)
+    assert longer.robot_file(2) == plan.robot_file(2), "draws that are added change none"
+
+
+def test_masses_are_off_within_the_spread_and_no_law_is_told(tmp_path: Path) -> None:
+    plan = study(spread=0.2)
+    content = plan.robot_file(0)
+    assert content is not None
+    file = tmp_path / "paper.yaml"
+    file.write_text(json.dumps(content))
+    flight = Flight(plan.plan(Draw(STC, "ideal", 0), str(file)))
+    nominal, flown = flight.controller_settings.robot, flight.robot
+    assert nominal == "paper"
+    factors = flown.mass / np.array([750.0, 20.0, 35.0, 20.0, 10.0, 20.0, 5.0])
+    assert np.all((factors > 0.8) & (factors < 1.2))
+    assert np.ptp(factors) > 0.05
+    assert flight.mission_settings.waypoints_deg
+    assert study().robot_file(0) is None, "no spread, no other robot"
+
+
+def row(law: Law, index: int, attitude: float, failure: str = "") -> Row:
+    metrics = {} if failure else {"attitude": attitude, "ripple_base_torque": 10 * attitude}
+    return Row(Draw(law, "fine", index), failure, metrics)
+
+
+def test_medians_and_spread_leave_failures_out_and_count_them() -> None:
+    rows = [row(STC, i, float(i + 1)) for i in range(5)] + [row(CTC, 0, 0.0, "diverged")]
+    good, bad = cells(rows)
+    assert (good.flights, good.failed, bad.failed) == (5, 0, 1)
+    assert good.metrics["attitude"] == pytest.approx((1.2, 3.0, 4.8))
+    assert not bad.metrics
+    record = as_records([good, bad])
+    assert record[0]["metrics"]["ripple_base_torque"]["median"] == 30.0
+    assert record[1]["metrics"] == {}
+    texts = list(summary_table([good, bad]).texts(summary_table([good, bad]).groups[0]))
+    assert [line[-1] for line in texts] == ["0 of 5", "1 of 1"]
+    assert len(figure([good, bad]).axes) == 4
+
+
+def test_a_bad_option_is_refused_before_anything_flies() -> None:
+    with pytest.raises(InputError, match="nosuch"):
+        sweep(study(sensors=["nosuch"]))
+    with pytest.raises(InputError, match="pid"):
+        sweep(study(laws=[Law("pid", "default")]))
+
+
+def test_the_command_writes_tables_and_a_figure(tmp_path: Path) -> None:
+    out = tmp_path / "study"
+    arguments = ["sweep", "--law", "tde_stc", "--sensors", "ideal", "--sensors", "white_l1"]
+    arguments += ["--duration", "0.2", "--out", str(out), "--json"]
+    result = CliRunner().invoke(cli, arguments, catch_exceptions=False)
+    assert result.exit_code == 0
+    found = json.loads(result.stdout)["cells"]
+    assert [cell["sensors"] for cell in found] == ["ideal", "white_l1"]
+    ripples = [cell["metrics"]["torque_4_6"]["median"] for cell in found]
+    assert ripples[0] < ripples[1]
+    rows = list(csv.DictReader((out / "table.csv").read_text().splitlines()))
+    assert [line["sensors"] for line in rows] == ["ideal", "white_l1"]
+    assert {path.name for path in out.iterdir()} == {
+        "table.csv", "summary.md", "sensors.png", "sensors.svg",
+    }  # fmt: skip
