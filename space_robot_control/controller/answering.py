@@ -17,6 +17,7 @@ from space_robot_sim.robot import Robot
 
 from .controller import Controller
 from .law_choice import LawChoice
+from .reference_buffer import ReferenceBuffer
 from .settings import ControllerNodeSettings
 from .supervisor import Supervisor
 
@@ -36,11 +37,14 @@ class Answering:
     """Answers states, never a tick anew, with the messages of the controller. Knows no ROS."""
 
     def __init__(
-        self, controller: Controller, laws: LawChoice, settings: ControllerNodeSettings,
-        robot: Robot,
+        self, controller: Controller, laws: LawChoice, references: ReferenceBuffer,
+        settings: ControllerNodeSettings, robot: Robot,
     ) -> None:  # fmt: skip
-        """Answer with ``controller`` under the laws chosen, as the node's settings say."""
-        self._controller, self._laws = controller, laws
+        """Answer with ``controller`` under the laws chosen, as the node's settings say.
+
+        ``references`` are told what is now.
+        """
+        self._controller, self._laws, self._references = controller, laws, references
         self.supervisor = Supervisor(controller, robot.n + 3, settings.hold_ticks)
         self.stamps = StampGuard(settings.longest_jump)
         self._commands = CommandCodec(robot.axis_names, settings.timebase)
@@ -58,9 +62,14 @@ class Answering:
         """Tell how a state of ``tick`` that has come stands."""
         if tick == self.answered:
             return Standing.ANSWERED
-        if tick == self.stamps.last or self.stamps.passes(tick):
+        if tick == self.stamps.last:
             return Standing.NEW
-        return Standing.REFUSED
+        if not self.stamps.passes(tick):
+            return Standing.REFUSED
+        if self.stamps.is_new_time:
+            self._references.begin(tick)
+        self._references.now = tick
+        return Standing.NEW
 
     def messages(
         self, tick: int, state: RobotState, reference: Block

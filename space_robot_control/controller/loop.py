@@ -46,10 +46,12 @@ class ControllerLoop:
             robot, self._laws.choice.chosen, settings.period, settings.acceleration_filter_hz,
             settings.filter_settings,
         )  # fmt: skip
-        self._answering = Answering(self._controller, self._laws.choice, settings, robot)
         timebase = settings.timebase
         self._states = StateInput(node, robot, timebase)
         self._references = ReferenceInput(node, robot, timebase, settings.reference_timeout)
+        self._answering = Answering(
+            self._controller, self._laws.choice, self._references.buffer, settings, robot
+        )
         self._command_out = RawPublisher(node, topics.COMMAND)
         self._out = {
             topics.COMMAND: self._command_out,
@@ -161,10 +163,6 @@ class ControllerLoop:
     def _believe(self, tick: int, last: int) -> None:
         """Follow the sender of a state whose stamp is believed; it may begin a new time."""
         self._states.follow()
-        references = self._references.buffer
-        if self._answering.stamps.is_new_time:
-            references.begin(tick)
-            if last >= 0:
-                self._node.log(f"a new time begins at tick {tick}, after {last}")
-        references.now = tick
+        if self._answering.stamps.is_new_time and last >= 0:
+            self._node.log(f"a new time begins at tick {tick}, after {last}")
         self._state_at = time.monotonic()

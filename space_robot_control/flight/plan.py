@@ -12,7 +12,7 @@ from space_robot_msgs_py.bag.mcap_file import Compression
 from space_robot_msgs_py.config.validation import StrictModel, one_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.faults.grammar import Kinds, parse_faults
-from space_robot_sim.plant.faults import PART_KINDS, PLANT_KINDS
+from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import MOST_TICKS
 
@@ -189,12 +189,8 @@ class Flight:
         Raises:
             InputError: it asks for something that only nodes have.
         """
-        needed = [
-            text for text, fault in zip(self.faults, parse_faults(self.faults, KINDS), strict=True)
-            if fault.kind.name not in PART_KINDS
-        ]  # fmt: skip
-        if needed:
-            asked = f"faults {needed}"
+        if self.orchestrator_faults:
+            asked = f"faults {[str(fault) for fault in self.orchestrator_faults]}"
         elif self.plant_settings.realtime:
             asked = "realtime"
         elif self.plant_settings.fifo_priority or self.controller_settings.fifo_priority:

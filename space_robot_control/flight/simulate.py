@@ -10,12 +10,14 @@ import itertools
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.blocks import block_bounds
+from space_robot_msgs_py.bag.blocks import block_bounds, blocks_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.samples import Command, LawInForce
@@ -27,6 +29,7 @@ from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 
 from ..controller.law_changes import LawChanges
 from .closed_loop import close_loop, measured_ticks
+from .message_loop import MessageLoop
 from .plan import Flight
 
 STRETCH_TICKS = 10_000
@@ -38,13 +41,24 @@ class Messages:
 
     def __init__(self, flight: Flight, recorder: BagRecorder) -> None:
         robot, timebase = flight.robot, flight.timebase
-        self._recorder, self._flight = recorder, flight
+        self.record, self._flight = recorder.record, flight
         self._states = StateCodec(robot.joint_names, timebase)
         self._commands = CommandCodec(robot.axis_names, timebase)
         self._references = ReferenceCodec(robot.joint_names, timebase)
         self._telemetry = TelemetryCodec(robot.axis_names)
         self._clock = ClockCodec()
         self._law = LawCodec(timebase)
+
+    def begin_tick(self, tick: int) -> None:
+        """Write what comes now and then: the reference from ``tick`` on, and the clock."""
+        flight = self._flight
+        chunk_ticks = flight.mission_settings.chunk_ticks
+        if tick % chunk_ticks == 0:
+            joints, base = self._references.encode(flight.mission.chunk(tick, chunk_ticks))
+            self.record(topics.REFERENCE_JOINTS, joints)
+            self.record(topics.REFERENCE_BASE, base)
+        if tick % flight.plant_settings.clock_decimation == 0:
+            self.record(topics.CLOCK, self._clock.encode(flight.timebase.stamp_ns(tick)))
 
     def stretch(self, log: FlightLog, start: int, stop: int, answered: int) -> None:
         """Write what mission, plant and controller send in the ticks ``start`` to ``stop``.
@@ -53,19 +67,13 @@ class Messages:
         """
         assert log.commanded_torque is not None
         assert log.telemetry is not None
-        record, flight = self._recorder.record, self._flight
-        chunk_ticks = flight.mission_settings.chunk_ticks
+        record, flight = self.record, self._flight
         laws = [law for law in log.laws if start <= law.tick < stop]
         for tick in range(start, stop):
-            if tick % chunk_ticks == 0:
-                joints, base = self._references.encode(flight.mission.chunk(tick, chunk_ticks))
-                record(topics.REFERENCE_JOINTS, joints)
-                record(topics.REFERENCE_BASE, base)
+            self.begin_tick(tick)
             joints, base = self._states.encode(log.state(tick))
             record(topics.JOINT_STATES, joints)
             record(topics.BASE_STATE, base)
-            if tick % flight.plant_settings.clock_decimation == 0:
-                record(topics.CLOCK, self._clock.encode(flight.timebase.stamp_ns(tick)))
             if tick >= answered:
                 continue
             row = tick - log.first_tick
@@ -121,6 +129,8 @@ def fly_blocks(
     measured, before the error is raised; a state that was not answered has a command of NaN. All
     that was flown is then in the bag.
 
+    A flight whose messages fail is handed out as its bag tells it, once it is over.
+
     Args:
         flight: a checked plan; its plant is flown on from where it stands.
         bag: where to write the messages the graph would have sent (None: nowhere).
@@ -133,6 +143,9 @@ def fly_blocks(
         InputError: the bag cannot be written, or the flight needs a graph of nodes.
     """
     flight.check_in_process()
+    if flight.plant_settings.has_message_faults:
+        yield from _fly_by_messages(flight, bag, progress)
+        return
     block_of = block_of or (lambda start, stop: unflown(flight, start, stop))
     laws: tuple[LawInForce, ...] = ()
     changes = LawChanges()
@@ -162,6 +175,9 @@ def simulate(
         FlightError: as there; its ``log`` is what was flown.
         InputError: as there, or a log of the whole flight would not fit into memory.
     """
+    flight.check_in_process()
+    if flight.plant_settings.has_message_faults:
+        return _flown_by_messages(flight, bag, progress)
     _check_memory(flight)
     log, flown = unflown(flight), 0
     try:
@@ -172,6 +188,40 @@ def simulate(
         error.log = log.rows(0, flown)
         raise
     return log
+
+
+def _fly_by_messages(
+    flight: Flight, bag: Path | None, progress: Callable[[int], None]
+) -> Iterator[FlightLog]:
+    try:
+        log = _flown_by_messages(flight, bag, progress)
+    except FlightError as error:
+        if error.log:
+            yield from blocks_of(error.log)
+        raise
+    yield from blocks_of(log)
+
+
+def _flown_by_messages(
+    flight: Flight, bag: Path | None, progress: Callable[[int], None]
+) -> FlightLog:
+    """Fly by `MessageLoop` into a bag, and read that."""
+    with TemporaryDirectory() as folder:
+        path = bag or Path(folder) / "bag"
+        try:
+            with _recording(flight, path) as messages:
+                assert messages
+                loop = MessageLoop(flight, messages.record)
+                for tick in range(flight.plant.tick, flight.ticks):
+                    if tick % STRETCH_TICKS == 0:
+                        progress(tick)
+                    messages.begin_tick(tick)
+                    loop.fly_tick()
+        except FlightError as error:
+            error.log = read_flight(path, trust=True)
+            raise
+        progress(flight.ticks)
+        return read_flight(path, trust=True)
 
 
 def _fly_block(

@@ -60,6 +60,11 @@ class FaultSettings(StrictModel):
         """The faults, without the empty texts."""
         return parse_faults(self.faults, PLANT_KINDS)
 
+    @property
+    def has_message_faults(self) -> bool:
+        """True if messages between plant and controller are to fail."""
+        return any(fault.kind.name in MESSAGE_KINDS for fault in self.parsed_faults)
+
     def schedule(self, robot: Robot, period: float) -> Schedule:
         """Place the faults in a flight of ``robot`` in ticks of ``period`` seconds.
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 import time
 from collections import deque
-from collections.abc import Iterable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +26,7 @@ from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 
 from ..robot import Robot
 from .command_guard import CommandGuard
+from .exchange import NONE, SentState, exchange_of
 from .plant import Plant
 from .settings import PlantNodeSettings
 from .wall_clock import WallClock
@@ -46,17 +45,6 @@ MOST_AT_ONCE = 100
 """Commands taken before the clock is looked at again: somebody may flood the topic."""
 HOLDING_TICKS = 20
 """A command held for longer is worth a word in the diagnostics."""
-NONE = -1
-"""No tick."""
-
-
-class SentState(NamedTuple):
-    """A measured state as it goes out."""
-
-    joints: bytes
-    base: bytes
-    answered_by: int
-    """Tick of the command that will come for it; `NONE`: no command will."""
 
 
 class PlantLoop:
@@ -79,6 +67,7 @@ class PlantLoop:
         self._commands = CommandCodec(robot.axis_names, timebase)
         self._clock = ClockCodec()
         self._guard = CommandGuard(robot.n + 3, settings.hold_ticks)
+        self._exchange = exchange_of(settings, robot, settings.period, self._states, self._guard)
         self._joint_states = RawPublisher(node, topics.JOINT_STATES)
         self._base_state = RawPublisher(node, topics.BASE_STATE)
         self._clock_out = RawPublisher(node, topics.CLOCK)
@@ -162,6 +151,7 @@ class PlantLoop:
             "saturated_ticks": self._plant.saturated_ticks,
             **{f"refused: {reason}": count for reason, count in guard.refused.items()},
             **self._command_in.counts("refused"),
+            **({"faults": "injected"} if any(self._settings.faults) else {}),
         }
         if self._answers:
             values["latency_mean_ms"] = 1e3 * self._latency_s / self._answers
@@ -174,18 +164,13 @@ class PlantLoop:
             return Health("holding the last good command", Level.WARN, values)
         return Health("nominal", values=values)
 
-    def _measure(self) -> Iterable[SentState]:
-        """Measure this tick's state; what reaches the controller in this tick."""
-        joints, base = self._states.encode(self._plant.state)
-        return (SentState(joints, base, self._plant.tick),)
-
     def _begin_tick(self) -> None:
         tick = self._plant.tick
         self._is_under_way = True
         self._by_the_clock = self._controller_silent or (self._settings.realtime and tick > 0)
         self._must_give_way = self._by_the_clock and self._wall_clock.left(tick) <= 0.0
         self._heard_before = self._heard
-        self._unsent.extend(self._measure())
+        self._unsent.extend(self._exchange.send(self._plant.state))
         if self._unsent:
             self._send_next()
         if tick % self._settings.clock_decimation == 0:
@@ -241,6 +226,7 @@ class PlantLoop:
         """Step the plant under the command in force, and begin the next tick."""
         plant, guard, clock = self._plant, self._guard, self._wall_clock
         tick = plant.tick
+        self._exchange.end(tick)
         if tick == 0:
             clock.start(0)  # time begins when the loop is closed
         elif self._by_the_clock and clock.slip(tick) and (remark := clock.remark()):
@@ -280,12 +266,8 @@ class PlantLoop:
         if self._heard < tick <= self._plant.tick:
             self._heard = tick
             source.follow()
-        self._deliver()
+        self._exchange.take(self._plant.tick)
         return tick
-
-    def _deliver(self) -> None:
-        """Hand the command in the guard's `offered` to the actuators."""
-        self._guard.accept(self._plant.tick)
 
     def _time_answer(self) -> None:
         latency = time.monotonic() - self._sent_at

@@ -143,7 +143,6 @@ def test_files_that_give_nodes_different_periods_are_refused(tmp_path: Path) -> 
     ("parameters", "said"),
     [
         ({"plant": {"realtime": True}}, "realtime: that needs the graph of nodes: use `fly`"),
-        ({"plant": {"faults": ["nan_state@1"]}}, "nan_state@1"),
         ({"controller": {"fifo_priority": 5}}, "fifo_priority: that needs the graph"),
     ],
 )

@@ -86,9 +86,9 @@ def test_a_swap_after_the_end_changes_nothing() -> None:
     np.testing.assert_array_equal(swapped.applied_torque, plain.applied_torque)
 
 
-def test_faults_need_the_graph() -> None:
+def test_faults_of_processes_need_the_graph() -> None:
     with pytest.raises(InputError, match="use `fly`"):
-        simulate(Flight(FlightPlan(faults=["nan_state@1-2"])))
+        simulate(Flight(FlightPlan(faults=["kill_recorder@1"])))
 
 
 def test_simulate_prints_what_its_bag_says(tmp_path: Path) -> None:

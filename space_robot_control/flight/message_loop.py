@@ -1,0 +1,98 @@
+"""Plant, mission and controller in this process, closed message by message.
+
+So a flight whose messages fail is that of a graph in lockstep, by the same classes. Where the
+nodes' timing would matter, the graph's flight need not repeat: here the controller takes every
+state that reaches it, none is passed over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.errors import MessageError
+from space_robot_msgs_py.samples import RobotState
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.stamp_guard import AGREEING
+from space_robot_sim.plant.command_guard import CommandGuard
+from space_robot_sim.plant.exchange import NONE, SentState, exchange_of
+
+from ..controller.answering import Answering, Standing
+from ..controller.law_choice import LawChoice
+from ..controller.reference_buffer import ReferenceBuffer
+from .plan import Flight
+
+Record = Callable[[topics.Topic, bytes], object]
+
+
+class MessageLoop:
+    """Flies tick by tick; every message is handed to ``record``, as it is sent."""
+
+    def __init__(self, flight: Flight, record: Record) -> None:
+        robot, settings = flight.robot, flight.plant_settings
+        self._flight, self._plant, self._record = flight, flight.plant, record
+        self._guard = CommandGuard(robot.n + 3, settings.hold_ticks)
+        self._states = StateCodec(robot.joint_names, flight.timebase)
+        self._commands = CommandCodec(robot.axis_names, flight.timebase)
+        self._exchange = exchange_of(settings, robot, flight.period, self._states, self._guard)
+        self._references = ReferenceBuffer(robot.n)
+        self._answering = Answering(
+            flight.controller, LawChoice(flight.law, flight.swaps), self._references,
+            flight.controller_settings, robot,
+        )  # fmt: skip
+        self._state = RobotState.allocate(robot.n)
+        self._streamed = 0
+        """The first tick that the mission has not sent yet."""
+
+    def fly_tick(self) -> None:
+        """Let mission and controller do what the plant's tick asks for, and step the plant.
+
+        Raises:
+            DivergedError: see `Plant.step`.
+        """
+        plant, tick = self._plant, self._plant.tick
+        self._stream(tick)
+        for sent in self._exchange.send(plant.state):
+            self._record(topics.JOINT_STATES, sent.joints)
+            self._record(topics.BASE_STATE, sent.base)
+            self._deliver(sent, tick)
+        self._exchange.end(tick)
+        plant.step(self._guard.act(tick))
+
+    def _stream(self, tick: int) -> None:
+        """Let the controller have the reference as far ahead as the mission sends it."""
+        settings, mission = self._flight.mission_settings, self._flight.mission
+        while self._streamed < tick + settings.lead_ticks:
+            chunk = mission.chunk(self._streamed, settings.chunk_ticks)
+            self._references.add(chunk)
+            self._streamed = chunk.stop
+
+    def _deliver(self, sent: SentState, tick: int) -> None:
+        """Let the controller have a state; one whose answer is awaited comes until it is there."""
+        for _ in range(1 if sent.answered_by == NONE else AGREEING):
+            if self._answer(sent, tick) == sent.answered_by:
+                return
+
+    def _answer(self, sent: SentState, tick: int) -> int:
+        """Let the controller answer a state, once; the tick that is answered, `NONE` if none is.
+
+        An answer that is asked for again is left out: the next one overtakes it, or is lost
+        with it.
+        """
+        state, references = self._state, self._references
+        try:
+            stamp = self._states.decode_joints(sent.joints, state)
+            self._states.decode_base(sent.base, state)
+        except MessageError:
+            return NONE
+        if self._answering.judge(stamp) is not Standing.NEW:
+            return NONE
+        reference = references.at(stamp) if references.covers(stamp) else references.hold(stamp)
+        if reference is None:
+            return NONE
+        for topic, message in self._answering.messages(stamp, state, reference):
+            self._record(topic, message)
+            if topic is topics.COMMAND:
+                self._commands.decode(message, self._guard.offered)
+                self._exchange.take(tick)
+        return stamp

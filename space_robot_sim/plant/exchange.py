@@ -1,0 +1,98 @@
+"""What passes between a plant and its controller in a tick, in order or with faults. Knows no ROS.
+
+In the order of a tick: `Exchange.send` the state, `Exchange.take` the commands that come for it,
+`Exchange.end`; then `CommandGuard.act` says which command acts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+from space_robot_msgs_py.samples import RobotState
+from space_robot_msgs_py.wire.codecs import StateCodec
+
+from ..faults.link import awaited_stamp
+from ..robot import Robot
+from .command_guard import CommandGuard
+from .faults import FaultSettings, MessageFaults
+
+NONE = -1
+"""No tick."""
+
+
+class SentState(NamedTuple):
+    """A measured state as it goes out."""
+
+    joints: bytes
+    base: bytes
+    answered_by: int
+    """Tick of the command that will come for it; `NONE`: no command will."""
+
+
+class Exchange:
+    """Hands every state out, and every command in."""
+
+    def __init__(self, codec: StateCodec, guard: CommandGuard) -> None:
+        self._codec, self._guard = codec, guard
+
+    def send(self, state: RobotState) -> Iterable[SentState]:
+        """Return what reaches the controller in the tick of the measured ``state``."""
+        joints, base = self._codec.encode(state)
+        return (SentState(joints, base, state.tick),)
+
+    def take(self, tick: int) -> None:
+        """Take the command in the guard's ``offered``, which has come at ``tick``."""
+        self._guard.accept(tick)
+
+    def end(self, tick: int) -> None:
+        """End the exchange of ``tick``: all that has come for it is there."""
+
+
+class FaultyExchange(Exchange):
+    """Messages are lost, late, repeated and spoilt, as a flight's faults say.
+
+    A state that is lost, late or wrongly stamped has no answer to wait for: that is known here,
+    so that a flight in lockstep repeats.
+    """
+
+    def __init__(self, codec: StateCodec, guard: CommandGuard, faults: MessageFaults) -> None:
+        super().__init__(codec, guard)
+        self._faults = faults
+        self._asked = NONE
+        """Tick of the newest state that a controller can have answered."""
+
+    def send(self, state: RobotState) -> Iterator[SentState]:
+        """See `Exchange.send`."""
+        tick, faults = state.tick, self._faults
+        measured = faults.measure(state)
+        messages = self._codec.encode(measured)
+        for arriving in faults.states.push(tick, messages, measured.tick):
+            stamp = awaited_stamp([arriving], tick, self._asked)
+            if stamp is not None:
+                self._asked = stamp
+            joints, base = arriving.item
+            yield SentState(joints, base, NONE if stamp is None else stamp)
+
+    def take(self, tick: int) -> None:
+        """See `Exchange.take`; the command may act in a later tick, or never."""
+        faults, offered = self._faults, self._guard.offered
+        faults.corruption.spoil_command(offered, tick)
+        faults.commands.send(tick, offered.torque.copy(), offered.tick)
+
+    def end(self, tick: int) -> None:
+        """See `Exchange.end`."""
+        guard = self._guard
+        for command in self._faults.commands.arrivals(tick):
+            guard.offered.tick, guard.offered.torque[:] = command.stamp, command.item
+            guard.accept(tick)
+
+
+def exchange_of(
+    settings: FaultSettings, robot: Robot, period: float, codec: StateCodec, guard: CommandGuard
+) -> Exchange:
+    """Return the exchange of a flight: a faulty one if any of its messages are to fail."""
+    if not settings.has_message_faults:
+        return Exchange(codec, guard)
+    faults = MessageFaults(settings.schedule(robot, period), robot.n)
+    return FaultyExchange(codec, guard, faults)
