@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from .options import OPTIONS, flight_options
+from .options import flight_options
 
 
 @click.group()
@@ -54,8 +55,7 @@ def check(as_json: bool, **options: Any) -> None:
 
 
 @gains.command()
-@OPTIONS["robot"]
-@OPTIONS["mission"]
+@flight_options("robot", "mission", "sensors", "navigation", "set")
 @click.option(
     "--case", "cases", multiple=True, default=["1"], show_default=True, metavar="CASE",
     help="A case that is to be flown, with its payload; may be repeated.",
@@ -73,6 +73,10 @@ def check(as_json: bool, **options: Any) -> None:
     help="Poles of all laws, rad/s [default: a quarter of the estimate's].",
 )  # fmt: skip
 @click.option(
+    "--ripple", type=click.FloatRange(0.0, 10.0, min_open=True), default=0.1, show_default=True,
+    help="Noise allowed on a torque, RMS, as a share of the largest that the mission asks.",
+)  # fmt: skip
+@click.option(
     "-o", "--output", type=click.Path(path_type=Path, file_okay=False), required=True,
     metavar="DIR", help="Folder of the set, for --gains.",
 )  # fmt: skip
@@ -82,12 +86,13 @@ def tune(context: click.Context, /, output: Path, **options: Any) -> None:
 
     h_bar from the inertia along the mission, so that the time-delay estimate contracts with the
     margin asked for, whichever of the masses are wrong; a low-pass for it; poles below its lag;
-    switching gains from the errors that are left. Nothing is flown. The method is told step by
-    step in the docs, its numbers in the files.
+    switching gains from the errors that are left. Sensors and navigation are listened to on a robot
+    at rest; nothing is flown. The method is told in the docs, its numbers in the files.
 
     \b
     Examples:
       space-robot gains tune -o my_gains
+      space-robot gains tune --sensors fine --navigation filtered -o my_gains
       space-robot gains tune --robot seven_joint --case 1 --case 2 --margin 0.03 -o my_gains
       space-robot fly --gains my_gains
     """
@@ -95,12 +100,10 @@ def tune(context: click.Context, /, output: Path, **options: Any) -> None:
     from ..tuning.method import Wishes
     from .gains_tuned import tuned_set, write_set
 
-    wishes = Wishes(options["margin"], options["mass_uncertainty"], options["bandwidth"])
+    names = ("margin", "mass_uncertainty", "bandwidth", "ripple")
+    wishes, cases = Wishes(*(options.pop(name) for name in names)), options.pop("cases")
     with terminal(stderr=True).status("tuning") as status:
-        tuned = tuned_set(
-            options["robot"], options["mission"], options["cases"], wishes,
-            lambda text: status.update(text),
-        )  # fmt: skip
+        tuned = tuned_set(options, cases, wishes, status.update)
     for path in write_set(tuned, _command(context), output):
         click.echo(f"wrote {path}", err=True)
 
@@ -109,8 +112,13 @@ def _command(context: click.Context) -> str:
     """Return the command line with the options that were given."""
     words = []
     for option in context.command.params:
-        value = context.params[str(option.name)]
-        if context.get_parameter_source(str(option.name)) != ParameterSource.DEFAULT:
-            values = value if isinstance(value, tuple) else (value,)
-            words += [word for each in values for word in (option.opts[0], str(each))]
+        name = str(option.name)
+        if context.get_parameter_source(name) == ParameterSource.DEFAULT:
+            continue
+        value = context.params[name]
+        if name == "parameters":
+            given = [(f"{n}.{key}", v) for n, own in value.items() for key, v in own.items()]
+            value = [f"{parameter}={json.dumps(v)}" for parameter, v in given]
+        for each in value if isinstance(value, (list, tuple)) else [value]:
+            words += [option.opts[0], str(each)]
     return shlex.join(["space-robot", "gains", "tune", *words])

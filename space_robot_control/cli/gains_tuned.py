@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.dynamics.attitude import SINGULAR_ETA
 from space_robot_sim.environment.payload import with_payload
@@ -19,16 +21,16 @@ from ..tuning.demand import demand
 from ..tuning.gain_file import gain_files
 from ..tuning.inertia import inertia_along
 from ..tuning.method import Tuned, Wishes, tune
+from ..tuning.noise import listen
 
 
 def tuned_set(
-    robot: str, mission: str, cases: Sequence[str], wishes: Wishes, step: Callable[[str], None]
+    options: Mapping[str, Any], cases: Sequence[str], wishes: Wishes, step: Callable[[str], None]
 ) -> Tuned:
     """Make the set.
 
     Args:
-        robot: its name or path; it is the nominal one.
-        mission: its name or path; empty: the robot's.
+        options: of a `FlightPlan`: robot (the nominal one), mission, sensors, navigation.
         cases: names or paths of the environments to be flown in.
         wishes: of the user.
         step: told what is being done.
@@ -36,8 +38,8 @@ def tuned_set(
     Raises:
         InputError: something named is not there, or the wishes do not go together.
     """
-    plans = [FlightPlan(robot=robot, mission=mission, case=case) for case in cases]
-    settings = [FlightSettings.resolve(plan.options(), {}) for plan in plans]
+    plans = [validate(FlightPlan, {**options, "case": case}, "options") for case in cases]
+    settings = [FlightSettings.resolve(plan.options(), plan.parameters) for plan in plans]
     nominal, reference = Robots(settings[0]).plant, settings[0].mission
     eta = reference.base_quaternion[0] / float(np.linalg.norm(reference.base_quaternion))
     if abs(eta) <= SINGULAR_ETA:
@@ -51,7 +53,11 @@ def tuned_set(
         inertias.append(inertia_along(loaded, reference))
     step("forces along the mission")
     asked = demand(nominal, reference, [own.plant for own in settings])
-    return tune(np.concatenate(inertias), asked, wishes, settings[0].plant.period)
+    plant, navigation, noise = settings[0].plant, settings[0].controller.filter_settings, None
+    if plant.sensors != "ideal" or navigation:
+        step("noise of the sensors")
+        noise = listen(nominal, plant, navigation, reference, plant.period)
+    return tune(np.concatenate(inertias), asked, wishes, plant.period, noise)
 
 
 def write_set(tuned: Tuned, command: str, folder: Path) -> list[Path]:

@@ -9,12 +9,15 @@
    noise grows with it.
 3. **Low-pass of the time-delay pair.** The largest eigenvalue may then exceed 1 or even 2. With a
    low-pass of weight w the estimate's error fades by ``1 - w lambda`` a tick; w is the largest
-   that keeps this from changing sign, ``w alpha max(lambda) / (1 - mu) <= 1``, and that keeps the
-   noise ``w h_bar v / delta`` (see `gain_check`) within the ripple allowed.
+   that keeps this from changing sign, ``w alpha max(lambda) / (1 - mu) <= 1``, and whose noise,
+   h_bar times that of the pair's acceleration (`noise`), stays within the ripple allowed: a share
+   of the largest force that the mission asks of the axis.
 4. **Bandwidth.** With its low-pass the estimate follows after ``T = delta / w`` and the lag of the
    navigation: an axis gets its wanted acceleration with a pole at ``margin / T`` rad/s in the
    slowest direction. Poles at W on top of it: ``s^3 / p + s^2 + 2 W s + W^2``, whose pair has a
-   damping of 0.7 for ``W = p / 4``.
+   damping of 0.7 for ``W = p / 4``. W is lower where computed torque, which multiplies noise of
+   rate and angle by ``H_S (2 W, W^2)``, would exceed the ripple. Ripple and bandwidth both go with
+   margin / T: the margin is had for a low-pass, the bandwidth is paid for in ripple.
 5. **Errors of the estimate.** Between two ticks it is off by what it cannot know yet:
    ``h_bar eps = T dF_S/dt + (1 - b) F_S``, with b the share of the torque that is reported, taken
    wrong by half of the margin. F_S is that of inverse dynamics along the mission.
@@ -39,12 +42,17 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.errors import InputError
 
 from .demand import Demand
+from .noise import Noise
 from .spectrum import eigenvalues
 
 Array = NDArray[np.float64]
 
 SEPARATION = 4.0
 """How many times faster the estimate is than the poles on top of it; see step 4."""
+LEAST_WEIGHT = 1e-4
+"""Of a low-pass: a corner of 0.03 Hz at 2 kHz."""
+BISECTIONS = 12
+"""For a weight to a thousandth, less than is written."""
 DIGITS = 3
 """Significant digits of a gain: fewer than machines differ in."""
 
@@ -59,6 +67,8 @@ class Wishes:
     """Share by which every mass and inertia may be wrong."""
     bandwidth: float | None = None
     """rad/s; None: what the estimate's lag allows."""
+    ripple: float = 0.1
+    """Share of the largest force of an axis that noise may make of its force, RMS."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +92,9 @@ class Tuned:
     """By law and name, (m,) each."""
 
 
-def tune(inertia: Array, asked: Demand, wishes: Wishes, period: float, lag: float = 0.0) -> Tuned:
+def tune(
+    inertia: Array, asked: Demand, wishes: Wishes, period: float, noise: Noise | None = None
+) -> Tuned:
     """Make a set.
 
     Args:
@@ -90,7 +102,7 @@ def tune(inertia: Array, asked: Demand, wishes: Wishes, period: float, lag: floa
         asked: of the mission.
         wishes: of the user.
         period: delta, s.
-        lag: by which the navigation's rates and torques come late, s.
+        noise: of the sensors behind the navigation, and its lag (None: neither).
 
     Raises:
         InputError: the wishes do not go together.
@@ -101,16 +113,17 @@ def tune(inertia: Array, asked: Demand, wishes: Wishes, period: float, lag: floa
     low, high = float(found.min()), float(found.max())
     size = margin * (1.0 + share) / low
     weight = min(1.0, (1.0 - share) / (size * high))
-    corner = low_pass_corner(weight, period)
-    delay = period / weight + lag
+    h_bar, allowed = size * shape, wishes.ripple * asked.peak
+    if noise:
+        weight = _quiet_weight(weight, noise, allowed / h_bar)
+    delay = period / weight + (noise.lag if noise else 0.0)
     fastest = margin / delay / SEPARATION
-    bandwidth = fastest if wishes.bandwidth is None else wishes.bandwidth
+    bandwidth = wishes.bandwidth or min(fastest, _quiet_bandwidth(inertia, noise, allowed))
     if bandwidth > 2.0 * fastest:
         raise InputError(
             f"bandwidth must be at most {2.0 * fastest:.3g} rad/s, half of the pole of an estimate "
             f"with this margin and lag, got {bandwidth:g}"
         )
-    h_bar = size * shape
     gap = delay * asked.slope + 0.5 * margin * asked.peak
     error = gap / h_bar
     layer = shape * (1.0 - share) / high
@@ -131,8 +144,9 @@ def tune(inertia: Array, asked: Demand, wishes: Wishes, period: float, lag: floa
         law: {name: significant(values) for name, values in own.items()}
         for law, own in gains.items()
     }
+    corner = float(significant(low_pass_corner(weight, period)))
     return Tuned(
-        wishes, float(significant(corner)), delay, bandwidth, size * low, size * high, error,
+        wishes, corner, delay, bandwidth, size * low, size * high, error,
         rounded,
     )  # fmt: skip
 
@@ -142,6 +156,41 @@ def axis_inertia(inertia: Array) -> Array:
     free = 1.0 / np.diagonal(np.linalg.inv(inertia), axis1=1, axis2=2)
     smallest: Array = free.min(axis=0)
     return smallest
+
+
+def _quiet_weight(largest: float, noise: Noise, allowed: Array) -> float:
+    """Return the largest weight up to ``largest`` whose noise is ``allowed`` (m,), rad/s2.
+
+    Raises:
+        InputError: there is none.
+    """
+    if np.all(noise.acceleration(largest) <= allowed):
+        return largest
+    low, high = math.log(LEAST_WEIGHT), math.log(largest)
+    if np.any(noise.acceleration(LEAST_WEIGHT) > allowed):
+        raise InputError(
+            "these sensors have more noise than any low-pass takes away: allow more ripple"
+        )
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        is_quiet = np.all(noise.acceleration(math.exp(middle)) <= allowed)
+        low, high = (middle, high) if is_quiet else (low, middle)
+    return math.exp(low)
+
+
+def _quiet_bandwidth(inertia: Array, noise: Noise | None, allowed: Array) -> float:
+    """Return the largest W of computed torque whose noise is ``allowed`` (m,), N m.
+
+    ``H^2 (4 W^2 sigma_rate^2 + W^4 sigma_e^2) = allowed^2`` on the axis that allows least.
+    """
+    if noise is None or not noise.rates.any():
+        return math.inf
+    own = np.diagonal(inertia, axis1=1, axis2=2).max(axis=0)
+    rate, angle = 2.0 * own * noise.rates.std(axis=0), own * noise.errors.std(axis=0)
+    root = np.sqrt(rate**4 + 4.0 * (angle * allowed) ** 2)
+    with np.errstate(divide="ignore"):
+        squares = 2.0 * allowed**2 / (rate**2 + root)
+    return float(np.sqrt(squares.min()))
 
 
 def low_pass_corner(weight: float, period: float) -> float:

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
@@ -151,3 +152,22 @@ def test_what_cannot_be_tuned_is_told(options: tuple[str, ...], said: str, tmp_p
 @pytest.mark.parametrize("option", ["--margin", "--mass-uncertainty", "--bandwidth"])
 def test_numbers_out_of_range_are_refused(option: str, tmp_path: Path) -> None:
     assert tune(tmp_path, option, "-1").exit_code == 2
+
+
+def test_a_set_for_sensors_keeps_the_ripple_it_is_allowed(tmp_path: Path) -> None:
+    """Closed loop with noise of L1, on every axis, beside what was allowed without any loop."""
+    parameter = "controller.hold_ticks=100"
+    result = tune(tmp_path, "--sensors", "white_l1", "--ripple", "0.05", "--set", parameter)
+    assert result.exit_code == 0, result.exception
+    head = (tmp_path / "ctc.yaml").read_text().splitlines()[0]
+    assert f"--sensors white_l1 --set {parameter} --ripple 0.05 -o" in head
+    quiet, loud = (
+        simulate(Flight(FlightPlan(gains=str(tmp_path), sensors=sensors, duration=5.0)))
+        for sensors in ("ideal", "white_l1")
+    )
+    assert quiet.commanded_torque is not None
+    assert loud.commanded_torque is not None
+    noise = (loud.commanded_torque - quiet.commanded_torque)[2000:]
+    asked = np.array([1.9, 4.2, 1.3, 1.1, 2.6, 4.0, 0.21, 0.35, 0.047])  # largest, 30 s
+    share = noise.std(axis=0) / asked
+    assert 0.03 < share.max() < 0.07

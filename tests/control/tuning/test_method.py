@@ -14,6 +14,7 @@ from space_robot_control.laws import laws
 from space_robot_control.tuning.demand import Demand, demand
 from space_robot_control.tuning.inertia import inertia_along
 from space_robot_control.tuning.method import Tuned, Wishes, axis_inertia, tune
+from space_robot_control.tuning.noise import Noise
 from space_robot_control.tuning.spectrum import eigenvalues
 from space_robot_msgs_py.errors import InputError
 
@@ -32,7 +33,8 @@ def scene(robot: str = "paper") -> tuple[Array, Demand]:
 
 
 def tuned(wishes: Wishes, robot: str = "paper", lag: float = 0.0) -> Tuned:
-    return tune(*scene(robot), wishes, PERIOD, lag)
+    still = np.zeros((100, scene(robot)[0].shape[-1]))
+    return tune(*scene(robot), wishes, PERIOD, Noise(still, still, lag, PERIOD))
 
 
 @pytest.mark.parametrize("robot", ["paper", "seven_joint"])
@@ -126,3 +128,35 @@ def test_demand_is_what_a_flight_commands() -> None:
     peak[:3] *= 2.0  # J0 = E / 2
     np.testing.assert_allclose(case_1.peak, peak, rtol=0.02, atol=2e-3)
     assert np.all(asked.peak >= case_1.peak)
+
+
+def white(rate: float, angle: float = 0.0) -> Noise:
+    """White noise of rates, rad/s (eps: 1/s), and of angles, rad, alike on all axes."""
+    rng, shape = np.random.default_rng(1), (8000, 9)
+    return Noise(rate * rng.normal(size=shape), angle * rng.normal(size=shape), 0.0, PERIOD)
+
+
+def test_noise_is_kept_within_the_ripple_allowed() -> None:
+    inertia, asked = scene()
+    wishes = Wishes(0.05, 0.2, ripple=0.1)
+    quiet, loud = (tune(inertia, asked, wishes, PERIOD, noise=white(x)) for x in (1e-9, 1e-5))
+    assert quiet.corner_hz == tuned(wishes).corner_hz
+    weight = 1.0 - np.exp(-2.0 * np.pi * loud.corner_hz * PERIOD)
+    share = loud.gains["tde_stc"]["h_bar"] * weight / PERIOD * 1e-5 / asked.peak
+    assert share.max() == pytest.approx(0.1, rel=0.05)
+    assert loud.bandwidth == pytest.approx(0.05 / loud.delay / 4.0, rel=1e-3)
+
+
+def test_bandwidth_is_also_what_computed_torque_allows() -> None:
+    inertia, asked = scene()
+    noise = white(1e-9, angle=1e-3)
+    found = tune(inertia, asked, Wishes(0.05, 0.2), PERIOD, noise)
+    own = np.diagonal(inertia, axis1=1, axis2=2).max(axis=0)
+    gains = found.gains["ctc"]
+    command = gains["k_d"] * noise.rates + gains["k_p"] * noise.errors
+    assert (own * command.std(axis=0) / asked.peak).max() == pytest.approx(0.1, rel=0.02)
+
+
+def test_noise_beyond_any_low_pass_is_refused() -> None:
+    with pytest.raises(InputError, match="allow more ripple"):
+        tune(*scene(), Wishes(0.05, 0.2), PERIOD, white(10.0))
