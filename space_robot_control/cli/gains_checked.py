@@ -7,18 +7,24 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.validation import validate
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_sim.dynamics.attitude import SINGULAR_ETA
 
 from ..controller.gains import available_laws
 from ..flight.node_settings import FlightSettings
 from ..flight.plan import Flight, FlightPlan
+from ..flight.simulate import simulate
 from ..tuning.gain_check import GainCheck, check_gains
 from ..tuning.inertia import inertia_along
 
+Array = NDArray[np.float64]
+
 ALL = "all"
+HELD = 6.0
+"""s of flight to measure ripple in."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +33,9 @@ class Checked:
 
     flight: Flight
     checks: list[GainCheck]
+    ripple: dict[str, Array | None]
+    """By law, (m,) N m: the torque's standard deviation with the robot held still, by its sensors'
+    noise; None if that diverged. Empty with ideal sensors."""
 
     @property
     def is_sound(self) -> bool:
@@ -50,7 +59,33 @@ def checked(options: dict[str, Any]) -> Checked:
         raise InputError("base_quaternion: turned by 180 degrees, where the laws are singular")
     inertia = inertia_along(flight.plant.robot, flight.mission_settings)
     corner = flight.controller_settings.acceleration_filter_hz
-    return Checked(flight, [check_gains(law, inertia, quaternion, corner) for law in laws])
+    checks = [check_gains(law, inertia, quaternion, corner) for law in laws]
+    ripple: dict[str, Array | None] = {}
+    if flight.plant_settings.sensors != "ideal":
+        names = flight.laws if every else [plan.controller]
+        ripple = {
+            check.law: held_ripple(flight, plan.model_copy(update={"controller": name}))
+            for check, name in zip(checks, names, strict=True)
+        }
+    return Checked(flight, checks, ripple)
+
+
+def held_ripple(flight: Flight, plan: FlightPlan) -> Array | None:
+    """Return (m,) the RMS of the torque about its mean, N m, with the robot held still.
+
+    It is flown for `HELD` s at the first waypoint of ``flight``, the last half of which counts.
+    None: it diverges.
+    """
+    first = flight.mission_settings.waypoints_deg[: flight.robot.n]
+    there = {"waypoint_times": [0.0], "waypoints_deg": first}
+    held = plan.with_parameters("mission", there).model_copy(update={"duration": HELD})
+    try:
+        log = simulate(Flight(held))
+    except FlightError:
+        return None
+    assert log.commanded_torque is not None
+    deviation: Array = log.commanded_torque[log.ticks // 2 :].std(axis=0)
+    return deviation
 
 
 def _first_law(plan: FlightPlan) -> str:
@@ -68,11 +103,12 @@ def report_of(found: Checked) -> dict[str, Any]:
         **{key: flight.description[key] for key in ("robot", "mission", "case", "gains")},
         "axes": flight.robot.axis_names,
         "is_sound": found.is_sound,
-        "laws": {check.law: dict(_of_law(check)) for check in found.checks},
+        **({"sensors": flight.plant_settings.sensors} if found.ripple else {}),
+        "laws": {check.law: dict(_of_law(check, found)) for check in found.checks},
     }
 
 
-def _of_law(check: GainCheck) -> Iterable[tuple[str, Any]]:
+def _of_law(check: GainCheck, found: Checked) -> Iterable[tuple[str, Any]]:
     yield "is_sound", check.is_sound
     if spectrum := check.spectrum:
         yield from (
@@ -83,4 +119,7 @@ def _of_law(check: GainCheck) -> Iterable[tuple[str, Any]]:
             ("torque_scale_margin", spectrum.margin),
             ("largest_torque_scale", spectrum.largest_scale),
         )
-    yield "noise_gain", np.asarray(check.noise_gain).tolist()
+    yield "noise_gain", check.noise_gain.tolist()
+    if found.ripple:
+        ripple = found.ripple[check.law]
+        yield "held_ripple", None if ripple is None else ripple.tolist()

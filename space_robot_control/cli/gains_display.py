@@ -23,6 +23,8 @@ def print_checks(found: Checked, console: Console) -> None:
     if any(check.spectrum for check in found.checks):
         print_table(_margins(found.checks), console)
     print_table(_noise_gains(found), console)
+    if found.ripple:
+        print_table(_ripple(found), console)
 
 
 def _margins(checks: list[GainCheck]) -> Table:
@@ -63,3 +65,16 @@ def _noise_gains(found: Checked) -> Table:
     ]
     title = "Torque that noise on the rate of an axis becomes, N m per rad/s"
     return Table.of(title, columns, rows)
+
+
+def _ripple(found: Checked) -> Table:
+    columns = [Column("", is_label=True), *(Column(law, spec=".3g") for law in found.ripple)]
+    rows = [
+        [name, *(None if x is None else float(x[axis]) for x in found.ripple.values())]
+        for axis, name in enumerate(found.flight.robot.axis_names)
+    ]
+    sensors = found.flight.plant_settings.sensors
+    table = Table.of(f"Torque ripple with sensors {sensors}, held still, N m RMS", columns, rows)
+    diverged = [law for law, ripple in found.ripple.items() if ripple is None]
+    notes = [f"Held still, {', '.join(diverged)} diverged."] if diverged else []
+    return Table(table.title, table.columns, table.groups, notes)

@@ -171,3 +171,19 @@ def test_a_set_for_sensors_keeps_the_ripple_it_is_allowed(tmp_path: Path) -> Non
     asked = np.array([1.9, 4.2, 1.3, 1.1, 2.6, 4.0, 0.21, 0.35, 0.047])  # largest, 30 s
     share = noise.std(axis=0) / asked
     assert 0.03 < share.max() < 0.07
+
+
+def test_ripple_of_a_robot_held_still_is_that_of_the_noise() -> None:
+    """With the noise of L1, independent code found 0.027 N m on the base under TDE-STC."""
+    found = report("--controller", "tde_stc", "--sensors", "white_l1")["laws"]["tde_stc"]
+    assert np.mean(found["held_ripple"][:3]) == pytest.approx(0.027, rel=0.1)
+    gain = np.array(found["noise_gain"]) * ([1e-6] * 3 + [1e-5] * 6)
+    np.testing.assert_allclose(found["held_ripple"], gain, rtol=0.5)
+    text = run("check", "--controller", "tde_stc", "--sensors", "white_l1").stdout
+    assert "Torque ripple with sensors white_l1, held still" in text
+
+
+def test_a_law_that_diverges_held_still_has_no_ripple() -> None:
+    options = ("--controller", "ctc", "--gains", "printed", "--sensors", "white_l1")
+    assert report(*options)["laws"]["ctc"]["held_ripple"] is None
+    assert "ctc diverged" in run("check", *options).stdout
