@@ -43,9 +43,9 @@ def flown(law: str, *faults: str, h_bar: bool = False, **plant: Any) -> tuple[in
 
 @pytest.mark.parametrize("law", LAWS)
 def test_one_percent_too_much_in_the_echo_is_fatal(law: str) -> None:
-    """Given by a parameter or by a fault, which are not the same numbers to the last bit."""
+    """Given by a parameter or by a fault; what grows is rounding and what friction kicks off."""
     for ticks, _ in (flown(law, echo_scale=1.01), flown(law, f"torque_scale@0:all={1 / 1.01}")):
-        assert ticks == pytest.approx(DIVERGES_AT[law], rel=0.06)
+        assert ticks == pytest.approx(DIVERGES_AT[law], rel=0.15 if law == "tde_smc" else 0.05)
 
 
 @pytest.mark.parametrize("law", LAWS)
