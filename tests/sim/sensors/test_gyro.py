@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ Array = NDArray[np.float64]
 SEEDS = range(8)
 
 
+@cache
 def record(ticks: int, period: float, seed: int, **settings: float) -> Array:
     """Measured rates (ticks, 3) of a base at rest."""
     bench = Bench(seed=seed, period=period, gyro=settings)
