@@ -102,7 +102,7 @@ def test_a_flight_tells_its_sensors() -> None:
         Flight(FlightPlan(sensors="best"))
 
 
-@pytest.mark.parametrize("fault", ["drop_state@1", "nan_command@1", "kill_mission@1"])
+@pytest.mark.parametrize("fault", ["stop_controller@1", "kill_mission@1"])
 def test_what_fails_between_nodes_needs_them(fault: str) -> None:
     flight = Flight(FlightPlan(faults=["noise_gyro@0:1e-6", fault], duration=0.01))
     with pytest.raises(InputError) as caught:

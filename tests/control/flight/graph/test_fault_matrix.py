@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from flights import Flown
+from paths import CONFIG
 
 from space_robot_control.flight.faults import KINDS
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -22,6 +23,7 @@ from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule, ScheduledFault
 from space_robot_sim.plant.faults import PLANT_KINDS
+from space_robot_sim.robot import Robot
 
 pytest.importorskip("rclpy")
 
@@ -45,9 +47,12 @@ FLIGHTS: dict[str, tuple[str, ...]] = {
         "noise_joint_position@0.25-0.3:1e-6", "noise_joint_velocity@0.35-0.4:1e-6",
         "quantise_attitude@0.45-0.5:1e-5", "quantise_gyro@0.55-0.6:1e-6",
         "quantise_joint_position@0.65-0.7:1e-5", "quantise_joint_velocity@0.75-0.8:1e-6",
+        "gyro_bias@0.81-0.83:base_x=1e-6", "tracker_blind@0.84-0.85", "encoder_stuck@0.86-0.865:3",
     ),
     "bad actuators": (
         "saturate_base@0.1-0.2:0.001", "saturate_joints@0.3-0.4:0.01", "stuck_joint@0.6-0.9:3=15",
+        "drive_scale@0.42-0.45:all=0.9", "drive_bias@0.46-0.49:base_x=0.01",
+        "torque_scale@0.5-0.53:all=1.001", "torque_bias@0.54-0.57:base_x=0.001",
         "torque_scale@0.45-0.5:all=0.99", "torque_bias@0.52-0.57:joint2=0.01",
         "drive_scale@0.91-0.94:joints=1.02", "drive_bias@0.95-0.98:base_x=0.01",
     ),
@@ -102,7 +107,12 @@ def seen(fly: Fly) -> Callable[[str], Seen]:
     def get(name: str) -> Seen:
         texts = FLIGHTS[name]
         flown = fly(*OPTIONS, *(word for text in texts for word in ("--fault", text)))
-        schedule = Schedule(parse_faults(texts, PLANT_KINDS), SEED, PERIOD)
+        schedule = Schedule(
+            parse_faults(texts, PLANT_KINDS),
+            SEED,
+            PERIOD,
+            Robot.from_yaml(CONFIG / "robots/paper.yaml").axis_names,
+        )
         expected = {
             fault.kind.name: sum(
                 fault.happens_at(tick) and matters(fault, tick) for tick in range(2000)
@@ -169,11 +179,20 @@ MATRIX: list[tuple[str, str, str, Check]] = [
     ("quantise_gyro", "bad sensors", "flown through", tracks(0.55, 0.6, 1e-3)),
     ("quantise_joint_position", "bad sensors", "flown through", tracks(0.65, 0.7, 1e-3)),
     ("quantise_joint_velocity", "bad sensors", "flown through", tracks(0.75, 0.8, 1e-3)),
+    ("gyro_bias", "bad sensors", "flown through", tracks(0.81, 0.83, 1e-3)),
+    ("tracker_blind", "bad sensors", "the last attitude held", tracks(0.84, 0.85, 1e-3)),
+    ("tracker_blind", "bad sensors", "the last attitude held",
+     lambda seen: bool((np.diff(seen.log.quaternion[1680:1700], axis=0) == 0.0).all())),
+    ("encoder_stuck", "bad sensors", "flown through", tracks(0.86, 0.865, 1e-2)),
     ("saturate_base", "bad actuators", "clipped, echoed",
      lambda seen: bool(np.abs(seen.torque(0.1, 0.2)[:, :3]).max() == 0.001)),
     ("saturate_joints", "bad actuators", "clipped, counted",
      lambda seen: bool(np.abs(seen.torque(0.3, 0.4)[:, 3:]).max() == 0.01)
      and seen.count("plant", "saturated_ticks") > 100),
+    ("drive_scale", "bad actuators", "flown through", tracks(0.42, 0.45, 1e-2)),
+    ("drive_bias", "bad actuators", "flown through", tracks(0.46, 0.49, 1e-2)),
+    ("torque_scale", "bad actuators", "flown through", tracks(0.5, 0.53, 1e-2)),
+    ("torque_bias", "bad actuators", "flown through", tracks(0.54, 0.57, 1e-2)),
     ("stuck_joint", "bad actuators", "the others go on", tracks(0.6, 0.9, 0.5)),
     ("torque_scale", "bad actuators", "flown through", tracks(0.45, 0.5, 1e-2)),
     ("torque_bias", "bad actuators", "flown through", tracks(0.52, 0.57, 1e-2)),
