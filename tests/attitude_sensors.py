@@ -40,7 +40,9 @@ class Case(NamedTuple):
     @property
     def settings(self) -> NavigationFilterSettings:
         return NavigationFilterSettings(
-            tracker_across=self.across, tracker_about=self.about, gyro_angle_walk=self.arw,
+            tracker_across=self.across, tracker_about=self.about,
+            tracker_boresight=[0.0, 0.0, 1.0], joint_angle_noise=1e-7, joint_rate_noise=0.0,
+            gyro_angle_walk=self.arw,
             gyro_rate_walk=self.rrw, gyro_bias=self.bias, tracker_delay=self.delay * self.period,
             rate_filter_hz=0.0, joint_bandwidth_hz=0.0,
         )  # fmt: skip

@@ -40,6 +40,14 @@ def law_of(name: str) -> ControlLaw:
     return find_law(name)({key: np.array(v) for key, v in GAINS[name].items()}, PERIOD)
 
 
+NAVIGATION = NavigationFilterSettings(
+    tracker_across=1e-5, tracker_about=8e-5, tracker_boresight=[0.0, 0.0, 1.0], tracker_delay=0.1,
+    gyro_angle_walk=3e-7, gyro_rate_walk=1e-9, gyro_bias=1e-6, joint_angle_noise=1e-7,
+    joint_rate_noise=0.0,
+)  # fmt: skip
+"""A filter for good sensors, with a number for everything."""
+
+
 class Loop:
     """Plant, controller and mission in one process; a test may bend what passes between them."""
 

@@ -13,7 +13,8 @@ from space_robot_msgs_py.config.files import config_directory
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 from space_robot_msgs_py.config.yaml_text import is_folder
 
-from .navigation.settings import Mode, NavigationFilterSettings, completed
+from .navigation.believed_sensors import completed
+from .navigation.settings import Mode, NavigationFilterSettings
 
 OF_THE_SET = "controller.yaml"
 """A file of a gain set with the controller's parameters that belong to its gains; need not be."""
@@ -51,6 +52,10 @@ class ControllerNodeSettings(NodeSettings):
     navigation: Mode = Field(
         "direct", description="what the laws see: direct (what is measured) or filtered"
     )
+    navigation_sensors: str = Field(
+        "fine",
+        description="sensors that the filter is for: of config/sensors, or a path to their YAML",
+    )
     navigation_filter: NavigationFilterSettings = NavigationFilterSettings()
     hold_ticks: Annotated[int, Field(ge=0, le=10**6)] = Field(
         200, description="bad states over which the last torque is repeated; then it is zero"
@@ -71,8 +76,14 @@ class ControllerNodeSettings(NodeSettings):
 
     @property
     def filter_settings(self) -> NavigationFilterSettings | None:
-        """The numbers of the navigation filter, complete; None: there is none."""
-        return completed(self.navigation_filter) if self.navigation == "filtered" else None
+        """The numbers of the navigation filter, complete; None: there is none.
+
+        Raises:
+            InputError: the sensors that it is for are not there, or their file is wrong.
+        """
+        if self.navigation == "direct":
+            return None
+        return completed(self.navigation_filter, self.navigation_sensors, self.period)
 
     @classmethod
     def layers(cls, selected: Mapping[str, str]) -> list[Path]:

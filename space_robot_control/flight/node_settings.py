@@ -73,7 +73,11 @@ class FlightSettings(NamedTuple):
         for file in set_file(controller.robot, path):  # as if given: a bag is to tell of it
             of_the_set = dict(flatten(node_parameters(file, "controller")))
             given["controller"] = {**of_the_set, **given["controller"]}
-            controller = ControllerNodeSettings.resolve(merge(nest(of_the_set), own))
+            own = merge(nest(of_the_set), own)
+            controller = ControllerNodeSettings.resolve(own)
+        if controller.navigation == "filtered" and "navigation_sensors" not in own:
+            own["navigation_sensors"] = given["controller"]["navigation_sensors"] = plant.sensors
+            controller = ControllerNodeSettings.resolve(own)
         settings = cls(
             plant,
             controller.model_copy(update={"gains": path}),

@@ -21,15 +21,13 @@ from .attitude_filter import (
 )
 from .joint_filter import JointFilter, begin_joints, filter_joints, tune
 from .low_pass import LowPass, begin_low_pass, low_pass_weight, pass_low
-from .settings import NavigationFilterSettings, completed
+from .settings import NavigationFilterSettings
 
 Array = NDArray[np.float64]
 
 LONGEST_BRIDGE = 20
 """Ticks from one state to the next over which the rates are interpolated; after a longer gap the
 attitude begins anew."""
-LEAST = 1e-12
-"""No sensor is better, rad, rad/s: a covariance of zero cannot be inverted."""
 
 
 class Navigation(Record):
@@ -53,12 +51,12 @@ class Navigation(Record):
 
     @classmethod
     def build(cls, n: int, settings: NavigationFilterSettings, period: float) -> Navigation:
-        """Read the numbers of the settings for a robot of ``n`` joints.
+        """Read the numbers of the settings, all of them given, for a robot of ``n`` joints.
 
         Raises:
-            InputError: they do not fit the period.
+            InputError: a number that cannot be, or does not fit the period.
         """
-        navigation, settings = cls.allocate(n), completed(settings)
+        navigation = cls.allocate(n)
         delay = round(settings.tracker_delay / period)
         if delay > LONGEST_DELAY:
             raise InputError(
@@ -72,23 +70,18 @@ class Navigation(Record):
                 f"navigation_filter.tracker_boresight must have a norm near 1, got {norm:g}"
             )
         along = np.outer(boresight, boresight) / norm**2
-        across, about, walk, bias, angle = (
-            max(LEAST, value)
-            for value in (
-                settings.tracker_across, settings.tracker_about, settings.gyro_angle_walk,
-                settings.gyro_bias, settings.joint_angle_noise,
-            )
-        )  # fmt: skip
+        across, about = settings.tracker_across**2, settings.tracker_about**2
         assign(navigation, is_filtered=1.0)
         assign(
-            navigation.attitude, noise=across**2 * (np.eye(3) - along) + about**2 * along,
-            angle_walk=walk**2, rate_walk=settings.gyro_rate_walk**2,
-            initial_bias_variance=bias**2, gate=settings.gate**2, delay=delay,
+            navigation.attitude, noise=across * (np.eye(3) - along) + about * along,
+            angle_walk=settings.gyro_angle_walk**2, rate_walk=settings.gyro_rate_walk**2,
+            initial_bias_variance=settings.gyro_bias**2, gate=settings.gate**2, delay=delay,
         )  # fmt: skip
         assign(navigation.low_pass, weight=low_pass_weight(settings.rate_filter_hz, period))
         tune(
-            navigation.joints, settings.joint_bandwidth_hz, angle, settings.joint_rate_noise, period
-        )
+            navigation.joints, settings.joint_bandwidth_hz, settings.joint_angle_noise,
+            settings.joint_rate_noise, period,
+        )  # fmt: skip
         return navigation
 
 

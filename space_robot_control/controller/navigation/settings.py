@@ -58,29 +58,3 @@ class NavigationFilterSettings(StrictModel):
     joint_bandwidth_hz: Corner = Field(
         150.0, description="bandwidth of the filter of joint angles and rates, Hz (0: none)"
     )
-
-
-FINE = {
-    "tracker_across": 1e-5,
-    "tracker_about": 8e-5,
-    "tracker_boresight": [0.0, 0.0, 1.0],
-    "tracker_delay": 0.1,
-    "gyro_angle_walk": 3e-7,
-    "gyro_rate_walk": 1e-9,
-    "gyro_bias": 1e-6,
-    "joint_angle_noise": 1e-7,
-    "joint_rate_noise": 0.0,
-}
-"""Good sensors."""
-
-
-def completed(settings: NavigationFilterSettings) -> NavigationFilterSettings:
-    """Return the settings with numbers for all that the sensors are to say."""
-    given = settings.model_dump()
-    return settings.model_copy(
-        update={name: value for name, value in FINE.items() if not _is_given(given[name])}
-    )
-
-
-def _is_given(value: float | list[float]) -> bool:
-    return any(value) if isinstance(value, list) else value >= 0.0

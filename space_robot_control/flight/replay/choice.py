@@ -75,13 +75,13 @@ class ControllerChoice:
         law = find_law(str(named))
         self.law_name = law.name
         is_same_law = law.name == flight.get("controller", law.name)
-        self.parameters: dict[str, Any] = {
-            **flown, **self._robot(flown), **recorded_navigation(flight)
-        }  # fmt: skip
+        self.parameters: dict[str, Any] = {**flown, **self._robot(flown)}
         """The node's parameters, by dotted name."""
         recorded_gains = flight.get("gains_used", {})
         if recorded_gains and is_same_law and not gains:
             self.parameters["gains"] = self._gains_folder(law, recorded_gains)
+        if "navigation_sensors" not in self._said:
+            self.parameters |= recorded_navigation(flight)
         self.parameters |= self._said
         if not trust:
             self._check_files(flown)
@@ -118,7 +118,7 @@ class ControllerChoice:
 
     def _check_files(self, flown: Mapping[str, Any]) -> None:
         """See that no file is read whose path the bag tells."""
-        for what in ("robot", "gains"):
+        for what in ("robot", "gains", "navigation_sensors"):
             if what not in self._said and self.parameters.get(what) == flown.get(what, ""):
                 check_file(what, str(flown[what]))
 
@@ -170,9 +170,10 @@ def recorded_parameters(flight: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def recorded_navigation(flight: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the numbers of the navigation filter that flew, as parameters."""
+    """Return the numbers of the navigation filter that flew, as parameters; no file is read."""
     recorded = flight.get("navigation_filter", {})
-    return {f"navigation_filter.{name}": value for name, value in recorded.items()}
+    numbers = {f"navigation_filter.{name}": value for name, value in recorded.items()}
+    return {"navigation_sensors": "fine", **numbers} if numbers else {}
 
 
 def _same(now: Mapping[str, Any], recorded: Mapping[str, Any]) -> bool:

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from closed_loop import PERIOD, Loop, law_of
+from closed_loop import NAVIGATION, PERIOD, Loop, law_of
 
 from space_robot_control.controller.navigation.settings import NavigationFilterSettings
 from space_robot_control.flight.closed_loop import close_loop
@@ -38,7 +38,7 @@ def closed(loop: Loop, stretches: list[int]) -> FlightLog:
 
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("latency", [0, 3])
-@pytest.mark.parametrize("navigation", [None, NavigationFilterSettings()])
+@pytest.mark.parametrize("navigation", [None, NAVIGATION])
 def test_compiled_flight_is_the_one_of_single_steps(
     paper_robot: Robot, name: str, latency: int, navigation: NavigationFilterSettings | None
 ) -> None:

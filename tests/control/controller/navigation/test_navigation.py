@@ -5,18 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from attitude_sensors import attitude_error, exponential
-from closed_loop import PERIOD, Loop, law_of
+from closed_loop import NAVIGATION, PERIOD, Loop, law_of
 from numpy.typing import NDArray
 
 from space_robot_control.controller.navigation.navigation import (
     LONGEST_BRIDGE,
     Navigation,
     navigate,
-)
-from space_robot_control.controller.navigation.settings import (
-    FINE,
-    NavigationFilterSettings,
-    completed,
 )
 from space_robot_msgs_py.errors import InputError, UnusableStateError
 from space_robot_msgs_py.samples import RobotState
@@ -26,7 +21,7 @@ Array = NDArray[np.float64]
 
 OMEGA = np.array([0.02, -0.03, 0.01])
 N = 6
-SETTINGS = NavigationFilterSettings(tracker_delay=0.01, rate_filter_hz=0.0)
+SETTINGS = NAVIGATION.model_copy(update={"tracker_delay": 0.01, "rate_filter_hz": 0.0})
 
 
 def state_at(tick: int) -> RobotState:
@@ -111,15 +106,6 @@ def test_the_torque_of_an_estimate_lags_as_its_rates_do() -> None:
     assert (torque[3:] == torque[3]).all()
 
 
-def test_numbers_not_given_are_the_sensors() -> None:
-    given = NavigationFilterSettings(tracker_across=1e-3, tracker_delay=0.0, joint_rate_noise=0.0)
-    found = completed(given)
-    assert (found.tracker_across, found.tracker_delay, found.joint_rate_noise) == (1e-3, 0.0, 0.0)
-    assert found.tracker_about == FINE["tracker_about"]
-    assert found.tracker_boresight == FINE["tracker_boresight"]
-    assert completed(found) == found
-
-
 @pytest.mark.parametrize(
     ("key", "value", "why"),
     [
@@ -129,7 +115,7 @@ def test_numbers_not_given_are_the_sensors() -> None:
 )
 def test_what_does_not_fit_is_refused(key: str, value: object, why: str) -> None:
     with pytest.raises(InputError, match=why):
-        Navigation.build(N, NavigationFilterSettings(**{key: value}), 1e-4)
+        Navigation.build(N, NAVIGATION.model_copy(update={key: value}), 1e-4)
 
 
 # In the controller
@@ -167,7 +153,7 @@ def test_a_law_that_takes_over_finds_the_filter_as_it_is(paper_robot: Robot) -> 
 
 def test_with_perfect_sensors_the_filter_hardly_matters(paper_robot: Robot) -> None:
     """A tracker in every tick, without delay: errors stay below 1e-6."""
-    perfect = NavigationFilterSettings(tracker_delay=0.0)
+    perfect = NAVIGATION.model_copy(update={"tracker_delay": 0.0})
     loop = Loop(paper_robot, law_of("tde_stc"), navigation=perfect)
     errors, _ = loop.fly(2000)
     truth = loop.plant.state.copy()

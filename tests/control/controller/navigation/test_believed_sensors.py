@@ -1,0 +1,87 @@
+"""What the filter believes of its sensors: given, or from the sensors' own file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from closed_loop import NAVIGATION
+
+from space_robot_control.controller.navigation.believed_sensors import (
+    LEAST,
+    LEAST_ANGLE,
+    believed_numbers,
+    completed,
+)
+from space_robot_control.controller.navigation.navigation import Navigation
+from space_robot_control.controller.navigation.settings import NavigationFilterSettings
+from space_robot_msgs_py.errors import InputError
+from space_robot_sim.sensors.sensors import SensorSettings
+
+PERIOD = 5e-4
+FILE = """
+plant_node:
+  ros__parameters:
+    command_latency_ticks: 1
+    star_tracker: {noise_across: 3.0e-5, noise_about: 2.0e-4, boresight: [0, 1, 0], delay: 0.2}
+    gyro: {angle_random_walk: 3.0e-6, noise: 1.0e-4, initial_bias: [1.0e-6, -5.0e-6, 0.0]}
+    encoders: {bits: 20, difference_ticks: 1}
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> str:
+    path = tmp_path / "sensors.yaml"
+    path.write_text(FILE)
+    return str(path)
+
+
+def test_numbers_are_those_of_the_sensors_file(file: str) -> None:
+    found = completed(NavigationFilterSettings(), file, PERIOD)
+    assert (found.tracker_across, found.tracker_about) == (3e-5, 2e-4)
+    assert (found.tracker_boresight, found.tracker_delay) == ([0.0, 1.0, 0.0], 0.2)
+    # noise of single samples, summed over a second, is worth sigma sqrt(period)
+    assert found.gyro_angle_walk == pytest.approx(np.hypot(3e-6, 1e-4 * PERIOD**0.5))
+    assert (found.gyro_rate_walk, found.gyro_bias) == (0.0, 5e-6)
+    assert found.joint_angle_noise == pytest.approx(2.0 * np.pi / 2**20 / 12**0.5)
+    assert found.joint_rate_noise == 0.0  # differenced angles are no news
+
+
+def test_what_is_given_comes_first(file: str) -> None:
+    given = NavigationFilterSettings(tracker_across=1e-3, tracker_delay=0.0, joint_rate_noise=1e-4)
+    found = completed(given, file, PERIOD)
+    assert (found.tracker_across, found.tracker_delay, found.joint_rate_noise) == (1e-3, 0.0, 1e-4)
+    assert found.tracker_about == 2e-4
+    assert completed(found, file, PERIOD) == found
+
+
+def test_no_file_is_read_where_every_number_is_given() -> None:
+    assert completed(NAVIGATION, "there is none", PERIOD) is NAVIGATION
+    with pytest.raises(InputError, match="there is none"):
+        completed(NAVIGATION.model_copy(update={"gyro_bias": -1.0}), "there is none", PERIOD)
+
+
+def test_nothing_is_believed_to_be_perfect() -> None:
+    """Ideal sensors make a filter that can be built."""
+    found = believed_numbers(SensorSettings(), PERIOD)
+    assert found["tracker_across"] == found["tracker_about"] == LEAST_ANGLE
+    assert found["gyro_angle_walk"] == found["joint_angle_noise"] == LEAST
+    assert found["joint_rate_noise"] == LEAST
+    settings = NavigationFilterSettings(**found)
+    navigation = Navigation.build(6, settings, PERIOD)
+    assert np.isfinite(navigation.joints.angle_gain).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("plant_node: {ros__parameters: {gyro: {noise: -1}}}", r"sensors.yaml: gyro.noise: "),
+        ("plant_node: {gyro: {noise: 1}}", r"sensors.yaml: plant_node: 'ros__parameters'"),
+    ],
+)
+def test_a_wrong_file_is_named(tmp_path: Path, text: str, why: str) -> None:
+    path = tmp_path / "sensors.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=why):
+        completed(NavigationFilterSettings(), str(path), PERIOD)
