@@ -224,7 +224,7 @@ _SPECIAL: dict[str, st.SearchStrategy[Any]] = {
     "waypoints_deg": st.lists(st.integers(-90, 90), min_size=18, max_size=18),
     "compression": st.sampled_from(["none", "lz4", "zstd"]),
     "split_size": st.sampled_from([0, 100_000, "2M"]),
-    "sensors": st.sampled_from(["ideal", "fine"]),
+    "sensors": st.sampled_from(["ideal", "white_l1"]),
     "navigation_sensors": st.sampled_from(["ideal", "coarse"]),
     "navigation": st.sampled_from(["direct", "filtered"]),
     "navigation_filter.tracker_boresight": st.sampled_from([[0, 0, 0], [1, 0, 2.5]]),
