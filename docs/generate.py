@@ -155,7 +155,7 @@ def topic_page() -> str:
         (
             f"`{topic.name}`", topic.type, str(topic.depth),
             "transient local" if topic.transient_local else "volatile",
-            "each tick" if topic.per_tick else "an event" if topic.is_event else "now and then",
+            _occasion(topic),
         )
         for topic in (*topics.ALL, topics.DIAGNOSTICS)
     )  # fmt: skip
@@ -165,6 +165,12 @@ def topic_page() -> str:
         " [bags](../manual/bags.md#topics). Every topic but `/diagnostics` is recorded.",
         table(("topic", "type", "history", "durability", "a message"), rows),
     ]) + "\n"  # fmt: skip
+
+
+def _occasion(topic: topics.Topic) -> str:
+    if topic.is_optional:
+        return "each tick, where sensors or actuators err"
+    return "each tick" if topic.per_tick else "an event" if topic.is_event else "now and then"
 
 
 def main() -> None:

@@ -25,6 +25,8 @@ class Topic(NamedTuple):
     """A message whenever something happens, so a gap in its stamps is no loss."""
     has_stamp: bool = True
     """Its messages begin with a stamp; of others the first number is the tick."""
+    is_optional: bool = False
+    """Sent in some flights only, so that silence is no loss."""
 
 
 JOINT_STATES = Topic("/joint_states", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
@@ -41,10 +43,20 @@ LAW = Topic(
     transient_local=True, is_event=True,
 )  # fmt: skip
 CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock", 1_000)
+# The truth is sent where what the sensors tell may differ from it; no flight software listens.
+TRUTH_JOINT_STATES = Topic(
+    "/truth/joint_states", "sensor_msgs/msg/JointState", 10_000, per_tick=True, is_optional=True
+)
+TRUTH_BASE_STATE = Topic(
+    "/truth/base_state", "sensor_msgs/msg/MultiDOFJointState", 10_000,
+    per_tick=True, is_optional=True,
+)  # fmt: skip
 
 ALL = (
     JOINT_STATES, BASE_STATE, COMMAND, REFERENCE_JOINTS, REFERENCE_BASE, TELEMETRY, LAW, CLOCK,
+    TRUTH_JOINT_STATES, TRUTH_BASE_STATE,
 )  # fmt: skip
 """All that are recorded."""
+TRUTH = (TRUTH_JOINT_STATES, TRUTH_BASE_STATE)
 BY_NAME = {topic.name: topic for topic in ALL}
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100)

@@ -32,7 +32,8 @@ class TorqueLimits(NamedTuple):
 class Saturation(Metric):
     """Counts the ticks at which the torque applied on some axis was at its limit.
 
-    The plant clips to the limit, so "at" is exact but for the rounding of whoever recorded.
+    The plant clips to the limit, so "at" is exact but for the rounding of whoever recorded. It is
+    the torque as reported, behind the limits and before what the drives make of it.
     """
 
     def __init__(self, limits: TorqueLimits) -> None:
@@ -42,7 +43,7 @@ class Saturation(Metric):
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
         limit = self._limits.of_axes(log.axes) * (1.0 - 1e-9)
-        at_limit = np.abs(log.applied_torque) >= limit
+        at_limit = np.abs(log.as_measured().applied_torque) >= limit
         self._ticks += int(np.count_nonzero(at_limit.any(axis=1)))
         self._rows += log.ticks
 
@@ -108,9 +109,14 @@ class MissedDeadlines(Metric):
         """Ticks that differ, and those that were compared: they have a command."""
 
     def add(self, log: FlightLog, error: Array) -> None:
-        """Take further rows."""
-        measured = measured_rows(log, self._before)
-        self._before, self._unanswered = last_rows(log, 1), log.unanswered
+        """Take further rows.
+
+        Drives give another torque than commanded, an echo tells another one, and in time: what
+        counts is that neither is as commanded.
+        """
+        told = log.as_measured()
+        measured = measured_rows(told, self._before)
+        self._before, self._unanswered = last_rows(told, 1), log.unanswered
         if log.commanded_torque is None:
             return
         self._known += int(np.count_nonzero(np.isfinite(log.commanded_torque[:, 0])))
@@ -118,11 +124,13 @@ class MissedDeadlines(Metric):
         if self._due is not None:
             commands = np.concatenate([self._due, commands])
         # the first row that applies one of them is ``delay`` rows behind the first of them
-        applied = log.applied_torque[max(0, log.ticks + self._delay - len(commands)) :]
+        first = min(log.ticks, max(0, log.ticks + self._delay - len(commands)))
         limit = self._limits.of_axes(log.axes)
-        commanded = np.clip(commands[: len(applied)], -limit, limit)
-        known = np.isfinite(commanded).all(axis=1) & measured[log.ticks - len(applied) :]
-        differ = np.any(applied != commanded, axis=1) & known
+        commanded = np.clip(commands[: log.ticks - first], -limit, limit)
+        known = np.isfinite(commanded).all(axis=1) & measured[first:]
+        differ = np.any(told.applied_torque[first:] != commanded, axis=1) & known
+        if told is not log:
+            differ &= np.any(log.applied_torque[first:] != commanded, axis=1)
         self.differing += int(np.count_nonzero(differ))
         self.compared += int(np.count_nonzero(known))
         self._due = commands[-self._delay :].copy()

@@ -71,6 +71,15 @@ def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
     yield [f"{joint}_position_rad" for joint in joints], log.joint_positions
     yield [f"{joint}_velocity_rad_s" for joint in joints], log.joint_velocities
     yield _each("applied_torque", axes, "n_m"), log.applied_torque
+    if (told := log.measured) is not None:
+        yield _each("measured_q", WXYZ), told.quaternion
+        yield _each("measured_omega_base", XYZ, "rad_s"), told.omega_base
+        yield _each("measured_position", joints, "rad"), told.joint_positions
+        yield _each("measured_velocity", joints, "rad_s"), told.joint_velocities
+        yield _each("reported_torque", axes, "n_m"), told.applied_torque
+    if log.believed_error is not None:
+        yield _each("believed_error_q", XYZ), log.believed_error[:, :3]
+        yield _each("believed_error", joints, "rad"), log.believed_error[:, 3:]
     if log.commanded_torque is not None:
         yield _each("commanded_torque", axes, "n_m"), log.commanded_torque
     if log.latency_s is not None:

@@ -30,6 +30,12 @@ from .estimate_error import HBar
 Array = NDArray[np.float64]
 
 
+IDEAL = "ideal"
+"""The sensors that tell the truth."""
+DIRECT = "direct"
+"""The navigation that takes the states for what they are."""
+
+
 class NotDescribedError(InputError):
     """The bag does not say what a metric needs; the message says what is missing."""
 
@@ -80,8 +86,11 @@ def estimator(log: FlightLog) -> tuple[HBar, float]:
     """Find h_bar of the laws' time-delay estimate, and the weight of its low-pass (0: none).
 
     Raises:
-        InputError: the law is not recorded, and has no estimate or is not described.
+        InputError: the law is not recorded, and has no estimate or is not described; or its
+            estimate is not of the states measured.
     """
+    if navigation_of(log) != DIRECT:
+        raise InputError("the filtered states that N_hat is formed of are not recorded")
     if log.laws:
         h_bar = recorded_h_bar
     else:
@@ -93,6 +102,16 @@ def estimator(log: FlightLog) -> tuple[HBar, float]:
     parameters, key = _parameters(log, ControllerNodeSettings.node), "acceleration_filter_hz"
     settings = ControllerNodeSettings.resolve({key: parameters[key]} if key in parameters else {})
     return h_bar, low_pass_weight(settings.acceleration_filter_hz, log.timebase.period)
+
+
+def sensors_of(log: FlightLog) -> str:
+    """Name the sensors that flew, as far as the bag tells."""
+    return str(_parameters(log, PlantNodeSettings.node).get("sensors", "")) or IDEAL
+
+
+def navigation_of(log: FlightLog) -> str:
+    """Name the navigation that flew, as far as the bag tells."""
+    return str(_parameters(log, ControllerNodeSettings.node).get("navigation", "")) or DIRECT
 
 
 def recorded_h_bar(log: FlightLog) -> Array:

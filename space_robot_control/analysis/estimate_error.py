@@ -2,9 +2,9 @@
 
 ``N = F_S - h_bar rhodd`` (33) is all that the constant diagonal inertia h_bar (the gain ``h_bar``)
 leaves out; ``N_hat(t) = N(t - delta)`` (35), (36). The controller forms N_hat from the pair of
-`space_robot_control.controller.time_delay_estimation`: the torque *applied* over the last
-interval and the mean acceleration over it. Both are in a bag, so N_hat follows without the
-telemetry.
+`space_robot_control.controller.time_delay_estimation`: the torque *reported* for the last
+interval and the mean acceleration *measured* over it. Both are in a bag, so N_hat follows without
+the telemetry.
 """
 
 from __future__ import annotations
@@ -68,56 +68,67 @@ class DelayedEstimate:
         return estimate
 
 
+class Intervals:
+    """Force and mean acceleration over each interval between two rows of a log in parts."""
+
+    def __init__(self) -> None:
+        self._last: FlightLog | None = None
+        self._side = 1.0
+        """1 if Q continues from Q in the last row, -1 if from -Q."""
+
+    def of(self, log: FlightLog) -> tuple[FlightLog, Array]:
+        """Return the rows at which the new intervals begin, and one more; and (K, 2, m) of each."""
+        rows = joined(self._last, log)
+        turned = replace(rows, quaternion=self._side * continuous_quaternion(rows))
+        with np.errstate(divide="ignore", invalid="ignore"):  # J0 may be singular
+            pairs = np.stack([applied_force(turned), mean_acceleration(turned)], axis=1)
+        self._last = last_rows(log, 1)
+        same = np.array_equal(turned.quaternion[-1], rows.quaternion[-1])
+        self._side = 1.0 if same else -1.0
+        return rows, pairs
+
+
 class EstimateErrors:
     """``N - N_hat`` of a flight in parts, in the units of `generalised_motion.neglected_force`.
 
-    It is known from the third row on, at the tick before. Ticks whose state was filled in
-    (`FlightLog.filled`), and their neighbours, are left out: what stands there was not measured.
-    So are ticks under a law without an estimate.
+    N is of the true motion and the torque given, N_hat of the motion measured and the torque
+    reported, as the controller had them. The error is known from the third row on, at the tick
+    before. Ticks whose state was filled in (`FlightLog.filled`), and their neighbours, are left
+    out: what stands there was not measured. So are ticks under a law without an estimate.
     """
 
     def __init__(self, h_bar: HBar, smoothing: float = 0.0, rest: bool = True) -> None:
         """``h_bar``: as `described.estimator` has it; the others as in `DelayedEstimate`."""
         self._h_bar = h_bar
         self._estimate = DelayedEstimate(smoothing, rest)
+        self._true, self._told = Intervals(), Intervals()
         self._before: FlightLog | None = None
-        """The last two rows, or the only one."""
-        self._side = 1.0
-        """1 if Q continues from Q in these rows, -1 if from -Q."""
+        """The last row, as measured."""
         self._measured = np.empty(0, np.bool_)
-        """True for those of these rows that were measured."""
+        """True for those of the last two rows that were measured."""
         self._last: Array | None = None
         """(1, 2, m) force and acceleration of the estimate at the last row."""
 
     def of(self, log: FlightLog) -> Array:
         """(K, m) those that become known with the rows of ``log``."""
-        before = self._before
-        rows = joined(before, log)
-        recorded = rows.quaternion
-        rows = replace(rows, quaternion=self._side * continuous_quaternion(rows))
-        measured = np.concatenate([self._measured, measured_rows(log, before)])
-        seen = max(0, rows.ticks - log.ticks - 1)  # intervals
-        part = rows.rows(seen, rows.ticks)
-        with np.errstate(divide="ignore", invalid="ignore"):  # J0 may be singular
-            force, acceleration = applied_force(part), mean_acceleration(part)
-        estimates = self._estimate.of(np.stack([force, acceleration], axis=1))
+        as_measured = log.as_measured()
+        measured = np.concatenate([self._measured, measured_rows(as_measured, self._before)])
+        rows, true = self._true.of(log)
+        told = true if as_measured is log else self._told.of(as_measured)[1]
+        estimates = self._estimate.of(told)
         if self._last is not None:
             estimates = np.concatenate([self._last, estimates])
-        known = slice(len(force) - len(estimates) + 1, len(force))
-        h_bar = self._h_bar(part)
+        known = slice(len(true) - len(estimates) + 1, len(true))
+        h_bar = self._h_bar(rows)
         if h_bar.ndim == 2:
             h_bar = h_bar[known]
         # force and acceleration outlast a change of law or gains, their h_bar does not
         estimate = estimates[:-1, 0] - h_bar * estimates[:-1, 1]
-        error: Array = force[known] - h_bar * acceleration[known] - estimate
+        error: Array = true[known, 0] - h_bar * true[known, 1] - estimate
         there = np.broadcast_to(np.isfinite(h_bar).all(axis=-1), len(error))
         if log.filled:
             there = there & measured[:-2] & measured[1:-1] & measured[2:]
-        self._before, self._measured = (
-            last_rows(replace(rows, quaternion=recorded), 2),
-            measured[-2:],
-        )
-        self._side = 1.0 if np.array_equal(rows.quaternion[-2:][0], recorded[-2:][0]) else -1.0
+        self._before, self._measured = last_rows(as_measured, 1), measured[-2:]
         self._last = estimates[-1:].copy()
         return error if there.all() else error[there]
 

@@ -14,15 +14,18 @@ from space_robot_msgs_py.errors import InputError
 
 from .actuation import Latency, MissedDeadlines, Saturation, TorqueLimits
 from .columns import recording
-from .described import estimator, robot_of, torque_limits
+from .described import estimator, navigation_of, robot_of, sensors_of, torque_limits
 from .estimate_error import EstimateError
 from .metrics import Chatter, Maxima, Rms, tracking_error
+from .navigation import NavigationError
 from .pointing import Pointing
 from .ripple import Ripple
 from .settling import Settling
 
 DESCRIBED = ("controller", "case", "gains", "robot")
 """Keys of a flight's description that a report repeats."""
+OF_TRUTH = ("navigation_error",)
+"""Metrics that only flights have whose truth was recorded beside what was measured."""
 
 
 def analyze(log: FlightLog) -> dict[str, Any]:
@@ -87,8 +90,15 @@ class Analysis:
 
     def _begin(self, block: FlightLog) -> None:
         self._first_tick = block.first_tick
-        self._head = {key: block.flight.get(key) for key in DESCRIBED}
+        self._head = {
+            **{key: block.flight.get(key) for key in DESCRIBED},
+            "sensors": sensors_of(block),
+            "navigation": navigation_of(block),
+            "truth_recorded": block.measured is not None,
+        }
         for name, metric in _METRICS.items():
+            if name in OF_TRUTH and block.measured is None:
+                continue
             try:
                 self._metrics[name] = metric(block)
             except InputError as error:
@@ -117,6 +127,7 @@ def _missed_deadlines(log: FlightLog) -> MissedDeadlines:
 _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
     "rms": lambda log: Rms(log.axes),
     "maxima": lambda log: Maxima(log.axes),
+    "navigation_error": NavigationError,
     "chatter": lambda log: Chatter(log.axes, log.timebase.period),
     "ripple": lambda log: Ripple(log, robot_of(log)),
     "settling": Settling,

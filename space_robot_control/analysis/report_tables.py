@@ -7,10 +7,11 @@ from functools import partial
 from itertools import groupby
 from typing import Any, NamedTuple
 
+from .described import IDEAL
 from .pointing import ARCSEC
 from .settling import BAND
 from .tables import NONE, Column, Group, Table
-from .words import Report, flown, law_of, notes, remarks
+from .words import Report, flown, law_of, notes, remarks, seen_through
 
 UNITS = {"attitude": "-", "joints": "rad", "base_torque": "N m", "torque": "N m"}
 
@@ -19,6 +20,8 @@ DEFINITIONS = {
     "of the paper holds",
     "RMS, eq. (64)": "a third of the root mean square of the vector: what the paper defines",
     "maximum": "largest absolute value on any axis of the column",
+    "navigation error": "what the law believed of attitude and joints, beside the truth, at the "
+    "ticks of its telemetry: RMS, mean of axes",
     "variation per s": "how far the torque moves up and down in a second, mean over the axes",
     "power > 100 Hz": "share of the torque's power above 100 Hz, mean over the axes: chatter",
     "ripple": "root mean square, above 2 Hz, of the torque beside the one that inverse dynamics "
@@ -55,18 +58,28 @@ class Line(NamedTuple):
 
 
 def rms_table(report: Report) -> Table:
-    """Tabulate RMS, chatter and ripple of a flight; its remarks stand below."""
+    """Tabulate RMS, chatter and ripple of a flight; its remarks stand below.
+
+    Where the truth was recorded, the navigation error stands in the place of (64).
+    """
     title = f"{flown(report)}: {report['ticks']} ticks, {report['duration_s']:g} s"
+    if report["truth_recorded"]:
+        title += f"\n{seen_through(report)}"
+    navigation = report["navigation_error"]
     columns = (
         Column(is_label=True), Column("unit"), Column("RMS, mean\nof axes"),
-        Column("RMS, eq.\n(64)"), Column("variation\nper s", spec=".3g"),
-        Column("power >\n100 Hz", spec=".2e"), Column("ripple", spec=".2e"),
+        Column("naviga-\ntion RMS" if navigation else "RMS, eq.\n(64)"),
+        Column("variation\nper s", spec=".3g"), Column("power >\n100 Hz", spec=".2e"),
+        Column("ripple", spec=".2e"),
     )  # fmt: skip
+    beside = report["rms"]["eq64"]
+    if navigation:
+        beside = dict.fromkeys(beside, "") | navigation["rms"]
     rough = *report["chatter"].values(), (report["ripple"] or {}).get("rms", {})
     rows: list[list[Any]] = []
     for key, value in report["rms"]["mean_axis"].items():
         spec = ".4f" if "torque" in key else ".3e"
-        rms = f"{value:{spec}}", f"{report['rms']['eq64'][key]:{spec}}"
+        rms = f"{value:{spec}}", beside[key] and f"{beside[key]:{spec}}"
         rows.append([key, unit_of(key), *rms, *(measure.get(key, "") for measure in rough)])
     return Table(title, columns, [Group(rows)], remarks(report))
 
@@ -81,7 +94,11 @@ def comparison_table(reports: Mapping[str, Report]) -> Table:
     """Tabulate all metrics of several bags, a column each."""
     each = list(reports.values())
     flights: list[list[Any]] = [["controller", *map(law_of, each)]]
-    for key in ("case", "gains", "robot"):
+    described = ["case", "gains", "robot"]
+    if any(report["truth_recorded"] or report["sensors"] != IDEAL for report in each):
+        described += ["sensors", "navigation"]
+        flights.append(["errors are of", *map(_errors_of, each)])
+    for key in described:
         flights.append([key, *(report[key] and str(report[key]) for report in each)])
     flights.append(["time (s)", *(f"{r['from_s']:g} to {r['to_s']:g}" for r in each)])
     columns = Column(is_label=True), *(Column(name) for name in reports)
@@ -120,6 +137,7 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
         found += each("power > 100 Hz", ("chatter", "power_above_100_hz"))
         found += each("ripple", ("ripple", "rms"), "N m")
     found += each("ripple's peak", ("ripple", "peak"), text=_peak)
+    found += each("navigation error", ("navigation_error", "rms"), unit_of)
     found += each("maximum", ("maxima",), unit_of)
     found += each("settled after", ("settling", "settled_s"), "s", text=_settled)
     found.append(one("saturation", "ticks at a limit", "", _saturated))
@@ -141,6 +159,12 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
         one("recording", "finished", "", lambda r: "no" if r["unfinished"] else "yes"),
         one("recording", "damage found", "", lambda r: str(len(r["damage"]))),
     ]
+
+
+def _errors_of(report: Report) -> str:
+    if report["truth_recorded"]:
+        return "the truth"
+    return "the truth" if report["sensors"] == IDEAL else "what was measured"
 
 
 def _number(value: float) -> str:

@@ -21,6 +21,14 @@ def flown(described: Mapping[str, Any]) -> str:
     return ", ".join([str(law or "unknown law"), *known])
 
 
+def seen_through(report: Report) -> str:
+    """Say through which sensors and navigation the law saw, and that errors are of the truth."""
+    return (
+        f"sensors {report['sensors']}, navigation {report['navigation']}; "
+        "errors and torques are the true ones"
+    )
+
+
 def law_of(described: Mapping[str, Any]) -> str | None:
     """Name the law, or all the laws and when they changed; None: nobody says."""
     return in_words(described.get("laws", ())) or described.get("controller")

@@ -47,12 +47,15 @@ def _close_loop_compiled(
     assert rows.commanded_torque is not None
     assert rows.telemetry is not None
     states = np.empty(rows.ticks, plant.state.block.dtype)
+    truths = np.empty(0 if rows.measured is None else rows.ticks, states.dtype)
     tick, fastest, status = fly_ticks(
         law.code, plant.block, plant.command_delay_buffer, controller.block, plant.state.block,
-        rows.references(start, stop), states, rows.commanded_torque, rows.telemetry, start,
-        plant.period,
+        plant.truth.block, rows.references(start, stop), states, truths, rows.commanded_torque,
+        rows.telemetry, start, plant.period,
     )  # fmt: skip
-    rows.put(start, states[: tick - start + (status != USABLE)])
+    measured = tick - start + (status != USABLE)
+    rows.put(start, states[:measured] if rows.measured is None else truths[:measured])
+    rows.put_measured(start, states[:measured])
     plant.state.tick = plant.truth.tick = tick
     if status != USABLE:
         raise unusable(status, tick, plant.state.quaternion)
@@ -75,7 +78,8 @@ def _close_loop_in_python(plant: Plant, controller: Controller, log: FlightLog) 
     assert log.telemetry is not None
     for row in range(log.ticks):
         tick = log.first_tick + row
-        log.put(tick, plant.state.block)
+        log.put(tick, plant.state.block if log.measured is None else plant.truth.block)
+        log.put_measured(tick, plant.state.block)
         command = controller.update(plant.state, log.references(tick, tick + 1))
         log.commanded_torque[row] = command.torque
         log.telemetry[row] = controller.telemetry()
@@ -85,13 +89,14 @@ def _close_loop_in_python(plant: Plant, controller: Controller, log: FlightLog) 
 @kernel
 def fly_ticks(
     law: LawCode, plant_block: Block, command_delay_buffer: Array, controller_block: Block,
-    state: Block, references: Block, states: Block, torques: Array, telemetry: Array, start: int,
-    period: float,
+    state: Block, truth: Block, references: Block, states: Block, truths: Block, torques: Array,
+    telemetry: Array, start: int, period: float,
 ) -> tuple[int, float, int]:  # fmt: skip
     """Fly from the tick ``start`` on, a tick for each reference; the loop of `close_loop`.
 
     The sensors have measured ``start``, and not yet the tick reached. ``state`` is what they
-    measure; ``states``, ``torques`` and ``telemetry`` are filled, a row a tick.
+    measure of ``truth``; ``states``, ``torques`` and ``telemetry`` are filled, a row a tick, and
+    ``truths``, unless it is empty.
 
     Returns:
         The tick reached, the fastest rate there, and the status of its state.
@@ -102,6 +107,8 @@ def fly_ticks(
         if k > 0:
             sense(plant.sensors, plant.truth, tick, period, plant.measured)
         states[k] = state[0]
+        if truths.size > 0:
+            truths[k] = truth[0]
         status = controller_tick(
             controller_block, law, tick, state, references[k : k + 1], torque, period
         )

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import RobotState
-from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec, TruthCodec
 from space_robot_msgs_py.wire.stamp_guard import AGREEING
 from space_robot_sim.plant.command_guard import CommandGuard
 from space_robot_sim.plant.exchange import NONE, SentState, exchange_of
@@ -33,6 +33,7 @@ class MessageLoop:
         self._flight, self._plant, self._record = flight, flight.plant, record
         self._guard = CommandGuard(robot.n + 3, settings.hold_ticks)
         self._states = StateCodec(robot.joint_names, flight.timebase)
+        self._truth = TruthCodec(robot.joint_names, flight.timebase)
         self._commands = CommandCodec(robot.axis_names, flight.timebase)
         self._exchange = exchange_of(settings, robot, flight.period, self._states, self._guard)
         self._references = ReferenceBuffer(robot.n)
@@ -56,6 +57,10 @@ class MessageLoop:
             self._record(topics.JOINT_STATES, sent.joints)
             self._record(topics.BASE_STATE, sent.base)
             self._deliver(sent, tick)
+        if not plant.measures_truth:
+            joints, base = self._truth.encode(plant.truth)
+            self._record(topics.TRUTH_JOINT_STATES, joints)
+            self._record(topics.TRUTH_BASE_STATE, base)
         self._exchange.end(tick)
         plant.step(self._guard.act(tick))
 

@@ -22,9 +22,9 @@ from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.samples import Command, LawInForce
 from space_robot_msgs_py.wire.clock import ClockCodec
-from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec, TruthCodec
 from space_robot_msgs_py.wire.controller_law import LawCodec
-from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
+from space_robot_msgs_py.wire.controller_telemetry import SIGNALS, TelemetryCodec
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 
 from ..controller.law_changes import LawChanges
@@ -43,6 +43,7 @@ class Messages:
         robot, timebase = flight.robot, flight.timebase
         self.record, self._flight = recorder.record, flight
         self._states = StateCodec(robot.joint_names, timebase)
+        self._truth = TruthCodec(robot.joint_names, timebase)
         self._commands = CommandCodec(robot.axis_names, timebase)
         self._references = ReferenceCodec(robot.joint_names, timebase)
         self._telemetry = TelemetryCodec(robot.axis_names)
@@ -69,11 +70,16 @@ class Messages:
         assert log.telemetry is not None
         record, flight = self.record, self._flight
         laws = [law for law in log.laws if start <= law.tick < stop]
+        told = log.as_measured()
         for tick in range(start, stop):
             self.begin_tick(tick)
-            joints, base = self._states.encode(log.state(tick))
+            joints, base = self._states.encode(told.state(tick))
             record(topics.JOINT_STATES, joints)
             record(topics.BASE_STATE, base)
+            if told is not log:
+                joints, base = self._truth.encode(log.state(tick))
+                record(topics.TRUTH_JOINT_STATES, joints)
+                record(topics.TRUTH_BASE_STATE, base)
             if tick >= answered:
                 continue
             row = tick - log.first_tick
@@ -114,6 +120,8 @@ def unflown(flight: Flight, start: int = 0, stop: int | None = None) -> FlightLo
     log.telemetry = np.empty((log.ticks, 4, log.axes))
     reference = flight.mission.chunk(start, log.ticks)
     log.reference_joints, log.reference_base = reference.joints, reference.base
+    if not flight.plant.measures_truth:
+        log.measure_apart()
     return log
 
 
@@ -240,11 +248,23 @@ def _fly_block(
         try:
             close_loop(plant, controller, block, start, stop)
         except Exception as error:
+            _note_beliefs(flight, block, start, plant.tick)
             if messages:
                 messages.stretch(block, start, measured_ticks(plant, error), plant.tick)
             raise
+        _note_beliefs(flight, block, start, stop)
         if messages:
             messages.stretch(block, start, stop, stop)
+
+
+def _note_beliefs(flight: Flight, block: FlightLog, start: int, stop: int) -> None:
+    """Note the error that the law told in its telemetry in the ticks ``start`` to ``stop``."""
+    if block.believed_error is None:
+        return
+    assert block.telemetry is not None
+    every = flight.controller_settings.telemetry_decimation
+    told = slice(-(-start // every) * every - block.first_tick, stop - block.first_tick, every)
+    block.believed_error[told] = block.telemetry[told, SIGNALS.index("e")]
 
 
 def _ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:
@@ -266,7 +286,8 @@ def _check_memory(flight: Flight) -> None:
     """
     from .memory import available_bytes
 
-    columns = unflown(flight, 0, 1).columns.values()
+    row = unflown(flight, 0, 1)
+    columns = [*row.columns.values(), *(row.measured.columns.values() if row.measured else ())]
     needed, free = flight.ticks * sum(column.nbytes for column in columns), available_bytes()
     if needed > free:
         raise InputError(

@@ -53,7 +53,10 @@ def blocks_of(log: FlightLog) -> Iterator[FlightLog]:
 def last_rows(log: FlightLog, count: int) -> FlightLog:
     """Copy the last ``count`` rows, or all if there are fewer."""
     rows = log.rows(max(0, log.ticks - count), log.ticks)
-    return replace(rows, **{name: column.copy() for name, column in rows.columns.items()})
+    columns: dict[str, Any] = {name: column.copy() for name, column in rows.columns.items()}
+    if rows.measured is not None:
+        columns["measured"] = rows.measured.each(lambda _, column: column.copy())
+    return replace(rows, **columns)
 
 
 def joined(before: FlightLog | None, log: FlightLog) -> FlightLog:
@@ -64,4 +67,9 @@ def joined(before: FlightLog | None, log: FlightLog) -> FlightLog:
         name: np.concatenate([getattr(before, name), column])
         for name, column in log.columns.items()
     }
+    if log.measured is not None and before.measured is not None:
+        told = before.measured.columns
+        columns["measured"] = log.measured.each(
+            lambda name, column: np.concatenate([told[name], column])
+        )
     return replace(log, **columns, first_tick=before.first_tick)

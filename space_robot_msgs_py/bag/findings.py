@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..samples import Timebase
+from ..topics import TRUTH
 
 _STRETCHES = 3
 SHOWN = 12
@@ -46,3 +47,11 @@ def unread_messages(recorded: Mapping[str, int], gone: Mapping[str, int]) -> lis
     return [
         f"{sum(gone.values())} of {sum(recorded.values())} recorded messages cannot be read: {each}"
     ]
+
+
+def half_truth(counts: Mapping[str, int]) -> list[str]:
+    """Tell if only one half of the true states is there, so that it is of no use."""
+    there = [topic.name for topic in TRUTH if counts.get(topic.name)]
+    if len(there) != 1:
+        return []
+    return [f"of the true states only {there[0]} is there: the measured ones are taken for them"]

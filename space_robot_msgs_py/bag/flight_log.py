@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -19,8 +19,41 @@ REFERENCE = ("reference_joints", "reference_base")
 
 
 @dataclass(slots=True)
+class MeasuredStates:
+    """The state columns of a `FlightLog` once more, as the sensors told them."""
+
+    base_position: Array
+    """(N, 3) m, inertial frame."""
+    quaternion: Array
+    """(N, 4) ``[w, x, y, z]``."""
+    base_velocity: Array
+    """(N, 3) m/s, inertial frame."""
+    omega_base: Array
+    """(N, 3) rad/s, base frame."""
+    joint_positions: Array
+    """(N, n) rad."""
+    joint_velocities: Array
+    """(N, n) rad/s."""
+    applied_torque: Array
+    """(N, n+3) N m, reported for the interval that ended at the tick; base frame, then joints."""
+
+    @property
+    def columns(self) -> dict[str, Array]:
+        """All of them, by name."""
+        return {name: getattr(self, name) for name in STATE_FIELDS}
+
+    def each(self, change: Callable[[str, Array], Array]) -> MeasuredStates:
+        """Return what ``change`` makes of each column, given its name."""
+        return MeasuredStates(*(change(name, column) for name, column in self.columns.items()))
+
+
+@dataclass(slots=True)
 class FlightLog:
-    """Measured and desired motion and the applied torque, tick by tick from 0."""
+    """True and desired motion and the torque given, tick by tick from 0.
+
+    Where the sensors told something else than the truth, and the truth was recorded beside it,
+    `measured` has what they told. Without it both are one, or only what they told is known.
+    """
 
     timebase: Timebase
     joint_names: tuple[str, ...]
@@ -37,7 +70,7 @@ class FlightLog:
     joint_velocities: Array
     """(N, n) rad/s."""
     applied_torque: Array
-    """(N, n+3) N m over the interval that ended at the tick; base frame, then joints."""
+    """(N, n+3) N m given over the interval that ended at the tick; base frame, then joints."""
     reference_joints: Array
     """(N, 3, n) desired position, velocity, acceleration."""
     reference_base: Array
@@ -66,6 +99,11 @@ class FlightLog:
     """Every change of law or gains in flight, the first law first; empty: not recorded."""
     first_tick: int = 0
     """Tick of row 0; not 0 in a part of a flight."""
+    measured: MeasuredStates | None = None
+    """The states as the sensors told them, and the torque as reported; None: see above."""
+    believed_error: Array | None = None
+    """(N, n+3) e of the telemetry, the tracking error as the law saw it (NaN: not of this tick);
+    None without `measured`."""
     trusted: bool = True
     """True if ``flight`` is the user's own word: files and modules it names may be opened.
 
@@ -108,10 +146,7 @@ class FlightLog:
 
     def finite(self, columns: Iterable[str]) -> NDArray[np.bool_]:
         """(N,) whether a row has no NaN in some of the columns."""
-        found = np.ones(self.ticks, np.bool_)
-        for name in columns:
-            found &= np.isfinite(getattr(self, name).reshape(self.ticks, -1)).all(axis=1)
-        return found
+        return finite_rows(getattr(self, name) for name in columns)
 
     def longest_stretch(self) -> FlightLog:
         """The longest stretch of `whole` rows, for what cannot bear a gap; views, not copies."""
@@ -129,12 +164,28 @@ class FlightLog:
 
     def put(self, start: int, states: Block) -> None:
         """Copy the `State` of each tick from ``start`` on into its row."""
-        k = start - self.first_tick
-        for name in STATE_FIELDS:
-            getattr(self, name)[k : k + len(states)] = states[name]
+        _put(self, start - self.first_tick, states)
+
+    def put_measured(self, start: int, states: Block) -> None:
+        """Copy what the sensors told of each tick from ``start`` on into its row of `measured`."""
+        if self.measured is not None:
+            _put(self.measured, start - self.first_tick, states)
+
+    def measure_apart(self) -> None:
+        """Make room, NaN, for what the sensors tell and the law believes beside the truth."""
+        states = MeasuredStates(*(getattr(self, name) for name in STATE_FIELDS))
+        self.measured = states.each(lambda _, column: np.full_like(column, np.nan))
+        self.believed_error = np.full_like(self.applied_torque, np.nan)
+
+    def as_measured(self) -> FlightLog:
+        """The flight as the flight software was told it: no truth, but `measured` in its place."""
+        if self.measured is None:
+            return self
+        columns: dict[str, Any] = self.measured.columns
+        return replace(self, **columns, measured=None, believed_error=None)
 
     def state(self, tick: int) -> RobotState:
-        """The state of a tick, as the plant measured it."""
+        """The state of a tick: the true one, where that is known."""
         block = State.block(len(self.joint_names))
         for name in STATE_FIELDS:
             block[name] = getattr(self, name)[tick - self.first_tick]
@@ -148,11 +199,25 @@ class FlightLog:
 
     @property
     def columns(self) -> dict[str, Any]:
-        """All arrays that have a row a tick, by name."""
+        """All arrays that have a row a tick, by name; without those of `measured`."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
 
     def rows(self, start: int, stop: int) -> FlightLog:
         """The rows ``start`` to ``stop``: views, not copies. Counts stay those of the whole log."""
-        rows = {name: column[start:stop] for name, column in self.columns.items()}
+        rows: dict[str, Any] = {name: column[start:stop] for name, column in self.columns.items()}
+        if self.measured is not None:
+            rows["measured"] = self.measured.each(lambda _, column: column[start:stop])
         return replace(self, **rows, first_tick=self.first_tick + start)
+
+
+def finite_rows(columns: Iterable[Array]) -> NDArray[np.bool_]:
+    """(N,) true where some columns (N, ...), at least one, have no NaN."""
+    each = (np.isfinite(column.reshape(len(column), -1)).all(axis=1) for column in columns)
+    found: NDArray[np.bool_] = np.logical_and.reduce(list(each))
+    return found
+
+
+def _put(columns: FlightLog | MeasuredStates, row: int, states: Block) -> None:
+    for name in STATE_FIELDS:
+        getattr(columns, name)[row : row + len(states)] = states[name]

@@ -8,18 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..samples import STATE_FIELDS
-from .flight_log import REFERENCE, FlightLog
+from .flight_log import REFERENCE, FlightLog, MeasuredStates, finite_rows
 
 
 def fill_gaps(log: FlightLog) -> None:
     """Give ticks without a usable state the one before, and missing references the last point.
 
-    From the first whole tick to the last state; `FlightLog.filled` counts the states.
+    From the first whole tick to the last state; `FlightLog.filled` counts the states. Only what
+    the sensors told is filled in: the truth has no such gaps.
     """
-    states = log.finite(STATE_FIELDS)
-    end = len(states) - int(np.argmax(states[::-1])) if states.any() else 0
+    told = log if log.measured is None else log.measured
+    states = finite_rows(getattr(told, name) for name in STATE_FIELDS)
+    known = log.finite(STATE_FIELDS) | states
+    end = len(known) - int(np.argmax(known[::-1])) if known.any() else 0
     log.filled = int(np.count_nonzero(~states[:end]))
-    _repeat_before(log, STATE_FIELDS, states, end)
+    _repeat_before(told, STATE_FIELDS, states, end)
     references = log.finite(REFERENCE)
     _repeat_before(log, REFERENCE, references, end)
     log.reference_joints[:end][~references[:end], 1:] = 0.0  # at rest
@@ -27,7 +30,7 @@ def fill_gaps(log: FlightLog) -> None:
 
 
 def _repeat_before(
-    log: FlightLog, columns: tuple[str, ...], good: NDArray[np.bool_], end: int
+    log: FlightLog | MeasuredStates, columns: tuple[str, ...], good: NDArray[np.bool_], end: int
 ) -> None:
     source = np.maximum.accumulate(np.where(good[:end], np.arange(end), -1))
     bad = np.flatnonzero(~good[:end] & (source >= 0))

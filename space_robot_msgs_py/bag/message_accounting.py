@@ -124,7 +124,7 @@ class MessageAccounting:
 
     def missing(self, last_tick: int) -> int:
         """Messages that were sent but are not here, for a flight from tick 0 to ``last_tick``."""
-        if self.topic.is_event:
+        if self.topic.is_event or (self.topic.is_optional and not self.received):
             return 0
         if self.topic.per_tick:
             return last_tick + 1 - self.received

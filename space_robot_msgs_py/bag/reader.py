@@ -18,7 +18,7 @@ from .accounts import Account, foreign, noted_accounts, paused
 from .batch import Batch
 from .contents import Bag
 from .description import read_description
-from .findings import missing_ticks, unread_messages
+from .findings import half_truth, missing_ticks, unread_messages
 from .flight_log import FlightLog
 from .folder import open_bag
 from .gaps import fill_gaps
@@ -78,6 +78,7 @@ def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
     for topic in REQUIRED:
         if not rows.counts[topic.name]:
             raise missing(topic, bag, selection)
+    rows.tell_apart()
     log, excused = rows.log, topics_with_allowed_gaps(flight)
     log.flight = flight
     gone = _gone(selection, rows)
@@ -89,7 +90,7 @@ def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
     ticks = len(whole) - int(np.argmax(whole[::-1])) if whole.any() else 0
     damage += [*bag.damage, *unread_messages(selection.recorded() or {}, gone)]
     damage += [f"{name} is left out: {wrong}" for name, wrong in selection.wrong.items()]
-    damage += rows.oddities(bool(excused)) + paused(accounts)
+    damage += rows.oddities(bool(excused)) + paused(accounts) + half_truth(rows.counts)
     if not ticks:
         context = "; ".join(_not_finished(bag) + damage)
         raise InputError(f"not one tick with its state and reference ({context})")

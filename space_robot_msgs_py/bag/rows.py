@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from .. import topics
 from ..errors import MessageError
-from ..samples import LawInForce, Timebase, in_order
+from ..samples import STATE_FIELDS, LawInForce, Timebase, in_order
 from ..wire.controller_law import LawCodec
+from ..wire.controller_telemetry import SIGNALS
 from ..wire.message import description
 from .batch import Batch
 from .field_reader import Array, FieldReader, Places
-from .flight_log import FlightLog
+from .flight_log import FlightLog, MeasuredStates
 from .kernels import NO_STAMP, read_stamps
 from .message_accounting import LONGEST_JUMP, MessageAccounting
 
@@ -69,6 +70,10 @@ class Rows:
             dict.fromkeys(c.name for reader in self._readers.values() for c in reader.columns)
         )
         """Columns of the log that messages fill."""
+        self._apart: MeasuredStates | None = None
+        """The true states, once one has come; after `tell_apart` what the sensors told."""
+        self._errors: list[tuple[NDArray[np.int64], Array]] = []
+        """Ticks and e of the telemetry."""
         self._laws: list[LawInForce] = []
         self._law_faults: list[str] = []
 
@@ -114,6 +119,17 @@ class Rows:
                 self._put(topic, ticks[which], values)
                 self._note_sending(topic, batch, which, ticks[which])
 
+    def tell_apart(self) -> None:
+        """Make the true states those of the log, if both their halves came; call it at the end."""
+        if not all(self.counts[topic.name] for topic in topics.TRUTH):
+            self._apart = None
+        if self._apart is None:
+            return
+        told = MeasuredStates(*(getattr(self.log, name) for name in STATE_FIELDS))
+        for name, column in self._apart.columns.items():
+            setattr(self.log, name, column)
+        self.log.measured = self._apart = told
+
     def finish(self, ticks: int) -> FlightLog:
         """The log, cut to ``ticks`` rows."""
         log = self.log
@@ -122,6 +138,11 @@ class Rows:
             column.resize((ticks, *column.shape[1:]), refcheck=False)
         if topics.COMMAND.name not in self.accounting:
             log.commanded_torque = None
+        if log.measured is not None:
+            log.believed_error = np.full((ticks, log.axes), np.nan)
+            for at, error in self._errors:
+                there = (at >= 0) & (at < ticks)
+                log.believed_error[at[there]] = error[there]
         sent, answered = self._sent_ns[topics.BASE_STATE], self._sent_ns[topics.COMMAND]
         if self._wall_clock and topics.COMMAND.name in self.accounting:
             both = (answered != _NEVER) & (sent != _NEVER)
@@ -136,6 +157,7 @@ class Rows:
             numbers, known = np.zeros(len(batch)), np.zeros(len(batch), np.bool_)
             for which, values in self._readers[topic].read(batch):
                 numbers[which], known[which] = values[:, 0], np.abs(values[:, 0]) < LAST_TICK
+                self._note_errors(values[known[which]])
             return np.where(known, numbers, 0.0).astype(np.int64), known
         stamps = stamps_of(batch)
         known = stamps != NO_STAMP
@@ -154,9 +176,12 @@ class Rows:
             self._believed += length * len(ticks)
             self._grow(int(ticks.max()) + length)
         places, rows = _by_place(ticks, rows, self._rows)
+        target: FlightLog | MeasuredStates = self.log
+        if topic in topics.TRUTH:
+            target = self._apart = self._apart or self._room_apart()
         start = 0
         for name, first, length in columns:
-            column = getattr(self.log, name)
+            column = getattr(target, name)
             flat = column.reshape(len(column), math.prod(column.shape[1:]))
             flat[places, first : first + length] = rows[:, start : start + length]
             start += length
@@ -170,6 +195,19 @@ class Rows:
         self._sent_ns[topic][ticks] = sent_ns
         self._wall_clock = self._wall_clock or bool(np.any(sent_ns != batch.log_ns[which]))
 
+    def _room_apart(self) -> MeasuredStates:
+        """NaN, as many rows as the log has."""
+        states = MeasuredStates(*(getattr(self.log, name) for name in STATE_FIELDS))
+        return states.each(lambda _, column: np.full_like(column, np.nan))
+
+    def _note_errors(self, values: Array) -> None:
+        """``values``: (M, ...) the tick, then s, u, N_hat and e of each message, if it is ours."""
+        axes = self.log.axes
+        if values.shape[1] == 1 + len(SIGNALS) * axes:
+            first = 1 + SIGNALS.index("e") * axes
+            error = values[:, first : first + axes].copy()
+            self._errors.append((values[:, 0].astype(np.int64), error))
+
     def _note_laws(self, batch: Batch, ticks: NDArray[np.int64]) -> None:
         for i, tick in enumerate(ticks.tolist()):
             try:
@@ -180,6 +218,7 @@ class Rows:
     def _columns(self) -> list[NDArray[Any]]:
         return [
             *(getattr(self.log, name) for name in self._names),
+            *(self._apart.columns.values() if self._apart is not None else ()),
             *self._sent_ns.values(),
         ]
 

@@ -29,6 +29,7 @@ from .command_guard import CommandGuard
 from .exchange import NONE, SentState, exchange_of
 from .plant import Plant
 from .settings import PlantNodeSettings
+from .truth_output import TruthOutput
 from .wall_clock import WallClock
 
 PATIENCE_S = 0.02
@@ -73,7 +74,10 @@ class PlantLoop:
         self._clock_out = RawPublisher(node, topics.CLOCK)
         self._command_in = FollowedSubscription(node, topics.COMMAND, PolledCallbackGroup())
         self._for_answer = Wait(PATIENCE_S, (self._command_in,), is_brief=True)
-        self.outputs = (self._joint_states, self._base_state, self._clock_out)
+        self._truth = TruthOutput(node, self._plant, timebase)
+        self.outputs = (
+            self._joint_states, self._base_state, self._clock_out, *self._truth.outputs,
+        )  # fmt: skip
         self.wait_for = settings.wait_for
         self.is_complete = False
         self._wall_clock = WallClock(settings.period)
@@ -176,6 +180,7 @@ class PlantLoop:
         if tick % self._settings.clock_decimation == 0:
             self._clock_sent = self._clock.encode(self._timebase.stamp_ns(tick))
             self._clock_out.publish(self._clock_sent)
+        self._truth.send(self._plant.truth)
 
     def _send_next(self) -> None:
         self._sent = state = self._unsent.popleft()

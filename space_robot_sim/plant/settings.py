@@ -24,7 +24,7 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
     node: ClassVar[str] = "plant"
     selectors: ClassVar[tuple[str, ...]] = ("robot", "mission", "case", "sensors")
     sends: ClassVar[tuple[topics.Topic, ...]] = (
-        topics.JOINT_STATES, topics.BASE_STATE, topics.CLOCK,
+        topics.JOINT_STATES, topics.BASE_STATE, topics.CLOCK, *topics.TRUTH,
     )  # fmt: skip
 
     mission: str = Field(

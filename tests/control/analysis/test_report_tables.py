@@ -25,6 +25,7 @@ PATHS: dict[str, tuple[str, ...]] = {
     "power > 100 Hz": ("chatter", "power_above_100_hz"),
     "ripple": ("ripple", "rms"),
     "settled after": ("settling", "settled_s"),
+    "navigation error": ("navigation_error", "rms"),
 }
 """Groups with a line for every key below."""
 POINTING = {
@@ -44,7 +45,7 @@ def numbered(value: Any, counter: itertools.count[int]) -> Any:
 
 @pytest.fixture(scope="module")
 def reports() -> list[dict[str, Any]]:
-    log = simulate(Flight(FlightPlan(duration=1.0)))
+    log = simulate(Flight(FlightPlan(duration=1.0, faults=["noise_gyro@0:1e-9"])))
     log.latency_s = np.linspace(1e-4, 3e-4, log.ticks)
     log.flight["parameters"]["plant"] |= {"base_torque_limit": 1.0, "joint_torque_limit": 1.0}
     report = analyze(log)

@@ -61,13 +61,15 @@ def test_compiled_stretches_fly_as_single_ticks_do() -> None:
     """Part faults begin and end, and random numbers run out, within the flight."""
     flight, log = Flight(FlightPlan(**PLAN)), flown()
     assert log.commanded_torque is not None
+    told = log.as_measured()
     plant, chunk = flight.plant, flight.mission.chunk(0, flight.ticks)
     reference = Reference.at_rest(flight.robot.n)
     joints, base = Reference.parts(reference)
     for tick in range(flight.ticks):
         joints[0], base[0] = chunk.joints[tick], chunk.base[tick]
-        np.testing.assert_array_equal(plant.state.quaternion, log.quaternion[tick])
-        np.testing.assert_array_equal(plant.state.joint_velocities, log.joint_velocities[tick])
+        for state, rows in ((plant.state, told), (plant.truth, log)):
+            np.testing.assert_array_equal(state.quaternion, rows.quaternion[tick])
+            np.testing.assert_array_equal(state.joint_velocities, rows.joint_velocities[tick])
         command = flight.controller.update(plant.state, reference)
         np.testing.assert_array_equal(command.torque, log.commanded_torque[tick])
         plant.step(command)

@@ -40,7 +40,11 @@ def test_every_shipped_parameter_file_is_one() -> None:
 def test_a_node_waits_for_listeners_to_what_it_sends_alone() -> None:
     assert PlantNodeSettings.resolve({"wait_for": ["a:/clock", "b", ""]}).wait_for[0] == "a:/clock"
     for schema, entry, sent in (
-        (PlantNodeSettings, "recorder_node:/command", "/joint_states, /base/state, /clock"),
+        (
+            PlantNodeSettings,
+            "recorder_node:/command",
+            "/joint_states, /base/state, /clock, /truth/joint_states, /truth/base_state",
+        ),
         (ControllerNodeSettings, "plant_node:", "/command, /controller/telemetry, /controller/law"),
     ):
         with pytest.raises(InputError) as error:

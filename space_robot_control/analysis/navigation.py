@@ -1,0 +1,63 @@
+"""Navigation error: how far what the law believed was from the truth.
+
+The law tells the error e that it sees in its telemetry. Less the true one this is the true state
+less the one believed, in the coordinates rho = [eps, theta], whatever stands between sensors and
+law: ``e - e_true = rho - rho_believed``. So it holds of measured states and of filtered ones, but
+is known at the ticks of the telemetry only.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.bag.blocks import Metric
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import InputError
+
+from .metrics import AxisMaximum, AxisRms, error_columns
+
+Array = NDArray[np.float64]
+
+
+class NavigationError(Metric):
+    """Takes RMS and maximum of the navigation error by error column of Table V."""
+
+    def __init__(self, log: FlightLog) -> None:
+        """``log``: the first rows."""
+        self._columns = error_columns(log.axes)
+        self._rms, self._maximum = AxisRms(log.axes), AxisMaximum(log.axes)
+
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows."""
+        if log.believed_error is None:
+            return
+        found = navigation_error(log, error)
+        self._rms.add(found)
+        self._maximum.add(found)
+
+    def result(self) -> dict[str, Any]:
+        """Return the ticks with telemetry, ``rms`` (mean of axes) and ``max`` by column."""
+        if not self._rms.rows:
+            raise InputError("no telemetry was recorded")
+        rms, largest = self._rms.value, self._maximum.value
+        return {
+            "ticks": self._rms.rows,
+            "rms": {name: float(np.mean(rms[axes])) for name, axes in self._columns.items()},
+            "max": {name: float(np.max(largest[axes])) for name, axes in self._columns.items()},
+        }
+
+
+def navigation_error(log: FlightLog, error: Array) -> Array:
+    """(K, n+3) true coordinates less those believed at the ticks with telemetry; eps, then rad.
+
+    Args:
+        log: with `FlightLog.believed_error`.
+        error: (N, n+3) its true tracking error.
+    """
+    assert log.believed_error is not None
+    known = np.isfinite(log.believed_error).all(axis=1)
+    found: Array = log.believed_error[known] - error[known]
+    return found

@@ -1,0 +1,188 @@
+"""The true states beside the measured ones, through a bag and in blocks."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bags import messages_of, read_accounts
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sensor_bench import Bench
+
+from space_robot_control.analysis import Analysis, analyze, excerpt
+from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.flight.simulate import fly_blocks, simulate
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag import blocks
+from space_robot_msgs_py.bag.blocks import joined, last_rows
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.bag.recorder import BagRecorder
+from space_robot_msgs_py.samples import STATE_FIELDS
+from space_robot_msgs_py.topics import Topic
+from space_robot_msgs_py.wire.cdr import header_stamp_ns
+
+NOISE = ["noise_attitude@0.01:1e-5", "noise_gyro@0-0.1:1e-6", "noise_joint_position@0:1e-5"]
+FAULTS = [*NOISE, "torque_scale@0.05:joints=0.998"]
+TICKS = 400
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[FlightLog, Path]:
+    bag = tmp_path_factory.mktemp("truth") / "bag"
+    plan = FlightPlan(faults=FAULTS, duration=TICKS * 0.0005, case="2")
+    return simulate(Flight(plan), bag), bag
+
+
+def recorded_anew(bag: Path, folder: Path, keep: Callable[[Topic, int], bool]) -> FlightLog:
+    """The flight of some of a bag's messages, by topic and stamp in ticks."""
+    flight = Flight(FlightPlan(faults=FAULTS, duration=TICKS * 0.0005, case="2"))
+    recorder = BagRecorder(folder, flight.description, flight.timebase)
+    for topic, data in messages_of(bag):
+        if not topic.has_stamp or keep(topic, header_stamp_ns(data) // 500_000):
+            recorder.record(topic, data)
+    recorder.close()
+    return read_flight(folder)
+
+
+def assert_same(log: FlightLog, other: FlightLog) -> None:
+    assert log.measured is not None
+    assert other.measured is not None
+    for name in STATE_FIELDS:
+        np.testing.assert_array_equal(getattr(log, name), getattr(other, name), name)
+        told = getattr(other.measured, name)
+        np.testing.assert_array_equal(getattr(log.measured, name), told, name)
+    np.testing.assert_array_equal(log.believed_error, other.believed_error)
+
+
+def test_a_bag_has_truth_and_measurement_as_flown(flown: tuple[FlightLog, Path]) -> None:
+    log, bag = flown
+    recorded = read_flight(bag)
+    assert_same(recorded, log)
+    assert recorded.lost == {topic.name: 0 for topic in topics.ALL}
+    assert analyze(recorded) == analyze(log)
+    assert {read_accounts(bag)[topic.name]["received"] for topic in topics.TRUTH} == {TICKS}
+
+
+def test_measured_is_what_the_sensors_make_of_the_truth(flown: tuple[FlightLog, Path]) -> None:
+    """Shown the truth of the bag alone, with the same faults, they tell the same to the bit."""
+    log = read_flight(flown[1])
+    assert log.measured is not None
+    sensors = Bench(*NOISE, truth=log.state(0))
+    told = log.as_measured()
+    for tick in range(TICKS):
+        measured = sensors.measure(log.state(tick))
+        for name in STATE_FIELDS[:-1]:
+            expected = getattr(measured, name)
+            np.testing.assert_array_equal(getattr(told.state(tick), name), expected, name)
+    noise = log.measured.joint_positions - log.joint_positions
+    assert np.std(noise) == pytest.approx(1e-5, rel=0.05)
+    # numbers of 5e-1 rad, subtracted, have lost their last bits
+    assert np.abs(log.applied_torque[200:, 3:] / log.measured.applied_torque[200:, 3:]).max() == (
+        pytest.approx(0.998)
+    )
+
+
+def test_sensors_that_tell_the_truth_need_no_second_word(tmp_path: Path) -> None:
+    """Nor is a bag without it incomplete."""
+    log = simulate(Flight(FlightPlan(duration=0.02)), tmp_path / "bag")
+    recorded = read_flight(tmp_path / "bag")
+    for one in (log, recorded):
+        assert one.measured is None
+        assert one.believed_error is None
+        assert one.as_measured() is one
+    assert recorded.lost == {topic.name: 0 for topic in topics.ALL}
+    for topic in topics.TRUTH:
+        account = read_accounts(tmp_path / "bag")[topic.name]
+        assert (account["received"], account["missing"]) == (0, 0)
+    assert not recorded.damage
+    report = analyze(recorded)
+    assert report["navigation_error"] is None
+    assert "navigation_error" not in report["unavailable"]
+    assert not report["truth_recorded"]
+
+
+def test_half_a_truth_is_none(flown: tuple[FlightLog, Path], tmp_path: Path) -> None:
+    log = recorded_anew(flown[1], tmp_path / "bag", lambda t, _: t is not topics.TRUTH_BASE_STATE)
+    assert log.measured is None
+    assert flown[0].measured is not None
+    np.testing.assert_array_equal(log.quaternion, flown[0].measured.quaternion)
+    assert any("only /truth/joint_states is there" in text for text in log.damage)
+
+
+def test_a_truth_that_is_missing_is_a_loss(flown: tuple[FlightLog, Path], tmp_path: Path) -> None:
+    log = recorded_anew(
+        flown[1], tmp_path / "bag", lambda t, tick: t is not topics.TRUTH_BASE_STATE or tick != 7
+    )
+    assert log.lost["/truth/base_state"] == 1
+    assert np.flatnonzero(~log.whole).tolist() == [7]
+    assert log.damage
+
+
+def test_states_kept_back_are_filled_in_beside_a_whole_truth(
+    flown: tuple[FlightLog, Path], tmp_path: Path
+) -> None:
+    """With what was told last: the truth has no gap."""
+    kept_back = (20, 21, 100, TICKS - 1)
+    sensed = (topics.JOINT_STATES, topics.BASE_STATE)
+    log = recorded_anew(
+        flown[1], tmp_path / "bag", lambda t, tick: t not in sensed or tick not in kept_back
+    )
+    original = flown[0]
+    assert log.filled == len(kept_back)
+    assert log.ticks == TICKS
+    assert log.whole.all()
+    assert log.measured is not None
+    assert original.measured is not None
+    for name in STATE_FIELDS:
+        np.testing.assert_array_equal(getattr(log, name), getattr(original, name), name)
+        told = getattr(original.measured, name).copy()
+        for tick in kept_back:
+            told[tick] = told[tick - 1]
+        np.testing.assert_array_equal(getattr(log.measured, name), told, name)
+    assert analyze(log)["rms"] == analyze(original)["rms"]
+
+
+@settings(max_examples=20)
+@given(st.lists(st.integers(1, TICKS - 1), max_size=4))
+def test_blocks_make_the_whole(cuts: list[int]) -> None:
+    analysis, edges = Analysis(), [0, *sorted(cuts), TICKS]
+    for start, stop in itertools.pairwise(edges):
+        if start < stop:
+            analysis.add(WHOLE.rows(start, stop))
+    one, other = analyze(WHOLE), analysis.report()
+    for key in ("rms", "navigation_error", "estimate_error", "missed_deadlines", "maxima"):
+        for kind, values in one[key].items():
+            assert other[key][kind] == pytest.approx(values, rel=1e-11), (key, kind)
+
+
+WHOLE = simulate(Flight(FlightPlan(faults=FAULTS, duration=TICKS * 0.0005)))
+
+
+def test_a_flight_in_blocks_is_the_flight(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(blocks, "BLOCK_TICKS", 150)
+    flight = Flight(FlightPlan(faults=FAULTS, duration=TICKS * 0.0005))
+    whole: FlightLog | None = None
+    for block in fly_blocks(flight):
+        whole = joined(whole, block)
+    assert whole is not None
+    assert_same(whole, WHOLE)
+
+
+def test_rows_take_what_was_measured_along() -> None:
+    part = excerpt(WHOLE, 0.05, 0.1)
+    assert part.measured is not None
+    assert WHOLE.measured is not None
+    np.testing.assert_array_equal(part.measured.quaternion, WHOLE.measured.quaternion[100:200])
+    last = last_rows(part, 3)
+    assert last.measured is not None
+    assert last.measured.quaternion.base is None  # a copy
+    np.testing.assert_array_equal(last.measured.quaternion, WHOLE.measured.quaternion[197:200])
+    told = part.as_measured()
+    assert told.measured is None
+    np.testing.assert_array_equal(told.quaternion, part.measured.quaternion)
+    np.testing.assert_array_equal(told.reference_base, part.reference_base)
