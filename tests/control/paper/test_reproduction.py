@@ -10,7 +10,9 @@ from typing import Any
 from urllib.parse import urlparse
 
 import pytest
+from click.testing import CliRunner
 
+from space_robot_control.cli.main import cli
 from space_robot_control.paper.reproduction.claims import claims
 from space_robot_control.paper.reproduction.flights import (
     ROWS,
@@ -83,6 +85,21 @@ def test_tde_smc_chatters_as_the_prototype_did(time_delay_flights: list[Result])
     assert variation["tde_smc"] == pytest.approx(103.0, rel=0.05)
     assert variation["tde_tsmc"] == pytest.approx(2.6, rel=0.05)
     assert variation["tde_stc"] == pytest.approx(0.33, rel=0.05)
+
+
+def test_rows_fly_with_sensors_that_are_not_ideal() -> None:
+    """And with the ideal ones if none are named."""
+    planned = Planned(Row("tde_stc", "1"), Variant("printed", True), shown=False)
+    ideal, noisy = fly(planned, 0.05, None), fly(planned, 0.05, None, "white_l1")
+    told = [result.parameters["plant"] for result in (ideal, noisy)]
+    assert [(plant["sensors"], plant["gyro"]["noise"]) for plant in told] == [
+        ("ideal", 0.0),
+        ("white_l1", 1e-6),
+    ]
+    assert ideal.rms != noisy.rms
+    result = CliRunner().invoke(cli, ["reproduce", "--sensors", "best"])
+    assert isinstance(result.exception, InputError)
+    assert str(result.exception).startswith("unknown sensor 'best': choose one of coarse, fine")
 
 
 def test_printed_computed_torque_gains_diverge_within_ticks() -> None:

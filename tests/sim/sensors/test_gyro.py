@@ -13,7 +13,7 @@ from space_robot_msgs_py.samples import RobotState
 
 Array = NDArray[np.float64]
 
-SEEDS = range(8)
+SEEDS = range(4)
 
 
 @cache
