@@ -180,7 +180,7 @@ OPTIONS: dict[str, Decorator] = {
         help="ideal, fine, tactical, coarse, white_l1, white_l2, or a path to a YAML file."),
     "gains": click.option(
         "--gains", default="default", show_default=True,
-        help="printed, tuned, default (printed where it flies), or a path."),
+        help="printed, tuned, robust, default (printed where it flies), or a path."),
     "robot": click.option(
         "--robot", default="paper", show_default=True,
         help="paper, seven_joint, or a path to a robot's YAML."),
