@@ -30,7 +30,9 @@ from .options import OUTPUT, flight_options, folder_option, put_json
 )  # fmt: skip
 @click.option("--seed", type=click.IntRange(0, 2**30), default=0, help="Seed of the draws.")
 @click.option("--jobs", type=click.IntRange(1, 256), help="Processes [default: one a core].")
-@folder_option("--out", help="Folder for table.csv, summary.md and the figure (PNG and SVG).")
+@folder_option(
+    "--out", help="Folder for table.csv, summary.md and the figure; an older sweep's are replaced."
+)
 @flight_options(
     "case", "robot", "mission", "duration", "navigation", "latency", "friction", "set", "json"
 )
@@ -61,7 +63,7 @@ def sweep(
     from space_robot_msgs_py.config.validation import validate
 
     from ..analysis.figures.style import save_figure
-    from ..analysis.files import check_writable, make_folder, write_text
+    from ..analysis.files import check_writable, make_folder, whole_file
     from ..analysis.tables import Column, Table, as_csv, as_markdown
     from ..analysis.terminal import print_table
     from ..campaign.processes import cores
@@ -81,7 +83,8 @@ def sweep(
     study = validate(Sweep, given, "options")
     if out:
         make_folder(out)
-        check_writable(out / "table.csv")
+        for name in ("table.csv", "summary.md", "sensors.png", "sensors.svg"):
+            check_writable(out / name)
     compile_kernels()
     with counting_progress("flights") as progress:
         rows = run(study, jobs or cores(), progress)
@@ -93,8 +96,10 @@ def sweep(
         flights = Table.of(
             "", [Column(name) for name in names], [[r.get(n) for n in names] for r in records]
         )
-        write_text(as_csv(flights), out / "table.csv")
-        write_text(as_markdown("Laws over grades of sensors", [table]), out / "summary.md")
+        summary = as_markdown("Laws over grades of sensors", [table])
+        for name, text in (("table.csv", as_csv(flights)), ("summary.md", summary)):
+            with whole_file(out / name, replace=True) as file:
+                file.write(text.encode())
         save_figure(figure(found), out / "sensors")
     put_json({"cells": as_records(found)}, as_json, output)
     if not as_json:
