@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 
 SLOWEST = 2.0
 """Hz; slower is what the task asks for, faster is ripple."""
+FAST = 25.0
+"""Hz; above the laws' limit cycles, where noise and switching are left."""
 SEGMENT_S = 4.0
 """s of a segment of the spectrum: lines 0.25 Hz apart. Under Hann's window a disturbance of
 0.75 Hz has sunk to 1e-4 of its power at `SLOWEST`."""
@@ -60,10 +62,10 @@ class RippleSpectrum(NamedTuple):
         mean: Array = np.mean(self.mean_square[:, axes], axis=1)
         return mean
 
-    @property
-    def rms(self) -> Array:
-        """(n+3,) N m, of each axis."""
-        rms: Array = np.sqrt(np.sum(self.mean_square, axis=0))
+    def rms(self, above: float = SLOWEST) -> Array:
+        """(n+3,) N m, of each axis' ripple ``above`` a frequency, Hz."""
+        fast = self.frequency >= above * (1.0 - 1e-9)
+        rms: Array = np.sqrt(np.sum(self.mean_square[fast], axis=0))
         return rms
 
     def peak(self, axes: slice) -> Peak | None:
@@ -113,13 +115,20 @@ class Ripple(Metric):
         return RippleSpectrum(frequency[fast], mean_square[fast])
 
     def result(self) -> dict[str, Any]:
-        """Return the RMS by torque column and by axis, N m, and the peak of each column."""
+        """Return the RMS by torque column and by axis, N m, and the peak of each column.
+
+        ``fast`` is the RMS of what is above `FAST`.
+        """
         found = self.spectrum()
-        columns, rms = torque_columns(len(self._names)), found.rms
+        columns, rms, fast = torque_columns(len(self._names)), found.rms(), found.rms(FAST)
         peaks = {name: found.peak(axes) for name, axes in columns.items()}
         return {
             "above_hz": SLOWEST,
             "rms": {name: float(np.mean(rms[axes])) for name, axes in columns.items()},
+            "fast": {
+                "above_hz": FAST,
+                "rms": {name: float(np.mean(fast[axes])) for name, axes in columns.items()},
+            },
             "axes": {name: float(value) for name, value in zip(self._names, rms, strict=True)},
             "peak": {
                 name: peak and {"frequency_hz": peak.frequency, "rms": peak.rms}

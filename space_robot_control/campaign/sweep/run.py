@@ -83,5 +83,7 @@ def fly(study: Sweep, draw: Draw) -> Row:
 def metrics(report: dict[str, Any]) -> dict[str, float]:
     """Return the figures of merit of a flight's report by name."""
     found: dict[str, float] = dict(report["rms"]["mean_axis"])
-    ripple = (report["ripple"] or {}).get("rms", {})
-    return found | {f"ripple_{group}": value for group, value in ripple.items()}
+    if ripple := report["ripple"]:
+        for name, bands in (("ripple", ripple), ("fast_ripple", ripple["fast"])):
+            found |= {f"{name}_{group}": value for group, value in bands["rms"].items()}
+    return found

@@ -18,6 +18,7 @@ SHOWN = {
     "joints_1_3": ("joints 1-3", "rad"),
     "joints_4_6": ("joints 4-6", "rad"),
     "ripple_base_torque": ("base ripple", "N m"),
+    "fast_ripple_base_torque": ("> 25 Hz", "N m"),
     "ripple_torque_1_3": ("ripple 1-3", "N m"),
     "ripple_torque_4_6": ("ripple 4-6", "N m"),
 }
