@@ -92,6 +92,7 @@ class Analysis:
         self._first_tick = block.first_tick
         self._head = {
             **{key: block.flight.get(key) for key in DESCRIBED},
+            "faults": [str(fault) for fault in block.flight.get("faults", ())],
             "sensors": sensors_of(block),
             "navigation": navigation_of(block),
             "truth_recorded": block.measured is not None,

@@ -23,8 +23,9 @@ def flown(described: Mapping[str, Any]) -> str:
 
 def seen_through(report: Report) -> str:
     """Say through which sensors and navigation the law saw, and that errors are of the truth."""
+    faults = ", faults" if report["faults"] else ""
     return (
-        f"sensors {report['sensors']}, navigation {report['navigation']}; "
+        f"sensors {report['sensors']}{faults}, navigation {report['navigation']}; "
         "errors and torques are the true ones"
     )
 

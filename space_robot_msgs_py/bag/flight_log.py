@@ -38,6 +38,11 @@ class MeasuredStates:
     """(N, n+3) N m, reported for the interval that ended at the tick; base frame, then joints."""
 
     @property
+    def angular_velocity(self) -> Array:
+        """(N, 3) rad/s, base frame; the same as ``omega_base``."""
+        return self.omega_base
+
+    @property
     def columns(self) -> dict[str, Array]:
         """All of them, by name."""
         return {name: getattr(self, name) for name in STATE_FIELDS}

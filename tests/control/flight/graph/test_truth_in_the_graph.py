@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
-from flights import Flown
+from flights import Flown, space_robot
 
 from space_robot_control.analysis import analyze
 from space_robot_control.flight.plan import Flight, FlightPlan
@@ -44,3 +45,11 @@ def test_truth_measured_and_believed_are_those_of_one_process(
     for key in ("latency", "unavailable"):
         assert here.pop(key) != there.pop(key)
     assert here == there
+
+
+def test_a_replay_plays_what_was_measured(tmp_path: Path) -> None:
+    """The controller answers it as in flight, to the last bit: it never sees the truth."""
+    plan = FlightPlan(faults=FAULTS, duration=0.4, sensors="fine", navigation="filtered")
+    simulate(Flight(plan), tmp_path / "bag")
+    replayed = space_robot("replay", str(tmp_path / "bag"), "--json")
+    assert replayed.returncode == 0, replayed.stderr
