@@ -32,8 +32,8 @@ from .closed_loop import close_loop, measured_ticks
 from .message_loop import MessageLoop
 from .plan import Flight
 
-STRETCH_TICKS = 10_000
-"""Ticks flown between two looks at the world outside."""
+STRETCH_TICKS, STRETCH_OF_MESSAGES = 10_000, 1_000
+"""Ticks flown between two looks at the world outside: in compiled code, message by message."""
 
 
 class Messages:
@@ -221,7 +221,7 @@ def _flown_by_messages(
                 assert messages
                 loop = MessageLoop(flight, messages.record)
                 for tick in range(flight.plant.tick, flight.ticks):
-                    if tick % STRETCH_TICKS == 0:
+                    if tick % STRETCH_OF_MESSAGES == 0:
                         progress(tick)
                     messages.begin_tick(tick)
                     loop.fly_tick()

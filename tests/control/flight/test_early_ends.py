@@ -66,7 +66,7 @@ FLIGHTS: dict[str, tuple[Callable[[], Flight], int, int, type[Exception]]] = {
     # what is flown, states sent, states answered, how it ends
     "diverged": (lambda: flight_of(controller="ctc", gains="printed"), 11, 11, DivergedError),
     "diverged after a swap": (
-        lambda: flight_of(gains="printed", swaps=["1.2:ctc"]), 2409, 2409, DivergedError,
+        lambda: flight_of(gains="printed", swaps=["1.2:ctc"]), 2410, 2410, DivergedError,
     ),
     "not finite": (lambda: failing(130, lambda: np.nan), 131, 131, DivergedError),
     "singular attitude": (
@@ -157,7 +157,7 @@ def test_the_error_has_the_log() -> None:
         simulate(flight_of(gains="printed", swaps=["1.2:ctc"]))
     log = caught.value.log
     assert log is not None
-    assert log.ticks == caught.value.tick == 2409
+    assert log.ticks == caught.value.tick == 2410
     assert log.commanded_torque is not None
     assert np.isfinite(log.commanded_torque).all()
 
