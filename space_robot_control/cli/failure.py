@@ -11,7 +11,7 @@ from space_robot_msgs_py.errors import DivergedError, FlightError, InputError
 if TYPE_CHECKING:
     from ..flight.plan import Flight
 
-FLOWN = ("controller", "case", "gains", "robot", "mission", "period", "swaps", "faults")
+FLOWN = ("controller", "case", "gains", "robot", "mission", "sensors", "period", "swaps", "faults")
 _DIVERGED = re.compile(r"diverged at tick (\d+)")
 
 
