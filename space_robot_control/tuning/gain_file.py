@@ -46,7 +46,8 @@ def gain_files(tuned: Tuned, command: str) -> Mapping[str, str]:
 
 def _numbers(tuned: Tuned, has_estimate: bool) -> Sequence[str]:
     wishes = tuned.wishes
-    lines = [f"W = {tuned.bandwidth:.3g} rad/s; masses wrong by {wishes.mass_uncertainty:.0%}."]
+    bandwidth = tuned.bandwidth if has_estimate else tuned.model_bandwidth
+    lines = [f"W = {bandwidth:.3g} rad/s; masses wrong by {wishes.mass_uncertainty:.0%}."]
     if has_estimate:
         lines += [
             f"Eigenvalues of H_S^-1 h_bar {tuned.smallest:.3g} to {tuned.largest:.3g}: "

@@ -15,9 +15,10 @@
 4. **Bandwidth.** With its low-pass the estimate follows after ``T = delta / w`` and the lag of the
    navigation: an axis gets its wanted acceleration with a pole at ``margin / T`` rad/s in the
    slowest direction. Poles at W on top of it: ``s^3 / p + s^2 + 2 W s + W^2``, whose pair has a
-   damping of 0.7 for ``W = p / 4``. W is lower where computed torque, which multiplies noise of
-   rate and angle by ``H_S (2 W, W^2)``, would exceed the ripple. Ripple and bandwidth both go with
-   margin / T: the margin is had for a low-pass, the bandwidth is paid for in ripple.
+   damping of 0.7 for ``W = p / 4``. Ripple and bandwidth both go with margin / T: the margin is
+   had for a low-pass, the bandwidth is paid for in ripple. Computed torque waits for no estimate.
+   Its W is four times slower than the navigation's lag, at most `MOST_PER_TICK`, and within the
+   ripple: it multiplies noise of rate and angle by ``H_S (2 W, W^2)``.
 5. **Errors of the estimate.** Between two ticks it is off by what it cannot know yet:
    ``h_bar eps = T dF_S/dt + (1 - b) F_S``, with b the share of the torque that is reported, taken
    wrong by half of the margin. F_S is that of inverse dynamics along the mission.
@@ -49,6 +50,8 @@ Array = NDArray[np.float64]
 
 SEPARATION = 4.0
 """How many times faster the estimate is than the poles on top of it; see step 4."""
+MOST_PER_TICK = 0.05
+"""Of a bandwidth times the period, rad: K_D takes a tenth of an error of a rate in a tick."""
 LEAST_WEIGHT = 1e-4
 """Of a low-pass: a corner of 0.03 Hz at 2 kHz."""
 BISECTIONS = 12
@@ -66,7 +69,7 @@ class Wishes:
     mass_uncertainty: float
     """Share by which every mass and inertia may be wrong."""
     bandwidth: float | None = None
-    """rad/s; None: what the estimate's lag allows."""
+    """rad/s, of all laws; None: what lag and ripple allow each."""
     ripple: float = 0.1
     """Share of the largest force of an axis that noise may make of its force, RMS."""
 
@@ -81,7 +84,9 @@ class Tuned:
     delay: float
     """T of step 4, s."""
     bandwidth: float
-    """W, rad/s."""
+    """W of the laws with time-delay estimation, rad/s, and..."""
+    model_bandwidth: float
+    """...of those with a model."""
     smallest: float
     """Smallest and..."""
     largest: float
@@ -118,7 +123,11 @@ def tune(
         weight = _quiet_weight(weight, noise, allowed / h_bar)
     delay = period / weight + (noise.lag if noise else 0.0)
     fastest = margin / delay / SEPARATION
-    bandwidth = wishes.bandwidth or min(fastest, _quiet_bandwidth(inertia, noise, allowed))
+    bandwidth = wishes.bandwidth or fastest
+    quiet = _quiet_bandwidth(inertia, noise, allowed)
+    of_model = wishes.bandwidth or min(quiet, MOST_PER_TICK / period)
+    if noise and noise.lag and not wishes.bandwidth:
+        of_model = min(of_model, 1.0 / SEPARATION / noise.lag)
     if bandwidth > 2.0 * fastest:
         raise InputError(
             f"bandwidth must be at most {2.0 * fastest:.3g} rad/s, half of the pole of an estimate "
@@ -130,10 +139,12 @@ def tune(
     unknown = asked.unknown + share * asked.nominal
     ones = np.ones_like(shape)
     rough = bandwidth * error
-    slope, poles = bandwidth * ones, {"k_p": bandwidth**2 * ones, "k_d": 2.0 * bandwidth * ones}
+    slope, poles = bandwidth * ones, _critical(bandwidth * ones)
     gains = {
-        "ctc": poles,
-        "ctc_smc": {"lambda": slope, "g": unknown, "delta": unknown / (bandwidth * layer)},
+        "ctc": _critical(of_model * ones),
+        "ctc_smc": {
+            "lambda": of_model * ones, "g": unknown, "delta": unknown / (of_model * layer)
+        },
         "tde_smc": {"h_bar": h_bar, "lambda": slope, "g": gap},
         "tde_tsmc": {"h_bar": h_bar, **poles, "k_1": np.sqrt(rough)},
         "tde_stc": {
@@ -146,9 +157,14 @@ def tune(
     }
     corner = float(significant(low_pass_corner(weight, period)))
     return Tuned(
-        wishes, corner, delay, bandwidth, size * low, size * high, error,
+        wishes, corner, delay, bandwidth, of_model, size * low, size * high, error,
         rounded,
     )  # fmt: skip
+
+
+def _critical(bandwidth: Array) -> dict[str, Array]:
+    """Return K_P and K_D with both poles at ``bandwidth`` (m,), rad/s."""
+    return {"k_p": bandwidth**2, "k_d": 2.0 * bandwidth}
 
 
 def axis_inertia(inertia: Array) -> Array:

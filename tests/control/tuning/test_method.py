@@ -54,8 +54,11 @@ def test_the_margin_is_left_with_the_worst_masses(robot: str, margin: float, sha
 def test_poles_are_those_of_the_bandwidth() -> None:
     found = tuned(Wishes(0.05, 0.2))
     assert found.bandwidth == pytest.approx(0.05 / found.delay / 4.0)
-    roots = np.roots([1.0, *(float(found.gains["ctc"][name][0]) for name in ("k_d", "k_p"))])
-    assert np.abs(roots) == pytest.approx([found.bandwidth] * 2, rel=0.01)
+    for law, bandwidth in (("tde_tsmc", found.bandwidth), ("ctc", found.model_bandwidth)):
+        roots = np.roots([1.0, *(float(found.gains[law][name][0]) for name in ("k_d", "k_p"))])
+        assert np.abs(roots) == pytest.approx([bandwidth] * 2, rel=0.02)
+    assert found.model_bandwidth == pytest.approx(0.05 / PERIOD)
+    assert tuned(Wishes(0.05, 0.2), lag=0.02).model_bandwidth == pytest.approx(12.5)
     # with the lag of the estimate, a pole at margin / T
     pole = 0.05 / found.delay
     slow = np.roots([1.0 / pole, 1.0, 2.0 * found.bandwidth, found.bandwidth**2])
@@ -72,7 +75,7 @@ def test_conditions_of_the_laws_hold() -> None:
     np.testing.assert_allclose(smc["g"], smc["h_bar"] * found.error, rtol=0.02)
     inertia = scene()[0]
     inside = eigenvalues(0.8 * inertia, layer["g"] / layer["delta"])  # s fades with these, 1/s
-    assert inside.max() == pytest.approx(found.bandwidth, rel=0.02)
+    assert inside.max() == pytest.approx(found.model_bandwidth, rel=0.02)
 
 
 def test_a_lag_of_the_navigation_makes_it_slower_not_weaker() -> None:
