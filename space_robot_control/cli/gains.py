@@ -72,7 +72,7 @@ def check(as_json: bool, **options: Any) -> None:
 )  # fmt: skip
 @click.option(
     "--bandwidth", type=click.FloatRange(0.0, 1e4, min_open=True), metavar="W",
-    help="Poles of all laws, rad/s [default: a quarter of the estimate's].",
+    help="Poles of all laws, rad/s [default: what lag and ripple allow].",
 )  # fmt: skip
 @click.option(
     "--ripple", type=click.FloatRange(0.0, 10.0, min_open=True), default=0.1, show_default=True,
