@@ -17,7 +17,7 @@ from ..controller.gains import available_laws
 from ..flight.node_settings import FlightSettings
 from ..flight.plan import Flight, FlightPlan
 from ..flight.simulate import simulate
-from ..tuning.gain_check import GainCheck, check_gains
+from ..tuning.gain_check import GainCheck, check_gains, pair_corner
 from ..tuning.inertia import inertia_along
 
 Array = NDArray[np.float64]
@@ -58,7 +58,7 @@ def checked(options: dict[str, Any]) -> Checked:
     if abs(quaternion[0]) <= SINGULAR_ETA:
         raise InputError("base_quaternion: turned by 180 degrees, where the laws are singular")
     inertia = inertia_along(flight.plant.robot, flight.mission_settings)
-    corner = flight.controller_settings.acceleration_filter_hz
+    corner = pair_corner(flight.controller_settings)
     checks = [check_gains(law, inertia, quaternion, corner) for law in laws]
     ripple: dict[str, Array | None] = {}
     if flight.plant_settings.sensors != "ideal":

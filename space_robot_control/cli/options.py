@@ -260,10 +260,11 @@ def plan_flight(**options: Any) -> Flight:
 
 def remark_on_gains(flight: Flight) -> None:
     """Say on standard error if the gains leave the time-delay estimate too little margin."""
+    from ..tuning.gain_check import pair_corner
     from ..tuning.warning import margin_remarks
 
     flown = [flight.law, *(law for _, law in flight.swaps)]
-    corner = flight.controller_settings.acceleration_filter_hz
+    corner = pair_corner(flight.controller_settings)
     remarks = margin_remarks(flown, flight.plant.robot, flight.mission_settings, corner)
     for remark in remarks:
         click.echo(remark, err=True)

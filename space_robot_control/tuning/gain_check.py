@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..controller.navigation.low_pass import low_pass_weight
+from ..controller.settings import ControllerNodeSettings
 from ..laws import ControlLaw
 from .inertia import attitude_jacobian
 from .spectrum import Spectrum, spectrum
@@ -45,6 +46,19 @@ class GainCheck:
         return self.spectrum is None or self.spectrum.is_sound
 
 
+def pair_corner(settings: ControllerNodeSettings) -> float:
+    """Return the corner, Hz, of a low-pass that all of the time-delay pair passes (0: none).
+
+    A navigation filter lets rates and torques lag alike, and so does the pair's own low-pass.
+    """
+    corners = [settings.acceleration_filter_hz]
+    if settings.navigation == "filtered":
+        own = settings.navigation_filter
+        both = (own.rate_filter_hz, own.joint_bandwidth_hz)
+        corners.append(max(both) if min(both) > 0.0 else 0.0)
+    return min((corner for corner in corners if corner > 0.0), default=0.0)
+
+
 def check_gains(
     law: ControlLaw, inertia: Array, quaternion: Array, acceleration_filter_hz: float = 0.0
 ) -> GainCheck:
@@ -54,7 +68,7 @@ def check_gains(
         law: with its gains and period.
         inertia: (K, m, m) H_S in the configurations that count.
         quaternion: (4,) attitude that the base holds in all of them.
-        acceleration_filter_hz: corner of the low-pass of the time-delay pair (0: none).
+        acceleration_filter_hz: see `pair_corner`.
     """
     weight = low_pass_weight(acceleration_filter_hz, law.period) or 1.0
     found = spectrum(inertia, law.h_bar, weight) if law.h_bar.size else None

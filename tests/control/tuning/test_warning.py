@@ -6,7 +6,9 @@ import time
 
 import pytest
 
+from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.tuning.gain_check import pair_corner
 from space_robot_control.tuning.warning import margin_remarks
 
 
@@ -56,3 +58,18 @@ def test_nobody_waits_for_it(robot: str) -> None:
     began = time.thread_time()
     margin_remarks([flight.law], flight.plant.robot, flight.mission_settings)
     assert time.thread_time() - began < 0.1  # 10 ms on an idle machine
+
+
+@pytest.mark.parametrize(
+    ("own", "given", "corner"),
+    [
+        ("direct", {}, 0.0),
+        ("direct", {"acceleration_filter_hz": 50.0}, 50.0),
+        ("filtered", {}, 150.0),  # rates 100, joints 150 Hz: what passes the faster one
+        ("filtered", {"acceleration_filter_hz": 50.0}, 50.0),
+        ("filtered", {"navigation_filter.rate_filter_hz": 0.0}, 0.0),
+    ],
+)
+def test_what_filters_the_pair_counts(own: str, given: dict[str, float], corner: float) -> None:
+    settings = ControllerNodeSettings.resolve({"navigation": own, **given})
+    assert pair_corner(settings) == corner
