@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from .options import OPTIONS
+
+if TYPE_CHECKING:
+    from ..controller.navigation.settings import Mode
 
 
 @click.command()
@@ -36,11 +39,12 @@ from .options import OPTIONS
     help="Only the gains each law flies by default, and figures as SVG only: half the time.",
 )
 @OPTIONS["sensors"]
+@OPTIONS["navigation"]
 @click.option("--jobs", type=click.IntRange(1, 256), help="Processes [default: one a core].")
 @click.option("--json", "as_json", is_flag=True, help="Print table_v.json.")
 def reproduce(
     out: Path, only: tuple[str, ...], duration: float | None, brief: bool, sensors: str,
-    jobs: int | None, as_json: bool,
+    navigation: Mode | None, jobs: int | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Fly Table V of the paper and compare: tables, Figures 5 to 9, one page with it all.
 
@@ -58,7 +62,7 @@ def reproduce(
     from ..campaign.processes import cores
     from ..flight.compilation import compile_kernels
     from ..flight.progress import counting_progress
-    from ..paper.reproduction.flights import ROWS, Row
+    from ..paper.reproduction.flights import ROWS, Row, Sight
     from ..paper.reproduction.reproduce import check_folder
     from ..paper.reproduction.reproduce import reproduce as run
 
@@ -68,8 +72,8 @@ def reproduce(
     compile_kernels()
     with counting_progress("flights") as progress:
         record = run(
-            rows, out, duration=duration, brief=brief, sensors=sensors, jobs=jobs or cores(),
-            progress=progress,
+            rows, out, duration=duration, brief=brief,
+            sight=Sight(sensors, navigation or "direct"), jobs=jobs or cores(), progress=progress,
         )  # fmt: skip
     if as_json:
         click.echo(json.dumps(record, indent=1))

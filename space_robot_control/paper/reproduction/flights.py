@@ -14,6 +14,7 @@ from ...analysis.figures import control_results
 from ...analysis.figures.figure_set import FigureFolder
 from ...analysis.metrics import Chatter, Rms, of_log
 from ...analysis.plot_series import BaseTorque
+from ...controller.navigation.settings import Mode
 from ...flight.plan import Flight, FlightPlan
 from ...flight.simulate import simulate
 from .table_v import PRINTED
@@ -76,6 +77,17 @@ class Row:
 ROWS = tuple(Row(controller, case) for controller, case in PRINTED)
 
 
+class Sight(NamedTuple):
+    """What the laws see of the truth: Table V's see all of it."""
+
+    sensors: str = "ideal"
+    """Of config/sensors, or a path."""
+    navigation: Mode = "direct"
+
+
+PERFECT = Sight()
+
+
 class Planned(NamedTuple):
     """A row in one variant."""
 
@@ -121,14 +133,16 @@ class Result:
 
 
 def fly(
-    planned: Planned, duration: float | None, figures: FigureFolder | None, sensors: str = "ideal"
-) -> Result:
+    planned: Planned, duration: float | None, figures: FigureFolder | None,
+    sight: Sight = PERFECT,
+) -> Result:  # fmt: skip
     """Fly one row in one variant; if it is shown it is also drawn into ``figures``."""
     row, variant, _ = planned
     flight = Flight(
         FlightPlan(
             controller=row.controller, case=row.case, gains=variant.gains, robot=ROBOT,
-            friction=variant.friction, duration=duration, sensors=sensors,
+            friction=variant.friction, duration=duration, sensors=sight.sensors,
+            navigation=None if sight.navigation == "direct" else sight.navigation,
         )
     )  # fmt: skip
     told = parameters(flight)
@@ -149,8 +163,10 @@ def fly(
 
 def parameters(flight: Flight) -> dict[str, Any]:
     """Return all that plant, controller and mission are told in a flight."""
+    navigation = flight.controller_settings.filter_settings
     return {
         "period_s": flight.period,
+        "navigation": navigation.model_dump() if navigation else "direct",
         "plant": flight.plant_settings.model_dump(exclude={"mission", "wait_for"}),
         "gains": flight.gains_used,
         "mission": {

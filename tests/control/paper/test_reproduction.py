@@ -20,6 +20,7 @@ from space_robot_control.paper.reproduction.flights import (
     Planned,
     Result,
     Row,
+    Sight,
     Variant,
     fly,
     plan,
@@ -90,12 +91,14 @@ def test_tde_smc_chatters_as_the_prototype_did(time_delay_flights: list[Result])
 def test_rows_fly_with_sensors_that_are_not_ideal() -> None:
     """And with the ideal ones if none are named."""
     planned = Planned(Row("tde_stc", "1"), Variant("printed", True), shown=False)
-    ideal, noisy = fly(planned, 0.05, None), fly(planned, 0.05, None, "white_l1")
+    ideal, noisy = fly(planned, 0.05, None), fly(planned, 0.05, None, Sight("white_l1", "filtered"))
     told = [result.parameters["plant"] for result in (ideal, noisy)]
     assert [(plant["sensors"], plant["gyro"]["noise"]) for plant in told] == [
         ("ideal", 0.0),
         ("white_l1", 1e-6),
     ]
+    assert ideal.parameters["navigation"] == "direct"
+    assert noisy.parameters["navigation"]["tracker_across"] == 1e-5
     assert ideal.rms != noisy.rms
     result = CliRunner().invoke(cli, ["reproduce", "--sensors", "best"])
     assert isinstance(result.exception, InputError)
