@@ -109,3 +109,21 @@ def test_the_first_difference_of_the_page_on_replay_is_that_of_the_two_gains(
         pytest.approx(replayed[1, first], rel=1e-9),
         pytest.approx(difference, abs=0.005e-6),
     ]
+
+
+def test_the_page_on_real_spacecraft_has_what_its_commands_give(tmp_path: Path) -> None:
+    """Two laws' rows of the first table, by its two commands."""
+    three = tmp_path / "three"
+    tune = "gains tune --case 1 --case 4-2 --sensors fine --navigation filtered --bandwidth 3 -o"
+    run(*tune.split(), str(three))
+    sweep = "sweep --navigation filtered --case 3 --draws 9 --spread 0.2 --sensors fine --json"
+    laws = ("ctc", "tde_stc")
+    report = json.loads(run(*sweep.split(), *(f"--law={law}={three}" for law in laws)))
+    page = (ROOT / "docs/explanation/real_spacecraft.md").read_text("utf-8")
+    names = ("attitude", "joints_1_3", "joints_4_6", "ripple_base_torque", "ripple_torque_4_6")
+    for cell in report["cells"]:
+        row = re.search(rf"^\| fine \| {cell['controller']} \|(.*)\|$", page, re.MULTILINE)
+        assert row is not None
+        shown = [float(text) for text in row.group(1).split("|")]
+        found = [cell["metrics"][name]["median"] for name in names]
+        np.testing.assert_allclose(shown, found, rtol=0.06)
