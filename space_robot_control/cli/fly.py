@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from .options import OPTIONS, flight_options, plan_flight, remark_on_gains
+from .options import OPTIONS, flight_options, plan_flight, remarks_on_gains
 
 
 @click.command()
@@ -56,9 +56,8 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     flight = plan_flight(**options)
     bag = bag or default_bag(flight)
     check_bag_path(bag)
-    remark_on_gains(flight)
     try:
-        report = fly_graph(flight, bag, analyze)
+        report = fly_graph(flight, bag, analyze, remarks_on_gains(flight))
     except FlightError as error:
         if as_json:
             echo_json(failed_report(flight, bag, error, report_of(bag)))

@@ -258,16 +258,14 @@ def plan_flight(**options: Any) -> Flight:
     return Flight(validate(FlightPlan, options, "options"))
 
 
-def remark_on_gains(flight: Flight) -> None:
-    """Say on standard error if the gains leave the time-delay estimate too little margin."""
+def remarks_on_gains(flight: Flight) -> list[str]:
+    """Return what there is to say of gains that leave the time-delay estimate too little margin."""
     from ..tuning.gain_check import pair_corner
     from ..tuning.warning import margin_remarks
 
     flown = [flight.law, *(law for _, law in flight.swaps)]
     corner = pair_corner(flight.controller_settings)
-    remarks = margin_remarks(flown, flight.plant.robot, flight.mission_settings, corner)
-    for remark in remarks:
-        click.echo(remark, err=True)
+    return margin_remarks(flown, flight.plant.robot, flight.mission_settings, corner)
 
 
 OUTPUT = file_option("--output", help="File to write the JSON to as well.")

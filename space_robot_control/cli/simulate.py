@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from .options import OPTIONS, flight_options, plan_flight, remark_on_gains
+from .options import OPTIONS, flight_options, plan_flight, remarks_on_gains
 
 
 @click.command()
@@ -43,7 +43,8 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
         check_bag_path(bag)
         if remark := room_remark(flight, bag):
             click.echo(remark, err=True)
-    remark_on_gains(flight)
+    for remark in remarks_on_gains(flight):
+        click.echo(remark, err=True)
     compile_kernels()
     period, analysis, began = flight.period, Analysis(), time.monotonic()
     with flight_progress(flight.ticks * period, flight.controller.law.name) as show:

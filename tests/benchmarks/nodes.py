@@ -138,7 +138,7 @@ class TimedControllerLoop(ControllerLoop):
         if self.is_empty:
             empty_controller(self._controller)
         watch.attach(self._controller, "update", "update controller")
-        watch.attach(self._commands, "encode", "encode command")
+        watch.attach(self._answering, "encode", "encode command")
         watch.attach(self._command_out, "publish", "publish command")
 
     def close(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,10 @@ COMPOSED_DRAIN_S = 0.002
 
 
 def fly(
-    flight: Flight, bag: Path, analyze: Callable[[FlightLog], dict[str, Any]]
+    flight: Flight,
+    bag: Path,
+    analyze: Callable[[FlightLog], dict[str, Any]],
+    remarks: Iterable[str] = (),
 ) -> dict[str, Any]:
     """Fly on a ROS 2 graph and return the report of the recorded bag.
 
@@ -44,6 +47,7 @@ def fly(
         flight: a checked plan.
         bag: the folder to record to.
         analyze: makes the report of the recorded flight.
+        remarks: on the flight, said once it can begin.
 
     Raises:
         InputError: the bag cannot be made, or the domain is taken.
@@ -58,6 +62,8 @@ def fly(
         begin = time.monotonic()
         try:
             _say(f"flying on ROS_DOMAIN_ID={domain}, recording to {bag}")
+            for remark in remarks:
+                _say(remark)
             parameters = flight_parameters(flight, bag)
             with Graph(_commands(flight, parameters), node_environment(domain)) as graph:
                 what_happened = follow(graph, flight, parameters, domain, stopped)

@@ -21,7 +21,7 @@ from space_robot_msgs_py.bag.reader import read_flight
 @pytest.fixture(scope="module", params=["paper", "seven_joint"])
 def bag(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("bags") / request.param
-    simulate(Flight(FlightPlan(robot=request.param, duration=0.1)), folder)
+    simulate(Flight(FlightPlan(robot=request.param, duration=0.1, sensors="fine")), folder)
     return folder
 
 
