@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import State
 
 from ..faults.schedule import PartFault
@@ -43,13 +44,17 @@ class Sensors(Record):
             InputError: they do not fit one another or the period.
         """
         sensors = cls.allocate(n)
-        assign(
-            sensors,
-            star_tracker=StarTracker.build(n, settings.star_tracker, period, truth),
-            gyro=Gyro.build(n, settings.gyro, period, truth),
-            encoders=Encoders.build(n, settings.encoders, period, truth),
-            are_ideal=all(getattr(settings, name) == default for name, default in IDEAL),
-        )
+        try:
+            assign(
+                sensors,
+                star_tracker=StarTracker.build(n, settings.star_tracker, period, truth),
+                gyro=Gyro.build(n, settings.gyro, period, truth),
+                encoders=Encoders.build(n, settings.encoders, period, truth),
+                are_ideal=all(getattr(settings, name) == default for name, default in IDEAL),
+            )
+        except InputError as error:
+            file = getattr(settings, "sensors", "given")  # the plant node's settings name it
+            raise InputError(f"sensors {file}: {error}") from None
         return sensors
 
 

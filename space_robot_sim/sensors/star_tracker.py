@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
@@ -27,6 +27,18 @@ MOST_UNDER_WAY = 64
 """Measurements that have been taken and are not released yet."""
 
 
+def has_direction(vector: list[float]) -> list[float]:
+    """Return ``vector`` if it can be made a unit vector.
+
+    Raises:
+        ValueError: it is far too short or too long.
+    """
+    norm = float(np.linalg.norm(vector))
+    if not 1e-3 <= norm <= 1e3:
+        raise ValueError(f"the norm must be near 1, not {norm:g}")
+    return vector
+
+
 class StarTrackerSettings(StrictModel):
     """A star tracker; by default without error, at every tick."""
 
@@ -34,9 +46,9 @@ class StarTrackerSettings(StrictModel):
         0.0, description="standard deviation about each axis across the boresight, rad"
     )
     noise_about: Angle = Field(0.0, description="standard deviation about the boresight, rad")
-    boresight: Annotated[list[float], Field(min_length=3, max_length=3)] = Field(
-        [0.0, 0.0, 1.0], description="axis of its optics in the base frame"
-    )
+    boresight: Annotated[
+        list[float], Field(min_length=3, max_length=3), AfterValidator(has_direction)
+    ] = Field([0.0, 0.0, 1.0], description="axis of its optics in the base frame")
     rate: Annotated[float, Field(ge=0.0, le=1e5)] = Field(
         0.0, description="measurements a second, to a whole number of ticks (0: one a tick)"
     )
@@ -86,9 +98,6 @@ class StarTracker(Record):
         Raises:
             InputError: the settings do not fit one another or the period.
         """
-        norm = float(np.linalg.norm(settings.boresight))
-        if not 1e-3 <= norm <= 1e3:
-            raise InputError(f"star_tracker.boresight must have a norm near 1, got {norm:g}")
         if settings.rate * period > 1.0 + 1e-9:
             raise InputError(
                 f"star_tracker.rate must be at most one measurement a tick, "
@@ -104,8 +113,8 @@ class StarTracker(Record):
         tracker = cls.allocate(n)
         assign(
             tracker, sigma=[settings.noise_across, settings.noise_about], step=settings.step,
-            boresight=np.array(settings.boresight) / norm, interval=interval, delay=delay,
-            held=truth.quaternion,
+            boresight=np.array(settings.boresight) / np.linalg.norm(settings.boresight),
+            interval=interval, delay=delay, held=truth.quaternion,
         )  # fmt: skip
         return tracker
 
