@@ -117,9 +117,9 @@ class Plant:
         self._is_ideal = bool(sensors.are_ideal)
         self.measures_truth = (
             self._is_ideal and reports_given(memory.actuators)
-            and not self._part_faults.are_in("actuators")
+            and not self._part_faults.are_in("actuators") and not settings.has_message_faults
         )  # fmt: skip
-        """True if `state` can never differ from `truth`."""
+        """True if what comes of `state` can never differ from `truth`."""
         self._draws = Draws(settings.fault_seed, arrays_of_draws(memory.sensors))
         self.next_change = math.inf
         """The first tick to come that needs `begin_tick`: compiled code may fly up to there."""
