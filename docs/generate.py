@@ -169,7 +169,7 @@ def topic_page() -> str:
 
 def _occasion(topic: topics.Topic) -> str:
     if topic.is_optional:
-        return "each tick, where sensors or actuators err"
+        return "every 20 ticks, where sensors or actuators err"
     return "each tick" if topic.per_tick else "an event" if topic.is_event else "now and then"
 
 

@@ -44,19 +44,18 @@ LAW = Topic(
 )  # fmt: skip
 CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock", 1_000)
 # The truth is sent where what the sensors tell may differ from it; no flight software listens.
-TRUTH_JOINT_STATES = Topic(
-    "/truth/joint_states", "sensor_msgs/msg/JointState", 10_000, per_tick=True, is_optional=True
+TRUTH_JOINTS = Topic(
+    "/truth/joints", "trajectory_msgs/msg/JointTrajectory", 1_000, is_optional=True
 )
-TRUTH_BASE_STATE = Topic(
-    "/truth/base_state", "sensor_msgs/msg/MultiDOFJointState", 10_000,
-    per_tick=True, is_optional=True,
-)  # fmt: skip
+TRUTH_BASE = Topic(
+    "/truth/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 1_000, is_optional=True
+)
 
 ALL = (
     JOINT_STATES, BASE_STATE, COMMAND, REFERENCE_JOINTS, REFERENCE_BASE, TELEMETRY, LAW, CLOCK,
-    TRUTH_JOINT_STATES, TRUTH_BASE_STATE,
+    TRUTH_JOINTS, TRUTH_BASE,
 )  # fmt: skip
 """All that are recorded."""
-TRUTH = (TRUTH_JOINT_STATES, TRUTH_BASE_STATE)
+TRUTH = (TRUTH_JOINTS, TRUTH_BASE)
 BY_NAME = {topic.name: topic for topic in ALL}
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import RobotState
-from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec, TruthCodec
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.stamp_guard import AGREEING
 from space_robot_sim.plant.command_guard import CommandGuard
 from space_robot_sim.plant.exchange import NONE, SentState, exchange_of
@@ -28,12 +28,15 @@ Record = Callable[[topics.Topic, bytes], object]
 class MessageLoop:
     """Flies tick by tick; every message is handed to ``record``, as it is sent."""
 
-    def __init__(self, flight: Flight, record: Record) -> None:
+    def __init__(
+        self, flight: Flight, record: Record, tell_truth: Callable[[RobotState], None]
+    ) -> None:
+        """``tell_truth``: called with every true state that differs from what is told of it."""
         robot, settings = flight.robot, flight.plant_settings
         self._flight, self._plant, self._record = flight, flight.plant, record
+        self._tell_truth = tell_truth
         self._guard = CommandGuard(robot.n + 3, settings.hold_ticks)
         self._states = StateCodec(robot.joint_names, flight.timebase)
-        self._truth = TruthCodec(robot.joint_names, flight.timebase)
         self._commands = CommandCodec(robot.axis_names, flight.timebase)
         self._exchange = exchange_of(settings, robot, flight.period, self._states, self._guard)
         self._references = ReferenceBuffer(robot.n)
@@ -58,9 +61,7 @@ class MessageLoop:
             self._record(topics.BASE_STATE, sent.base)
             self._deliver(sent, tick)
         if not plant.measures_truth:
-            joints, base = self._truth.encode(plant.truth)
-            self._record(topics.TRUTH_JOINT_STATES, joints)
-            self._record(topics.TRUTH_BASE_STATE, base)
+            self._tell_truth(plant.truth)
         self._exchange.end(tick)
         plant.step(self._guard.act(tick))
 

@@ -20,12 +20,13 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.samples import Command, LawInForce
+from space_robot_msgs_py.samples import Command, LawInForce, RobotState
 from space_robot_msgs_py.wire.clock import ClockCodec
-from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec, TruthCodec
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.controller_law import LawCodec
 from space_robot_msgs_py.wire.controller_telemetry import SIGNALS, TelemetryCodec
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
+from space_robot_msgs_py.wire.truth_writer import TruthWriter
 
 from ..controller.law_changes import LawChanges
 from .closed_loop import close_loop, measured_ticks
@@ -43,7 +44,7 @@ class Messages:
         robot, timebase = flight.robot, flight.timebase
         self.record, self._flight = recorder.record, flight
         self._states = StateCodec(robot.joint_names, timebase)
-        self._truth = TruthCodec(robot.joint_names, timebase)
+        self._truth = TruthWriter(robot.joint_names, timebase)
         self._commands = CommandCodec(robot.axis_names, timebase)
         self._references = ReferenceCodec(robot.joint_names, timebase)
         self._telemetry = TelemetryCodec(robot.axis_names)
@@ -61,6 +62,16 @@ class Messages:
         if tick % flight.plant_settings.clock_decimation == 0:
             self.record(topics.CLOCK, self._clock.encode(flight.timebase.stamp_ns(tick)))
 
+    def tell_truth(self, state: RobotState) -> None:
+        """Write the true state of a tick, with some before it."""
+        for message in self._truth.add(state):
+            self.record(*message)
+
+    def end(self) -> None:
+        """Write what is kept back."""
+        for message in self._truth.flush():
+            self.record(*message)
+
     def stretch(self, log: FlightLog, start: int, stop: int, answered: int) -> None:
         """Write what mission, plant and controller send in the ticks ``start`` to ``stop``.
 
@@ -77,9 +88,7 @@ class Messages:
             record(topics.JOINT_STATES, joints)
             record(topics.BASE_STATE, base)
             if told is not log:
-                joints, base = self._truth.encode(log.state(tick))
-                record(topics.TRUTH_JOINT_STATES, joints)
-                record(topics.TRUTH_BASE_STATE, base)
+                self.tell_truth(log.state(tick))
             if tick >= answered:
                 continue
             row = tick - log.first_tick
@@ -100,9 +109,11 @@ def _recording(flight: Flight, bag: Path | None) -> Iterator[Messages | None]:
     recorder = BagRecorder(
         bag, flight.description, flight.timebase, settings.compression, settings.split_size
     )
+    messages = Messages(flight, recorder)
     try:
-        yield Messages(flight, recorder)
+        yield messages
     finally:
+        messages.end()
         recorder.close()
 
 
@@ -219,7 +230,7 @@ def _flown_by_messages(
         try:
             with _recording(flight, path) as messages:
                 assert messages
-                loop = MessageLoop(flight, messages.record)
+                loop = MessageLoop(flight, messages.record, messages.tell_truth)
                 for tick in range(flight.plant.tick, flight.ticks):
                     if tick % STRETCH_OF_MESSAGES == 0:
                         progress(tick)

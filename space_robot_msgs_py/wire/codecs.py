@@ -3,30 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 from ..samples import Command, RobotState, State, Timebase
 from .base_state import BaseState
 from .command import Commands
 from .compiled_codec import CompiledCodec
 from .joint_states import JointStates
-from .truth_base_state import TruthBaseState
-from .truth_joint_states import TruthJointStates
 
 
 class StateCodec:
     """`RobotState` as the pair /joint_states and /base/state."""
 
-    joint_states: ClassVar[type[JointStates]] = JointStates
-    base_state: ClassVar[type[BaseState]] = BaseState
-
     def __init__(self, joint_names: Sequence[str], timebase: Timebase) -> None:
         self._timebase, record = timebase, State.dtype(len(joint_names))
-        self._joints = CompiledCodec(self.joint_states(joint_names, timebase), record)
-        self._base = CompiledCodec(self.base_state(joint_names, timebase), record)
+        self._joints = CompiledCodec(JointStates(joint_names, timebase), record)
+        self._base = CompiledCodec(BaseState(joint_names, timebase), record)
 
     def encode(self, state: RobotState) -> tuple[bytes, bytes]:
-        """The bytes of the joints' and of the base's message."""
+        """The bytes of /joint_states and /base/state."""
         stamp_ns = self._timebase.stamp_ns(state.tick)
         numbers = state.numbers
         return self._joints.encode(stamp_ns, numbers), self._base.encode(stamp_ns, numbers)
@@ -46,13 +40,6 @@ class StateCodec:
             MessageError: the message does not fit.
         """
         return self._timebase.tick(self._base.decode(data, state.numbers))
-
-
-class TruthCodec(StateCodec):
-    """`RobotState` as the pair /truth/joint_states and /truth/base_state."""
-
-    joint_states = TruthJointStates
-    base_state = TruthBaseState
 
 
 class CommandCodec:

@@ -134,6 +134,7 @@ class PlantLoop:
     def stand_down(self) -> None:
         """Leave the actuators at zero, and let the listeners have all that was sent."""
         self._guard.release()
+        self._truth.flush()
         elapsed = time.monotonic() - self._began_at
         flush(self.outputs, FLUSH_S if self.is_complete else STOPPED_FLUSH_S)
         clock, missed = self._wall_clock, self.missed_deadlines

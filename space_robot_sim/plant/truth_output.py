@@ -7,7 +7,7 @@ from rclpy.node import Node
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.endpoints import RawPublisher
 from space_robot_msgs_py.samples import RobotState, Timebase
-from space_robot_msgs_py.wire.codecs import TruthCodec
+from space_robot_msgs_py.wire.truth_writer import Messages, TruthWriter
 
 from .plant import Plant
 
@@ -17,13 +17,21 @@ class TruthOutput:
 
     def __init__(self, node: Node, plant: Plant, timebase: Timebase) -> None:
         """Open the topics, or none."""
-        self._codec = TruthCodec(plant.robot.joint_names, timebase)
-        self.outputs: tuple[RawPublisher, ...] = ()
+        self._writer = TruthWriter(plant.robot.joint_names, timebase)
+        self._outputs: dict[topics.Topic, RawPublisher] = {}
         if not plant.measures_truth:
-            self.outputs = tuple(RawPublisher(node, topic) for topic in topics.TRUTH)
+            self._outputs = {topic: RawPublisher(node, topic) for topic in topics.TRUTH}
+        self.outputs = tuple(self._outputs.values())
 
     def send(self, truth: RobotState) -> None:
-        """Publish both messages; best once the tick's state is out and is being answered."""
+        """Take a tick's truth; best once its state is out and is being answered."""
         if self.outputs:
-            for output, data in zip(self.outputs, self._codec.encode(truth), strict=True):
-                output.publish(data)
+            self._publish(self._writer.add(truth))
+
+    def flush(self) -> None:
+        """Publish what is kept back."""
+        self._publish(self._writer.flush())
+
+    def _publish(self, messages: Messages) -> None:
+        for topic, data in messages:
+            self._outputs[topic].publish(data)

@@ -17,8 +17,8 @@ LISTENERS = {
     topics.TELEMETRY: ("recorder_node",),
     topics.LAW: ("recorder_node",),
     topics.CLOCK: ("mission_node", "recorder_node"),
-    topics.TRUTH_JOINT_STATES: ("recorder_node",),
-    topics.TRUTH_BASE_STATE: ("recorder_node",),
+    topics.TRUTH_JOINTS: ("recorder_node",),
+    topics.TRUTH_BASE: ("recorder_node",),
 }
 """Nodes of the graph that subscribe to each topic."""
 

@@ -25,6 +25,7 @@ from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.samples import STATE_FIELDS
 from space_robot_msgs_py.topics import Topic
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
+from space_robot_msgs_py.wire.truth_writer import CHUNK_TICKS
 
 NOISE = ["noise_attitude@0.01:1e-5", "noise_gyro@0-0.1:1e-6", "noise_joint_position@0:1e-5"]
 FAULTS = [*NOISE, "torque_scale@0.05:joints=0.998"]
@@ -65,7 +66,9 @@ def test_a_bag_has_truth_and_measurement_as_flown(flown: tuple[FlightLog, Path])
     assert_same(recorded, log)
     assert recorded.lost == {topic.name: 0 for topic in topics.ALL}
     assert analyze(recorded) == analyze(log)
-    assert {read_accounts(bag)[topic.name]["received"] for topic in topics.TRUTH} == {TICKS}
+    assert {read_accounts(bag)[topic.name]["received"] for topic in topics.TRUTH} == {
+        TICKS // CHUNK_TICKS
+    }
 
 
 def test_measured_is_what_the_sensors_make_of_the_truth(flown: tuple[FlightLog, Path]) -> None:
@@ -107,19 +110,19 @@ def test_sensors_that_tell_the_truth_need_no_second_word(tmp_path: Path) -> None
 
 
 def test_half_a_truth_is_none(flown: tuple[FlightLog, Path], tmp_path: Path) -> None:
-    log = recorded_anew(flown[1], tmp_path / "bag", lambda t, _: t is not topics.TRUTH_BASE_STATE)
+    log = recorded_anew(flown[1], tmp_path / "bag", lambda t, _: t is not topics.TRUTH_BASE)
     assert log.measured is None
     assert flown[0].measured is not None
     np.testing.assert_array_equal(log.quaternion, flown[0].measured.quaternion)
-    assert any("only /truth/joint_states is there" in text for text in log.damage)
+    assert any("only /truth/joints is there" in text for text in log.damage)
 
 
 def test_a_truth_that_is_missing_is_a_loss(flown: tuple[FlightLog, Path], tmp_path: Path) -> None:
     log = recorded_anew(
-        flown[1], tmp_path / "bag", lambda t, tick: t is not topics.TRUTH_BASE_STATE or tick != 7
+        flown[1], tmp_path / "bag", lambda t, tick: t is not topics.TRUTH_BASE or tick != 60
     )
-    assert log.lost["/truth/base_state"] == 1
-    assert np.flatnonzero(~log.whole).tolist() == [7]
+    assert log.lost["/truth/base"] == 1
+    assert np.flatnonzero(~log.whole).tolist() == [*range(60, 80)]
     assert log.damage
 
 

@@ -45,7 +45,7 @@ def test_a_node_waits_for_listeners_to_what_it_sends_alone() -> None:
         (
             PlantNodeSettings,
             "recorder_node:/command",
-            "/joint_states, /base/state, /clock, /truth/joint_states, /truth/base_state",
+            "/joint_states, /base/state, /clock, /truth/joints, /truth/base",
         ),
         (ControllerNodeSettings, "plant_node:", "/command, /controller/telemetry, /controller/law"),
     ):

@@ -1,0 +1,45 @@
+"""/truth/base: the base as it truly moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from .. import topics
+from ..errors import MessageError
+from ..samples import Timebase
+from .base_state import WXYZ, XYZ
+from .message import Column, Run
+from .trajectory import Trajectory
+
+
+class TruthBase(Trajectory):
+    """A trajectory_msgs/MultiDOFJointTrajectory of one body, without accelerations."""
+
+    topic = topics.TRUTH_BASE
+    columns = (
+        Column("base_position", 0, 3),
+        Column("quaternion", 0, 4),
+        Column("base_velocity", 0, 3),
+        Column("omega_base", 0, 3),
+    )
+    frame_id = topics.INERTIAL_FRAME
+
+    def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
+        """``names``: those of the joints do not matter here."""
+        super().__init__([topics.BASE_FRAME], timebase)
+
+    def point(self) -> Mapping[str, Any]:
+        """One body."""
+        return {"transforms": [{}], "velocities": [{}]}
+
+    def point_runs(self, point: Any, order: Sequence[int]) -> Iterable[Run]:
+        """Pose; velocity on inertial axes, angular velocity on base axes."""
+        if not len(point.transforms) == len(point.velocities) == 1:
+            raise MessageError(f"{self.topic.name}: a point lacks pose or velocity", "size")
+        return (
+            Run("transforms[0].translation", XYZ),
+            Run("transforms[0].rotation", WXYZ),
+            Run("velocities[0].linear", XYZ),
+            Run("velocities[0].angular", XYZ),
+        )

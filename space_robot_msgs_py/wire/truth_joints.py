@@ -1,0 +1,46 @@
+"""/truth/joints: the controlled axes as they truly move, and the torques truly given to them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from .. import topics
+from ..errors import MessageError
+from ..samples import Timebase
+from .message import Column, Run
+from .trajectory import Trajectory
+
+FIELDS = ("positions", "velocities", "effort")
+
+
+class TruthJoints(Trajectory):
+    """A trajectory_msgs/JointTrajectory of base x, y, z and the joints, as in /command.
+
+    The base's positions are the vector part of its quaternion, its velocities are on base axes.
+    """
+
+    topic = topics.TRUTH_JOINTS
+
+    def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
+        """``names``: of the joints."""
+        n = len(names)
+        super().__init__((*topics.BASE_AXES, *names), timebase)
+        self.columns = (
+            Column("quaternion", 1, 3),
+            Column("joint_positions", 0, n),
+            Column("omega_base", 0, 3),
+            Column("joint_velocities", 0, n),
+            Column("applied_torque", 0, n + 3),
+        )
+
+    def point(self) -> Mapping[str, Any]:
+        """A number an axis of each field."""
+        return dict.fromkeys(FIELDS, [0.0] * len(self.names))
+
+    def point_runs(self, point: Any, order: Sequence[int]) -> Iterable[Run]:
+        """Positions, velocities, effort, each in the order of our names."""
+        for field in FIELDS:
+            if len(getattr(point, field)) != len(order):
+                raise MessageError(f"{self.topic.name}: a point lacks {field} of some axis", "size")
+            yield Run(field, order)
