@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mujoco
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
+from random_robots import State
 from scipy.spatial.transform import Rotation
 
-if TYPE_CHECKING:
-    from random_robots import State
-
-    from space_robot_sim.robot import Robot
+from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -93,6 +91,16 @@ def pinocchio_mass_matrix(robot: Robot, state: State, position: ArrayLike = (0, 
     upper = np.triu(pin.crba(model, model.createData(), pinocchio_state(state, position)[0]))
     to_base = to_base_axes(state.quaternion, robot.n + 6)
     return to_base.T @ (upper + np.triu(upper, 1).T) @ to_base
+
+
+def rho_space_inertia(robot: Robot, quaternion: Array, theta: Array) -> Array:
+    """H_S by Pinocchio, (25) and the elimination of the base's translation."""
+    zero = np.zeros(3)
+    h = pinocchio_mass_matrix(robot, State(quaternion, theta, zero, zero, 0.0 * theta))
+    reduced = h[3:, 3:] - h[3:, :3] @ np.linalg.solve(h[:3, :3], h[:3, 3:])
+    inverse = np.eye(robot.n + 3)
+    inverse[:3, :3] = np.linalg.inv(attitude_jacobian_inertial(quaternion))
+    return inverse.T @ reduced @ inverse
 
 
 def pinocchio_bias_force(robot: Robot, state: State, position: ArrayLike = (0, 0, 0)) -> Array:

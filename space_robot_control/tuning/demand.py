@@ -16,7 +16,7 @@ from space_robot_sim.environment.payload import with_payload
 from space_robot_sim.robot import Robot
 
 from ..mission.mission import MissionSettings
-from .inertia import SAMPLING, attitude_jacobian, sampled_mission
+from .inertia import SAMPLING, attitude_jacobian, sampled_reference
 
 Array = NDArray[np.float64]
 
@@ -63,9 +63,8 @@ def _smooth_force(
     robot: Robot, settings: MissionSettings, case: EnvironmentSettings | None = None
 ) -> Array:
     """Return F_S (K, m) every `SAMPLING` s, without Coulomb friction."""
-    mission = sampled_mission(robot, settings)
-    count = int(np.ceil(mission.duration / SAMPLING - 1e-9)) + 1
-    chunk = mission.chunk(0, count)
+    chunk = sampled_reference(robot, settings)
+    count = len(chunk.joints)
     quaternion, still = chunk.base[0, :4], np.zeros(3)
     to_force = np.linalg.inv(attitude_jacobian(quaternion)).T
     rotation, model = np.empty((3, 3)), RhoSpaceModel.allocate(robot.n)
@@ -83,8 +82,7 @@ def _smooth_force(
 
 
 def _coulomb(robot: Robot, settings: MissionSettings, case: EnvironmentSettings) -> Array:
-    mission = sampled_mission(robot, settings)
-    count = int(np.ceil(mission.duration / SAMPLING - 1e-9)) + 1
-    force = np.zeros((count, robot.n + 3))
-    force[:, 3:] = case.friction.coulomb * np.sign(mission.chunk(0, count).joints[:, 1])
+    rates = sampled_reference(robot, settings).joints[:, 1]
+    force = np.zeros((len(rates), robot.n + 3))
+    force[:, 3:] = case.friction.coulomb * np.sign(rates)
     return force

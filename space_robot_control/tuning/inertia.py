@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.samples import ReferenceChunk
 from space_robot_sim.robot import Robot
 
 from ..mission.mission import Mission, MissionSettings
@@ -25,13 +26,16 @@ SAMPLING = 0.05
 """s between two configurations looked at; a leg of a mission takes seconds."""
 
 
-def sampled_mission(robot: Robot, settings: MissionSettings, step: float = SAMPLING) -> Mission:
-    """Return the mission in ticks of ``step`` s, to be looked at rather than flown.
+def sampled_reference(
+    robot: Robot, settings: MissionSettings, step: float = SAMPLING
+) -> ReferenceChunk:
+    """Return the whole reference of a mission every ``step`` s, its last waypoint included.
 
     Raises:
         InputError: the waypoints do not fit the times or the joints.
     """
-    return Mission(robot.n, settings, step)
+    mission = Mission(robot.n, settings, step)
+    return mission.chunk(0, int(np.ceil(mission.duration / step - 1e-9)) + 1)
 
 
 def inertia_along(robot: Robot, settings: MissionSettings, step: float = SAMPLING) -> Array:
@@ -45,8 +49,7 @@ def inertia_along(robot: Robot, settings: MissionSettings, step: float = SAMPLIN
     Raises:
         InputError: the waypoints do not fit the times or the joints.
     """
-    mission = sampled_mission(robot, settings, step)
-    chunk = mission.chunk(0, int(np.ceil(mission.duration / step - 1e-9)) + 1)
+    chunk = sampled_reference(robot, settings, step)
     return inertia_in_rho(chunk.base[0, :4], semi_floating_inertia(robot, chunk.joints[:, 0]))
 
 

@@ -37,6 +37,16 @@ class MeasuredStates:
     applied_torque: Array
     """(N, n+3) N m, reported for the interval that ended at the tick; base frame, then joints."""
 
+    @classmethod
+    def of(cls, log: FlightLog) -> MeasuredStates:
+        """Return the state columns of ``log`` themselves, not copies."""
+        return cls(*(getattr(log, name) for name in STATE_FIELDS))
+
+    @classmethod
+    def unknown(cls, log: FlightLog) -> MeasuredStates:
+        """Return columns of NaN, as many rows as ``log`` has."""
+        return cls.of(log).each(lambda _, column: np.full_like(column, np.nan))
+
     @property
     def angular_velocity(self) -> Array:
         """(N, 3) rad/s, base frame; the same as ``omega_base``."""
@@ -178,8 +188,7 @@ class FlightLog:
 
     def measure_apart(self) -> None:
         """Make room, NaN, for what the sensors tell and the law believes beside the truth."""
-        states = MeasuredStates(*(getattr(self, name) for name in STATE_FIELDS))
-        self.measured = states.each(lambda _, column: np.full_like(column, np.nan))
+        self.measured = MeasuredStates.unknown(self)
         self.believed_error = np.full_like(self.applied_torque, np.nan)
 
     def as_measured(self) -> FlightLog:

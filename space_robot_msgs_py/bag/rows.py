@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .. import topics
 from ..errors import MessageError
-from ..samples import STATE_FIELDS, LawInForce, Timebase, in_order
+from ..samples import LawInForce, Timebase, in_order
 from ..wire.controller_law import LawCodec
 from ..wire.controller_telemetry import SIGNALS
 from ..wire.message import description
@@ -125,7 +125,7 @@ class Rows:
             self._apart = None
         if self._apart is None:
             return
-        told = MeasuredStates(*(getattr(self.log, name) for name in STATE_FIELDS))
+        told = MeasuredStates.of(self.log)
         for name, column in self._apart.columns.items():
             setattr(self.log, name, column)
         self.log.measured = self._apart = told
@@ -178,7 +178,7 @@ class Rows:
         places, rows = _by_place(ticks, rows, self._rows)
         target: FlightLog | MeasuredStates = self.log
         if topic in topics.TRUTH:
-            target = self._apart = self._apart or self._room_apart()
+            target = self._apart = self._apart or MeasuredStates.unknown(self.log)
         start = 0
         for name, first, length in columns:
             column = getattr(target, name)
@@ -194,11 +194,6 @@ class Rows:
         sent_ns = batch.publish_ns[which]
         self._sent_ns[topic][ticks] = sent_ns
         self._wall_clock = self._wall_clock or bool(np.any(sent_ns != batch.log_ns[which]))
-
-    def _room_apart(self) -> MeasuredStates:
-        """NaN, as many rows as the log has."""
-        states = MeasuredStates(*(getattr(self.log, name) for name in STATE_FIELDS))
-        return states.each(lambda _, column: np.full_like(column, np.nan))
 
     def _note_errors(self, values: Array) -> None:
         """``values``: (M, ...) the tick, then s, u, N_hat and e of each message, if it is ours."""

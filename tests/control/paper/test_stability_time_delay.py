@@ -9,8 +9,8 @@ import pytest
 import yaml
 from closed_loop import GAINS, H_BAR
 from hypothesis import given, settings
-from oracles import attitude_jacobian_inertial, pinocchio_mass_matrix
-from random_robots import Case, State, cases
+from oracles import rho_space_inertia
+from random_robots import Case, cases
 
 from space_robot_control.analysis.generalised_motion import mean_acceleration
 from space_robot_control.flight.plan import Flight, FlightPlan
@@ -22,17 +22,6 @@ from space_robot_control.paper.stability.time_delay_error import (
 )
 from space_robot_control.tuning.spectrum import contraction_matrix
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_sim import Robot
-
-
-def rho_space_inertia(robot: Robot, quaternion: np.ndarray, theta: np.ndarray) -> np.ndarray:
-    """H_S by Pinocchio, (25) and the elimination of the base's translation."""
-    zero = np.zeros(3)
-    h = pinocchio_mass_matrix(robot, State(quaternion, theta, zero, zero, 0.0 * theta))
-    reduced = h[3:, 3:] - h[3:, :3] @ np.linalg.solve(h[:3, :3], h[:3, 3:])
-    inverse = np.eye(robot.n + 3)
-    inverse[:3, :3] = np.linalg.inv(attitude_jacobian_inertial(quaternion))
-    return inverse.T @ reduced @ inverse
 
 
 def desired(plan: FlightPlan, every: float) -> tuple[Flight, FlightLog]:

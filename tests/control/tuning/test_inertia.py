@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles import attitude_jacobian_inertial, pinocchio_mass_matrix
-from random_robots import State, random_quaternion, random_robot
+from oracles import rho_space_inertia
+from random_robots import random_quaternion, random_robot
 
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.tuning.inertia import (
@@ -15,17 +15,6 @@ from space_robot_control.tuning.inertia import (
     inertia_in_rho,
     semi_floating_inertia,
 )
-from space_robot_sim import Robot
-
-
-def rho_space_inertia(robot: Robot, quaternion: np.ndarray, theta: np.ndarray) -> np.ndarray:
-    """H_S by Pinocchio, (25) and the elimination of the base's translation."""
-    zero = np.zeros(3)
-    h = pinocchio_mass_matrix(robot, State(quaternion, theta, zero, zero, 0.0 * theta))
-    reduced = h[3:, 3:] - h[3:, :3] @ np.linalg.solve(h[:3, :3], h[:3, 3:])
-    inverse = np.eye(robot.n + 3)
-    inverse[:3, :3] = np.linalg.inv(attitude_jacobian_inertial(quaternion))
-    return inverse.T @ reduced @ inverse
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 6, 9]))
