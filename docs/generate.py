@@ -168,6 +168,8 @@ def topic_page() -> str:
 
 
 def _occasion(topic: topics.Topic) -> str:
+    if topic.per_tick and topic.is_optional:
+        return "each tick, where there are any"
     if topic.is_optional:
         return "every 20 ticks, where sensors or actuators err"
     return "each tick" if topic.per_tick else "an event" if topic.is_event else "now and then"

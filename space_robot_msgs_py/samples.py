@@ -6,7 +6,7 @@ float64, allocated once by the owner and overwritten in place.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,8 +15,41 @@ from numpy.typing import NDArray
 
 from .compiled.records import Block, Record, shaped
 from .errors import MessageError
+from .topics import BASE_AXES
 
 Array = NDArray[np.float64]
+
+MOST_WHEELS, MOST_THRUSTERS = 8, 24
+"""The base has no more reaction wheels and thrusters. A state has room for as many, so that their
+number is no part of its layout, and another number compiles nothing anew."""
+
+
+class RobotNames(NamedTuple):
+    """The names that a robot's numbers go by in messages."""
+
+    joints: tuple[str, ...]
+    wheels: tuple[str, ...] = ()
+    thrusters: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, joints: Sequence[str], actuators: Sequence[str], wheel_count: int) -> RobotNames:
+        """Split the names of the base's ``actuators``: wheels come before thrusters."""
+        return cls(tuple(joints), tuple(actuators[:wheel_count]), tuple(actuators[wheel_count:]))
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Those of the controlled axes: base x, y, z, then joints."""
+        return (*BASE_AXES, *self.joints)
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """Those of the base's actuators: wheels, then thrusters."""
+        return (*self.wheels, *self.thrusters)
+
+    @property
+    def commanded(self) -> tuple[str, ...]:
+        """Those of all that a `Command` has a number for."""
+        return (*self.axes, *self.actuators)
 
 
 class Timebase(NamedTuple):
@@ -66,10 +99,19 @@ class State(Record):
     """Joint velocities, rad/s."""
     applied_torque: Array = shaped(lambda n: (n + 3,))
     """Torque applied over the last interval, N m: base x, y, z in the base frame, then joints."""
+    wheel_velocities: Array = shaped(lambda n: (MOST_WHEELS,))
+    """Speeds of the reaction wheels about their axes relative to the base, rad/s; 0 where the base
+    has no wheel."""
+    wheel_torques: Array = shaped(lambda n: (MOST_WHEELS,))
+    """Torques that the motors gave the wheels over the last interval, N m."""
+    thrusts: Array = shaped(lambda n: (MOST_THRUSTERS,))
+    """Forces of the thrusters, means over the last interval, N."""
 
 
-STATE_FIELDS = tuple(State.__annotations__)
-"""Names of the numbers of a state, in their order in memory."""
+ACTUATOR_FIELDS = ("wheel_velocities", "wheel_torques", "thrusts")
+"""Names of the numbers of a state that are of the base's actuators; no sensor spoils them."""
+STATE_FIELDS = tuple(name for name in State.__annotations__ if name not in ACTUATOR_FIELDS)
+"""Names of the others, in their order in memory, before those of the actuators."""
 
 
 class RobotState:
@@ -78,7 +120,7 @@ class RobotState:
     Each field of `State` is an attribute, a view of ``block``, which compiled code reads whole.
     """
 
-    __slots__ = ("block", "numbers", "tick", *STATE_FIELDS)
+    __slots__ = ("block", "numbers", "tick", *STATE_FIELDS, *ACTUATOR_FIELDS)
     base_position: Array
     quaternion: Array
     base_velocity: Array
@@ -86,13 +128,16 @@ class RobotState:
     joint_positions: Array
     joint_velocities: Array
     applied_torque: Array
+    wheel_velocities: Array
+    wheel_torques: Array
+    thrusts: Array
 
     def __init__(self, tick: int, block: Block) -> None:
         """``block``: (1,) array of a `State`."""
         self.tick, self.block = tick, block
         self.numbers: Array = block.view(np.float64)
         """All fields one behind the other, the same memory."""
-        for name in STATE_FIELDS:
+        for name in STATE_FIELDS + ACTUATOR_FIELDS:
             setattr(self, name, block[0][name])
 
     @classmethod
@@ -144,7 +189,8 @@ class Command:
 
     tick: int
     torque: Array
-    """(n+3,) N m: base x, y, z (base frame), then joints."""
+    """(n+3+A,) N m: base x, y, z (base frame), then joints; then what is asked of each actuator of
+    the base: torques of the wheels' motors, N m, and forces of the thrusters, N."""
 
 
 @dataclass(slots=True)

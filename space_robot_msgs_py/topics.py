@@ -31,6 +31,13 @@ class Topic(NamedTuple):
 
 JOINT_STATES = Topic("/joint_states", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
 BASE_STATE = Topic("/base/state", "sensor_msgs/msg/MultiDOFJointState", 10_000, per_tick=True)
+# What the base's actuators tell of themselves; sent where there are any.
+WHEELS_STATE = Topic(
+    "/wheels/state", "sensor_msgs/msg/JointState", 10_000, per_tick=True, is_optional=True
+)
+THRUSTERS_STATE = Topic(
+    "/thrusters/state", "sensor_msgs/msg/JointState", 10_000, per_tick=True, is_optional=True
+)
 COMMAND = Topic("/command", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
 # Reference and clock are not transient local: a late joiner would be told the past, and that a
 # message was lost if one is pushed out meanwhile; at depth 1 a slow one would lose some. The
@@ -53,7 +60,7 @@ TRUTH_BASE = Topic(
 
 ALL = (
     JOINT_STATES, BASE_STATE, COMMAND, REFERENCE_JOINTS, REFERENCE_BASE, TELEMETRY, LAW, CLOCK,
-    TRUTH_JOINTS, TRUTH_BASE,
+    TRUTH_JOINTS, TRUTH_BASE, WHEELS_STATE, THRUSTERS_STATE,
 )  # fmt: skip
 """All that are recorded."""
 TRUTH = (TRUTH_JOINTS, TRUTH_BASE)

@@ -22,6 +22,7 @@ from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.recorder import BagRecorder
+from space_robot_msgs_py.samples import RobotNames
 from space_robot_msgs_py.wire.codec import Codec
 from space_robot_msgs_py.wire.definitions import decode
 from space_robot_msgs_py.wire.message import description
@@ -95,7 +96,7 @@ def test_a_message_is_one_file_in_wire_and_one_line_in_topics(
     described = description(newest)
     sys.modules.pop(f"{room_of_messages.__name__}.newest")
     assert described is not None
-    codec = Codec(described.of_robot(flight.robot.joint_names, flight.timebase))
+    codec = Codec(described.of_robot(RobotNames(flight.robot.joint_names), flight.timebase))
     simulate(flight, tmp_path / "flown")
     recorder = BagRecorder(tmp_path / "bag", flight.description, flight.timebase)
     for name, data in open_bag(tmp_path / "flown").messages(*topics.ALL):

@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled.records import Block
-from ..samples import STATE_FIELDS, LawInForce, ReferenceChunk, RobotState, State, Timebase
+from ..samples import (
+    ACTUATOR_FIELDS,
+    STATE_FIELDS,
+    LawInForce,
+    ReferenceChunk,
+    RobotState,
+    State,
+    Timebase,
+)
 
 Array = NDArray[np.float64]
 
@@ -90,6 +98,15 @@ class FlightLog:
     """(N, 3, n) desired position, velocity, acceleration."""
     reference_base: Array
     """(N, 10) desired quaternion, angular velocity, acceleration (base frame)."""
+    wheel_velocities: Array
+    """(N, W) rad/s relative to the base, as many as the base has reaction wheels."""
+    wheel_torques: Array
+    """(N, W) N m that the wheels' motors gave over the interval that ended at the tick."""
+    thrusts: Array
+    """(N, T) N, means over the interval that ended at the tick, as many as there are thrusters."""
+    actuator_commands: Array
+    """(N, W+T) the controller's answer to the tick: torques of the wheels' motors, N m, then forces
+    of the thrusters, N (NaN: none)."""
     flight: dict[str, Any] = field(default_factory=dict)
     """The flight as recorded: controller, case, ..."""
     lost: dict[str, int] = field(default_factory=dict)
@@ -126,10 +143,16 @@ class FlightLog:
     """
 
     @classmethod
-    def allocate(cls, ticks: int, joint_names: tuple[str, ...], timebase: Timebase) -> FlightLog:
-        """A log of ``ticks`` rows of NaN."""
+    def allocate(
+        cls, ticks: int, joint_names: tuple[str, ...], timebase: Timebase, wheels: int = 0,
+        thrusters: int = 0,
+    ) -> FlightLog:  # fmt: skip
+        """A log of ``ticks`` rows of NaN, for a base with so many wheels and thrusters."""
         n = len(joint_names)
-        shapes = [(3,), (4,), (3,), (3,), (n,), (n,), (n + 3,), (3, n), (10,)]
+        shapes = [
+            *((3,), (4,), (3,), (3,), (n,), (n,), (n + 3,), (3, n), (10,)),
+            *((wheels,), (wheels,), (thrusters,), (wheels + thrusters,)),
+        ]
         columns: list[Any] = [np.full((ticks, *shape), np.nan) for shape in shapes]
         return cls(timebase, joint_names, *columns)
 
@@ -179,12 +202,12 @@ class FlightLog:
 
     def put(self, start: int, states: Block) -> None:
         """Copy the `State` of each tick from ``start`` on into its row."""
-        _put(self, start - self.first_tick, states)
+        _put(self, start - self.first_tick, states, STATE_FIELDS + ACTUATOR_FIELDS)
 
     def put_measured(self, start: int, states: Block) -> None:
         """Copy what the sensors told of each tick from ``start`` on into its row of `measured`."""
         if self.measured is not None:
-            _put(self.measured, start - self.first_tick, states)
+            _put(self.measured, start - self.first_tick, states, STATE_FIELDS)
 
     def measure_apart(self) -> None:
         """Make room, NaN, for what the sensors tell and the law believes beside the truth."""
@@ -201,8 +224,9 @@ class FlightLog:
     def state(self, tick: int) -> RobotState:
         """The state of a tick: the true one, where that is known."""
         block = State.block(len(self.joint_names))
-        for name in STATE_FIELDS:
-            block[name] = getattr(self, name)[tick - self.first_tick]
+        for name in STATE_FIELDS + ACTUATOR_FIELDS:
+            row = getattr(self, name)[tick - self.first_tick]
+            block[name][0, : len(row)] = row
         return RobotState(tick, block)
 
     def references(self, start: int, stop: int) -> Block:
@@ -232,6 +256,9 @@ def finite_rows(columns: Iterable[Array]) -> NDArray[np.bool_]:
     return found
 
 
-def _put(columns: FlightLog | MeasuredStates, row: int, states: Block) -> None:
-    for name in STATE_FIELDS:
-        getattr(columns, name)[row : row + len(states)] = states[name]
+def _put(
+    columns: FlightLog | MeasuredStates, row: int, states: Block, names: tuple[str, ...]
+) -> None:
+    for name in names:
+        column = getattr(columns, name)
+        column[row : row + len(states)] = states[name][:, : column.shape[1]]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .. import topics
 from ..errors import MessageError
-from ..samples import LawInForce, Timebase, in_order
+from ..samples import LawInForce, RobotNames, Timebase, in_order
 from ..wire.controller_law import LawCodec
 from ..wire.controller_telemetry import SIGNALS
 from ..wire.message import description
@@ -62,7 +62,7 @@ class Rows:
         self._rows = self._believed = 0
         described = {topic: description(topic) for topic in topics.ALL}
         self._readers = {
-            topic: FieldReader(describe.of_robot(joint_names, timebase))
+            topic: FieldReader(describe.of_robot(RobotNames(joint_names), timebase))
             for topic, describe in described.items()
             if describe
         }

@@ -1,17 +1,17 @@
-"""/command: the torque of every axis, as the efforts of a sensor_msgs/JointState."""
+"""/command: what is asked of every axis and actuator, as a sensor_msgs/JointState's efforts."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from .. import topics
-from ..samples import Timebase
+from ..samples import RobotNames, Timebase
 from .joint_states import JointStates
 from .message import Column
 
 
 class Commands(JointStates):
-    """Efforts of the axes by name: the base's (in its frame) and the joints'."""
+    """Efforts by name: of the base's axes (its frame), of the joints, of the base's actuators."""
 
     topic = topics.COMMAND
     fields = ("effort",)
@@ -22,6 +22,6 @@ class Commands(JointStates):
         self.columns = (Column("commanded_torque", 0, len(self.names)),)
 
     @classmethod
-    def of_robot(cls, joint_names: Sequence[str], timebase: Timebase) -> Commands:
-        """The base's axes come before the joints."""
-        return cls((*topics.BASE_AXES, *joint_names), timebase)
+    def of_robot(cls, names: RobotNames, timebase: Timebase) -> Commands:
+        """The base's axes come before the joints, its actuators after them."""
+        return cls(names.commanded, timebase)

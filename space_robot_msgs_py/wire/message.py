@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import MessageError
-from ..samples import Timebase
+from ..samples import RobotNames, Timebase
 from ..topics import Topic
 from .cdr import BODY, Bytes, MessageLayout
 from .definitions import decode
@@ -83,9 +83,9 @@ class MessageDescription(ABC):
         self.names, self.timebase = tuple(names), timebase
 
     @classmethod
-    def of_robot(cls, joint_names: Sequence[str], timebase: Timebase) -> MessageDescription:
-        """The messages of a robot with these joints."""
-        return cls(joint_names, timebase)
+    def of_robot(cls, names: RobotNames, timebase: Timebase) -> MessageDescription:
+        """The messages of a robot with these names, of which most need those of the joints."""
+        return cls(names.joints, timebase)
 
     @abstractmethod
     def content(self, rows: int) -> Mapping[str, Any]:

@@ -11,7 +11,7 @@ import yaml
 from paths import CONFIG
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.samples import RobotNames, Timebase
 from space_robot_msgs_py.wire.message import description
 
 OVERRIDES = CONFIG / "qos/record_overrides.yaml"
@@ -54,7 +54,7 @@ def test_what_a_topics_messages_say_stands_in_the_module_of_its_name(topic: topi
     if found is None:
         assert topic is topics.LAW
         return
-    described = found.of_robot(["a", "b"], Timebase(500_000))
+    described = found.of_robot(RobotNames(("a", "b"), ("c",), ("d",)), Timebase(500_000))
     width = sum(column.length for column in described.columns)
     assert not width or len(described.own(3).offsets) in (width, 3 * width)
 

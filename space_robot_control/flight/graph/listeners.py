@@ -19,6 +19,8 @@ LISTENERS = {
     topics.CLOCK: ("mission_node", "recorder_node"),
     topics.TRUTH_JOINTS: ("recorder_node",),
     topics.TRUTH_BASE: ("recorder_node",),
+    topics.WHEELS_STATE: _TO_CONTROLLER,
+    topics.THRUSTERS_STATE: ("recorder_node",),
 }
 """Nodes of the graph that subscribe to each topic."""
 

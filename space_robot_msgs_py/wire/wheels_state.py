@@ -1,0 +1,29 @@
+"""/wheels/state: speed of every reaction wheel, and the torque of its motor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from .. import topics
+from ..samples import RobotNames, Timebase
+from .joint_states import JointStates
+from .message import Column
+
+
+class WheelsState(JointStates):
+    """A sensor_msgs/JointState: speeds relative to the base, and the torques the motors gave."""
+
+    topic = topics.WHEELS_STATE
+    fields = ("velocity", "effort")
+    frame_id = topics.BASE_FRAME
+
+    def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
+        """``names``: of the wheels."""
+        super().__init__(names, timebase)
+        count = len(self.names)
+        self.columns = (Column("wheel_velocities", 0, count), Column("wheel_torques", 0, count))
+
+    @classmethod
+    def of_robot(cls, names: RobotNames, timebase: Timebase) -> WheelsState:
+        """The wheels alone."""
+        return cls(names.wheels, timebase)
