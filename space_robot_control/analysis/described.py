@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import laws_of
 from space_robot_msgs_py.config.files import named_file
+from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
+from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
 from space_robot_sim.plant.settings import PlantNodeSettings
 from space_robot_sim.robot import Robot
 
@@ -109,6 +111,16 @@ def sensors_of(log: FlightLog) -> str:
     return str(_parameters(log, PlantNodeSettings.node).get("sensors", "")) or IDEAL
 
 
+def base_actuators_of(log: FlightLog) -> BaseActuatorSettings:
+    """Return the base's actuators that flew: ideal ones if the bag tells of none.
+
+    Raises:
+        InputError: what the bag tells cannot be.
+    """
+    told = log.flight.get("base_actuators", {})
+    return validate(BaseActuatorSettings, told, "base_actuators of the bag")
+
+
 def navigation_of(log: FlightLog) -> str:
     """Name the navigation that flew, as far as the bag tells."""
     return str(_parameters(log, ControllerNodeSettings.node).get("navigation", "")) or DIRECT
@@ -154,7 +166,7 @@ def _described_h_bar(log: FlightLog) -> Array:
 def _check_files(log: FlightLog, given: Mapping[str, Any]) -> None:
     """See that nothing but what is shipped is read, unless the bag is trusted."""
     if not log.trusted:
-        for what in ("robot", "case", "mission", "gains"):
+        for what in ("robot", "case", "mission", "gains", "sensors", "actuators"):
             check_file(what, str(given.get(what, "")))
 
 

@@ -40,11 +40,12 @@ if TYPE_CHECKING:
 )
 @OPTIONS["sensors"]
 @OPTIONS["navigation"]
+@OPTIONS["actuators"]
 @click.option("--jobs", type=click.IntRange(1, 256), help="Processes [default: one a core].")
 @click.option("--json", "as_json", is_flag=True, help="Print table_v.json.")
 def reproduce(
     out: Path, only: tuple[str, ...], duration: float | None, brief: bool, sensors: str,
-    navigation: Mode | None, jobs: int | None, as_json: bool,
+    navigation: Mode | None, actuators: str, jobs: int | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Fly Table V of the paper and compare: tables, Figures 5 to 9, one page with it all.
 
@@ -62,18 +63,20 @@ def reproduce(
     from ..campaign.processes import cores
     from ..flight.compilation import compile_kernels
     from ..flight.progress import counting_progress
-    from ..paper.reproduction.flights import ROWS, Row, Sight
+    from ..paper.reproduction.flights import ROWS, Equipment, Row
     from ..paper.reproduction.reproduce import check_folder
     from ..paper.reproduction.reproduce import reproduce as run
 
     rows = [Row.parse(text) for text in dict.fromkeys(only)] or list(ROWS)
     check_folder(out)
     named_file("sensors", sensors)
+    named_file("actuators", actuators)
     compile_kernels()
     with counting_progress("flights") as progress:
         record = run(
             rows, out, duration=duration, brief=brief,
-            sight=Sight(sensors, navigation or "direct"), jobs=jobs or cores(), progress=progress,
+            equipment=Equipment(sensors, navigation or "direct", actuators), jobs=jobs or cores(),
+            progress=progress,
         )  # fmt: skip
     if as_json:
         click.echo(json.dumps(record, indent=1))

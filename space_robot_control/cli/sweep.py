@@ -34,7 +34,16 @@ from .options import OUTPUT, flight_options, folder_option, put_json
     "--out", help="Folder for table.csv, summary.md and the figure; an older sweep's are replaced."
 )
 @flight_options(
-    "case", "robot", "mission", "duration", "navigation", "latency", "friction", "set", "json"
+    "case",
+    "robot",
+    "mission",
+    "duration",
+    "navigation",
+    "actuators",
+    "latency",
+    "friction",
+    "set",
+    "json",
 )
 @OUTPUT
 def sweep(

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.config.files import config_directory
+from space_robot_msgs_py.config.files import config_directory, named_file
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 from space_robot_msgs_py.config.yaml_text import is_folder
 
@@ -31,7 +31,7 @@ class ControllerNodeSettings(NodeSettings):
     """Parameters of controller_node; the gains stand beside them as ``<law>.<gain>``."""
 
     node: ClassVar[str] = "controller"
-    selectors: ClassVar[tuple[str, ...]] = ("robot", "gains")
+    selectors: ClassVar[tuple[str, ...]] = ("robot", "actuators", "gains")
     sends: ClassVar[tuple[topics.Topic, ...]] = (topics.COMMAND, topics.TELEMETRY, topics.LAW)
 
     controller: str = Field(
@@ -39,6 +39,11 @@ class ControllerNodeSettings(NodeSettings):
     )
     gains: str = Field(
         "default", description="gain set of config/gains/<robot>, or a path to a file or folder"
+    )
+    actuators: str = Field(
+        "ideal",
+        description="actuators that the controller believes the base to have: of "
+        "config/actuators, or a path to their YAML",
     )
     telemetry_decimation: Annotated[int, Field(ge=1, le=10**6)] = Field(
         20, description="ticks between two messages on /controller/telemetry"
@@ -87,5 +92,9 @@ class ControllerNodeSettings(NodeSettings):
 
     @classmethod
     def layers(cls, selected: Mapping[str, str]) -> list[Path]:
-        """Add what the gain set says to the controller itself."""
-        return [*super().layers(selected), *set_file(selected["robot"], selected["gains"])]
+        """Add what the files of the actuators and of the gain set say to the controller itself."""
+        return [
+            *super().layers(selected),
+            named_file("actuators", selected["actuators"]),
+            *set_file(selected["robot"], selected["gains"]),
+        ]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
-from space_robot_msgs_py.config.files import node_parameters
+from space_robot_msgs_py.config.files import named_file, node_parameters
 from space_robot_msgs_py.config.settings import NodeSettings
 from space_robot_msgs_py.config.trees import Tree, flatten, merge, nest
 from space_robot_msgs_py.config.validation import one_of
@@ -65,12 +65,17 @@ class FlightSettings(NamedTuple):
             for node in NODES
         }
         plant = PlantNodeSettings.resolve(given["plant"])
+        given["controller"].setdefault("actuators", plant.actuators)
         if plant.realtime:  # by the wall clock there is no time to wait
             given["controller"] = {"reference_timeout": 0.0, **given["controller"]}
         own, gains = split_gains(given["controller"])
         controller = ControllerNodeSettings.resolve(own)
         path = gains_as_path(controller.gains, controller.robot)
-        for file in set_file(controller.robot, path):  # as if given: a bag is to tell of it
+        of_flight = named_file("actuators", controller.actuators)
+        for file in (
+            of_flight,
+            *set_file(controller.robot, path),
+        ):  # as if given: a bag tells of it
             of_the_set = dict(flatten(node_parameters(file, "controller")))
             given["controller"] = {**of_the_set, **given["controller"]}
             own = merge(nest(of_the_set), own)

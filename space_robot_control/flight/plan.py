@@ -11,11 +11,13 @@ from pydantic import ByteSize, Field
 from space_robot_msgs_py.bag.mcap_file import Compression
 from space_robot_msgs_py.config.validation import StrictModel, one_of
 from space_robot_msgs_py.errors import InputError
+from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
 from space_robot_sim.faults.grammar import Kinds, parse_faults
 from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import MOST_TICKS
 
+from ..controller.allocation.believed_actuators import believed_actuators
 from ..controller.controller import Controller
 from ..controller.gains import build_laws
 from ..controller.navigation.settings import Mode
@@ -36,6 +38,8 @@ class FlightPlan(StrictModel):
     case: str = "1"
     gains: str = "default"
     sensors: str = "ideal"
+    actuators: str = "ideal"
+    """Of the base."""
     robot: str = "paper"
     mission: str = ""
     duration: Annotated[float | None, Field(gt=0.0, le=1e6)] = None
@@ -87,6 +91,7 @@ class FlightPlan(StrictModel):
                 "mission": self.mission,
                 "case": self.case,
                 "sensors": self.sensors,
+                "actuators": self.actuators,
                 "realtime": self.realtime,
                 "command_latency_ticks": self.command_latency_ticks,
                 "fifo_priority": self.fifo_priority,
@@ -154,6 +159,11 @@ class Flight:
         """In force at the start."""
         self.plant = Plant(self.robot, settings.plant, self.period)
         self.mission = Mission(self.robot.n, settings.mission, self.period)
+        self.believed_actuators = believed_actuators(
+            settings.controller.actuators, self._robots.controller
+        )
+        """The base's actuators as the controller knows them."""
+        self._check_actuators()
         self.controller = Controller(
             self._robots.controller, self.law, self.period,
             settings.controller.acceleration_filter_hz, settings.controller.filter_settings,
@@ -182,6 +192,18 @@ class Flight:
             raise InputError(
                 f"{', '.join(asked)}: that needs a process for each node: fly without --composed"
             )
+
+    def _check_actuators(self) -> None:
+        flown, believed = self.plant_settings, self.believed_actuators
+        both = [(s.base_actuation, s.wheel_count, s.thruster_count) for s in (flown, believed)]
+        if both[0] != both[1]:
+            said = "; ".join(
+                f"{node} {actuation}, {wheels} wheels, {thrusters} thrusters"
+                for node, (actuation, wheels, thrusters) in zip(
+                    ("plant", "controller"), both, strict=True
+                )
+            )
+            raise InputError(f"plant and controller must have the same actuators, got {said}")
 
     def check_in_process(self) -> None:
         """See that the flight does without a graph of nodes.
@@ -227,6 +249,18 @@ class Flight:
         return {"navigation": "filtered", "navigation_filter": settings.model_dump()}
 
     @property
+    def _base_actuators(self) -> dict[str, Any]:
+        """The numbers of the base's actuators, and those believed where they are others."""
+        flown, believed = (
+            s.model_dump(include=set(BaseActuatorSettings.model_fields))
+            for s in (self.plant_settings, self.believed_actuators)
+        )
+        if self.plant_settings.base_actuation == "ideal":
+            return {}
+        other = {} if believed == flown else {"controller_base_actuators": believed}
+        return {"base_actuators": flown, **other}
+
+    @property
     def description(self) -> dict[str, Any]:
         """The flight as a bag tells it; enough to fly it again.
 
@@ -240,6 +274,8 @@ class Flight:
             "controller": self.law.name,
             "case": plant.case,
             "sensors": plant.sensors,
+            "actuators": plant.actuators,
+            **self._base_actuators,
             "gains": controller.gains,
             "robot": self.robot.name,
             "mission": mission.mission or Path(mission.robot).stem,

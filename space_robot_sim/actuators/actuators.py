@@ -21,6 +21,7 @@ from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, nested
 
 from ..faults.schedule import PartFault
+from .base_actuation import BaseActuatorSettings
 from .command_delay import CommandDelaySettings, delay_command
 from .drive import Drive, DriveSettings, WrongDrive, drive_torque
 from .torque_echo import TorqueEcho, TorqueEchoSettings, WrongEcho, report_torque
@@ -30,8 +31,9 @@ Array = NDArray[np.float64]
 
 
 class ActuatorSettings(
-    TorqueEchoSettings, DriveSettings, TorqueLimitSettings, CommandDelaySettings
-):
+    BaseActuatorSettings, TorqueEchoSettings, DriveSettings, TorqueLimitSettings,
+    CommandDelaySettings,
+):  # fmt: skip
     """Settings of the actuators."""
 
 

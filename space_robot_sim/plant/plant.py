@@ -80,7 +80,8 @@ class Plant:
         """Place the robot at rest.
 
         Raises:
-            InputError: initial configuration, sensors or faults do not fit the robot or period.
+            InputError: initial configuration, actuators, sensors or faults do not fit the robot or
+                period.
         """
         n = robot.n
         if len(settings.initial_joints_deg) != n:
@@ -91,6 +92,7 @@ class Plant:
         norm = float(np.linalg.norm(settings.initial_quaternion))
         if not 1e-3 <= norm <= 1e3:
             raise InputError(f"initial_quaternion must have a norm near 1, got {norm:g}")
+        settings.check(robot, getattr(settings, "actuators", "given"))
         self.robot = with_payload(robot, settings.payload)
         self.period = period
         self.block = PlantMemory.block(n)

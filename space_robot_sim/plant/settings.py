@@ -22,7 +22,7 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
     """Parameters of plant_node."""
 
     node: ClassVar[str] = "plant"
-    selectors: ClassVar[tuple[str, ...]] = ("robot", "mission", "case", "sensors")
+    selectors: ClassVar[tuple[str, ...]] = ("robot", "mission", "case", "sensors", "actuators")
     sends: ClassVar[tuple[topics.Topic, ...]] = (
         topics.JOINT_STATES, topics.BASE_STATE, topics.CLOCK, *topics.TRUTH,
         topics.WHEELS_STATE, topics.THRUSTERS_STATE,
@@ -33,6 +33,9 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
     )
     case: str = Field("1", description="a case of config/cases, or a path to its YAML")
     sensors: str = Field("ideal", description="of config/sensors, or a path to their YAML")
+    actuators: str = Field(
+        "ideal", description="of the base: of config/actuators, or a path to their YAML"
+    )
     ticks: Annotated[int, Field(ge=0, le=MOST_TICKS)] = Field(
         0, description="ticks to fly, then exit (0: until stopped)"
     )
@@ -56,10 +59,11 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
 
     @classmethod
     def layers(cls, selected: Mapping[str, str]) -> list[Path]:
-        """Add the mission (where the arm starts), the case (what disturbs it), and the sensors."""
+        """Add mission (where the arm starts), case (what disturbs it), sensors and actuators."""
         return [
             *super().layers(selected),
             mission_file(selected["robot"], selected["mission"]),
             named_file("cases", selected["case"]),
             named_file("sensors", selected["sensors"]),
+            named_file("actuators", selected["actuators"]),
         ]

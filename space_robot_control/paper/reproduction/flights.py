@@ -77,15 +77,17 @@ class Row:
 ROWS = tuple(Row(controller, case) for controller, case in PRINTED)
 
 
-class Sight(NamedTuple):
-    """What the laws see of the truth: Table V's see all of it."""
+class Equipment(NamedTuple):
+    """What stands between laws and robot: Table V's see the truth, and have what they ask for."""
 
     sensors: str = "ideal"
     """Of config/sensors, or a path."""
     navigation: Mode = "direct"
+    actuators: str = "ideal"
+    """Of the base: of config/actuators, or a path."""
 
 
-PERFECT = Sight()
+PERFECT = Equipment()
 
 
 class Planned(NamedTuple):
@@ -134,15 +136,16 @@ class Result:
 
 def fly(
     planned: Planned, duration: float | None, figures: FigureFolder | None,
-    sight: Sight = PERFECT,
+    equipment: Equipment = PERFECT,
 ) -> Result:  # fmt: skip
     """Fly one row in one variant; if it is shown it is also drawn into ``figures``."""
     row, variant, _ = planned
     flight = Flight(
         FlightPlan(
             controller=row.controller, case=row.case, gains=variant.gains, robot=ROBOT,
-            friction=variant.friction, duration=duration, sensors=sight.sensors,
-            navigation=None if sight.navigation == "direct" else sight.navigation,
+            friction=variant.friction, duration=duration, sensors=equipment.sensors,
+            actuators=equipment.actuators,
+            navigation=None if equipment.navigation == "direct" else equipment.navigation,
         )
     )  # fmt: skip
     told = parameters(flight)

@@ -21,7 +21,7 @@ from ...campaign.processes import processes
 from ...flight.software import commit, versions
 from .claims import claims, claims_table
 from .figures import figure_groups, start_comparisons
-from .flights import PERFECT, Planned, Result, Row, Sight, fly, plan
+from .flights import PERFECT, Equipment, Planned, Result, Row, fly, plan
 from .table import cells, cells_table, chatter, chatter_table, variant_tables
 
 TABLE = "table_v"
@@ -51,7 +51,7 @@ def reproduce(
     *,
     duration: float | None = None,
     brief: bool = False,
-    sight: Sight = PERFECT,
+    equipment: Equipment = PERFECT,
     jobs: int = 1,
     progress: Callable[[int], Callable[[], None]] = lambda total: lambda: None,
 ) -> dict[str, Any]:
@@ -62,7 +62,7 @@ def reproduce(
         folder: made or renewed at the end, whole; an older reproduction there is replaced.
         duration: s to fly (None: the mission's 30 s, which is what Table V is about).
         brief: fly only what Table V asks for, see `plan`; figures as SVG only.
-        sight: the sensors, and what is made of them; Table V is about ideal ones.
+        equipment: sensors, navigation and actuators; Table V is about ideal ones.
         jobs: processes at work.
         progress: called with the number of flights, gives what is called after each.
 
@@ -80,8 +80,8 @@ def reproduce(
         figures.path.mkdir(parents=True)
         planned = list(plan(rows, brief))
         with processes(jobs) as pool:
-            results = _fly_and_draw(pool, planned, duration, figures, sight, progress)
-        record = _write(rows, results, duration or FULL_DURATION, brief, sight, figures)
+            results = _fly_and_draw(pool, planned, duration, figures, equipment, progress)
+        record = _write(rows, results, duration or FULL_DURATION, brief, equipment, figures)
         if folder.exists():
             shutil.rmtree(folder)
         work.rename(folder)
@@ -93,13 +93,13 @@ def _fly_and_draw(
     planned: Sequence[Planned],
     duration: float | None,
     figures: FigureFolder,
-    sight: Sight,
+    equipment: Equipment,
     progress: Callable[[int], Callable[[], None]],
 ) -> list[Result]:
     """Return the results in the order of ``planned``."""
     # first those the comparisons wait for, last those that take the shortest
     order = sorted(planned, key=lambda flight: (not flight.compared, not flight.shown))
-    futures = {flight: pool.submit(fly, flight, duration, figures, sight) for flight in order}
+    futures = {flight: pool.submit(fly, flight, duration, figures, equipment) for flight in order}
     done = progress(len(planned))  # may start a thread: not before the processes are forked
     for future in futures.values():
         future.add_done_callback(lambda _: done())
@@ -116,7 +116,7 @@ def _write(
     results: Sequence[Result],
     duration: float,
     brief: bool,
-    sight: Sight,
+    equipment: Equipment,
     figures: FigureFolder,
 ) -> dict[str, Any]:
     folder, comparison = figures.path.parent, cells(results)
@@ -129,8 +129,9 @@ def _write(
         "machine": f"{platform.system()} {platform.machine()}",
         "duration_s": duration,
         "brief": brief,
-        "sensors": sight.sensors,
-        "navigation": sight.navigation,
+        "sensors": equipment.sensors,
+        "navigation": equipment.navigation,
+        "actuators": equipment.actuators,
     }
     told = {
         f"{r.row.controller}, case {r.row.case}, {r.variant.gains} gains": r.parameters

@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot_control.analysis import analyze
+from space_robot_control.controller.allocation.believed_actuators import believed_actuators
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import build_laws, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
@@ -220,6 +221,26 @@ _SPECIAL: dict[str, st.SearchStrategy[Any]] = {
         st.lists(st.integers(0, 3) | st.floats(0.0, 1.0), min_size=1, max_size=1),
     ),
     "torque_echo": st.sampled_from(["command", "given"]),
+    "actuators": st.just("wheels"),
+    "base_actuation": st.just("hardware"),
+    "wheels.axes": st.just([1, 0, 0, 0, 1.5, 0, 0, 0, 1, 1, 1, 1]),
+    "thrusters.positions": st.just([0.0]),
+    "thrusters.directions": st.just([0.0]),
+    **dict.fromkeys(
+        (
+            "wheels.rotor_inertia",
+            "wheels.max_torque",
+            "wheels.coulomb",
+            "wheels.viscous",
+            "thrusters.force",
+            "thrusters.shortest_pulse",
+            "thrusters.delay",
+            "thrusters.specific_impulse",
+        ),
+        st.lists(st.just(1) | st.floats(0.01, 1.0), min_size=1, max_size=1),
+    ),
+    "wheels.max_momentum": st.lists(st.integers(2, 30), min_size=4, max_size=4),
+    "wheels.initial_speed": st.lists(st.floats(-1, 1), min_size=4, max_size=4),
     "waypoint_times": st.just([0, 1.5, 3]),
     "waypoints_deg": st.lists(st.integers(-90, 90), min_size=18, max_size=18),
     "compression": st.sampled_from(["none", "lz4", "zstd"]),
@@ -266,7 +287,7 @@ def _any_parameters() -> st.SearchStrategy[Parameters]:
 @given(_any_parameters())
 def test_all_that_is_made_of_a_plan_agrees(parameters: Parameters) -> None:
     """Settings and objects as the nodes make them of what they are sent; labels; `simulate`."""
-    flight = flight_of(parameters)
+    flight = flight_of(parameters, actuators="wheels")
     sent = json.loads(json.dumps(flight.parameters))
     for schema in SCHEMAS:
         for name in parameters.get(schema.node, {}):
@@ -296,6 +317,7 @@ def test_all_that_is_made_of_a_plan_agrees(parameters: Parameters) -> None:
     assert theirs.block.tobytes() == flight.plant.block.tobytes()
     assert theirs.command_delay_buffer.shape == flight.plant.command_delay_buffer.shape
     robot = Robot.from_yaml(named_file("robots", controller.robot))
+    assert believed_actuators(controller.actuators, robot) == flight.believed_actuators
     loop = Controller(
         robot, law, controller.period, controller.acceleration_filter_hz, controller.filter_settings
     )

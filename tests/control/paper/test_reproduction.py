@@ -17,10 +17,10 @@ from space_robot_control.paper.reproduction.claims import claims
 from space_robot_control.paper.reproduction.flights import (
     ROWS,
     VARIANTS,
+    Equipment,
     Planned,
     Result,
     Row,
-    Sight,
     Variant,
     fly,
     plan,
@@ -91,7 +91,10 @@ def test_tde_smc_chatters_as_the_prototype_did(time_delay_flights: list[Result])
 def test_rows_fly_with_sensors_that_are_not_ideal() -> None:
     """And with the ideal ones if none are named."""
     planned = Planned(Row("tde_stc", "1"), Variant("printed", True), shown=False)
-    ideal, noisy = fly(planned, 0.05, None), fly(planned, 0.05, None, Sight("white_l1", "filtered"))
+    ideal, noisy = (
+        fly(planned, 0.05, None),
+        fly(planned, 0.05, None, Equipment("white_l1", "filtered")),
+    )
     told = [result.parameters["plant"] for result in (ideal, noisy)]
     assert [(plant["sensors"], plant["gyro"]["noise"]) for plant in told] == [
         ("ideal", 0.0),

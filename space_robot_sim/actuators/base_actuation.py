@@ -1,0 +1,111 @@
+"""What turns the base: an ideal torque, hardware (wheels, thrusters), or nothing."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.errors import InputError
+
+from ..robot import Robot
+from .thrusters import ThrusterSettings
+from .wheels import WheelSettings
+
+Array = NDArray[np.float64]
+
+BaseActuation = Literal["ideal", "hardware", "none"]
+LEAST_SHARE = 1e-6
+"""Of a unit torque: what no torque of the actuators may lack."""
+
+
+class BaseActuatorSettings(StrictModel):
+    """Settings of the base's actuators; those of a file of config/actuators for the plant."""
+
+    base_actuation: BaseActuation = Field(
+        "ideal",
+        description="what turns the base: ideal (the torque commanded), hardware (wheels, "
+        "thrusters), none (the base floats freely)",
+    )
+    wheels: WheelSettings = WheelSettings()
+    thrusters: ThrusterSettings = ThrusterSettings()
+
+    @property
+    def wheel_count(self) -> int:
+        """Number of wheels, W."""
+        return self.wheels.count
+
+    @property
+    def thruster_count(self) -> int:
+        """Number of thrusters, T."""
+        return self.thrusters.count
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the actuators that are commanded one by one: wheels, then thrusters."""
+        wheels = (f"wheel_{i + 1}" for i in range(self.wheel_count))
+        return (*wheels, *(f"thruster_{i + 1}" for i in range(self.thruster_count)))
+
+    def check(self, robot: Robot, file: str) -> None:
+        """See that the numbers fit one another and a robot.
+
+        Args:
+            robot: whose base they are on.
+            file: whose they are: a name in config/actuators, or a path.
+
+        Raises:
+            InputError: they do not; in one line with file and key.
+        """
+        try:
+            self._check(robot)
+        except InputError as error:
+            raise InputError(f"actuators {file}: {error}") from None
+
+    def _check(self, robot: Robot) -> None:
+        given = [part for part in ("wheels", "thrusters") if getattr(self, part).count]
+        if self.base_actuation != "hardware":
+            if given:
+                raise InputError(
+                    f"{given[0]} are for base_actuation hardware, got {self.base_actuation!r}"
+                )
+            return
+        if not given:
+            raise InputError("base_actuation is hardware: wheels.axes or thrusters.positions lack")
+        self.wheels.check(robot.inertia[0])
+        self.thrusters.check()
+        _check_torques(self)
+        for name in set(self.names) & set(robot.joint_names):
+            raise InputError(f"{name!r} is a joint of robot {robot.name!r}, too: rename the joint")
+
+
+def _check_torques(settings: BaseActuatorSettings) -> None:
+    """See that a torque in any direction can be had: wheels push both ways, thrusters one.
+
+    Raises:
+        InputError: says about which axis none can.
+    """
+    from scipy.optimize import nnls  # slow to import
+
+    axes, torques = settings.wheels.unit_axes, settings.thrusters.torques
+    if not len(torques):
+        if np.linalg.matrix_rank(axes, tol=LEAST_SHARE) < 3:
+            raise InputError(
+                "wheels.axes must span all directions: there are torques that they cannot give"
+            )
+        return
+    sizes = np.linalg.norm(torques, axis=1)
+    turning = torques[sizes > LEAST_SHARE * sizes.max()] if sizes.max() > 0.0 else torques[:0]
+    columns = np.vstack([axes, -axes, turning / np.linalg.norm(turning, axis=1)[:, None]]).T
+    for i, name in enumerate("xyz"):
+        for sign in (1.0, -1.0):
+            wanted = sign * np.eye(3)[i]
+            lacks = nnls(columns, wanted)[1] if columns.size else 1.0
+            if lacks > LEAST_SHARE:
+                side = "positive" if sign > 0.0 else "negative"
+                raise InputError(
+                    f"thrusters.directions: no {side} torque about {name} can be had of the "
+                    "thrusters" + (" and wheels" if len(axes) else "")
+                )

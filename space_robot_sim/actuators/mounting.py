@@ -1,0 +1,74 @@
+"""Flat lists of vectors and of values, as ROS parameters have them, for actuators on the base."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from space_robot_msgs_py.errors import InputError
+
+Array = NDArray[np.float64]
+
+NO_VECTORS = [0.0]
+"""ROS has no empty list of numbers."""
+FEWEST = Field(min_length=1)
+Vectors = Annotated[list[Annotated[float, Field(ge=-1e3, le=1e3)]], FEWEST]
+Sizes = Annotated[list[Annotated[float, Field(ge=0.0, le=1e9)]], FEWEST]
+Positive = Annotated[list[Annotated[float, Field(gt=0.0, le=1e9)]], FEWEST]
+
+
+def are_vectors(flat: list[float], most: int) -> list[float]:
+    """Return ``flat`` if it holds x, y, z of at most so many vectors, or none (``[0.0]``).
+
+    Raises:
+        ValueError: it does not.
+    """
+    if flat != NO_VECTORS and (len(flat) % 3 or len(flat) > 3 * most):
+        raise ValueError(
+            f"x, y, z of at most {most} vectors were expected, or [0.0] for none: "
+            f"{len(flat)} numbers"
+        )
+    return flat
+
+
+def are_directions(flat: list[float], most: int) -> list[float]:
+    """Return ``flat`` if all vectors in it can be made unit vectors, see `are_vectors`.
+
+    Raises:
+        ValueError: one is far too short or too long.
+    """
+    for i, norm in enumerate(np.linalg.norm(vectors(are_vectors(flat, most)), axis=1)):
+        if not 1e-3 <= norm <= 1e3:
+            raise ValueError(f"the norm of each must be near 1, that of number {i + 1} is {norm:g}")
+    return flat
+
+
+def vectors(flat: list[float]) -> Array:
+    """Return the vectors (k, 3) of a flat list."""
+    if flat == NO_VECTORS:
+        return np.empty((0, 3))
+    return np.array(flat, dtype=np.float64).reshape(-1, 3)
+
+
+def directions(flat: list[float]) -> Array:
+    """Return the vectors (k, 3) of a flat list with length 1."""
+    found = vectors(flat)
+    units: Array = found / np.linalg.norm(found, axis=1, keepdims=True)
+    return units
+
+
+def values_of(given: list[float], key: str, count: int, what: str) -> Array:
+    """Return (count,) values of a setting with one value for all, or one for each.
+
+    Raises:
+        InputError: it has another number of them.
+    """
+    if len(given) not in (1, count):
+        raise InputError(
+            f"{key} has {len(given)} values, one for all or {count} are allowed: one a {what}"
+        )
+    values: Array = np.broadcast_to(np.array(given, dtype=np.float64), count)
+    return values
