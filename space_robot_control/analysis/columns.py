@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, laws_of
 
+from .attitude_drift import controls_base
 from .metrics import tracking_error
 
 Array = NDArray[np.float64]
@@ -89,7 +90,8 @@ def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
     yield _each("reference_omega_base_rate", XYZ, "rad_s2"), q_d[:, 7:]
     for k, number in enumerate(("position_rad", "velocity_rad_s", "acceleration_rad_s2")):
         yield [f"reference_{joint}_{number}" for joint in joints], joints_d[:, k]
-    yield _each("error_q", XYZ), error[:, :3]
+    if controls_base(log):
+        yield _each("error_q", XYZ), error[:, :3]
     yield _each("error", joints, "rad"), error[:, 3:]
 
 

@@ -20,6 +20,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import laws_of
 from space_robot_msgs_py.errors import InputError
 
+from .attitude_drift import controls_base
 from .generalised_motion import (
     applied_force,
     continuous_quaternion,
@@ -141,6 +142,7 @@ class EstimateError(Metric):
         self._errors = EstimateErrors(h_bar, smoothing, rest=log.first_tick == 0)
         self._laws: set[str] = set()
         self._has_estimate = False
+        self._groups = axis_groups(log.axes - 3, controls_base(log))
         self._rms, self._maximum = AxisRms(log.axes), AxisMaximum(log.axes)
 
     def add(self, log: FlightLog, error: Array) -> None:
@@ -158,10 +160,9 @@ class EstimateError(Metric):
             if self._laws and not self._has_estimate:
                 raise InputError(f"{', '.join(sorted(self._laws))} has no time-delay estimate")
             raise InputError("three measured states in a row are needed")
-        each, largest = self._rms.value, self._maximum.value
-        if not np.isfinite(each).all():
+        each, largest, groups = self._rms.value, self._maximum.value, self._groups
+        if not np.isfinite([each[axes].sum() for axes in groups.values()]).all():
             raise InputError("the base turned by 180 degrees, where J0 of (1) is singular")
-        groups = axis_groups(len(each) - 3)
         return {
             "rms": {name: float(np.mean(each[axes])) for name, axes in groups.items()},
             "max": {name: float(np.max(largest[axes])) for name, axes in groups.items()},

@@ -22,22 +22,26 @@ Array = NDArray[np.float64]
 Table = dict[str, dict[str, float]]
 
 
-def axis_groups(n: int) -> dict[str, slice]:
-    """Divide the n+3 axes into base, inner (1 to 3) and outer joints, by their keys' suffix."""
-    groups = {"base": slice(0, 3), f"1_{min(n, 3)}": slice(3, 3 + min(n, 3))}
+def axis_groups(n: int, controls_base: bool = True) -> dict[str, slice]:
+    """Divide the n+3 axes into base, inner (1 to 3) and outer joints, by their keys' suffix.
+
+    The base is no group of a flight in which nothing turns it.
+    """
+    groups = {"base": slice(0, 3)} if controls_base else {}
+    groups[f"1_{min(n, 3)}"] = slice(3, 3 + min(n, 3))
     if n > 3:
         groups[f"4_{n}"] = slice(6, 3 + n)
     return groups
 
 
-def error_columns(axes: int) -> dict[str, slice]:
+def error_columns(axes: int, controls_base: bool = True) -> dict[str, slice]:
     """Return which of the m = n+3 axes each error column of Table V is of."""
-    return _columns(axis_groups(axes - 3), "attitude", "joints")
+    return _columns(axis_groups(axes - 3, controls_base), "attitude", "joints")
 
 
-def torque_columns(axes: int) -> dict[str, slice]:
+def torque_columns(axes: int, controls_base: bool = True) -> dict[str, slice]:
     """Return which of the m = n+3 axes each torque column of Table V is of."""
-    return _columns(axis_groups(axes - 3), "base_torque", "torque")
+    return _columns(axis_groups(axes - 3, controls_base), "base_torque", "torque")
 
 
 def tracking_error(log: FlightLog) -> Array:
@@ -124,8 +128,9 @@ class TotalVariation:
 class Rms(Metric):
     """The RMS of errors and torques, by definition and column of Table V."""
 
-    def __init__(self, axes: int) -> None:
+    def __init__(self, axes: int, controls_base: bool = True) -> None:
         self._error, self._torque = AxisRms(axes), AxisRms(axes)
+        self._controls_base = controls_base
 
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
@@ -136,16 +141,17 @@ class Rms(Metric):
         """By definition and column."""
         error, torque = self._error.value, self._torque.value
         return {
-            "mean_axis": _by_column(error, torque, np.mean),
-            "eq64": _by_column(error, torque, eq64),
+            "mean_axis": _by_column(error, torque, np.mean, self._controls_base),
+            "eq64": _by_column(error, torque, eq64, self._controls_base),
         }
 
 
 class Maxima(Metric):
     """Largest |error| and |torque| on any axis, by column of Table V."""
 
-    def __init__(self, axes: int) -> None:
+    def __init__(self, axes: int, controls_base: bool = True) -> None:
         self._error, self._torque = AxisMaximum(axes), AxisMaximum(axes)
+        self._controls_base = controls_base
 
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
@@ -154,14 +160,14 @@ class Maxima(Metric):
 
     def result(self) -> dict[str, float]:
         """By column, in its unit."""
-        return _by_column(self._error.value, self._torque.value, np.max)
+        return _by_column(self._error.value, self._torque.value, np.max, self._controls_base)
 
 
 class Chatter(Metric):
     """Measures how rough the applied torques are, by measure and column of Table V."""
 
-    def __init__(self, axes: int, period: float) -> None:
-        self._period, self._columns = period, torque_columns(axes)
+    def __init__(self, axes: int, period: float, controls_base: bool = True) -> None:
+        self._period, self._columns = period, torque_columns(axes, controls_base)
         self._variation, self._power = TotalVariation(axes), PowerAbove(axes, period)
 
     def add(self, log: FlightLog, error: Array) -> None:
@@ -190,13 +196,15 @@ def of_log(metric: Metric, log: FlightLog) -> Any:
     return metric.result()
 
 
-def _by_column(error: Array, torque: Array, figure: Callable[[Array], Any]) -> dict[str, float]:
+def _by_column(
+    error: Array, torque: Array, figure: Callable[[Array], Any], controls_base: bool
+) -> dict[str, float]:
     """Sum up the numbers of the axes, (m,) each, in every column of Table V."""
     return {
         name: float(figure(values[axes]))
         for values, columns in (
-            (error, error_columns(len(error))),
-            (torque, torque_columns(len(torque))),
+            (error, error_columns(len(error), controls_base)),
+            (torque, torque_columns(len(torque), controls_base)),
         )
         for name, axes in columns.items()
     }

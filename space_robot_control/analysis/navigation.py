@@ -17,6 +17,7 @@ from space_robot_msgs_py.bag.blocks import Metric
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
+from .attitude_drift import controls_base
 from .metrics import AxisMaximum, AxisRms, error_columns
 
 Array = NDArray[np.float64]
@@ -27,7 +28,7 @@ class NavigationError(Metric):
 
     def __init__(self, log: FlightLog) -> None:
         """``log``: the first rows."""
-        self._columns = error_columns(log.axes)
+        self._columns = error_columns(log.axes, controls_base(log))
         self._rms, self._maximum = AxisRms(log.axes), AxisMaximum(log.axes)
 
     def add(self, log: FlightLog, error: Array) -> None:

@@ -12,6 +12,7 @@ from typing_extensions import Self
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
+from .attitude_drift import controls_base
 from .described import robot_of
 from .metrics import error_columns, torque_columns, tracking_error
 from .pointing import PointingError, pointing_error
@@ -67,7 +68,8 @@ class PlotSeries(NamedTuple):
     """(N,) norm of the error of each column of Table V: eps, rad."""
     torques: dict[str, Array]
     """(N,) norm of the torque of each column of Table V, N m."""
-    base_torque: BaseTorque
+    base_torque: BaseTorque | None
+    """None where nothing turned the base."""
     pointing: PointingError | None
     """None where the robot is not known."""
     latency_ms: Array | None
@@ -78,7 +80,7 @@ class PlotSeries(NamedTuple):
     @classmethod
     def of(cls, log: FlightLog) -> Self:
         """Compute them from a whole flight or an excerpt."""
-        error, axes = tracking_error(log), log.axes
+        error, axes, of_base = tracking_error(log), log.axes, controls_base(log)
         pointing = ripple = None
         with suppress(InputError):
             pointing = pointing_error(log, robot_of(log))
@@ -89,9 +91,9 @@ class PlotSeries(NamedTuple):
             latency = 1e3 * known if len(known) else None
         return cls(
             tick_times(log),
-            _norms(error, error_columns(axes)),
-            _norms(log.applied_torque, torque_columns(axes)),
-            BaseTorque.of(log),
+            _norms(error, error_columns(axes, of_base)),
+            _norms(log.applied_torque, torque_columns(axes, of_base)),
+            BaseTorque.of(log) if of_base else None,
             pointing,
             latency,
             ripple,

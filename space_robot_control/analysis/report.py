@@ -13,6 +13,7 @@ from space_robot_msgs_py.bag.law_history import as_data, within
 from space_robot_msgs_py.errors import InputError
 
 from .actuation import Latency, MissedDeadlines, Saturation, TorqueLimits
+from .attitude_drift import UNAVAILABLE, AttitudeDrift, controls_base
 from .columns import recording
 from .described import estimator, navigation_of, robot_of, sensors_of, torque_limits
 from .estimate_error import EstimateError
@@ -26,6 +27,8 @@ DESCRIBED = ("controller", "case", "gains", "robot")
 """Keys of a flight's description that a report repeats."""
 OF_TRUTH = ("navigation_error",)
 """Metrics that only flights have whose truth was recorded beside what was measured."""
+OF_FREE_BASE = ("attitude_drift",)
+"""Metrics that only flights have in which nothing turns the base."""
 
 
 def analyze(log: FlightLog) -> dict[str, Any]:
@@ -84,7 +87,9 @@ class Analysis:
             "from_s": self._first_tick * period_ns / 1e9,
             "to_s": stop * period_ns / 1e9,
             **metrics,
-            "unavailable": {name: unavailable[name] for name in _METRICS if name in unavailable},
+            "unavailable": {
+                name: unavailable[name] for name in (*UNAVAILABLE, *_METRICS) if name in unavailable
+            },
             **self._tail,
         }
 
@@ -97,8 +102,12 @@ class Analysis:
             "navigation": navigation_of(block),
             "truth_recorded": block.measured is not None,
         }
+        if not controls_base(block):
+            self._unavailable |= UNAVAILABLE
         for name, metric in _METRICS.items():
             if name in OF_TRUTH and block.measured is None:
+                continue
+            if name in OF_FREE_BASE and controls_base(block):
                 continue
             try:
                 self._metrics[name] = metric(block)
@@ -126,10 +135,11 @@ def _missed_deadlines(log: FlightLog) -> MissedDeadlines:
 
 
 _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
-    "rms": lambda log: Rms(log.axes),
-    "maxima": lambda log: Maxima(log.axes),
+    "rms": lambda log: Rms(log.axes, controls_base(log)),
+    "maxima": lambda log: Maxima(log.axes, controls_base(log)),
+    "attitude_drift": AttitudeDrift,
     "navigation_error": NavigationError,
-    "chatter": lambda log: Chatter(log.axes, log.timebase.period),
+    "chatter": lambda log: Chatter(log.axes, log.timebase.period, controls_base(log)),
     "ripple": lambda log: Ripple(log, robot_of(log)),
     "settling": Settling,
     "saturation": lambda log: Saturation(torque_limits(log)),

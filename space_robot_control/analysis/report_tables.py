@@ -20,6 +20,8 @@ DEFINITIONS = {
     "of the paper holds",
     "RMS, eq. (64)": "a third of the root mean square of the vector: what the paper defines",
     "maximum": "largest absolute value on any axis of the column",
+    "attitude drift": "angle by which the base has turned from where it was at the first tick, of "
+    "a flight in which nothing turns it",
     "navigation error": "what the law believed of attitude and joints, beside the truth, at the "
     "ticks of its telemetry: RMS, mean of axes",
     "variation per s": "how far the torque moves up and down in a second, mean over the axes",
@@ -137,6 +139,7 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
         found += each("power > 100 Hz", ("chatter", "power_above_100_hz"))
         found += each("ripple", ("ripple", "rms"), "N m")
     found += each("ripple's peak", ("ripple", "peak"), text=_peak)
+    found += each("attitude drift", ("attitude_drift",), "deg", label=_end_or_max)
     found += each("navigation error", ("navigation_error", "rms"), unit_of)
     found += each("maximum", ("maxima",), unit_of)
     found += each("settled after", ("settling", "settled_s"), "s", text=_settled)
@@ -238,6 +241,10 @@ def _differing(report: Report) -> str:
 
 def _axes(key: str, kind: str) -> str:
     return f"{key if key == 'base' else f'joints_{key}'} {_upper(kind)}"
+
+
+def _end_or_max(key: str) -> str:
+    return key.removesuffix("_deg")
 
 
 def _upper(kind: str) -> str:

@@ -20,8 +20,9 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 from space_robot_sim.robot import Robot
-from space_robot_sim.robot.dynamics import inverse_dynamics
+from space_robot_sim.robot.dynamics import free_inverse_dynamics, inverse_dynamics
 
+from .attitude_drift import controls_base
 from .metrics import torque_columns
 from .spectrum import PowerSpectrum
 
@@ -94,6 +95,7 @@ class Ripple(Metric):
         if 0.5 / self._period <= SLOWEST:
             raise InputError(f"ticks less than {0.5 / SLOWEST:g} s apart are needed")
         self._names = (*BASE_AXES, *log.joint_names)
+        self._columns = torque_columns(log.axes, controls_base(log))
         self._spectrum = PowerSpectrum(log.axes, self._period, round(SEGMENT_S / self._period))
         self._rows = 0
 
@@ -120,7 +122,7 @@ class Ripple(Metric):
         ``fast`` is the RMS of what is above `FAST`.
         """
         found = self.spectrum()
-        columns, rms, fast = torque_columns(len(self._names)), found.rms(), found.rms(FAST)
+        columns, rms, fast = self._columns, found.rms(), found.rms(FAST)
         peaks = {name: found.peak(axes) for name, axes in columns.items()}
         return {
             "above_hz": SLOWEST,
@@ -142,7 +144,7 @@ def desired_torque(log: FlightLog, robot: Robot) -> Array:
     references = log.references(log.first_tick, log.first_tick + log.ticks)
     quaternion = references["quaternion"]
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
-    return inverse_dynamics(robot, references)
+    return (inverse_dynamics if controls_base(log) else free_inverse_dynamics)(robot, references)
 
 
 def ripple_spectrum(log: FlightLog, robot: Robot) -> RippleSpectrum:

@@ -11,6 +11,7 @@ from space_robot_msgs_py.bag.blocks import Metric
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
+from .attitude_drift import controls_base
 from .metrics import error_columns, largest_of_columns
 from .waypoints import Waypoints
 
@@ -33,13 +34,14 @@ class Settling(Metric):
         """``log``: the first rows; ``band``: unit of the error, for the largest of the axes."""
         self._first_tick, self._period, self._band = log.first_tick, log.timebase.period, band
         self._waypoints = Waypoints()
-        self._outside = dict.fromkeys(error_columns(log.axes), -1)
+        self._columns = error_columns(log.axes, controls_base(log))
+        self._outside = dict.fromkeys(self._columns, -1)
         """Last row outside the band, by column."""
 
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
         before = self._waypoints.rows
-        for name, axes in error_columns(log.axes).items():
+        for name, axes in self._columns.items():
             outside = largest_of_columns(error[:, axes]) > self._band
             if outside.any():
                 self._outside[name] = before + len(error) - 1 - int(np.argmax(outside[::-1]))

@@ -7,6 +7,8 @@ from typing import Any
 
 from space_robot_msgs_py.bag.law_history import in_words
 
+from .attitude_drift import FREE
+
 Report = dict[str, Any]
 
 
@@ -39,6 +41,11 @@ def remarks(report: Report) -> list[str]:
     """Say in sentences what was lost, damaged or left unanswered."""
     lost = {topic: count for topic, count in report["lost"].items() if count}
     found = [f"messages lost: {lost or 'none'}"]
+    if drift := report["attitude_drift"]:
+        found.append(
+            f"{FREE}: its attitude is no error but drift, {drift['max_deg']:.4g} deg at most and "
+            f"{drift['end_deg']:.4g} deg at the end, which pointing includes"
+        )
     found += [
         text for text in (report["unfinished"], *report["damage"], *report["foreign"]) if text
     ]

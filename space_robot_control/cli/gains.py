@@ -23,21 +23,25 @@ def gains() -> None:
     "--controller", default="all", show_default=True,
     help="A law's name, or module:Class of your own; all: every law that the gain set has.",
 )  # fmt: skip
-@flight_options("case", "gains", "robot", "mission", "sensors", "navigation", "seed", "set", "json")
+@flight_options(
+    "case", "gains", "robot", "mission", "sensors", "actuators", "navigation", "seed", "set", "json"
+)
 def check(as_json: bool, **options: Any) -> None:
     """Tell which margin and noise gain the laws of a gain set have along a mission.
 
     For laws with time-delay estimation: the eigenvalues of H_S^-1 h_bar, the radius of
     E - H_S^-1 h_bar, the share by which the torque reported may exceed the one commanded. For all
     laws: the torque that noise on the measured rates becomes; with --sensors, the ripple of the
-    torque while the robot is held still for some seconds. Exit code 1 if the radius is 1 or more or
-    the margin below 2 % for any of the laws.
+    torque while the robot is held still for some seconds. With --actuators none the inertia is that
+    of the joints of a robot whose base floats freely. Exit code 1 if the radius is 1 or more or the
+    margin below 2 % for any of the laws.
 
     \b
     Examples:
       space-robot gains check
       space-robot gains check --controller tde_stc --gains my_gains/
       space-robot gains check --sensors fine --navigation filtered
+      space-robot gains check --actuators none
       space-robot gains check --case 4-2 --set controller.tde_stc.h_bar='[200.]'
     """
     from space_robot_msgs_py.errors import SpaceRobotError

@@ -55,9 +55,11 @@ def checked(options: dict[str, Any]) -> Checked:
     flight = Flight(plan)
     laws = flight.laws.values() if every else [flight.law]
     quaternion = flight.mission.chunk(0, 1).base[0, :4]
-    if abs(quaternion[0]) <= SINGULAR_ETA:
+    if flight.controls_base and abs(quaternion[0]) <= SINGULAR_ETA:
         raise InputError("base_quaternion: turned by 180 degrees, where the laws are singular")
-    inertia = inertia_along(flight.plant.robot, flight.mission_settings)
+    inertia = inertia_along(
+        flight.plant.robot, flight.mission_settings, controls_base=flight.controls_base
+    )
     corner = pair_corner(flight.controller_settings)
     checks = [check_gains(law, inertia, quaternion, corner) for law in laws]
     ripple: dict[str, Array | None] = {}
@@ -100,7 +102,10 @@ def report_of(found: Checked) -> dict[str, Any]:
     """Return the findings as data for JSON."""
     flight = found.flight
     return {
-        **{key: flight.description[key] for key in ("robot", "mission", "case", "gains")},
+        **{
+            key: flight.description[key]
+            for key in ("robot", "mission", "case", "actuators", "gains")
+        },
         "axes": flight.robot.axis_names,
         "is_sound": found.is_sound,
         **({"sensors": flight.plant_settings.sensors} if found.ripple else {}),

@@ -7,7 +7,6 @@ from rich.console import Console
 from ..analysis.tables import Column, Table, Verdict
 from ..analysis.terminal import print_table
 from ..flight.terminal import say
-from ..tuning.gain_check import GainCheck
 from ..tuning.spectrum import LEAST_MARGIN
 from .gains_checked import Checked
 
@@ -18,22 +17,22 @@ def print_checks(found: Checked, console: Console) -> None:
     say(
         console,
         f"robot {what['robot']}, mission {what['mission']}, case {what['case']}, "
-        f"gains {what['gains']}",
+        f"gains {what['gains']}, actuators {what['actuators']}",
     )
     if any(check.spectrum for check in found.checks):
-        print_table(_margins(found.checks), console)
+        print_table(_margins(found), console)
     print_table(_noise_gains(found), console)
     if found.ripple:
         print_table(_ripple(found), console)
 
 
-def _margins(checks: list[GainCheck]) -> Table:
+def _margins(found: Checked) -> Table:
     columns = [
         Column("", is_label=True), Column("smallest", spec=".4f"), Column("largest", spec=".4f"),
         Column("radius"), Column("margin"),
     ]  # fmt: skip
     rows = []
-    for check in checks:
+    for check in found.checks:
         if spectrum := check.spectrum:
             small = "good" if spectrum.is_sound else "bad"
             word = "sound" if spectrum.margin >= LEAST_MARGIN else "small"
@@ -42,7 +41,8 @@ def _margins(checks: list[GainCheck]) -> Table:
                 Verdict(f"{spectrum.radius:.4f} < 1", *_holds(spectrum.contracts)),
                 Verdict(f"{spectrum.margin:.2%}", word if spectrum.contracts else "none", small),
             ])  # fmt: skip
-    table = Table.of("Eigenvalues of H_S^-1 h_bar along the mission", columns, rows)
+    inertia = "H_S" if found.flight.controls_base else "H_f"
+    table = Table.of(f"Eigenvalues of {inertia}^-1 h_bar along the mission", columns, rows)
     note = (
         "The margin is the share by which the torque reported may exceed the one commanded "
         "until the time-delay estimate diverges."

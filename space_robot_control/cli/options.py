@@ -269,7 +269,9 @@ def remarks_on_gains(flight: Flight) -> list[str]:
 
     flown = [flight.law, *(law for _, law in flight.swaps)]
     corner = pair_corner(flight.controller_settings)
-    return margin_remarks(flown, flight.plant.robot, flight.mission_settings, corner)
+    return margin_remarks(
+        flown, flight.plant.robot, flight.mission_settings, corner, flight.controls_base
+    )
 
 
 OUTPUT = file_option("--output", help="File to write the JSON to as well.")

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.compiled.records import Block, assign
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Command, RobotState
+from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
 from space_robot_sim.robot import Robot
 
 from ..laws import ControlLaw, Signals
@@ -41,6 +42,7 @@ class Controller:
     def __init__(
         self, robot: Robot, law: ControlLaw, period: float, acceleration_filter_hz: float = 0.0,
         navigation: NavigationFilterSettings | None = None,
+        actuators: BaseActuatorSettings | None = None,
     ) -> None:  # fmt: skip
         """Build it for a robot and a law.
 
@@ -50,6 +52,7 @@ class Controller:
             period: s.
             acceleration_filter_hz: corner of the low-pass of the time-delay pair (0: none).
             navigation: settings of the navigation filter (None: the laws see what is measured).
+            actuators: of the base, as the controller knows them (None: ideal ones).
 
         Raises:
             InputError: settings that do not fit the period.
@@ -59,6 +62,8 @@ class Controller:
         """The controller's `ControllerMemory`, for compiled loops."""
         memory: ControllerMemory = self.block[0]
         assign(memory, model=robot.model, last_jacobian_inverse=2.0 * np.eye(3))
+        is_free = actuators is not None and actuators.base_actuation == "none"
+        assign(memory, controls_base=0.0 if is_free else 1.0)
         assign(memory, transfer_ticks=max(1, round(TRANSFER_S / period)))
         assign(memory.pair, smoothing=low_pass_weight(acceleration_filter_hz, period))
         if navigation:

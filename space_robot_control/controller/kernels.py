@@ -9,6 +9,7 @@ from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
 from space_robot_msgs_py.samples import State
 from space_robot_sim.dynamics.attitude import SINGULAR_ETA, attitude_jacobian_inverse
+from space_robot_sim.dynamics.free_floating import free_floating_into
 from space_robot_sim.dynamics.model import Model
 from space_robot_sim.dynamics.rho_space import rho_space_into
 
@@ -16,7 +17,13 @@ from ..laws import Signals
 from ..laws.compiled import LawCode
 from .navigation.navigation import Navigation, navigate
 from .time_delay_estimation import TimeDelayPair, follows, observe, time_delay_estimate
-from .tracking import force_from_torque, measured_rate, torque_from_force, tracking_errors
+from .tracking import (
+    force_from_torque,
+    leave_base_out,
+    measured_rate,
+    torque_from_force,
+    tracking_errors,
+)
 
 Array = NDArray[np.float64]
 
@@ -35,6 +42,8 @@ class ControllerMemory(Record):
 
     model: Model = nested(Model)
     """The nominal robot."""
+    controls_base: float = shaped(lambda n: ())
+    """1; 0: nothing turns the base, so its axes have no signals and no force."""
     signals: Signals = nested(Signals)
     """Those of the last tick."""
     pair: TimeDelayPair = nested(TimeDelayPair)
@@ -94,6 +103,8 @@ def compute_signals(
 ) -> int:  # fmt: skip
     """Turn a measured state, or what navigation makes of it, and its reference into signals.
 
+    Without a base to control all of them are zero on its axes, and none asks for J0^-1.
+
     Args: see `controller_tick`; ``h_bar`` is empty for a law without time-delay estimate.
 
     Returns:
@@ -101,14 +112,14 @@ def compute_signals(
         a measured state that was usable.
     """
     memory, measured = block[0], state[0]
-    signals, rate = memory.signals, memory.rate
-    status: int = status_of(measured)
+    signals, rate, controls_base = memory.signals, memory.rate, memory.controls_base == 1.0
+    status: int = status_of(measured, controls_base)
     if status != USABLE:
         return status
     if memory.navigation.is_filtered == 1.0:
         navigate(memory.navigation, tick, measured, period)
         measured = memory.navigation.estimate
-        status = status_of(measured)
+        status = status_of(measured, controls_base)
         if status != USABLE:
             return status
     near, dot = memory.quaternion, 0.0
@@ -118,17 +129,29 @@ def compute_signals(
     for k in range(4):
         near[k] = side * measured.quaternion[k]
     measured_rate(measured, near, memory.jacobian, rate)
-    if not follows(memory.pair, tick):  # whatever J0 was, this one's is nearer
+    if controls_base:
+        if not follows(memory.pair, tick):  # whatever J0 was, this one's is nearer
+            attitude_jacobian_inverse(near, memory.last_jacobian_inverse)
+        # the applied torque acted from the last tick on, so that tick's J0 turns it into F_S
+        force_from_torque(
+            memory.last_jacobian_inverse, measured.applied_torque, memory.applied_force
+        )
         attitude_jacobian_inverse(near, memory.last_jacobian_inverse)
-    # the applied torque acted from the last tick on, so that tick's J0 turns it into F_S
-    force_from_torque(memory.last_jacobian_inverse, measured.applied_torque, memory.applied_force)
-    attitude_jacobian_inverse(near, memory.last_jacobian_inverse)
+    else:
+        memory.applied_force[:] = measured.applied_torque
     tracking_errors(measured, near, rate, reference[0], memory.desired_jacobian, signals)
+    if not controls_base:
+        leave_base_out(signals, rate, memory.applied_force)
     observe(memory.pair, tick, memory.applied_force, rate, signals.acceleration_desired, period)
     if h_bar.size > 0:
         time_delay_estimate(memory.pair, h_bar, signals.n_hat)
-    if uses_model:
+    if uses_model and controls_base:
         rho_space_into(
+            memory.model, near, measured.joint_positions, measured.omega_base,
+            measured.joint_velocities, signals.nominal,
+        )  # fmt: skip
+    elif uses_model:
+        free_floating_into(
             memory.model, near, measured.joint_positions, measured.omega_base,
             measured.joint_velocities, signals.nominal,
         )  # fmt: skip
@@ -136,7 +159,7 @@ def compute_signals(
 
 
 @kernel
-def status_of(state: State) -> int:
+def status_of(state: State, controls_base: bool) -> int:
     """`USABLE`, or why no law may see the state."""
     quaternion, total = state.quaternion, 0.0
     for k in range(4):
@@ -154,7 +177,7 @@ def status_of(state: State) -> int:
         return TOO_LARGE
     if abs(square - 1.0) > NORM_TOLERANCE:
         return NOT_UNIT
-    return SINGULAR if abs(quaternion[0]) <= SINGULAR_ETA else USABLE
+    return SINGULAR if controls_base and abs(quaternion[0]) <= SINGULAR_ETA else USABLE
 
 
 @kernel
@@ -162,7 +185,7 @@ def apply_transfer(block: Block, tick: int, force: Array, torque: Array) -> None
     """Write the ``torque`` of a law's ``force`` (m,), which takes over from the one applied before.
 
     ``F_S + (F_applied - F_S at the takeover) fade``, the fade falling from 1 to 0. At tick 0
-    nothing has been applied, so nothing is taken over.
+    nothing has been applied, so nothing is taken over. A base that is not controlled gets none.
     """
     memory = block[0]
     if memory.transfer_left < 0.0:
@@ -177,3 +200,6 @@ def apply_transfer(block: Block, tick: int, force: Array, torque: Array) -> None
     if fade > 0.0:
         memory.transfer_left -= 1.0
     torque_from_force(memory.jacobian, memory.force, torque)
+    if memory.controls_base == 0.0:
+        for k in range(3):
+            memory.force[k] = torque[k] = 0.0

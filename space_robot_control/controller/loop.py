@@ -13,6 +13,7 @@ from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_sim.robot import Robot
 
+from .allocation.believed_actuators import believed_actuators
 from .answering import Answering, Standing
 from .controller import Controller
 from .law_set import LawSet
@@ -44,7 +45,7 @@ class ControllerLoop:
         self._laws.warm_up(robot)
         self._controller = Controller(
             robot, self._laws.choice.chosen, settings.period, settings.acceleration_filter_hz,
-            settings.filter_settings,
+            settings.filter_settings, believed_actuators(settings.actuators, robot),
         )  # fmt: skip
         timebase = settings.timebase
         self._states = StateInput(node, robot, timebase)

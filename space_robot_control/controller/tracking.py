@@ -58,6 +58,14 @@ def tracking_errors(
 
 
 @kernel
+def leave_base_out(signals: Signals, rate: Array, applied_force: Array) -> None:
+    """Zero the base's axes in what `tracking_errors` writes, in ``rate`` and in the force (m,)."""
+    for k in range(3):
+        signals.error[k] = signals.error_rate[k] = signals.acceleration_desired[k] = 0.0
+        rate[k] = applied_force[k] = 0.0
+
+
+@kernel
 def torque_from_force(jacobian: Array, force: Array, torque: Array) -> None:
     """``tau = J^T F_S``: torque in the base frame and on the joints from the generalised force."""
     rotate_back(jacobian, force[:3], torque[:3])

@@ -167,6 +167,7 @@ class Flight:
         self.controller = Controller(
             self._robots.controller, self.law, self.period,
             settings.controller.acceleration_filter_hz, settings.controller.filter_settings,
+            self.believed_actuators,
         )  # fmt: skip
         self.ticks = self._ticks()
 
@@ -192,6 +193,11 @@ class Flight:
             raise InputError(
                 f"{', '.join(asked)}: that needs a process for each node: fly without --composed"
             )
+
+    @property
+    def controls_base(self) -> bool:
+        """True if anything turns the base; else it floats freely."""
+        return self.plant_settings.base_actuation != "none"
 
     def _check_actuators(self) -> None:
         flown, believed = self.plant_settings, self.believed_actuators

@@ -12,6 +12,7 @@ measured rate of that axis becomes in the same tick, N m s, with the noise of ev
 Switching terms act on noise in a way that depends on its size: ``g sign(s)`` adds up to g, and
 the roots of super-twisting and of the terminal sliding mode their ``h_bar K_1 |s|^1/2``. A torque
 on the base is ``J0^T F``, about the base's axes, per unit of omega_base; rhodot is J0 of that.
+Where nothing turns the base its axes have no torque, and the joints the inertia H_f of `inertia`.
 """
 
 from __future__ import annotations
@@ -66,12 +67,14 @@ def check_gains(
 
     Args:
         law: with its gains and period.
-        inertia: (K, m, m) H_S in the configurations that count.
+        inertia: (K, m, m) H_S in the configurations that count; (K, n, n) H_f of the joints if
+            nothing turns the base.
         quaternion: (4,) attitude that the base holds in all of them.
         acceleration_filter_hz: see `pair_corner`.
     """
     weight = low_pass_weight(acceleration_filter_hz, law.period) or 1.0
-    found = spectrum(inertia, law.h_bar, weight) if law.h_bar.size else None
+    h_bar = law.h_bar[-inertia.shape[-1] :]
+    found = spectrum(inertia, h_bar, weight) if h_bar.size else None
     return GainCheck(law.name, found, noise_gain(law, inertia, quaternion, weight))
 
 
@@ -80,15 +83,18 @@ def noise_gain(law: ControlLaw, inertia: Array, quaternion: Array, weight: float
 
     Args: see `check_gains`; ``weight`` is that of the low-pass.
     """
-    gains = law.gain_values
+    axes = inertia.shape[-1]
+    gains = {name: values[-axes:] for name, values in law.gain_values.items()}
     # the slope of a sliding surface stands where K_D does
-    damping = gains.get("k_d", gains.get("lambda", np.zeros(inertia.shape[-1])))
+    damping = gains.get("k_d", gains.get("lambda", np.zeros(axes)))
     if law.h_bar.size:
-        per_rate = law.h_bar * (weight / law.period + damping)
+        per_rate = law.h_bar[-axes:] * (weight / law.period + damping)
     else:
         per_rate = np.diagonal(inertia, axis1=1, axis2=2).max(axis=0) * damping
         if {"g", "delta"} <= gains.keys():
             per_rate = per_rate + gains["g"] / gains["delta"]
+    if axes < len(law.memory.s):  # the base has none
+        return np.concatenate([np.zeros(3), per_rate])
     gain: Array = per_rate.copy()
     jacobian = attitude_jacobian(quaternion)
     gain[:3] = np.diag(jacobian.T @ np.diag(per_rate[:3]) @ jacobian)

@@ -6,7 +6,13 @@ that about the robot's common CoM,
     H_r = sum_i  Jw_i^T I_i Jw_i + m_i (Jv_i - Jv_c)^T (Jv_i - Jv_c),    H_S = J^-T H_r J^-1,
 
 with the Jacobians of body i's angular velocity and CoM, Jv_c their mean weighted by mass, and
-J = blkdiag(J0, E) of (22). `rho_space_into` has the same matrix from composite bodies, one
+J = blkdiag(J0, E) of (22). If nothing turns the base its rotation goes, too, and the joints keep
+
+    H_f = H_MM - H_MB H_BB^-1 H_BM,    the inverse of the joints' part of H_S^-1.
+
+By Cauchy's interlacing the eigenvalues of ``H_f^-1 h_bar`` then lie between the extreme ones of
+``H_S^-1 h_bar``: a time-delay estimate has no less margin than with the base held.
+`rho_space_into` has H_S from composite bodies, one
 configuration a call; this one needs no compiled code, whose loading would make a command wait.
 """
 
@@ -38,19 +44,32 @@ def sampled_reference(
     return mission.chunk(0, int(np.ceil(mission.duration / step - 1e-9)) + 1)
 
 
-def inertia_along(robot: Robot, settings: MissionSettings, step: float = SAMPLING) -> Array:
+def inertia_along(
+    robot: Robot, settings: MissionSettings, step: float = SAMPLING, controls_base: bool = True
+) -> Array:
     """Return H_S (K, m, m) of ``robot`` along a mission's reference, every ``step`` s.
+
+    If nothing turns the base: H_f (K, n, n).
 
     Args:
         robot: with its payload, if it carries one.
         settings: of the mission; its last waypoint is looked at too.
         step: s.
+        controls_base: whether anything turns the base.
 
     Raises:
         InputError: the waypoints do not fit the times or the joints.
     """
     chunk = sampled_reference(robot, settings, step)
-    return inertia_in_rho(chunk.base[0, :4], semi_floating_inertia(robot, chunk.joints[:, 0]))
+    inertia = semi_floating_inertia(robot, chunk.joints[:, 0])
+    return inertia_in_rho(chunk.base[0, :4], inertia) if controls_base else free_inertia(inertia)
+
+
+def free_inertia(inertia: Array) -> Array:
+    """Return H_f (K, n, n) of H_r, or of H_S, (K, m, m)."""
+    share = np.linalg.solve(inertia[:, :3, :3], inertia[:, :3, 3:])
+    left: Array = inertia[:, 3:, 3:] - inertia[:, 3:, :3] @ share
+    return left
 
 
 def attitude_jacobian(quaternion: Array) -> Array:

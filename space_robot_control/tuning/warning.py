@@ -22,6 +22,7 @@ def margin_remarks(
     robot: Robot,
     mission: MissionSettings,
     acceleration_filter_hz: float = 0.0,
+    controls_base: bool = True,
 ) -> list[str]:
     """Return a line for each of the laws that diverges, or nearly does, for its h_bar alone.
 
@@ -30,18 +31,19 @@ def margin_remarks(
         robot: the plant's, with its payload.
         mission: its reference.
         acceleration_filter_hz: corner of the low-pass of the time-delay pair (0: none).
+        controls_base: whether anything turns the base.
     """
     laws = {law.name: law for law in flown if law.h_bar.size}
     if not laws:
         return []
     try:
-        inertia = inertia_along(robot, mission, COARSE)
+        inertia = inertia_along(robot, mission, COARSE, controls_base)
     except InputError:  # it is the flight that has to complain
         return []
     remarks = []
     for name, law in laws.items():
         weight = low_pass_weight(acceleration_filter_hz, law.period) or 1.0
-        found = spectrum(inertia, law.h_bar, weight)
+        found = spectrum(inertia, law.h_bar[-inertia.shape[-1] :], weight)
         if not found.contracts:
             why = f"h_bar is too large for the robot (radius {found.radius:.3g}): it will diverge"
         elif not found.is_sound:

@@ -58,15 +58,9 @@ def rho_space_into(
         joint_velocities: (n,) rad/s.
         out: results and scratch.
     """
-    inertia, bias, full = out.inertia, out.bias, out.full_inertia
+    inertia, bias = out.inertia, out.bias
     omega, convective, moved = out.vectors[0], out.vectors[1], out.vectors[2]
-    rotation_matrix(quaternion, out.rotation)
-    rotate(out.rotation, omega_base, omega)
-    forward_kinematics(model, quaternion, joint_positions, out.data)
-    crba(model, out.data, full)
-    spatial_velocities(model, omega, joint_velocities, out.data)
-    rnea_bias(model, out.data, out.full_bias)
-    _eliminate_translation(full, out.full_bias, inertia, bias)
+    semi_floating_into(model, quaternion, joint_positions, omega_base, joint_velocities, out)
     # J0 on inertial axes is the transpose of J0 in the base frame, so its J0^-T is the latter's
     # inverse. For a unit quaternion J0dot w0 = -|w0|^2 eps / 4.
     attitude_jacobian_inverse(quaternion, out.to_force)
@@ -86,6 +80,25 @@ def rho_space_into(
         rotate(out.to_force, convective, inertia[i, :3])
     convective[:] = bias[:3]
     rotate(out.to_force, convective, bias[:3])
+
+
+@kernel
+def semi_floating_into(
+    model: Model, quaternion: Array, joint_positions: Array, omega_base: Array,
+    joint_velocities: Array, out: RhoSpaceModel,
+) -> None:  # fmt: skip
+    """Fill ``out.inertia`` and ``out.bias`` with H_r and c_r, the base's part on inertial axes.
+
+    Args: see `rho_space_into`; no attitude is singular. ``out.vectors[0]`` is then the base's
+    angular velocity on inertial axes, rad/s.
+    """
+    rotation_matrix(quaternion, out.rotation)
+    rotate(out.rotation, omega_base, out.vectors[0])
+    forward_kinematics(model, quaternion, joint_positions, out.data)
+    crba(model, out.data, out.full_inertia)
+    spatial_velocities(model, out.vectors[0], joint_velocities, out.data)
+    rnea_bias(model, out.data, out.full_bias)
+    _eliminate_translation(out.full_inertia, out.full_bias, out.inertia, out.bias)
 
 
 @kernel

@@ -9,9 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..dynamics.aba import aba
 from ..dynamics.crba import crba
+from ..dynamics.free_floating import free_inverse_dynamics_along
 from ..dynamics.inverse_dynamics import inverse_dynamics_along
 from ..dynamics.kinematics import forward_kinematics, spatial_velocities
 from ..dynamics.model import Data
+from ..dynamics.rho_space import RhoSpaceModel
 from ..dynamics.rnea import rnea_bias
 
 if TYPE_CHECKING:
@@ -146,4 +148,20 @@ def inverse_dynamics(robot: Robot, references: Block) -> Array:
     n = robot.n
     out = np.empty((len(references), n + 3))
     inverse_dynamics_along(robot.model, references, Data.allocate(n), np.empty((2, 3)), out)
+    return out
+
+
+def free_inverse_dynamics(robot: Robot, references: Block) -> Array:
+    """Return the torque that each desired motion of the joints asks for if nothing turns the base.
+
+    Args:
+        robot: the robot's numbers; it has no momentum.
+        references: (N,) array of a `space_robot_msgs_py.samples.Reference` each, of unit
+            quaternions.
+
+    Returns:
+        (N, n+3) N m, zero on the base's axes, then on the joints.
+    """
+    out = np.empty((len(references), robot.n + 3))
+    free_inverse_dynamics_along(robot.model, references, RhoSpaceModel.allocate(robot.n), out)
     return out

@@ -90,7 +90,7 @@ class FigureSet:
     def _figures(self) -> Iterator[tuple[str, str, Figure]]:
         """Draw the figures one after the other; with name of the file and caption."""
         flights = self._flights
-        torques = {name: series.base_torque for name, series in flights.items()}
+        torques = {n: s.base_torque for n, s in flights.items() if s.base_torque is not None}
         several = len(self._missions) > 1
         for number, (name, figure) in enumerate(self._missions.values(), start=1):
             suffix, of = (f"_{number}", f" of {name}") if several else ("", "")
@@ -101,8 +101,9 @@ class FigureSet:
         else:
             caption = "Errors and torques, norms over each group of axes (Figs. 6 to 9)"
             yield "control_results", caption, errors_and_torques(flights)
-        yield "junctions", "Base torque x where two motions meet", junctions(torques)
-        yield "chatter", "A stretch of base torque, and its spectrum", chatter(torques)
+        if torques:
+            yield "junctions", "Base torque x where two motions meet", junctions(torques)
+            yield "chatter", "A stretch of base torque, and its spectrum", chatter(torques)
         yield "ripple", "Spectrum of the torques' ripple", ripple(flights)
         caption = "The end effector's pointing error in the inertial frame"
         yield "pointing", caption, pointing(flights)

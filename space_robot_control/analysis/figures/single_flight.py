@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
+from ..attitude_drift import attitude_drift, controls_base
 from ..metrics import tracking_error
 from ..plot_series import tick_times
 from ..waypoints import junction_ticks, waypoint_ticks
@@ -42,19 +43,22 @@ def control_results(log: FlightLog, title: str) -> Figure:
     """Draw Figs. 6 to 9: errors and torques of the base (left) and of the joints (right).
 
     Below, the torques are enlarged round the junctions of the mission's segments, if the flight
-    has reached one.
+    has reached one. Where nothing turned the base, its drift stands in the place of its error.
 
     Args:
         log: a flight, whole or cut short.
         title: what was flown.
     """
     error, torque, time = tracking_error(log), log.applied_torque, tick_times(log)
+    of_base = "attitude error"
+    if not controls_base(log):
+        error[:, :3], of_base = attitude_drift(log), "attitude drift (deg)"
     moments = time[junction_ticks(log)[:MOST_JUNCTIONS]]
     rows = 3 if len(moments) else 2
     figure = page(22.0 + 46.0 * rows, title)
     cells = figure.add_gridspec(rows, 2)
     for column, (part, names, error_label, torque_label) in enumerate((
-        (slice(0, 3), BASE_AXES, "attitude error", "base torque (N m)"),
+        (slice(0, 3), BASE_AXES, of_base, "base torque (N m)"),
         (slice(3, None), log.joint_names, "joint error (rad)", "joint torque (N m)"),
     )):  # fmt: skip
         errors = figure.add_subplot(cells[0, column])
