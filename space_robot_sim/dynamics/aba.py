@@ -5,7 +5,7 @@ about one origin the usual changes of frame between links vanish. A spatial iner
 three blocks: ``[[J, G], [G^T, M]]``, angular part first, J and M symmetric.
 
 A locked joint passes its link's whole inertia and force on to the parent (hybrid dynamics,
-Featherstone 2008, chapter 9), which costs less than a free one.
+Featherstone 2008, chapter 9), which costs less than a free one. Wheels are leaves on the base.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ from .algebra import (
 )
 from .kinematics import forward_kinematics, spatial_velocities
 from .model import Data, Model
+from .wheels import take_wheels, turn_wheels
 
 Array = NDArray[np.float64]
 
@@ -50,6 +51,7 @@ def aba(
 
     ``force`` (n+6,) is ``[f0, tau0, tau]``, the base's part on inertial axes, N and N m. Joints
     that are locked in ``data`` do not accelerate, and ``data.holding`` tells what that takes.
+    Of a base with wheels they stand behind the joints, in velocities, force and ``out``.
     """
     forward_kinematics(model, quaternion, joint_positions, data)
     spatial_velocities(model, omega_inertial, joint_velocities, data)
@@ -92,6 +94,10 @@ def aba(
         bias_moment = add(bias_moment, transform(coupling, linear))
         bias_force = add(bias_force, transform_transposed(coupling, angular))
         bias_force = add(bias_force, transform_symmetric(mass, linear))
+    if model.wheel_count > 0.0:
+        inertia, bias_moment = take_wheels(
+            model, omega_inertial, joint_velocities, force, data, inertia, bias_moment
+        )
     # the base floats: no joint to the ground
     angular, linear = solve_spatial(
         inertia, coupling, mass,
@@ -100,6 +106,7 @@ def aba(
     store(linear, out, 0)
     store(angular, out, 3)
     # outwards: the accelerations
+    turn_wheels(model, angular, force, data, out)
     for i in range(1, model.mass.size):
         angular = add(angular, vector(data.coriolis[i], 0))
         linear = add(linear, vector(data.coriolis[i], 3))

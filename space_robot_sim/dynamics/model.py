@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.records import Record, shaped
+from space_robot_msgs_py.samples import MOST_WHEELS
 
 Array = NDArray[np.float64]
 
@@ -32,6 +33,12 @@ class Model(Record):
     """Cosine of DH ``alpha_{i-1}``."""
     sin_alpha: Array = shaped(lambda n: (n,))
     """Sine of DH ``alpha_{i-1}``."""
+    wheel_count: float = shaped(lambda n: ())
+    """Reaction wheels of the base, see `space_robot_sim.dynamics.wheels`; at most MOST_WHEELS."""
+    wheel_axis: Array = shaped(lambda n: (MOST_WHEELS, 3))
+    """Unit axes of the wheels, in the base's frame."""
+    wheel_inertia: Array = shaped(lambda n: (MOST_WHEELS,))
+    """Inertia of each wheel about its axis, kg m2; a part of the base's."""
 
 
 class Data(Record):
@@ -54,7 +61,9 @@ class Data(Record):
     """``U_i / D_i`` of the articulated-body recursion."""
     u_over_d: Array = shaped(lambda n: (n + 1,))
     """``u_i / D_i`` of the articulated-body recursion."""
-    locked: Array = shaped(lambda n: (n + 1,))
-    """1 for joints that must not accelerate, 0 for free ones (row 0 is unused)."""
-    holding: Array = shaped(lambda n: (n + 1,))
+    locked: Array = shaped(lambda n: (n + 1 + MOST_WHEELS,))
+    """1 for joints, then wheels, that must not accelerate, 0 for free ones (row 0 is unused)."""
+    holding: Array = shaped(lambda n: (n + 1 + MOST_WHEELS,))
     """Torque that a brake takes up on each locked joint so that it does not accelerate, N m."""
+    wheel_axis: Array = shaped(lambda n: (MOST_WHEELS, 3))
+    """Axes of the wheels."""

@@ -1,4 +1,4 @@
-"""Friction in the joints, the last term of (27), set-valued at rest.
+"""Friction in joints and wheels, the last term of (27), set-valued at rest.
 
 Coulomb's law gives a joint that turns ``f_C sign(thetadot)``, and one that stands any torque from
 ``-f_C`` to ``f_C``: whatever holds it (Filippov 1988). Which joints stand is found in
@@ -16,6 +16,7 @@ from pydantic import Field
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.samples import MOST_WHEELS
 from space_robot_msgs_py.topics import BASE_AXES
 
 from ..faults.axes import About
@@ -39,41 +40,47 @@ class FrictionSettings(StrictModel):
 
 
 class Friction(Record):
-    """The friction of one robot's joints."""
+    """The friction of one robot's joints, then of its wheels."""
 
-    coulomb: Array = shaped(lambda n: (n,))
+    count: float = shaped(lambda n: ())
+    """Joints and wheels that there are; the rest of the arrays is unused."""
+    coulomb: Array = shaped(lambda n: (n + MOST_WHEELS,))
     """f_C, N m."""
-    viscous: Array = shaped(lambda n: (n,))
+    viscous: Array = shaped(lambda n: (n + MOST_WHEELS,))
     """f_V, N m s/rad."""
     set_valued: float = shaped(lambda n: ())
     """0 for the sign alone, 1 for friction that holds joints at rest."""
 
     @classmethod
     def build(cls, n: int, settings: FrictionSettings) -> Friction:
-        """Give each of ``n`` joints the same friction."""
+        """Give each of ``n`` joints the same friction; of wheels it has none."""
         friction = cls.allocate(n)
-        assign(
-            friction, coulomb=settings.coulomb, viscous=settings.viscous,
-            set_valued=settings.set_valued,
-        )  # fmt: skip
+        assign(friction, count=n, set_valued=settings.set_valued)
+        friction.coulomb[:n], friction.viscous[:n] = settings.coulomb, settings.viscous
         return friction
+
+    @staticmethod
+    def add_wheels(friction: Friction, coulomb: Array, viscous: Array) -> None:
+        """Let wheels of this friction (W,), N m and N m s/rad, stand behind the joints."""
+        n = friction.coulomb.size - MOST_WHEELS
+        stop = n + coulomb.size
+        assign(friction, count=stop)
+        friction.coulomb[n:stop], friction.viscous[n:stop] = coulomb, viscous
 
 
 @kernel
-def friction_torque(
-    friction: Friction, joint_velocities: Array, directions: Array, out: Array
-) -> None:
-    """Write into ``out`` (n,) the torque ``f_f`` that opposes the motion of each joint, N m.
+def friction_torque(friction: Friction, velocities: Array, directions: Array, out: Array) -> None:
+    """Write into ``out`` the torque ``f_f`` that opposes the motion of each joint and wheel, N m.
 
     Args:
-        friction: of the joints.
-        joint_velocities: (n,) rad/s.
-        directions: (n,) 1 or -1, the sense in which a joint turns or begins to turn; 0 for one
-            that stands: what holds it is not told here.
-        out: (n,).
+        friction: of the joints and wheels.
+        velocities: of the joints, then of the wheels, rad/s.
+        directions: 1 or -1, the sense in which each turns or begins to turn; 0 for one that
+            stands: what holds it is not told here.
+        out: as long as they are.
     """
-    for i in range(out.size):
-        rate = joint_velocities[i]
+    for i in range(int(friction.count)):
+        rate = velocities[i]
         direction = directions[i] if friction.set_valued != 0.0 else np.sign(rate)
         out[i] = friction.coulomb[i] * direction + friction.viscous[i] * rate
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
+from space_robot_msgs_py.samples import MOST_WHEELS
 
 from ..dynamics.aba import aba
 from ..dynamics.attitude import quaternion_rate, rotate, rotation_matrix
@@ -18,76 +19,84 @@ from ..environment.friction import friction_torque
 Array = NDArray[np.float64]
 
 
+def state_size(n: int) -> int:
+    """Return how many numbers the state of a robot of ``n`` joints has, see `Stages`."""
+    return 2 * n + 13 + MOST_WHEELS
+
+
 class Stages(Record):
     """Scratch of the integrator.
 
-    A state ``x`` (2n+13,) is ``[r0 (3), quaternion (4), theta (n), v0 (3), w0 (3), thetadot (n)]``,
-    velocities on inertial axes.
+    A state ``x`` is ``[r0 (3), quaternion (4), theta (n), v0 (3), w0 (3), thetadot (n), Omega]``,
+    velocities on inertial axes; ``Omega`` (MOST_WHEELS,) are those of the wheels against the base.
     """
 
-    stage: Array = shaped(lambda n: (2 * n + 13,))
+    stage: Array = shaped(lambda n: (state_size(n),))
     """State at which the current stage is evaluated."""
-    slope: Array = shaped(lambda n: (4, 2 * n + 13))
+    slope: Array = shaped(lambda n: (4, state_size(n)))
     """Time derivatives."""
-    end: Array = shaped(lambda n: (2 * n + 13,))
+    end: Array = shaped(lambda n: (state_size(n),))
     """State at the end of a step."""
-    force: Array = shaped(lambda n: (n + 6,))
+    actuation: Array = shaped(lambda n: (n + 6 + MOST_WHEELS,))
+    """What the actuators give over the step: force (N) and torque (N m) on the base's axes, which
+    turn with it, torques on the joints, torques of the wheels' motors, N m."""
+    force: Array = shaped(lambda n: (n + 6 + MOST_WHEELS,))
     """Generalised force, base part on inertial axes."""
     disturbance: Array = shaped(lambda n: (n + 3,))
     """f_d of (61), N m."""
-    friction: Array = shaped(lambda n: (n,))
-    """f_f of each joint, N m."""
-    directions: Array = shaped(lambda n: (n,))
-    """The sense in which each joint slides over the step, see `friction_torque`."""
-    held: Array = shaped(lambda n: (n,))
-    """1 for joints that came back to rest within the step in which they broke away."""
+    friction: Array = shaped(lambda n: (n + MOST_WHEELS,))
+    """f_f of each joint, then of each wheel, N m."""
+    directions: Array = shaped(lambda n: (n + MOST_WHEELS,))
+    """The sense in which each of them slides over the step, see `friction_torque`."""
+    held: Array = shaped(lambda n: (n + MOST_WHEELS,))
+    """1 for those that came back to rest within the step in which they broke away."""
     data: Data = nested(Data)
-    """Its ``locked`` joints stand over the step."""
+    """Its ``locked`` joints and wheels stand over the step."""
 
 
 @kernel
 def state_derivative(
-    model: Model, environment: Environment, x: Array, torque: Array, disturbance: Array,
-    stages: Stages, out: Array,
+    model: Model, environment: Environment, x: Array, disturbance: Array, stages: Stages,
+    out: Array,
 ) -> None:  # fmt: skip
-    """Write xdot (2n+13,) into ``out``: (27) with f0 = 0.
+    """Write xdot into ``out``: (27).
 
     Args:
         model: the plant's robot.
         environment: its friction.
-        x: (2n+13,) the state, see `Stages`.
-        torque: (n+3,) N m, on the base's axes, which turn with it, then on the joints.
+        x: the state, see `Stages`.
         disturbance: (n+3,) f_d, N m, about inertial axes, then on the joints.
-        stages: scratch; says which joints slide in which sense and which stand.
-        out: (2n+13,).
+        stages: ``actuation``, and which joints and wheels slide in which sense and which stand;
+            scratch.
+        out: as ``x``.
     """
-    n = model.mass.size - 1
+    n, friction = model.mass.size - 1, environment.friction
     quaternion, theta = x[3:7], x[7 : 7 + n]
-    v0, w0, joint_velocities = x[7 + n : 10 + n], x[10 + n : 13 + n], x[13 + n :]
-    force, friction = stages.force, stages.friction
+    v0, w0, velocities = x[7 + n : 10 + n], x[10 + n : 13 + n], x[13 + n :]
+    force, actuation, resisting = stages.force, stages.actuation, stages.friction
     rotation_matrix(quaternion, stages.data.rotation)
-    rotate(stages.data.rotation, torque[:3], force[3:6])
+    rotate(stages.data.rotation, actuation[:3], force[:3])
+    rotate(stages.data.rotation, actuation[3:6], force[3:6])
     for k in range(3):
-        force[k] = 0.0
         force[3 + k] -= disturbance[k]
-    friction_torque(environment.friction, joint_velocities, stages.directions, friction)
+    friction_torque(friction, velocities, stages.directions, resisting)
     for i in range(n):
-        force[6 + i] = torque[3 + i] - disturbance[3 + i] - friction[i]
+        force[6 + i] = actuation[6 + i] - disturbance[3 + i] - resisting[i]
+    for k in range(n, int(friction.count)):  # the wheels
+        force[6 + k] = actuation[6 + k] - resisting[k]
     out[0:3] = v0
     quaternion_rate(quaternion, w0, out[3:7])
-    out[7 : 7 + n] = joint_velocities
-    aba(model, quaternion, theta, w0, joint_velocities, force, stages.data, out[7 + n :])
+    out[7 : 7 + n] = velocities[:n]
+    aba(model, quaternion, theta, w0, velocities, force, stages.data, out[7 + n :])
 
 
 @kernel
 def rk4_step(
-    model: Model, environment: Environment, x: Array, torque: Array, time: float, period: float,
-    stages: Stages,
-) -> None:  # fmt: skip
+    model: Model, environment: Environment, x: Array, time: float, period: float, stages: Stages
+) -> None:
     """Write into ``stages.end`` the state ``period`` s after ``x`` at ``time``; quaternion unit.
 
-    ``torque`` (n+3,) N m is held, see `state_derivative`; ``stages.slope[0]`` is the derivative
-    in ``x``.
+    ``stages.actuation`` is held; ``stages.slope[0]`` is the derivative in ``x``.
     """
     size, end = x.size, stages.end
     slope, stage, disturbance = stages.slope, stages.stage, stages.disturbance
@@ -97,7 +106,7 @@ def rk4_step(
             disturbance_torque(environment.disturbance, time + step, disturbance)
         for i in range(size):
             stage[i] = x[i] + step * slope[k - 1, i]
-        state_derivative(model, environment, stage, torque, disturbance, stages, slope[k])
+        state_derivative(model, environment, stage, disturbance, stages, slope[k])
     for i in range(size):
         slopes = slope[0, i] + 2.0 * (slope[1, i] + slope[2, i]) + slope[3, i]
         end[i] = x[i] + period / 6.0 * slopes

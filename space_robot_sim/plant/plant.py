@@ -23,7 +23,7 @@ from ..robot import Robot
 from ..sensors.noise import Draws
 from ..sensors.sensors import Sensors, SensorSettings, arrays_of_draws, sense
 from .faults import FaultSettings, PartFaults
-from .integrator import Stages
+from .integrator import Stages, state_size
 from .stick_slip import integrate
 from .truth import write_truth
 
@@ -58,7 +58,7 @@ class PlantMemory(Record):
     stages: Stages = nested(Stages)
     substeps: float = shaped(lambda n: ())
     """Integration steps in a tick."""
-    x: Array = shaped(lambda n: (2 * n + 13,))
+    x: Array = shaped(lambda n: (state_size(n),))
     """The state, see `Stages`."""
     rotation: Array = shaped(lambda n: (3, 3))
     """Scratch."""
@@ -209,23 +209,24 @@ def advance(
         The fastest rate then, see `fastest_rate`.
     """
     truth, measured = memory.truth, memory.measured
-    given = truth.applied_torque
+    given, n = truth.applied_torque, truth.joint_positions.size
     actuate(memory.actuators, command_delay_buffer, torque, tick, measured.applied_torque, given)
     substeps = int(memory.substeps)
     step = period / substeps
+    memory.stages.actuation[3 : 6 + n] = given
     for k in range(substeps):
         integrate(
-            memory.model, memory.environment, memory.x, given, tick * period + k * step, step,
+            memory.model, memory.environment, memory.x, tick * period + k * step, step,
             memory.stages,
         )  # fmt: skip
     write_truth(memory.x, memory.rotation, truth)
-    fastest: float = fastest_rate(memory.x, truth.joint_positions.size)
+    fastest: float = fastest_rate(memory.x, n)
     return fastest
 
 
 @kernel
 def fastest_rate(x: Array, n: int) -> float:
-    """Return the fastest angular velocity of base axes and joints, rad/s (NaN if any is)."""
+    """Return the fastest velocity of base axes, joints and wheels, rad/s (NaN if any is)."""
     fastest = 0.0
     for i in range(10 + n, x.size):
         if not abs(x[i]) <= fastest:  # also true of NaN

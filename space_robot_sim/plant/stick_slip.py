@@ -1,9 +1,9 @@
 """Steps over which joints slide, stand, come to rest and break away, as Coulomb's law has it.
 
-Within a step no friction changes its sign: a joint that slides keeps its sense, one that stands is
-locked. Where a joint comes to rest the step is cut, at the root of its velocity; there, and at the
-begin of every step, those at rest are found that break away. The friction torques then solve the
-box-constrained complementarity problem of the joints at rest:
+Wheels are joints here. Within a step no friction changes its sign: a joint that slides keeps its
+sense, one that stands is locked. Where a joint comes to rest the step is cut, at the root of its
+velocity; there, and at the begin of every step, those at rest are found that break away. The
+friction torques then solve the box-constrained complementarity problem of the joints at rest:
 
     |f_i| <= f_C,   thetadd_i = 0 if |f_i| < f_C,   thetadd_i sign(f_i) >= 0 if |f_i| = f_C
 
@@ -39,19 +39,15 @@ NONE = -1
 
 @kernel
 def integrate(
-    model: Model, environment: Environment, x: Array, torque: Array, time: float, period: float,
-    stages: Stages,
-) -> None:  # fmt: skip
-    """Advance ``x`` (2n+13,) in place from ``time`` by ``period``, s.
-
-    ``torque`` (n+3,) N m is held, see `state_derivative`.
-    """
+    model: Model, environment: Environment, x: Array, time: float, period: float, stages: Stages
+) -> None:
+    """Advance ``x`` in place from ``time`` by ``period``, s; ``stages.actuation`` is held."""
     left = period
     stages.held[:] = 0.0
     for _ in range(MOST_CUTS):
-        slide_or_stand(model, environment, x, torque, time, stages)
-        rk4_step(model, environment, x, torque, time, left, stages)
-        joint = first_at_rest(x, stages)
+        slide_or_stand(model, environment, x, time, stages)
+        rk4_step(model, environment, x, time, left, stages)
+        joint = first_at_rest(environment, x, stages)
         if joint == NONE:
             x[:] = stages.end
             return
@@ -62,35 +58,35 @@ def integrate(
         length = left
         while joint != NONE:  # one that comes to rest still earlier is met on the way
             velocity = x.size - stages.directions.size + joint
-            length = cut(model, environment, x, torque, time, length, velocity, stages)
+            length = cut(model, environment, x, time, length, velocity, stages)
             stages.end[velocity] = 0.0
-            joint = first_at_rest(x, stages)
+            joint = first_at_rest(environment, x, stages)
         x[:] = stages.end
         stages.held[:] = 0.0
         time += length
         left -= length
-    slide_or_stand(model, environment, x, torque, time, stages)
-    rk4_step(model, environment, x, torque, time, left, stages)
+    slide_or_stand(model, environment, x, time, stages)
+    rk4_step(model, environment, x, time, left, stages)
     x[:] = stages.end
 
 
 @kernel
 def slide_or_stand(
-    model: Model, environment: Environment, x: Array, torque: Array, time: float, stages: Stages
+    model: Model, environment: Environment, x: Array, time: float, stages: Stages
 ) -> None:
     """Find which joints slide in which sense and which stand in ``x``, and its derivative.
 
     They are written into ``stages.directions``, ``stages.data.locked`` and ``stages.slope[0]``.
     """
     directions, data, coulomb = stages.directions, stages.data, environment.friction.coulomb
-    n, derivative, sticks = directions.size, stages.slope[0], environment.friction.set_valued
-    first = x.size - n
+    n, derivative = int(environment.friction.count), stages.slope[0]
+    first, sticks = x.size - directions.size, environment.friction.set_valued
     for i in range(n):
         directions[i] = sticks * np.sign(x[first + i])
         data.locked[1 + i] = sticks if x[first + i] == 0.0 and coulomb[i] > 0.0 else 0.0
     disturbance_torque(environment.disturbance, time, stages.disturbance)
     for _ in range(MOST_PIVOTS):
-        state_derivative(model, environment, x, torque, stages.disturbance, stages, derivative)
+        state_derivative(model, environment, x, stages.disturbance, stages, derivative)
         changed = NONE
         for i in range(n):
             if x[first + i] != 0.0 or coulomb[i] * sticks == 0.0 or stages.held[i] != 0.0:
@@ -109,11 +105,11 @@ def slide_or_stand(
 
 
 @kernel
-def first_at_rest(x: Array, stages: Stages) -> int:
+def first_at_rest(environment: Environment, x: Array, stages: Stages) -> int:
     """Return the joint that came to rest first between ``x`` and ``stages.end``, or `NONE`."""
     directions, end = stages.directions, stages.end
     first, earliest, found = x.size - directions.size, 2.0, NONE
-    for i in range(directions.size):
+    for i in range(int(environment.friction.count)):
         before, after = x[first + i], end[first + i]
         if after * directions[i] < 0.0:
             share = before / (before - after)
@@ -124,8 +120,8 @@ def first_at_rest(x: Array, stages: Stages) -> int:
 
 @kernel
 def cut(
-    model: Model, environment: Environment, x: Array, torque: Array, time: float, length: float,
-    velocity: int, stages: Stages,
+    model: Model, environment: Environment, x: Array, time: float, length: float, velocity: int,
+    stages: Stages,
 ) -> float:  # fmt: skip
     """Return the time after which ``x[velocity]`` is zero, s, and leave that state in the stages.
 
@@ -137,7 +133,7 @@ def cut(
     side = 0
     for _ in range(MOST_TRIALS):
         length = (low * at_high - high * at_low) / (at_high - at_low)
-        rk4_step(model, environment, x, torque, time, length, stages)
+        rk4_step(model, environment, x, time, length, stages)
         found = stages.end[velocity]
         if abs(found) <= AT_REST or not low < length < high:
             break

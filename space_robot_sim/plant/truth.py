@@ -18,7 +18,7 @@ def write_truth(x: Array, rotation: Array, truth: State) -> None:
     """Write the plant's state into ``truth``; the torque in there is left alone.
 
     Args:
-        x: (2n+13,) the state, see `space_robot_sim.plant.integrator.Stages`.
+        x: the state, see `space_robot_sim.plant.integrator.Stages`.
         rotation: (3, 3) scratch.
         truth: angular velocity on base axes.
     """
@@ -29,4 +29,5 @@ def write_truth(x: Array, rotation: Array, truth: State) -> None:
     truth.base_velocity[:] = x[7 + n : 10 + n]
     rotation_matrix(truth.quaternion, rotation)
     rotate_back(rotation, x[10 + n : 13 + n], truth.omega_base)
-    truth.joint_velocities[:] = x[13 + n :]
+    truth.joint_velocities[:] = x[13 + n : 13 + 2 * n]
+    truth.wheel_velocities[:] = x[13 + 2 * n :]

@@ -29,7 +29,7 @@ def plant_steps(
 
 @kernel
 def forward_dynamics_calls(block: Block, force: Array, calls: int) -> None:
-    """``qdd = H^-1 (F - c)`` in the state of a `Plant`; ``force`` (n+6,)."""
+    """``qdd = H^-1 (F - c)`` in the state of a `Plant`; ``force`` (n+6+MOST_WHEELS,)."""
     memory = block[0]
     x, stages, n = memory.x, memory.stages, memory.measured.joint_positions.size
     out = stages.slope[0, 7 + n :]
@@ -42,15 +42,15 @@ def forward_dynamics_calls(block: Block, force: Array, calls: int) -> None:
 
 
 @kernel
-def state_derivatives(block: Block, torque: Array, disturbance: Array, calls: int) -> None:
-    """``xdot`` in the state of a `Plant`; ``torque`` and ``disturbance`` (n+3,)."""
+def state_derivatives(block: Block, disturbance: Array, calls: int) -> None:
+    """``xdot`` in the state of a `Plant`; ``disturbance`` (n+3,)."""
     memory = block[0]
     slope = memory.stages.slope[0]
     for _ in range(calls):
         state_derivative(
-            memory.model, memory.environment, memory.x, torque, disturbance, memory.stages, slope
+            memory.model, memory.environment, memory.x, disturbance, memory.stages, slope
         )
-        torque[0] = 1e-12 * slope[slope.size - 1]
+        memory.stages.actuation[6] = 1e-12 * slope[13 + memory.measured.joint_positions.size]
 
 
 @kernel

@@ -22,6 +22,7 @@ from oracles import (
 )
 from random_robots import State
 
+from space_robot_msgs_py.samples import MOST_WHEELS
 from space_robot_sim.dynamics.attitude import quaternion_rate
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.friction import FrictionSettings
@@ -96,9 +97,9 @@ class Ours:
             disturbance=DisturbanceSettings(scale=scale),
         )  # fmt: skip
         self.plant = Plant(start.robot, settings, PERIOD)
-        self.plant.block[0].x[:] = start.x
+        self.plant.block[0].x[: start.x.size] = start.x
         self._torque, self._ticks = start.torque.copy(), 0
-        self._force = np.zeros(n + 6)
+        self._force = np.zeros(n + 6 + MOST_WHEELS)
 
     def step(self, steps: int) -> None:
         plant_steps(
@@ -117,7 +118,7 @@ class Ours:
 
     @property
     def x(self) -> Array:
-        return np.array(self.plant.block[0].x)
+        return np.array(self.plant.block[0].x[:-MOST_WHEELS])
 
 
 class MuJoCo:

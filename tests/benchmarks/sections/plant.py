@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_msgs_py.samples import Command
+from space_robot_msgs_py.samples import MOST_WHEELS, Command
 from space_robot_sim.plant.plant import Plant
 
 from ..kernels import forward_dynamics_calls, plant_steps, state_derivatives
@@ -19,7 +19,8 @@ CASE = "3"
 def moving_plant() -> Plant:
     """The plant of case 3 with every joint turning, so that everything acts."""
     plant = Flight(FlightPlan(case=CASE, duration=1.0)).plant
-    plant.block[0].x[13 + plant.robot.n :] = 0.1
+    n = plant.robot.n
+    plant.block[0].x[13 + n : 13 + 2 * n] = 0.1
     return plant
 
 
@@ -29,7 +30,7 @@ def plant(options: Options) -> list[Result]:
     looped, called, parts = moving_plant(), moving_plant(), moving_plant()
     n, period = looped.robot.n, looped.period
     torque, command = np.zeros(n + 3), Command(0, np.zeros(n + 3))
-    force, disturbance = np.zeros(n + 6), np.zeros(n + 3)
+    force, disturbance = np.zeros(n + 6 + MOST_WHEELS), np.zeros(n + 3)
     seconds = interleave(
         {
             "step": lambda steps: plant_steps(
@@ -37,9 +38,7 @@ def plant(options: Options) -> list[Result]:
             ),
             "call": repeated(lambda: called.step(command)),
             "dynamics": lambda calls: forward_dynamics_calls(parts.block, force, calls),
-            "derivative": lambda calls: state_derivatives(
-                parts.block, torque, disturbance, calls
-            ),
+            "derivative": lambda calls: state_derivatives(parts.block, disturbance, calls),
         },
         options.batches(),
         batch_s=options.batch_s,

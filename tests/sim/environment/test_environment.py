@@ -30,7 +30,7 @@ def disturbance(n: int, scale: float, time: float) -> Array:
 
 def friction(joints: Friction, joint: int, rate: float) -> float:
     """The friction of one joint that turns alone."""
-    velocities = np.zeros(joints.coulomb.size)
+    velocities = np.zeros(int(joints.count))
     velocities[joint] = rate
     out = np.full(velocities.size, np.nan)
     friction_torque(joints, velocities, np.sign(velocities), out)
@@ -93,7 +93,7 @@ def test_friction_opposes_the_motion(rate: float, joint: int) -> None:
 def test_each_joint_has_its_own_friction(coefficients: list[float], rate: float) -> None:
     """As a stuck joint has."""
     joints = Friction.build(4, FrictionSettings())
-    joints.coulomb[:], joints.viscous[:] = coefficients[:4], coefficients[4:]
+    joints.coulomb[:4], joints.viscous[:4] = coefficients[:4], coefficients[4:]
     for joint in range(4):
         coulomb, viscous = coefficients[joint], coefficients[4 + joint]
         expected = coulomb * np.sign(rate) + viscous * rate

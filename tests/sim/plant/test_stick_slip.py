@@ -25,6 +25,7 @@ from space_robot_sim.dynamics.attitude import quaternion_rate
 from space_robot_sim.dynamics.model import Data
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.plant.conservation import kinetic_energy, momentum
+from space_robot_sim.plant.integrator import Stages
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.plant.stick_slip import slide_or_stand
 from space_robot_sim.robot import Robot
@@ -46,13 +47,22 @@ def place(plant: Plant, rng: np.random.Generator, rates: Array) -> State:
     """Put the plant anywhere, its joints turning at ``rates``."""
     n, x = plant.robot.n, plant.memory.x
     x[3:7], x[7 : 7 + n] = random_quaternion(rng), rng.uniform(-3.0, 3.0, n)
-    x[7 + n : 13 + n], x[13 + n :] = rng.normal(size=6), rates
+    x[7 + n : 13 + n], x[13 + n : 13 + 2 * n] = rng.normal(size=6), rates
     return state_of(plant)
 
 
 def state_of(plant: Plant) -> State:
     n, x = plant.robot.n, plant.memory.x.copy()
-    return State(x[3:7], x[7 : 7 + n], x[7 + n : 10 + n], x[10 + n : 13 + n], x[13 + n :])
+    rates = x[13 + n : 13 + 2 * n]
+    return State(x[3:7], x[7 : 7 + n], x[7 + n : 10 + n], x[10 + n : 13 + n], rates)
+
+
+def stand(plant: Plant, torque: Array) -> Stages:
+    """Find under a torque (n+3,) on base and joints which joints stand; the plant's scratch."""
+    memory = plant.memory
+    memory.stages.actuation[3 : 3 + torque.size] = torque
+    slide_or_stand(memory.model, memory.environment, memory.x, 0.0, memory.stages)
+    return memory.stages
 
 
 def data_of(plant: Plant) -> Data:
@@ -96,14 +106,14 @@ def test_joints_stand_or_break_away_as_coulombs_law_has_it(n: int, seed: int) ->
     rates = rng.normal(size=n) * rng.integers(0, 2, n)
     state = place(plant, rng, 0.3 * rates)
     torque = rng.normal(size=n + 3)
-    memory = plant.memory
-    slide_or_stand(memory.model, memory.environment, memory.x, torque, 0.0, memory.stages)
-    data, directions = data_of(plant), memory.stages.directions
-    friction = np.where(data.locked[1:] != 0.0, data.holding[1:], COULOMB * directions)
+    stages = stand(plant, torque)
+    data, directions = data_of(plant), stages.directions[:n]
+    locked = data.locked[1 : n + 1] != 0.0
+    friction = np.where(locked, data.holding[1 : n + 1], COULOMB * directions)
     (expected,) = solutions(plant.robot, state, torque, COULOMB)
     np.testing.assert_allclose(friction, expected, rtol=0.0, atol=1e-9)
-    accelerations = memory.stages.slope[0, 13 + n :]
-    assert not accelerations[data.locked[1:] != 0.0].any()
+    accelerations = stages.slope[0, 13 + n : 13 + 2 * n]
+    assert not accelerations[locked].any()
 
 
 @pytest.mark.parametrize("substeps", [1, 3])
@@ -127,7 +137,7 @@ def test_a_joint_comes_to_rest_when_and_where_it_should() -> None:
     plant = plant_of(robot, COULOMB)
     place(plant, rng, np.array([0.003]))
     plant.memory.x[8:14] *= 0.01
-    start = plant.memory.x.copy()
+    start = plant.memory.x[:15].copy()
     model = pinocchio_model(robot)
     data = model.createData()
 
@@ -177,7 +187,7 @@ def test_friction_never_adds_energy(n: int, seed: int, viscous: float) -> None:
 def test_a_joint_that_is_driven_through_rest_turns_on(paper_robot: Robot) -> None:
     """It does not stick where its motor is the stronger; the friction changes sides."""
     plant = plant_of(paper_robot, 0.02)
-    plant.memory.x[18] = 1e-4
+    plant.memory.x[24] = 1e-4
     smooth = plant_of(paper_robot, 0.0)
     torque = np.zeros(9)
     torque[8] = -0.5
@@ -206,9 +216,8 @@ def test_locked_joints_are_as_if_welded(seven_joint_robot: Robot) -> None:
     rates = rng.normal(size=n) * np.array([1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0])
     state = place(plant, rng, rates)
     torque = rng.normal(size=n + 3)
-    memory = plant.memory
-    memory.environment.friction.coulomb[rates != 0.0] = 0.0
-    slide_or_stand(memory.model, memory.environment, memory.x, torque, 0.0, memory.stages)
+    plant.memory.environment.friction.coulomb[: rates.size][rates != 0.0] = 0.0
+    stages = stand(plant, torque)
     mass = pinocchio_mass_matrix(seven_joint_robot, state)
     stands = 6 + np.flatnonzero(rates == 0.0)
     force = np.concatenate(
@@ -219,6 +228,6 @@ def test_locked_joints_are_as_if_welded(seven_joint_robot: Robot) -> None:
     saddle[n + 6 + np.arange(stands.size), stands] = 1.0
     saddle[stands, n + 6 + np.arange(stands.size)] = 1.0
     solution = np.linalg.solve(saddle, np.concatenate([force, np.zeros(stands.size)]))
-    np.testing.assert_allclose(memory.stages.slope[0, 7 + n :], solution[: n + 6], atol=1e-9)
-    holding = data_of(plant).holding[1:][stands - 6]
+    np.testing.assert_allclose(stages.slope[0, 7 + n : 13 + 2 * n], solution[: n + 6], atol=1e-9)
+    holding = data_of(plant).holding[stands - 5]
     np.testing.assert_allclose(holding, solution[n + 6 :], atol=1e-8)

@@ -1,0 +1,88 @@
+"""Reaction wheels of the base, as leaves of the articulated-body algorithm.
+
+A balanced wheel of spin inertia J on the axis a, which turns at Omega against the base, obeys
+
+    J (Omegadot + a . w0dot) = u,
+
+and the base, whose inertia I0 has the wheels in it as if they were locked,
+
+    I0 w0dot + w0 x (I0 w0 + sum J Omega a) + sum J Omegadot a = tau0,
+
+with the torque u on the wheel: its motor's less its friction. With Omegadot eliminated the base has
+the inertia ``I0 - sum J a a^T``, and ``- sum u a - w0 x sum J Omega a`` acts on it beside tau0.
+That is what a leaf of one joint comes to in `aba` (a gyrostat: Hughes, Spacecraft Attitude
+Dynamics, 1986, chapter 3). A wheel that stands is a locked joint.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+
+from .algebra import (
+    Symmetric,
+    Vector,
+    add,
+    cross,
+    dot,
+    outer_subtracted,
+    scale,
+    store,
+    vector,
+)
+from .model import Data, Model
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def take_wheels(
+    model: Model, omega_inertial: Array, velocities: Array, force: Array, data: Data,
+    inertia: Symmetric, bias_moment: Vector,
+) -> tuple[Symmetric, Vector]:  # fmt: skip
+    """Return the base's articulated inertia and bias moment with its wheels in them.
+
+    Args:
+        model: of the robot.
+        omega_inertial: (3,) rad/s, of the base on inertial axes.
+        velocities: (n+W,) of joints and wheels, rad/s.
+        force: (n+6+W,) as in `aba`; the last W are the torques on the wheels, N m.
+        data: with the base's ``rotation``; its ``wheel_axis`` is filled.
+        inertia: of the base and its links about the base's CoM, kg m2.
+        bias_moment: of the same, N m.
+    """
+    n, r = model.mass.size - 1, data.rotation
+    momentum = (0.0, 0.0, 0.0)
+    for k in range(int(model.wheel_count)):
+        a = vector(model.wheel_axis[k], 0)
+        axis = (
+            r[0, 0] * a[0] + r[0, 1] * a[1] + r[0, 2] * a[2],
+            r[1, 0] * a[0] + r[1, 1] * a[1] + r[1, 2] * a[2],
+            r[2, 0] * a[0] + r[2, 1] * a[1] + r[2, 2] * a[2],
+        )
+        store(axis, data.wheel_axis[k], 0)
+        spin_inertia = model.wheel_inertia[k]
+        momentum = add(momentum, scale(axis, spin_inertia * velocities[n + k]))
+        if data.locked[1 + n + k] == 0.0:
+            inertia = outer_subtracted(inertia, axis, scale(axis, spin_inertia))
+            bias_moment = add(bias_moment, scale(axis, force[6 + n + k]))
+    return inertia, add(bias_moment, cross(vector(omega_inertial, 0), momentum))
+
+
+@kernel
+def turn_wheels(model: Model, angular: Vector, force: Array, data: Data, out: Array) -> None:
+    """Write the wheels' accelerations behind the joints' into ``out``, rad/s2.
+
+    ``angular`` is the base's acceleration, rad/s2. What holds a locked wheel goes into
+    ``data.holding``, N m.
+    """
+    n = model.mass.size - 1
+    for k in range(int(model.wheel_count)):
+        of_base = dot(vector(data.wheel_axis[k], 0), angular)
+        if data.locked[1 + n + k] == 0.0:
+            out[6 + n + k] = force[6 + n + k] / model.wheel_inertia[k] - of_base
+        else:
+            out[6 + n + k] = 0.0
+            data.holding[1 + n + k] = force[6 + n + k] - model.wheel_inertia[k] * of_base
