@@ -1,4 +1,4 @@
-"""Momentum and kinetic energy of the whole robot, from a state: what a flight must conserve."""
+"""Momentum and kinetic energy of robot and wheels, from a state: what a flight must conserve."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.samples import RobotState
 
+from ..actuators.wheels import WheelSettings
 from ..dynamics.attitude import rotation_matrix
 from ..robot import Robot
 from ..robot.dynamics import mass_matrix
 
 Array = NDArray[np.float64]
+NO_WHEELS = WheelSettings()
 
 
 def generalised_velocity(state: RobotState) -> Array:
@@ -23,15 +25,28 @@ def generalised_velocity(state: RobotState) -> Array:
     )
 
 
-def momentum(robot: Robot, state: RobotState) -> tuple[Array, Array]:
+def momentum(
+    robot: Robot, state: RobotState, wheels: WheelSettings = NO_WHEELS
+) -> tuple[Array, Array]:
     """Return linear (N s) and angular momentum (N m s) about the inertial origin, inertial axes."""
     inertia = mass_matrix(robot, state.quaternion, state.joint_positions)
     base = inertia[:6] @ generalised_velocity(state)
-    return base[:3], base[3:] + np.cross(state.base_position, base[:3])
+    angular = base[3:] + np.cross(state.base_position, base[:3])
+    rotation = np.empty((3, 3))
+    rotation_matrix(state.quaternion, rotation)
+    return base[:3], angular + rotation @ wheels.unit_axes.T @ spin_momentum(wheels, state)
 
 
-def kinetic_energy(robot: Robot, state: RobotState) -> float:
-    """Return the kinetic energy T of (4), J."""
+def kinetic_energy(robot: Robot, state: RobotState, wheels: WheelSettings = NO_WHEELS) -> float:
+    """Return the kinetic energy T of (4) and of the wheels' spin, J."""
     velocity = generalised_velocity(state)
     inertia = mass_matrix(robot, state.quaternion, state.joint_positions)
-    return float(0.5 * velocity @ inertia @ velocity)
+    of_base, of_wheels = wheels.unit_axes @ state.omega_base, state.wheel_velocities[: wheels.count]
+    spin = spin_momentum(wheels, state) @ (of_base + 0.5 * of_wheels)
+    return float(0.5 * velocity @ inertia @ velocity + spin)
+
+
+def spin_momentum(wheels: WheelSettings, state: RobotState) -> Array:
+    """Return ``J Omega`` (W,) of the wheels, N m s: what they have beyond turning with the base."""
+    momenta: Array = wheels.values("rotor_inertia") * state.wheel_velocities[: wheels.count]
+    return momenta

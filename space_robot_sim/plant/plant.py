@@ -26,6 +26,7 @@ from .faults import FaultSettings, PartFaults
 from .integrator import Stages, state_size
 from .stick_slip import integrate
 from .truth import write_truth
+from .wheel_mounting import mount_wheels
 
 Array = NDArray[np.float64]
 Block = NDArray[Any]
@@ -106,11 +107,13 @@ class Plant:
         )  # fmt: skip
         memory.x[3:7] = np.array(settings.initial_quaternion) / norm
         memory.x[7 : 7 + n] = np.radians(settings.initial_joints_deg)
+        mount_wheels(memory, settings.wheels)
         self.truth = RobotState(0, self.block["truth"])
         self.state = RobotState(0, self.block["measured"])
         # at rest: what `write_truth` would say, without waiting for compiled code
         self.truth.quaternion[:] = memory.x[3:7]
         self.truth.joint_positions[:] = memory.x[7 : 7 + n]
+        self.truth.wheel_velocities[:] = memory.x[13 + 2 * n :]
         sensors = Sensors.build(n, settings, period, memory.truth)
         self._part_faults = PartFaults(settings.schedule(robot, period))
         if self._part_faults.are_in("sensors"):
@@ -214,6 +217,7 @@ def advance(
     substeps = int(memory.substeps)
     step = period / substeps
     memory.stages.actuation[3 : 6 + n] = given
+    memory.stages.actuation[6 + n :] = truth.wheel_torques
     for k in range(substeps):
         integrate(
             memory.model, memory.environment, memory.x, tick * period + k * step, step,

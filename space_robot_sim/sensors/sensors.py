@@ -76,10 +76,12 @@ FAULTS: dict[str, type[PartFault]] = {
 def sense(sensors: Sensors, truth: State, tick: int, period: float, measured: State) -> None:
     """Write into ``measured`` what the sensors tell of ``truth`` at ``tick``; call it once a tick.
 
-    The torque in ``measured`` is left alone; position and velocity of the base have no error.
+    The torques in ``measured`` are left alone; position and velocity of the base, and the speeds of
+    its wheels, have no error.
     """
     measured.base_position[:] = truth.base_position
     measured.base_velocity[:] = truth.base_velocity
+    measured.wheel_velocities[:] = truth.wheel_velocities
     if sensors.are_ideal == 1.0:
         measured.quaternion[:] = truth.quaternion
         measured.omega_base[:] = truth.omega_base
