@@ -1,0 +1,109 @@
+"""The flight software between a law and the base's actuators, a tick of it.
+
+    demand --+--> wheels --> motors' torques (and null motion)
+             |      ^ less the torque expected of the thrusters
+             +--> what the wheels' axes cannot give, and unloading --> thrusters --> pulses
+
+A base without wheels leaves all to the thrusters. What was given comes back in the reported
+torque, so the time-delay estimate is not misled by limits, failures or pulses.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
+from space_robot_msgs_py.samples import State
+from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
+
+from .modulation import Modulation, modulate
+from .null_motion import NullMotion, add_null_motion
+from .settings import AllocationSettings
+from .thrusters import Thrusters, expect_torque
+from .unloading import Unloading, find_unloading
+from .wheel_health import WheelHealth, observe_wheels, remember_asked
+from .wheels import Wheels, share_torque
+
+Array = NDArray[np.float64]
+
+
+class Allocation(Record):
+    """Settings and memory of the allocation."""
+
+    is_used: float = shaped(lambda n: ())
+    """0: the base's actuators are ideal, or there are none."""
+    wheels: Wheels = nested(Wheels)
+    health: WheelHealth = nested(WheelHealth)
+    null_motion: NullMotion = nested(NullMotion)
+    thrusters: Thrusters = nested(Thrusters)
+    modulation: Modulation = nested(Modulation)
+    unloading: Unloading = nested(Unloading)
+    of_thrusters: Array = shaped(lambda n: (3,))
+    """Torque demanded of the thrusters, N m."""
+    expected: Array = shaped(lambda n: (3,))
+    """Torque that they are expected to give from the present tick to the next, N m."""
+    of_wheels: Array = shaped(lambda n: (3,))
+    """Torque demanded of the wheels, N m."""
+
+    @classmethod
+    def build(
+        cls, n: int, believed: BaseActuatorSettings, settings: AllocationSettings, period: float
+    ) -> Allocation:
+        """Read the settings for a robot of ``n`` joints and ticks of ``period``, s."""
+        allocation = cls.allocate(n)
+        thrusters = Thrusters.build(n, believed.thrusters, settings, period)
+        assign(
+            allocation, is_used=bool(believed.names), thrusters=thrusters,
+            wheels=Wheels.build(n, believed.wheels, settings, period),
+            health=WheelHealth.build(n, settings), null_motion=NullMotion.build(n, settings),
+            modulation=Modulation.build(n, thrusters, settings, period),
+            unloading=Unloading.build(n, settings),
+        )  # fmt: skip
+        return allocation
+
+
+@kernel
+def observe_actuators(allocation: Allocation, tick: int, state: State) -> None:
+    """Take what the wheels report in the ``state`` of a ``tick``."""
+    if allocation.wheels.count > 0.0:
+        observe_wheels(allocation.health, allocation.wheels, tick, state)
+
+
+@kernel
+def allocate(allocation: Allocation, tick: int, base_torque: Array, command: Array) -> None:
+    """Write the commands that give the base a torque from ``tick`` to the next.
+
+    Args:
+        allocation: has observed the state of ``tick``.
+        tick: of the command.
+        base_torque: (3,) demanded, N m, base frame.
+        command: torque of each wheel's motor, N m, then force of each thruster, N; written.
+    """
+    wheels, thrusters = allocation.wheels, allocation.thrusters
+    wheel_count, thruster_count = int(wheels.count), int(thrusters.count)
+    if thruster_count > 0:
+        _allocate_thrusters(allocation, tick, base_torque)
+        for j in range(thruster_count):
+            command[wheel_count + j] = thrusters.is_open[j] * thrusters.force[j]
+    if wheel_count > 0:
+        for i in range(3):
+            allocation.of_wheels[i] = base_torque[i] - allocation.expected[i]
+        share_torque(wheels, allocation.of_wheels)
+        add_null_motion(allocation.null_motion, wheels)
+        remember_asked(allocation.health, wheels, tick)
+        for k in range(wheel_count):
+            command[k] = wheels.torque[k]
+
+
+@kernel
+def _allocate_thrusters(allocation: Allocation, tick: int, base_torque: Array) -> None:
+    wheels, demand = allocation.wheels, allocation.of_thrusters
+    find_unloading(allocation.unloading, wheels, demand)
+    if wheels.healthy.rank < 3.0:
+        for i in range(3):
+            for j in range(3):
+                demand[i] += wheels.healthy.beyond[i, j] * base_torque[j]
+    modulate(allocation.modulation, allocation.thrusters, tick, demand)
+    expect_torque(allocation.thrusters, tick, allocation.expected)

@@ -1,0 +1,68 @@
+"""Thrusters take momentum out of the wheels.
+
+From the moment that a wheel has more than ``unload_above`` of its largest momentum until all have
+less than ``unload_to``, thrusters are asked for the torque ``-H / unload_time``, H the wheels'
+momentum, cut to half of what the wheels can give: these hold the base against it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, assign, shaped
+
+from .settings import AllocationSettings
+from .wheels import Wheels
+
+Array = NDArray[np.float64]
+
+WHEELS_SHARE = 0.5
+"""Of the wheels' torque that unloading may take."""
+
+
+class Unloading(Record):
+    """Settings and state of the unloading."""
+
+    above: float = shaped(lambda n: ())
+    to: float = shaped(lambda n: ())
+    """Shares of the largest momentum."""
+    rate: float = shaped(lambda n: ())
+    """1/s."""
+    is_under_way: float = shaped(lambda n: ())
+    """0 or 1."""
+
+    @classmethod
+    def build(cls, n: int, settings: AllocationSettings) -> Unloading:
+        """Read the settings."""
+        unloading = cls.allocate(n)
+        assign(
+            unloading, above=settings.unload_above, to=settings.unload_to,
+            rate=1.0 / settings.unload_time,
+        )  # fmt: skip
+        return unloading
+
+
+@kernel
+def find_unloading(unloading: Unloading, wheels: Wheels, torque: Array) -> None:
+    """Write the ``torque`` (3,) N m asked of the thrusters, zero unless wheels are unloaded."""
+    fullest, x, y, z = 0.0, 0.0, 0.0, 0.0
+    for k in range(int(wheels.count)):
+        h, axis = wheels.momentum[k], wheels.axis[k]
+        fullest = max(fullest, abs(h) / wheels.max_momentum[k])
+        x += axis[0] * h
+        y += axis[1] * h
+        z += axis[2] * h
+    if fullest > unloading.above:
+        unloading.is_under_way = 1.0
+    elif fullest < unloading.to:
+        unloading.is_under_way = 0.0
+    rate, excess = unloading.rate * unloading.is_under_way, 1.0
+    for k in range(int(wheels.count)):
+        row = wheels.healthy.inverse[k]
+        load = abs(row[0] * x + row[1] * y + row[2] * z) * rate
+        excess = max(excess, load / (WHEELS_SHARE * wheels.max_torque[k]))
+    torque[0] = -rate / excess * x
+    torque[1] = -rate / excess * y
+    torque[2] = -rate / excess * z

@@ -1,0 +1,164 @@
+"""Pulses: their mean is the demand, and none is shorter than allowed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from space_robot_control.controller.allocation.modulation import Modulation, modulate
+from space_robot_control.controller.allocation.settings import AllocationSettings
+from space_robot_control.controller.allocation.thrusters import (
+    Thrusters,
+    expect_torque,
+    find_times,
+)
+from space_robot_sim.actuators.thrusters import ThrusterSettings
+
+Array = NDArray[np.float64]
+
+PERIOD = 5e-4
+KINDS = ["pwm", "sigma_delta", "schmitt"]
+
+
+def couples() -> tuple[list[float], list[float]]:
+    """Twelve thrusters, 1 m from the CoM, in pairs of pure couples about each axis."""
+    positions, directions = [], []
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        for arm in (1.0, -1.0):
+            for side in (1.0, -1.0):
+                positions.append(arm * np.eye(3)[j])
+                directions.append(side * np.eye(3)[k])
+    return np.ravel(positions).tolist(), np.ravel(directions).tolist()
+
+
+def slanted() -> tuple[list[float], list[float]]:
+    """Ten that point anywhere, each about all axes at once."""
+    positions, directions = np.random.default_rng(4).normal(size=(2, 10, 3))
+    return positions.ravel().tolist(), directions.ravel().tolist()
+
+
+class Bench:
+    def __init__(self, kind: str, layout: Any = couples, pulse: float = 0.01, **more: Any) -> None:
+        positions, directions = layout()
+        believed = ThrusterSettings(
+            positions=positions, directions=directions, force=[10.0], shortest_pulse=[pulse],
+            delay=[more.pop("delay", 0.0)],
+        )  # fmt: skip
+        settings = AllocationSettings(modulation=kind, **more)  # type: ignore[arg-type]
+        self.count = believed.count
+        self.torques = believed.torques
+        self.forces = believed.unit_directions * 10.0
+        self.thrusters = Thrusters.build(1, believed, settings, PERIOD)
+        self.modulation = Modulation.build(1, self.thrusters, settings, PERIOD)
+
+    def fly(self, demands: Array) -> Array:
+        """(ticks, T), 1 where open."""
+        rows = []
+        for tick, demand in enumerate(demands):
+            modulate(self.modulation, self.thrusters, tick, demand)
+            rows.append(self.thrusters.is_open[: self.count].copy())
+        return np.array(rows)
+
+
+def lengths(row: Array) -> Array:
+    """Ticks of each pulse of a thruster that had ended."""
+    edges = np.diff(np.concatenate([[0.0], row]))
+    begins, ends = np.flatnonzero(edges > 0.0), np.flatnonzero(edges < 0.0)
+    return np.asarray(ends - begins[: ends.size])
+
+
+@pytest.mark.parametrize("layout", [couples, slanted])
+@pytest.mark.parametrize("kind", KINDS)
+def test_mean_torque_follows_the_demand(kind: str, layout: Any) -> None:
+    bench = Bench(kind, layout)
+    demand = np.array([1.3, -0.4, 0.02])
+    opened = bench.fly(np.tile(demand, (8000, 1)))
+    mean = opened.mean(axis=0) @ bench.torques
+    one = np.linalg.norm(bench.torques, axis=1).max() * 0.1 / 4.0  # a whole pulse of 0.1 s in 4 s
+    np.testing.assert_allclose(mean, demand, atol=one)
+    owed = (8000 * demand - opened.sum(axis=0) @ bench.torques) * PERIOD
+    np.testing.assert_allclose(bench.modulation.owed[:3], owed, atol=1e-9)
+
+
+@pytest.mark.parametrize("layout", [couples, slanted])
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_pulse_is_shorter_than_allowed(kind: str, layout: Any) -> None:
+    rng, bench = np.random.default_rng(1), Bench(kind, layout, pulse=0.02)
+    demands = np.repeat(rng.normal(size=(40, 3)) * 3.0, 100, axis=0)
+    opened = bench.fly(demands)
+    pulses = np.concatenate([lengths(row) for row in opened.T])
+    assert pulses.size > 5
+    assert pulses.min() >= 40
+    assert bench.modulation.pulses.sum() >= pulses.size
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_impulses_follow_a_demand_that_varies(kind: str) -> None:
+    bench, t = Bench(kind), np.arange(12000) * PERIOD
+    demands = np.stack([2.0 * np.sin(t), 1.5 * np.cos(0.7 * t), 0.3 * np.sin(3.0 * t)], axis=1)
+    opened = bench.fly(demands)
+    lacking = np.cumsum(demands - opened @ bench.torques, axis=0) * PERIOD
+    assert np.abs(lacking).max() < {"pwm": 1.1, "sigma_delta": 0.15, "schmitt": 0.25}[kind]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_opposite_demands_cancel(kind: str) -> None:
+    """Noise about zero opens no valve."""
+    demands = np.random.default_rng(2).normal(size=(4000, 3)) * 0.3
+    opened = Bench(kind).fly(demands)
+    assert opened.sum() * 10.0 < np.abs(demands).sum() * 0.02
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_demand_beyond_all_thrusters_is_not_owed(kind: str) -> None:
+    bench = Bench(kind)
+    demands = np.zeros((6000, 3))
+    demands[:3000, 0], demands[:3000, 1] = 200.0, 20.0
+    opened = bench.fly(demands)
+    np.testing.assert_allclose(opened[500:2500].mean(axis=0) @ bench.torques, [20, 2, 0], atol=0.7)
+    assert opened[3400:].sum() == 0.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_after_a_gap_nothing_is_owed(kind: str) -> None:
+    bench = Bench(kind)
+    bench.fly(np.full((250, 3), 3.0))
+    modulate(bench.modulation, bench.thrusters, 5000, np.zeros(3))
+    assert bench.thrusters.is_open.sum() == 0.0
+    np.testing.assert_array_equal(bench.modulation.owed, 0.0)
+
+
+def test_schmitt_trigger_has_hysteresis() -> None:
+    """Wider thresholds: longer, rarer pulses."""
+    demand = np.tile([1.0, 0.0, 0.0], (8000, 1))
+    narrow = Bench("schmitt").fly(demand)
+    wide = Bench("schmitt", schmitt_on=3.0, schmitt_off=-3.0).fly(demand)
+    few, many = (sum(lengths(row).size for row in opened.T) for opened in (wide, narrow))
+    assert 0 < few < 0.5 * many
+    longest = max(lengths(row).max(initial=0) for row in wide.T)
+    assert longest > 2 * max(lengths(row).max(initial=0) for row in narrow.T)
+
+
+def test_pure_couples_where_the_layout_has_them() -> None:
+    bench, rng = Bench("pwm"), np.random.default_rng(3)
+    for _ in range(20):
+        impulse = rng.normal(size=3)
+        find_times(bench.thrusters, np.append(impulse, np.zeros(3)))
+        times = bench.thrusters.problem.x[: bench.count]
+        np.testing.assert_allclose(times @ bench.torques, impulse, atol=1e-9)
+        np.testing.assert_allclose(times @ bench.forces, 0.0, atol=1e-7)
+
+
+def test_expected_torque_comes_as_late_as_the_valves() -> None:
+    bench, torque, found, opened = Bench("pwm", delay=0.003), np.zeros(3), [], []
+    for tick in range(600):
+        modulate(bench.modulation, bench.thrusters, tick, np.array([2.0, -1.0, 0.5]))
+        expect_torque(bench.thrusters, tick, torque)
+        opened.append(bench.thrusters.is_open[: bench.count] @ bench.torques)
+        found.append(torque.copy())
+    np.testing.assert_allclose(found[6:], opened[:-6], atol=1e-12)
+    np.testing.assert_array_equal(found[:6], 0.0)
