@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.compiled.records import Block
@@ -60,11 +61,17 @@ class ControllerLoop:
             topics.LAW: RawPublisher(node, topics.LAW),
         }
         self.outputs = tuple(self._out.values())
-        self.wait_for = settings.wait_for
+        self._made_at = time.monotonic()
         self._unanswered = -1
         """A state's tick whose reference has not come yet; -1: none."""
         self._state_at = time.monotonic()
         self._look_ahead_at = 0.0
+
+    @property
+    def wait_for(self) -> Sequence[str]:
+        """See `Loop.wait_for`; nobody once ``listener_timeout`` is over."""
+        timeout, waited = self._settings.listener_timeout, time.monotonic() - self._made_at
+        return () if timeout and waited > timeout else self._settings.wait_for
 
     def begin(self) -> None:
         """Begin with the next state."""

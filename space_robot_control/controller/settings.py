@@ -78,6 +78,9 @@ class ControllerNodeSettings(NodeSettings):
         [""],
         description="who must listen before the first command: NODE:TOPIC, or NODE to all it sends",
     )
+    listener_timeout: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
+        0.0, description="s by the wall clock that wait_for is waited for (0: as long as it takes)"
+    )
 
     @property
     def filter_settings(self) -> NavigationFilterSettings | None:

@@ -46,7 +46,8 @@ class StateInput:
         self._half_until = 0.0
         """How long that base is waited for; 0: it has not been looked for in vain yet."""
         self._bases: dict[int, tuple[bytes, tuple[int, int]]] = {}
-        """States that unknown senders have sent, by tick, and their `SourceGuard.passed`."""
+        """States taken before their tick's joints, by tick, and their `SourceGuard.passed`: of
+        unknown senders, or what the followed one had sent when it became so."""
 
     @property
     def wait(self) -> Wait:
@@ -80,6 +81,7 @@ class StateInput:
 
     def reject(self, reason: str) -> None:
         """Count the state last taken as not good."""
+        self._bases.clear()
         self._reject(reason, self._joints, self._base)
 
     def _reject(self, reason: str, *inputs: FollowedSubscription) -> None:
@@ -104,6 +106,8 @@ class StateInput:
 
     def _take_base(self, tick: int) -> bool | None:
         """Take the base's half up to ``tick``; whether it is there, None if it may still come."""
+        if self._bases and (found := self._take_kept(tick)) is not None:
+            return found
         base_tick = -1
         while base_tick < tick:
             data = self._base.take()
@@ -111,6 +115,18 @@ class StateInput:
                 return None
             base_tick = self.codec.decode_base(data, self.state)
         return base_tick == tick
+
+    def _take_kept(self, tick: int) -> bool | None:
+        """`_take_base` from what the followed publisher had sent when it became so."""
+        has_sent = self._base.source.has_sent
+        self._bases = {
+            base_tick: kept
+            for base_tick, kept in self._bases.items()
+            if base_tick >= tick and has_sent(kept[1][0])
+        }
+        if tick in self._bases:
+            return self.codec.decode_base(self._bases.pop(tick)[0], self.state) == tick
+        return False if self._bases else None
 
     def _find_base(self, tick: int) -> bool | None:
         """Look for the base's half among all that has come: in a flood it may be far behind."""
@@ -128,5 +144,5 @@ class StateInput:
         if tick not in self._bases:
             return False if self._bases else None
         data, self._base.source.passed = self._bases[tick]
-        self._bases.clear()
+        self._bases = {later: kept for later, kept in self._bases.items() if later > tick}
         return self.codec.decode_base(data, self.state) == tick

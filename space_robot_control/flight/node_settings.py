@@ -28,6 +28,7 @@ NOT_TO_BE_SET = {
     "plant.ticks": "use --duration",
     "plant.wait_for": _WAITING,
     "controller.wait_for": _WAITING,
+    "controller.listener_timeout": _WAITING,
     "recorder.bag": "use --bag",
     "recorder.flight": "it is what the flight's options say",
     "recorder.robot": "use --robot",

@@ -9,6 +9,7 @@ from __future__ import annotations
 import importlib
 import time
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
@@ -17,7 +18,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 from ..topics import Topic
 from ..wire.source_guard import SourceGuard
-from .rclpy_internals import raw_publish, take_serialized
+from .rclpy_internals import publishes_alone, raw_publish, take_serialized
 from .serialized_take import Received, serialized_take
 
 MOST_REFUSED = 1_000
@@ -141,6 +142,7 @@ class FollowedSubscription(RawSubscription):
     ) -> None:
         super().__init__(node, topic, group, depth)
         self.source = SourceGuard()
+        self._is_only = partial(publishes_alone, self.handle)
 
     def take(self) -> bytes | None:
         """Take the next message of the publisher followed, if there is one."""
@@ -149,7 +151,9 @@ class FollowedSubscription(RawSubscription):
             if taken is None:
                 return None
             data, info = taken
-            if self.source.passes(info["publication_sequence_number"], info["received_timestamp"]):
+            if self.source.passes(
+                info["publication_sequence_number"], info["received_timestamp"], self._is_only
+            ):
                 return data
         return None
 

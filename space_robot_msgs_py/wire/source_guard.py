@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 SILENCE_NS = 800_000_000
 """A publisher that is silent for longer may be replaced. A node that waits for an answer asks again
 before that."""
@@ -25,7 +27,8 @@ class SourceGuard:
         self.others_messages = 0
         """Messages of others that came while somebody was followed."""
         self.is_sure = False
-        """True if the message that passed last came from the followed publisher without doubt."""
+        """True if the message that passed last came from the followed publisher without doubt, or
+        was good and made it so."""
         self._next = 0
         """The followed publisher's next number; 0: nobody is followed."""
         self._heard_ns = 0
@@ -33,8 +36,11 @@ class SourceGuard:
         """The message that passed last, for `follow`, unless that is sure. To be set by those who
         put messages aside."""
         self._contested = False
-        self._others: dict[int, None] = {}
-        """Next numbers of the others, those heard last at the end."""
+        self._begin = 0
+        """The followed publisher's first number that passed."""
+        self._others: dict[int, int] = {}
+        """The others' next numbers, and the first of those without a gap before that; those heard
+        last at the end."""
         self._doubts = 0
 
     @property
@@ -47,24 +53,34 @@ class SourceGuard:
         """True if it may be the followed publisher's or another's, by its number."""
         return self._contested and not self.is_sure
 
-    def passes(self, sequence: int, received_ns: int) -> bool:
-        """Tell if a message is to be looked at, by its sequence number and when it was received."""
+    def has_sent(self, sequence: int) -> bool:
+        """Tell if a message that passed, maybe before its publisher was followed, is of that."""
+        return self._begin <= sequence < self._next
+
+    def passes(
+        self, sequence: int, received_ns: int, is_only: Callable[[], bool] = lambda: False
+    ) -> bool:
+        """Tell if a message is to be looked at, by its sequence number and when it was received.
+
+        ``is_only`` tells if the topic has no second publisher now: then one that does not fit comes
+        behind a gap.
+        """
         if sequence == self._next and sequence not in self._others:
             self._next = sequence + 1
             self._heard_ns = received_ns
             self.is_sure = True
             return True
-        return self._passes_unsure(sequence, received_ns)
+        return self._passes_unsure(sequence, received_ns, is_only)
 
-    def _passes_unsure(self, sequence: int, received_ns: int) -> bool:
-        if sequence in self._others:
-            del self._others[sequence]
-        elif len(self._others) == MOST_OTHERS:
+    def _passes_unsure(self, sequence: int, received_ns: int, is_only: Callable[[], bool]) -> bool:
+        begin = self._others.pop(sequence, sequence)
+        if len(self._others) == MOST_OTHERS:
             del self._others[next(iter(self._others))]
-        self._others[sequence + 1] = None
+        self._others[sequence + 1] = begin
         is_contested = sequence == self._next
         is_silent = received_ns - self._heard_ns > SILENCE_NS
-        if self._next and not is_contested and not is_silent and sequence != UNSUPPORTED:
+        is_expected = is_contested or is_silent or sequence == UNSUPPORTED
+        if self._next and not is_expected and not is_only():
             self.others_messages += 1
             return False
         self.is_sure, self._contested = False, is_contested
@@ -72,12 +88,19 @@ class SourceGuard:
         return True
 
     def follow(self) -> None:
-        """The message that passed last was good: its publisher is the one to follow."""
+        """The message that passed last was good: its publisher is the one to follow.
+
+        If that was put aside, what the publisher has sent since has passed already.
+        """
         self._doubts = 0
         if not self.is_sure:
             sequence, self._heard_ns = self.passed
-            self._next = sequence + 1
-            self._others.pop(self._next, None)
+            runs = self._others.items()
+            self._next = min(
+                (stop for stop, begin in runs if begin <= sequence < stop), default=sequence + 1
+            )
+            self._begin = self._others.pop(self._next, sequence)
+            self.is_sure = True
 
     def doubt(self) -> None:
         """The message that passed last made no sense."""

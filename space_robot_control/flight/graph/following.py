@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
+from functools import partial
 from typing import Any
 
-from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import FlightError
 
 from ..faults import NODE_OF
@@ -16,6 +16,7 @@ from ..progress import FlightProgress, flight_progress
 from .degraded import degradation
 from .foreign import ForeignNodes
 from .injection import Injector
+from .listeners import wait_for
 from .monitor import Event, Monitor
 from .node_services import change_state
 from .processes import Graph, node_command
@@ -24,6 +25,8 @@ from .watch import Watch
 POLL_S = 0.1
 INJECTING_POLL_S = 0.01
 STALL_TIMEOUT_S = 60.0
+LISTENER_TIMEOUT_S = 5.0
+"""How long a controller that is started again waits for its listeners."""
 ORDER = ("recorder", "mission", "controller", "plant")
 NODE_NAMES = tuple(f"{node}_node" for node in ORDER)
 
@@ -78,12 +81,13 @@ class _Follower:
         self._fault_kinds = frozenset(fault.kind.name for fault in flight.orchestrator_faults)
         self._realtime = flight.plant_settings.realtime
         self._injector = Injector(flight.orchestrator_faults, graph)
-        again = {**parameters["controller"], "wait_for": [f"plant_node:{topics.COMMAND.name}"]}
         self._watch = Watch(
             graph, monitor,
             planned=frozenset(NODE_OF[fault.kind] for fault in flight.orchestrator_faults),
             restart_command=(
-                node_command("controller", again) if flight.plan.restart_controller else None
+                partial(_restart_command, parameters["controller"])
+                if flight.plan.restart_controller
+                else None
             ),
             last_tick=flight.ticks,
         )  # fmt: skip
@@ -166,3 +170,14 @@ def _remark(errors: tuple[float, float] | None, simulated_s: float, wall_s: floa
     if errors is None:
         return speed
     return f"{speed}errors: attitude {errors[0]:.1e}, joints {errors[1]:.1e} rad"
+
+
+def _restart_command(parameters: Mapping[str, Any], absent: Collection[str]) -> list[str]:
+    """Return the command of a controller that is started again while some nodes are ``absent``.
+
+    The recorder must have found it before it begins: the bag would lack what it answered until
+    then. But a recorder may be stopped, and the flight does not wait for that for long.
+    """
+    listeners = wait_for("controller", absent)
+    again = {"wait_for": listeners, "listener_timeout": LISTENER_TIMEOUT_S}
+    return node_command("controller", {**parameters, **again})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from space_robot_msgs_py import topics
 
 from ..node_settings import SCHEMAS
@@ -25,7 +27,12 @@ LISTENERS = {
 """Nodes of the graph that subscribe to each topic."""
 
 
-def wait_for(node: str) -> list[str]:
-    """Return the parameter ``wait_for`` of the plant or the controller in a whole graph."""
+def wait_for(node: str, absent: Collection[str] = ()) -> list[str]:
+    """Return the parameter ``wait_for`` of the plant or the controller in a whole graph.
+
+    ``absent``: nodes that have ended.
+    """
     (sends,) = (schema.sends for schema in SCHEMAS if schema.node == node)
-    return [f"{name}:{topic.name}" for topic in sends for name in LISTENERS[topic]]
+    return [
+        f"{name}:{topic.name}" for topic in sends for name in LISTENERS[topic] if name not in absent
+    ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from .monitor import Event, Monitor
 from .processes import Graph, NodeProcess
@@ -26,7 +26,7 @@ class Watch:
         graph: Graph,
         monitor: Monitor,
         planned: frozenset[str],
-        restart_command: Sequence[str] | None,
+        restart_command: Callable[[Collection[str]], Sequence[str]] | None,
         last_tick: int,
     ) -> None:
         """Watch a graph.
@@ -35,7 +35,8 @@ class Watch:
             graph: the processes.
             monitor: of what the nodes say.
             planned: nodes that are killed on purpose.
-            restart_command: the controller's (None: it is not started again).
+            restart_command: the controller's, by the nodes that have ended (None: it is not started
+                again).
             last_tick: the plant has flown to its end when it has reached this one.
         """
         self._graph, self._monitor, self._last_tick = graph, monitor, last_tick
@@ -98,7 +99,9 @@ class Watch:
     def _lose_controller(self, node: NodeProcess) -> None:
         if self._restart_command is not None and self.restarts < MOST_RESTARTS:
             self.restarts += 1
-            self._graph.restart("controller", self._restart_command)
+            nodes = self._graph.nodes.items()
+            ended = [f"{name}_node" for name, node in nodes if node.exit_code is not None]
+            self._graph.restart("controller", self._restart_command(ended))
             self._monitor.heard_at.pop("controller_node", None)  # until it speaks again
         elif "controller" in self._planned:
             self._gone.add("controller")

@@ -23,7 +23,7 @@ from ...laws import ControlLaw, find_law
 from ...laws.trust import check_file, check_law, is_plain
 
 NODE = ControllerNodeSettings.node
-OF_THE_GRAPH = ("wait_for", "fifo_priority", "autostart")
+OF_THE_GRAPH = ("wait_for", "listener_timeout", "fifo_priority", "autostart")
 """Parameters that say how a controller fits into its graph; a replay has another."""
 
 

@@ -114,6 +114,11 @@ class Replay:
             yield "the controller was stopped or started again in flight, the replayed one is not"
         if not has_laws:
             yield "the bag has no record of laws and gains changed in flight with `ros2 param set`"
+        if lost := self.recording.lost_commands:
+            yield (
+                f"the recorder missed {lost} commands: the states that they answered are not known,"
+                " and the replayed controller was not sent them"
+            )
         if "_mission" in faults:
             yield "the mission was killed or stopped: references may have come late in flight"
         if not flight:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.accounts import noted_accounts
 from space_robot_msgs_py.bag.description import read_description
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.message_accounting import message_tick, topics_with_allowed_gaps
@@ -70,6 +71,9 @@ class Recording:
         self.states_count = counts[topics.JOINT_STATES]
         """Ticks, about."""
         self.has_commands = bool(counts[topics.COMMAND])
+        account = noted_accounts(self._bag.custom_data()).get(topics.COMMAND.name)
+        self.lost_commands = account.missing if account else 0
+        """Answers that the recorder knows to have missed: what was answered then is not known."""
         self.is_finished = self._bag.finished
         self.answers_are_complete = bool(
             flight

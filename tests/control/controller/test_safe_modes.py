@@ -92,6 +92,7 @@ def test_the_restart_is_recorded_and_replayed(deaths: Story, domain: int) -> Non
     assert again.tick > 0.3 / PERIOD
     assert deaths.log.commanded_torque is not None
     answered = np.flatnonzero(np.isfinite(deaths.log.commanded_torque).all(axis=1))
+    assert again.tick in answered, "the recorder has missed what the controller answered first"
     last = int(answered[answered > again.tick][200])
     done = replay(Options(deaths.bag, domain=domain, end_s=(last + 1) * PERIOD))
     assert done.comparison.is_identical, done.report()["first_difference"]

@@ -112,6 +112,38 @@ def test_after_a_gap_ours_is_found_again() -> None:
     assert passed[SILENCE_NS // (100 * MS)]
 
 
+def test_behind_a_gap_the_only_publisher_is_found_again_at_once() -> None:
+    """With a second one it could be that one's."""
+    guard = SourceGuard()
+    assert guard.passes(4, MS)
+    guard.follow()
+    assert not guard.passes(7, MS, lambda: False)
+    assert guard.passes(8, MS, lambda: True)
+    assert not guard.is_sure
+    guard.follow()
+    assert guard.passes(9, MS)
+    assert guard.others_messages == 1
+
+
+@given(st.integers(1, 50), st.integers(0, 50), st.integers(0, 50))
+def test_one_found_by_a_message_put_aside_is_followed_behind_all_that_has_passed(
+    first: int, before: int, behind: int
+) -> None:
+    """As when messages of a sender not yet known are looked through for one that fits."""
+    guard, passed = SourceGuard(), []
+    for sequence in range(first, first + before + 1 + behind):
+        assert guard.passes(sequence, MS)
+        passed.append(guard.passed)
+    guard.passed = passed[before]
+    guard.follow()
+    assert all(guard.has_sent(sequence) for sequence, _ in passed)
+    following = passed[-1][0] + 1
+    assert not guard.has_sent(following)
+    assert guard.passes(following, 2 * MS)
+    assert guard.is_sure
+    assert guard.others_messages == 0
+
+
 def test_a_publisher_of_nothing_but_junk_is_not_followed_for_long() -> None:
     """Followed for one good message, or by mistake."""
     reader = Reader()

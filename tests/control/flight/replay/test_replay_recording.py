@@ -55,6 +55,20 @@ def test_a_state_without_its_other_half_is_passed_over(bag: Path, tmp_path: Path
     assert ticks == [tick for tick in range(400) if tick not in (10, 20)]
 
 
+def test_commands_that_the_recorder_missed_are_known(bag: Path, tmp_path: Path) -> None:
+    """By what their sender says: where the controller died, ticks without an answer are none."""
+    died = {"faults": ["kill_controller@0.05"], "restart_controller": True}
+    recorder = BagRecorder(tmp_path / "late", died, Recording(bag).timebase)
+    counts = dict.fromkeys(topics.BY_NAME, 0)
+    for name, data in open_bag(bag).messages(*topics.ALL):
+        counts[name] += 1
+        if name != topics.COMMAND.name or not 100 < counts[name] <= 130:
+            recorder.record(topics.BY_NAME[name], data, 1, b"participant " + b"0001", counts[name])
+    recorder.close()
+    assert Recording(bag).lost_commands == 0
+    assert Recording(tmp_path / "late").lost_commands == 30
+
+
 @pytest.mark.parametrize("topic", [topics.REFERENCE_JOINTS, topics.REFERENCE_BASE])
 def test_references_begin_with_the_one_that_covers_the_start(
     bag: Path, topic: topics.Topic
