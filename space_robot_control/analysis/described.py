@@ -7,7 +7,7 @@ are opened only if it is trusted (`FlightLog.trusted`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,8 @@ from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
+from space_robot_sim.environment.environment import EnvironmentSettings
+from space_robot_sim.environment.payload import with_payload
 from space_robot_sim.plant.settings import PlantNodeSettings
 from space_robot_sim.robot import Robot
 
@@ -28,6 +30,7 @@ from ..controller.settings import ControllerNodeSettings
 from ..laws.trust import check_file, check_law
 from .actuation import TorqueLimits
 from .estimate_error import HBar
+from .momentum import MomentumSeries
 
 Array = NDArray[np.float64]
 
@@ -70,18 +73,46 @@ def torque_limits(log: FlightLog) -> TorqueLimits:
     Raises:
         InputError: not even the case is named, or it is not here.
     """
+    settings = _plant_settings(log, ("base_torque_limit", "joint_torque_limit"))
+    base, joint = settings.base_torque_limit, settings.joint_torque_limit
+    if base_actuators_of(log).base_actuation != IDEAL:
+        base = 0.0  # hardware has limits of its own
+    return TorqueLimits(base or np.inf, joint or np.inf)
+
+
+def environment_of(log: FlightLog) -> EnvironmentSettings:
+    """Find what acted on the robot beside its actuators.
+
+    Raises:
+        InputError: not even the case is named, or it is not here.
+    """
+    return _plant_settings(log)
+
+
+def momentum_of(log: FlightLog) -> MomentumSeries:
+    """Return what follows the momentum of a flight from its first rows ``log`` on.
+
+    Raises:
+        InputError: the robot, its actuators or its environment are not known.
+    """
+    environment = environment_of(log)
+    robot = with_payload(robot_of(log), environment.payload)
+    return MomentumSeries(robot, flown_actuators(log), environment.disturbance)
+
+
+def _plant_settings(log: FlightLog, keys: Sequence[str] = ()) -> PlantNodeSettings:
+    """Return the plant's settings; if all ``keys`` are given, nothing but these is looked at."""
     given = _parameters(log, PlantNodeSettings.node)
     if not given:
         given = {key: log.flight[key] for key in ("robot", "case", "mission") if key in log.flight}
     if not given:
         raise NotDescribedError("the bag does not say what the plant was told")
-    keys = ("base_torque_limit", "joint_torque_limit")
-    if all(key in given for key in keys):
+    if keys and all(key in given for key in keys):
         given = {key: given[key] for key in keys}
     _check_files(log, given)
-    settings = PlantNodeSettings.resolve(given)
-    base, joint = settings.base_torque_limit, settings.joint_torque_limit
-    return TorqueLimits(base or np.inf, joint or np.inf)
+    # their numbers are in the bag, while their files may be elsewhere
+    given = {key: value for key, value in given.items() if key not in ("actuators", "sensors")}
+    return PlantNodeSettings.resolve(given)
 
 
 def estimator(log: FlightLog) -> tuple[HBar, float]:
@@ -111,6 +142,11 @@ def sensors_of(log: FlightLog) -> str:
     return str(_parameters(log, PlantNodeSettings.node).get("sensors", "")) or IDEAL
 
 
+def actuators_of(log: FlightLog) -> str:
+    """Name the base's actuators that flew, as far as the bag tells."""
+    return str(log.flight.get("actuators", "")) or IDEAL
+
+
 def base_actuators_of(log: FlightLog) -> BaseActuatorSettings:
     """Return the base's actuators that flew: ideal ones if the bag tells of none.
 
@@ -119,6 +155,24 @@ def base_actuators_of(log: FlightLog) -> BaseActuatorSettings:
     """
     told = log.flight.get("base_actuators", {})
     return validate(BaseActuatorSettings, told, "base_actuators of the bag")
+
+
+def flown_actuators(log: FlightLog) -> BaseActuatorSettings:
+    """Return `base_actuators_of` a flight, whose robot and columns they fit.
+
+    Raises:
+        InputError: they do not, or the robot is not known.
+    """
+    found = base_actuators_of(log)
+    if found.base_actuation == "hardware":
+        found.check(robot_of(log), "of the bag")
+    counts = log.wheel_velocities.shape[1], log.thrusts.shape[1]
+    if counts != (found.wheel_count, found.thruster_count):
+        raise NotDescribedError(
+            f"the bag describes {found.wheel_count} wheels and {found.thruster_count} thrusters, "
+            f"and has the states of {counts[0]} and {counts[1]}"
+        )
+    return found
 
 
 def navigation_of(log: FlightLog) -> str:

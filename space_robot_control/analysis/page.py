@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .report_tables import comparison_table
+from .sizing_table import sizing_table
 from .tables import Column, Table, Verdict
 from .template import template
 from .words import Report, law_of, notes, remarks
@@ -28,6 +29,7 @@ def render(
         names=list(reports),
         recorded=_recorded(reports),
         metrics=comparison_table(reports),
+        sizing={name: table for name, r in reports.items() if (table := sizing_table(r))},
         notes={name: [*remarks(r), *notes(r)] for name, r in reports.items()},
         descriptions={name: json.dumps(d, indent=1) for name, d in descriptions.items()},
         figures=figures,

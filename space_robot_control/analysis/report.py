@@ -15,13 +15,24 @@ from space_robot_msgs_py.errors import InputError
 from .actuation import Latency, MissedDeadlines, Saturation, TorqueLimits
 from .attitude_drift import UNAVAILABLE, AttitudeDrift, controls_base
 from .columns import recording
-from .described import estimator, navigation_of, robot_of, sensors_of, torque_limits
+from .described import (
+    actuators_of,
+    estimator,
+    flown_actuators,
+    momentum_of,
+    navigation_of,
+    robot_of,
+    sensors_of,
+    torque_limits,
+)
 from .estimate_error import EstimateError
 from .metrics import Chatter, Maxima, Rms, tracking_error
+from .momentum import MomentumBudget
 from .navigation import NavigationError
 from .pointing import Pointing
 from .ripple import Ripple
 from .settling import Settling
+from .sizing import ActuatorSet, Sizing
 
 DESCRIBED = ("controller", "case", "gains", "robot")
 """Keys of a flight's description that a report repeats."""
@@ -29,18 +40,24 @@ OF_TRUTH = ("navigation_error",)
 """Metrics that only flights have whose truth was recorded beside what was measured."""
 OF_FREE_BASE = ("attitude_drift",)
 """Metrics that only flights have in which nothing turns the base."""
+OF_HARDWARE = ("momentum",)
+"""Metrics that only flights have whose base was not turned by ideal torques."""
 
 
-def analyze(log: FlightLog) -> dict[str, Any]:
+def analyze(log: FlightLog, actuators: ActuatorSet | None = None) -> dict[str, Any]:
     """Compute the flight's report, the same from a graph flight, an in-process one, or a bag.
 
     A metric that this flight does not have is None; ``unavailable`` says why, by its key. Of a
     flight with gaps (a broken bag) the longest stretch without one is analyzed; ``damage`` says so.
 
+    Args:
+        log: a flight.
+        actuators: of the base, for the sizing; None: those that flew.
+
     Raises:
         InputError: no tick has both a state and a reference.
     """
-    analysis = Analysis()
+    analysis = Analysis(actuators)
     for block in blocks_of(_without_gaps(log)):
         analysis.add(block)
     return analysis.report()
@@ -49,9 +66,11 @@ def analyze(log: FlightLog) -> dict[str, Any]:
 class Analysis:
     """Does what `analyze` does, of a flight without gaps in blocks, as `blocks_of` cuts it."""
 
-    def __init__(self) -> None:
+    def __init__(self, actuators: ActuatorSet | None = None) -> None:
+        """``actuators``: of the base, for the sizing; None: those that flew."""
         self.ticks = 0
         """Rows so far."""
+        self._kinds = _METRICS | {"sizing": lambda log: _sizing(log, actuators)}
         self._metrics: dict[str, Metric] = {}
         self._unavailable: dict[str, str] = {}
         self._head: dict[str, Any] = {}
@@ -100,14 +119,17 @@ class Analysis:
             "faults": [str(fault) for fault in block.flight.get("faults", ())],
             "sensors": sensors_of(block),
             "navigation": navigation_of(block),
+            "actuators": actuators_of(block),
             "truth_recorded": block.measured is not None,
         }
         if not controls_base(block):
             self._unavailable |= UNAVAILABLE
-        for name, metric in _METRICS.items():
+        for name, metric in self._kinds.items():
             if name in OF_TRUTH and block.measured is None:
                 continue
             if name in OF_FREE_BASE and controls_base(block):
+                continue
+            if name in OF_HARDWARE and not block.flight.get("base_actuators"):
                 continue
             try:
                 self._metrics[name] = metric(block)
@@ -134,6 +156,10 @@ def _missed_deadlines(log: FlightLog) -> MissedDeadlines:
     return MissedDeadlines(int(log.flight.get("command_latency_ticks", 0)), limits)
 
 
+def _sizing(log: FlightLog, other: ActuatorSet | None) -> Sizing:
+    return Sizing(log, ActuatorSet(actuators_of(log), flown_actuators(log)), other)
+
+
 _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
     "rms": lambda log: Rms(log.axes, controls_base(log)),
     "maxima": lambda log: Maxima(log.axes, controls_base(log)),
@@ -147,5 +173,7 @@ _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
     "missed_deadlines": _missed_deadlines,
     "estimate_error": lambda log: EstimateError(log, *estimator(log)),
     "pointing": lambda log: Pointing(log, robot_of(log)),
+    "sizing": lambda log: _sizing(log, None),
+    "momentum": lambda log: MomentumBudget(momentum_of(log)),
 }
 """By key of the report, each made from a flight's first block."""

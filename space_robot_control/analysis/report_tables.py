@@ -43,6 +43,8 @@ DEFINITIONS = {
     "rotation": "angle of the one rotation between the end effector's desired and measured frame",
     "tool position": "distance from the desired position, the base at its measured position",
     "base's drift": "of the base's centre of mass from where it began; nothing holds it",
+    "asked of the base": "largest torque commanded on each axis of the base, and the largest "
+    "momentum that wheels have to hold for it",
     "recording": "what is missing of the flight or was found wrong with the bag",
 }
 """The meaning of each group of metrics, for someone who sees it for the first time."""
@@ -155,6 +157,14 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
         found += each(group, ("pointing", key), text=_angle, label=_upper)
     for group, key in (("tool position", "tool_position_m"), ("base's drift", "base_drift_m")):
         found += each(group, ("pointing", key), "m", label=_upper)
+    if not brief:
+        for key, name, unit in (
+            ("peak_torque_n_m", "torque", "N m"), ("peak_momentum_n_m_s", "momentum", "N m s"),
+        ):  # fmt: skip
+            found += each(
+                "asked of the base", ("sizing", "axes"), unit, text=partial(_of_axis, key=key),
+                label=partial(_named, name=name),
+            )  # fmt: skip
     return [
         *found,
         one("recording", "messages lost", "", lambda r: str(sum(r["lost"].values()))),
@@ -214,6 +224,14 @@ def _angle(value: float) -> str:
 
 def _peak(value: dict[str, float] | None) -> str:
     return f"{value['frequency_hz']:.4g} Hz\n{value['rms']:.2e} N m" if value else NONE
+
+
+def _of_axis(axis: dict[str, float], key: str) -> str:
+    return _number(axis[key])
+
+
+def _named(axis: str, name: str) -> str:
+    return f"{axis} {name}"
 
 
 def _settled(value: float | None) -> str:

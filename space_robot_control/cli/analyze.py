@@ -6,13 +6,18 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from space_robot_msgs_py.config.text import printable
 
 from .options import REMAP, TRUST, file_option, folder_option
+
+if TYPE_CHECKING:
+    from space_robot_msgs_py.bag.flight_log import FlightLog
+
+    from ..analysis.sizing import ActuatorSet
 
 
 @click.command()
@@ -31,6 +36,11 @@ from .options import REMAP, TRUST, file_option, folder_option
     help="The same as Parquet, with the flight's description.",
 )
 @file_option("--html", help="One page with tables and figures, to send to a colleague.")
+@click.option(
+    "--actuators",
+    metavar="NAME-or-FILE",
+    help="Whether these would have what each flight asks of its base (default: those that flew).",
+)
 @click.option("--from", "from_s", type=float, metavar="T", help="Begin at T simulated seconds.")
 @click.option("--to", "to_s", type=float, metavar="T", help="End before T simulated seconds.")
 @REMAP
@@ -44,6 +54,7 @@ def analyze(
     csv: Path | None,
     parquet: Path | None,
     html: Path | None,
+    actuators: str | None,
     from_s: float | None,
     to_s: float | None,
     remap: dict[str, str],
@@ -52,8 +63,9 @@ def analyze(
 ) -> None:
     """Metrics of recorded flights: one bag, or several side by side.
 
-    RMS, maxima, settling, chatter, saturation, latency, the error of the time-delay estimate, and
-    where the end effector pointed. docs/manual/analysis.md says what each means.
+    RMS, maxima, settling, chatter, saturation, latency, the error of the time-delay estimate,
+    where the end effector pointed, and what was asked of the base. docs/manual/analysis.md says
+    what each means.
     Modules and files that a bag names are not opened without --trust.
 
     \b
@@ -61,6 +73,7 @@ def analyze(
       space-robot analyze flights/one
       space-robot analyze flights/one flights/two --plot figures --html flights.html
       space-robot analyze flights/one --from 14 --to 16 --json
+      space-robot analyze flights/one --actuators wheels
       space-robot analyze flights/one --parquet one.parquet
       space-robot analyze theirs --remap /arm/joint_states:=/joint_states
     """  # fmt: skip
@@ -92,7 +105,7 @@ def analyze(
     descriptions: dict[str, dict[str, Any]] = {}
     for name, bag in zip(names, bags, strict=True):
         log = excerpt(read_flight(bag, remap, trust), from_s, to_s)
-        reports[name], descriptions[name] = analyze(log), log.flight
+        reports[name], descriptions[name] = analyze(log, _set(log, actuators)), log.flight
         for write, paths in exports:
             write(log, paths[name])
             click.echo(f"wrote {paths[name]}", err=True)
@@ -115,6 +128,21 @@ def analyze(
     _print(reports, as_json)
 
 
+def _set(log: FlightLog, name: str | None) -> ActuatorSet | None:
+    """Read the base's actuators that a flight is held beside.
+
+    Raises:
+        InputError: there are none of that name, or they do not fit its robot.
+    """
+    if name is None:
+        return None
+    from ..analysis.described import robot_of
+    from ..analysis.sizing import ActuatorSet
+    from ..controller.allocation.believed_actuators import believed_actuators
+
+    return ActuatorSet(name, believed_actuators(name, robot_of(log)))
+
+
 def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
     from ..flight.terminal import echo_json, terminal
 
@@ -123,6 +151,7 @@ def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
         echo_json(found[0] if len(found) == 1 else found)
         return
     from ..analysis.report_tables import metrics_table, rms_table
+    from ..analysis.sizing_table import sizing_table
     from ..analysis.terminal import print_table
     from .report_display import print_comparison
 
@@ -133,6 +162,8 @@ def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
     for report in reports.values():
         print_table(rms_table(report), console)
         print_table(metrics_table(report), console)
+        if table := sizing_table(report):
+            print_table(table, console)
 
 
 def _names(bags: Sequence[Path]) -> list[str]:

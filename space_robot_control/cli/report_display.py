@@ -8,6 +8,7 @@ from typing import Any
 from rich.console import Console
 
 from ..analysis.report_tables import comparison_table, rms_table
+from ..analysis.sizing_table import sizing_table
 from ..analysis.terminal import print_table
 from ..analysis.words import notes, remarks
 from ..flight.terminal import echo_json, say, terminal
@@ -23,7 +24,9 @@ def show_report(report: dict[str, Any], as_json: bool) -> None:
     if as_json:
         echo_json(report)
     else:
-        print_table(rms_table(report), terminal())
+        print_table(rms_table(report), console := terminal())
+        if (table := sizing_table(report)) and report["sizing"]["requirements"]:
+            print_table(table, console)
 
 
 def print_comparison(reports: dict[str, dict[str, Any]], console: Console) -> None:

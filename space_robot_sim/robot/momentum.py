@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .base_axes import base_axes, cross, to_base, to_inertial
 from .robot import Robot
 
 Array = NDArray[np.float64]
@@ -37,6 +38,8 @@ class RobotMomentum(NamedTuple):
     """(N, 3) m, of all bodies from the base's CoM, inertial axes."""
     angular: Array
     """(N, 3) N m s, angular momentum about the common centre of mass, inertial axes."""
+    base: Array
+    """(N, 3) N m s, the share of it that the base has; the arm has the rest."""
 
 
 class _Body(NamedTuple):
@@ -52,10 +55,10 @@ class _Body(NamedTuple):
 
 
 def robot_momentum(robot: Robot, motion: Motion) -> RobotMomentum:
-    """Sum up ``sum I_i w_i + m_i (r_i - r) x v_i`` over all bodies; ``r`` is their common CoM.
+    """Sum up ``I_i w_i + m_i (r_i - r) x (v_i - v)`` over all bodies.
 
-    The velocity of the base's CoM does not matter: ``sum m_i (r_i - r) = 0``. Wheels count as
-    locked to the base; what their spin adds is not the robot's.
+    ``r`` and ``v`` are their common CoM's, so the velocity of the base does not matter. Wheels
+    count as locked to the base; what their spin adds is not the robot's.
 
     Raises:
         ValueError: an array has the wrong shape.
@@ -65,33 +68,20 @@ def robot_momentum(robot: Robot, motion: Motion) -> RobotMomentum:
     for name, array, shape in zip(motion._fields, motion, wanted, strict=True):
         if array.shape != shape:
             raise ValueError(f"{name}: shape {shape} was expected, got {array.shape}")
-    centre, angular = np.empty((rows, 3)), np.empty((rows, 3))
+    found = RobotMomentum(*(np.empty((rows, 3)) for _ in RobotMomentum._fields))
+    mass = float(np.sum(robot.mass))
     for start in range(0, rows, _BATCH):
         part = slice(start, start + _BATCH)
         bodies = list(_bodies(robot, Motion(*(array[part].T for array in motion))))
-        middle = _sum(body.mass * body.com for body in bodies) / float(np.sum(robot.mass))
-        centre[part] = middle.T
-        angular[part] = _sum(
-            body.spin + body.mass * cross(body.com - middle, body.velocity) for body in bodies
-        ).T
-    return RobotMomentum(centre, angular)
-
-
-def rotation_rows(quaternion: Array) -> tuple[Array, Array, Array]:
-    """Return the base's axes x, y, z on inertial axes, (3, N) each, of (4, N) ``[w, x, y, z]``."""
-    w, x, y, z = quaternion
-    return (
-        np.array([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)]),
-        np.array([2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)]),
-        np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)]),
-    )
-
-
-def cross(a: Array, b: Array) -> Array:
-    """Return ``a x b`` of vectors (3, N), faster than NumPy's over short rows."""
-    return np.array(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    )
+        centre = _sum(body.mass * body.com for body in bodies) / mass
+        velocity = _sum(body.mass * body.velocity for body in bodies) / mass
+        shares = [
+            body.spin + body.mass * cross(body.com - centre, body.velocity - velocity)
+            for body in bodies
+        ]
+        found.centre_of_mass[part], found.base[part] = centre.T, shares[0].T
+        found.angular[part] = _sum(shares).T
+    return found
 
 
 def _sum(vectors: Iterable[Array]) -> Array:
@@ -101,8 +91,8 @@ def _sum(vectors: Iterable[Array]) -> Array:
 def _bodies(robot: Robot, motion: Motion) -> Iterator[_Body]:
     """Walk the chain (modified Denavit-Hartenberg) from the base outwards; arrays are (., N)."""
     model, theta, rate = robot.model, motion.joint_positions, motion.joint_velocities
-    x, y, z = rotation_rows(motion.quaternion)
-    omega = _sum(axis * w for axis, w in zip((x, y, z), motion.omega_base, strict=True))
+    x, y, z = base_axes(motion.quaternion)
+    omega = to_inertial(np.array((x, y, z)), motion.omega_base)
     joint, velocity = np.zeros_like(x), np.zeros_like(x)
     yield _body(robot, 0, (x, y, z), joint, velocity, omega)
     for i in range(robot.n):
@@ -121,7 +111,7 @@ def _body(
     omega: Array,
 ) -> _Body:  # fmt: skip
     """Return body i, whose frame sits at ``joint`` and moves with ``velocity``."""
-    arm = _sum(a * axis for a, axis in zip(robot.com[i], axes, strict=True))
-    local = np.array([np.einsum("ij,ij->j", axis, omega) for axis in axes])
-    spin = _sum(h * axis for h, axis in zip(robot.inertia[i] @ local, axes, strict=True))
+    turn = np.array(axes)
+    arm = to_inertial(turn, np.broadcast_to(robot.com[i][:, np.newaxis], joint.shape))
+    spin = to_inertial(turn, robot.inertia[i] @ to_base(turn, omega))
     return _Body(float(robot.mass[i]), joint + arm, velocity + cross(omega, arm), spin)

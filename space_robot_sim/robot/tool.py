@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .base_axes import base_axes
 from .robot import Robot
 
 Array = NDArray[np.float64]
@@ -48,10 +49,7 @@ def tool_pose(robot: Robot, quaternion: Array, joint_positions: Array) -> tuple[
 
 def _chain(robot: Robot, quaternion: Array, theta: Array) -> tuple[Array, Array, Array, Array]:
     """Return the tool's axes and position (m), (3, N) each, from (4, N) and (n, N) rad."""
-    w, x, y, z = quaternion
-    axis_x = np.array([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)])
-    axis_y = np.array([2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)])
-    axis_z = np.array([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
+    axis_x, axis_y, axis_z = base_axes(quaternion)
     at = np.zeros_like(axis_x)
     model = robot.model
     for i in range(robot.n):

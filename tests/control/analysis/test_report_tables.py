@@ -88,6 +88,9 @@ def test_every_line_is_its_figure(reports: list[dict[str, Any]]) -> None:
                 value = r["pointing"][key][kind]
                 angle = f"{value:.3g} rad\n{value * 180 / np.pi:.3g} deg"
                 texts[group, label] = angle if key.endswith("rad") else f"{value:.4g}"
+        for axis, asked in r["sizing"]["axes"].items():
+            texts["asked of the base", f"{axis} torque"] = f"{asked['peak_torque_n_m']:.4g}"
+            texts["asked of the base", f"{axis} momentum"] = f"{asked['peak_momentum_n_m_s']:.4g}"
         texts["recording", "messages lost"] = str(sum(r["lost"].values()))
         texts["recording", "states filled in"] = str(r["filled_ticks"])
         texts["recording", "finished"] = "yes"
@@ -100,7 +103,7 @@ def test_every_line_is_its_figure(reports: list[dict[str, Any]]) -> None:
 
 
 def test_brief_leaves_out_what_another_table_shows(reports: list[dict[str, Any]]) -> None:
-    left_out = [*PATHS][:2] + [*PATHS][3:6]
+    left_out = [*PATHS][:2] + [*PATHS][3:6] + ["asked of the base"]
     assert lines(reports, brief=True) == [
         line for line in lines(reports) if line.group not in left_out
     ]

@@ -50,6 +50,12 @@ def test_of_a_rigid_body_it_is_inertia_times_rate(paper_robot: Robot) -> None:
     inertia = robot_momentum(paper_robot, still).angular
     np.testing.assert_allclose(inertia, inertia.T, atol=1e-10)
     assert np.linalg.eigvalsh(inertia).min() > 0.0
+    base = robot_momentum(paper_robot, still).base
+    np.testing.assert_allclose(base, base.T, atol=1e-10)
+    lever = robot_momentum(paper_robot, still).centre_of_mass[0]
+    alone = paper_robot.inertia[0] + paper_robot.mass[0] * (lever @ lever * np.eye(3)
+                                                            - np.outer(lever, lever))  # fmt: skip
+    np.testing.assert_allclose(base, alone, rtol=1e-12, atol=1e-10)
     faster = robot_momentum(paper_robot, still._replace(omega_base=2.0 * np.eye(3))).angular
     np.testing.assert_allclose(faster, 2.0 * inertia, rtol=1e-13)
 

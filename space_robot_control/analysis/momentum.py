@@ -1,0 +1,158 @@
+"""Angular momentum of robot and wheels about their common centre of mass, on inertial axes.
+
+The base's inertia in the robot's file includes its wheels, locked. So the robot's momentum is
+that of everything with locked wheels, and the wheels' is what their spin relative to the base adds,
+``sum a_k J_k Omega_k``. Motors and joints only move it from one to the other: the sum changes by
+what comes from outside, that is thrusters and the disturbances of (61), and by nothing else.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.bag.blocks import Metric, joined, last_rows
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
+from space_robot_sim.environment.disturbance import DisturbanceSettings
+from space_robot_sim.robot import Robot
+from space_robot_sim.robot.base_axes import cross, to_inertial
+from space_robot_sim.robot.momentum import Motion, robot_momentum
+
+from .base_demand import axes_of
+
+Array = NDArray[np.float64]
+
+
+class Momentum(NamedTuple):
+    """Angular momentum of a flight's parts, tick by tick; N m s on inertial axes."""
+
+    robot: Array
+    """(N, 3) of all bodies, wheels locked."""
+    base: Array
+    """(N, 3) the share of it that the base has."""
+    wheels: Array
+    """(N, 3) of the wheels' spin."""
+    outside: Array
+    """(N, 3) N m s that came from outside since the first row."""
+    centre_of_mass: Array
+    """(N, 3) m, of the robot, inertial frame."""
+
+    @property
+    def total(self) -> Array:
+        """(N, 3) robot and wheels; less `outside` it is conserved."""
+        return self.robot + self.wheels
+
+
+class MomentumSeries:
+    """Follows the momentum through a flight, block by block."""
+
+    def __init__(
+        self, robot: Robot, flown: BaseActuatorSettings, disturbance: DisturbanceSettings
+    ) -> None:
+        """``robot``: that flew, payload included; ``flown``: what turned its base."""
+        self._robot, self.flown = robot, flown
+        self._disturbance = disturbance
+        self._before: FlightLog | None = None
+        self._outside = np.zeros(3)
+
+    def add(self, log: FlightLog) -> Momentum:
+        """Take further rows of the flight and return their momentum."""
+        rows = joined(self._before, log)
+        axes, skipped = axes_of(rows), rows.ticks - log.ticks
+        motion = Motion(
+            rows.quaternion / np.linalg.norm(rows.quaternion, axis=1, keepdims=True),
+            rows.omega_base, rows.joint_positions, rows.joint_velocities,
+        )  # fmt: skip
+        found = robot_momentum(self._robot, motion)
+        wheels = self.flown.wheels
+        spin = (rows.wheel_velocities * wheels.values("rotor_inertia")) @ wheels.unit_axes
+        outside = self._from_outside(rows, axes, found.centre_of_mass)
+        self._before, self._outside = last_rows(log, 1), outside[-1].copy()
+        whole = Momentum(
+            found.angular, found.base, to_inertial(axes, spin.T).T, outside,
+            rows.base_position + found.centre_of_mass,
+        )  # fmt: skip
+        return Momentum(*(values[skipped:] for values in whole))
+
+    def _from_outside(self, rows: FlightLog, axes: Array, centre_of_mass: Array) -> Array:
+        """Return the angular impulse up to each row, the first row's known, (N, 3) N m s."""
+        period, time = rows.timebase.period, rows.time
+        impulse = np.zeros((rows.ticks, 3))
+        if self.flown.thruster_count:
+            thrusters = self.flown.thrusters
+            force = rows.thrusts @ thrusters.unit_directions
+            torque = rows.thrusts @ np.cross(thrusters.places, thrusters.unit_directions)
+            each = [  # turned as the base is before and after the interval
+                _torque(side, centre, force[1:], torque[1:])
+                for side, centre in (
+                    (axes[:, :, :-1], centre_of_mass[:-1]), (axes[:, :, 1:], centre_of_mass[1:])
+                )
+            ]  # fmt: skip
+            impulse[1:] = 0.5 * period * np.cumsum(each[0] + each[1], axis=0)
+        wave = disturbance_impulse(self._disturbance, time)
+        outside: Array = self._outside + impulse + (wave - wave[0])[:, np.newaxis]
+        return outside
+
+
+class MomentumBudget(Metric):
+    """Largest momentum of each part, and how far the sum is from being conserved."""
+
+    def __init__(self, series: MomentumSeries) -> None:
+        self._series, self._flown = series, series.flown
+        self._start: Momentum | None = None
+        self._largest = dict.fromkeys(("robot", "base", "wheels", "outside"), 0.0)
+        self._drift = self._pushed = self._end = 0.0
+
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows."""
+        found = self._series.add(log)
+        if self._start is None:
+            self._start = Momentum(*(values[:1].copy() for values in found))
+        start = self._start
+        for name in self._largest:
+            self._largest[name] = max(self._largest[name], _longest(getattr(found, name)))
+        self._drift = max(self._drift, _longest(found.total - start.total - found.outside))
+        pushed = np.linalg.norm(found.centre_of_mass - start.centre_of_mass, axis=1)
+        self._pushed, self._end = max(self._pushed, float(pushed.max())), float(pushed[-1])
+
+    def result(self) -> dict[str, Any]:
+        """Return the largest sizes, N m s, the drift of the sum, and how far thrusters pushed, m.
+
+        The drift is relative to the largest momentum of the robot; where there are no wheels, to
+        that of its base, for the robot's is then to stay what it was.
+        """
+        size = self._largest["robot" if self._flown.wheel_count else "base"]
+        pushed = {"max": self._pushed, "end": self._end} if self._flown.thruster_count else None
+        return {
+            "peak_n_m_s": dict(self._largest),
+            "drift_n_m_s": self._drift,
+            "drift_relative": self._drift / size if size else None,
+            "pushed_m": pushed,
+        }
+
+
+def disturbance_impulse(disturbance: DisturbanceSettings, time: Array) -> Array:
+    """(N,) N m s that (61) has given to each inertial axis of the base from 0 to ``time`` (N,) s.
+
+    ``integral sin(w t) = (1 - cos(w t)) / w``.
+    """
+    found = np.zeros_like(time)
+    for frequency in disturbance.base_frequencies:
+        if frequency:
+            omega = 2.0 * np.pi * frequency
+            found += (1.0 - np.cos(omega * time)) / omega
+    impulse: Array = disturbance.scale * disturbance.base_amplitude * found
+    return impulse
+
+
+def _torque(axes: Array, centre_of_mass: Array, force: Array, torque: Array) -> Array:
+    """(N, 3) N m about the common CoM, inertial axes; of force and torque on the base's axes."""
+    pushed, turned = to_inertial(axes, force.T), to_inertial(axes, torque.T)
+    return (turned - cross(centre_of_mass.T, pushed)).T
+
+
+def _longest(vectors: Array) -> float:
+    return float(np.linalg.norm(vectors, axis=1).max())
