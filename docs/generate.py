@@ -38,7 +38,7 @@ EXAMPLES = {
     "P": "0.1", "TICKS": "2", "SIGMA": "1e-5", "STEP": "1e-5", "TORQUE": "0.5",
     "JOINT": "3", "BASE_AXIS=RATE": "base_x=1e-5", "JOINT=TORQUE": "3=20", "SECONDS": "1.5",
     "AXIS=FACTOR": "all=0.99",
-    "AXIS=TORQUE": "base_x=0.01",
+    "AXIS=TORQUE": "base_x=0.01", "WHEEL": "2", "THRUSTER": "3",
 }  # fmt: skip
 """An argument as it may be given, by the form of the kind."""
 

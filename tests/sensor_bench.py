@@ -11,7 +11,7 @@ from random_samples import random_sample
 
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Block
-from space_robot_msgs_py.samples import RobotState
+from space_robot_msgs_py.samples import RobotNames, RobotState
 from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule
 from space_robot_sim.plant.faults import PLANT_KINDS
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 PERIOD = 5e-4
 N = 6
-AXES = ("base_x", "base_y", "base_z", *(f"joint{i}" for i in range(1, N + 1)))
+NAMES = RobotNames(tuple(f"joint{i}" for i in range(1, N + 1)))
 
 
 def a_state(tick: int = 0, seed: int = 1) -> RobotState:
@@ -53,7 +53,7 @@ class Bench:
     ) -> None:  # fmt: skip
         """``truth``: at rest before tick 0."""
         start = a_state() if truth is None else truth
-        schedule = Schedule(parse_faults(faults, PLANT_KINDS), seed, period, AXES)
+        schedule = Schedule(parse_faults(faults, PLANT_KINDS), seed, period, NAMES)
         self.block = Sensors.block(N)
         self.block[0] = Sensors.build(
             N, SensorSettings.model_validate(settings), period, start.block[0]

@@ -38,7 +38,9 @@ class MessageLoop:
         self._guard = CommandGuard(robot.n + 3, settings.hold_ticks)
         self._states = StateCodec(robot.joint_names, flight.timebase)
         self._commands = CommandCodec(robot.axis_names, flight.timebase)
-        self._exchange = exchange_of(settings, robot, flight.period, self._states, self._guard)
+        self._exchange = exchange_of(
+            settings, flight.plant.names, flight.period, self._states, self._guard
+        )
         self._references = ReferenceBuffer(robot.n)
         self._answering = Answering(
             flight.controller, LawChoice(flight.law, flight.swaps), self._references,

@@ -22,18 +22,26 @@ class CommandDelaySettings(StrictModel):
     )
 
 
-def command_delay_buffer(settings: CommandDelaySettings, n: int) -> Array:
-    """Return the ring (ticks, n+3) of the commands on their way, N m; before the first is none."""
-    return np.zeros((settings.command_latency_ticks, n + 3))
+def ring_of(latency: Array) -> Array:
+    """Return the ring (ticks, c) of commands on their way, zeros.
+
+    Args:
+        latency: (c,) ticks by which each number of a command is late.
+    """
+    longest = int(latency.max(initial=0.0))
+    return np.zeros((longest + 1 if longest else 0, latency.size))
 
 
 @kernel
-def delay_command(buffer: Array, command: Array, tick: int, out: Array) -> None:
-    """Put ``command`` (n+3,) into the ring at ``tick``; write what is due there into ``out``."""
-    latency = buffer.shape[0]
-    for i in range(out.size):
+def delay_command(latency: Array, ring: Array, command: Array, tick: int, out: Array) -> None:
+    """Put ``command`` (c,) into the ring at ``tick``; write what is due there into ``out``.
+
+    ``latency`` holds the ticks by which each number is late; before the first command is none.
+    """
+    rows = ring.shape[0]
+    for i in range(command.size):
         due = command[i]
-        if latency > 0:
-            due = buffer[tick % latency, i]
-            buffer[tick % latency, i] = command[i]
+        if rows > 0:
+            ring[tick % rows, i] = command[i]
+            due = ring[(tick - int(latency[i])) % rows, i]
         out[i] = due

@@ -1,17 +1,27 @@
-"""Thrusters on the base, each open or closed: their numbers, as files and parameters give them."""
+"""Thrusters on the base, each open or closed.
+
+A thruster that is asked for more than half of its force is opened, a valve's delay later, and is
+closed again at the earliest after its shortest pulse. Open thrusters burn ``F / (I_sp g_0)`` of
+the tank's propellant; what is left in the tick in which it ends is shared alike.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_THRUSTERS
 
+from ..faults.axes import About
+from ..faults.grammar import Argument, Kind
+from ..faults.schedule import Schedule, ScheduledFault, TemporaryChange
 from .mounting import (
     FEWEST,
     NO_VECTORS,
@@ -25,6 +35,8 @@ from .mounting import (
 )
 
 Array = NDArray[np.float64]
+STANDARD_GRAVITY = 9.80665
+"""m/s2."""
 PER_THRUSTER = "one value for all thrusters, or one each"
 Times = Annotated[list[Annotated[float, Field(ge=0.0, le=1.0)]], FEWEST]
 
@@ -110,3 +122,116 @@ class ThrusterSettings(StrictModel):
         for name in ("force", "shortest_pulse", "delay", "specific_impulse"):
             if self.count:
                 self.values(name)
+
+
+class Thrusters(Record):
+    """The thrusters of one base; numbers beyond the last thruster are zero."""
+
+    count: float = shaped(lambda n: ())
+    force: Array = shaped(lambda n: (MOST_THRUSTERS,))
+    """Of an open thruster, N."""
+    direction: Array = shaped(lambda n: (MOST_THRUSTERS, 3))
+    """Unit vectors of the force on the base, base frame."""
+    lever: Array = shaped(lambda n: (MOST_THRUSTERS, 3))
+    """Torque about the base's CoM by force, m, base frame: position x direction."""
+    flow: Array = shaped(lambda n: (MOST_THRUSTERS,))
+    """Propellant that an open thruster burns, kg/s."""
+    shortest_pulse: Array = shaped(lambda n: (MOST_THRUSTERS,))
+    """Ticks, at least one."""
+    stuck_on: Array = shaped(lambda n: (MOST_THRUSTERS,))
+    """1 for a valve that cannot be closed."""
+    stuck_off: Array = shaped(lambda n: (MOST_THRUSTERS,))
+    """1 for a valve that cannot be opened, be it stuck on besides."""
+    open: Array = shaped(lambda n: (MOST_THRUSTERS,))
+    """1 for a valve that was open over the last tick."""
+    remaining: Array = shaped(lambda n: (MOST_THRUSTERS,))
+    """Ticks for which a valve must stay open."""
+    pulses: Array = shaped(lambda n: (MOST_THRUSTERS,))
+    """Times so far that a valve has opened."""
+    propellant: float = shaped(lambda n: ())
+    """Left in the tank, kg; inf: it never runs out."""
+    burnt: float = shaped(lambda n: ())
+    """Propellant used so far, kg."""
+
+    @classmethod
+    def build(cls, n: int, settings: ThrusterSettings, period: float) -> Thrusters:
+        """Read settings that fit one another, see `ThrusterSettings.check`, for ticks of a period.
+
+        Args:
+            n: joints of the robot.
+            settings: of the thrusters.
+            period: s.
+        """
+        thrusters, count = cls.allocate(n), settings.count
+        assign(thrusters, count=count, propellant=settings.propellant or np.inf)
+        if count:
+            force = settings.values("force")
+            thrusters.force[:count] = force
+            thrusters.direction[:count] = settings.unit_directions
+            thrusters.lever[:count] = settings.torques / force[:, None]
+            thrusters.flow[:count] = force / (
+                settings.values("specific_impulse") * STANDARD_GRAVITY
+            )
+            ticks = np.round(settings.values("shortest_pulse") / period)
+            thrusters.shortest_pulse[:count] = np.maximum(1.0, ticks)
+        return thrusters
+
+
+@kernel
+def fire(
+    thrusters: Thrusters, asked: Array, period: float, thrusts: Array, base_wrench: Array
+) -> None:
+    """Open and close valves; write what they give over a tick into ``thrusts``.
+
+    Args:
+        thrusters: whose valves and tank change.
+        asked: (T,) or more, force asked of each, N.
+        period: of a tick, s.
+        thrusts: (MOST_THRUSTERS,) N, mean over the tick, written.
+        base_wrench: (6,) force, N, and torque about the CoM, N m, on base axes; theirs is added.
+    """
+    flow = 0.0
+    for k in range(int(thrusters.count)):
+        wanted = asked[k] > 0.5 * thrusters.force[k] or thrusters.remaining[k] > 0.0
+        is_open = (wanted or thrusters.stuck_on[k] != 0.0) and thrusters.stuck_off[k] == 0.0
+        if is_open and thrusters.open[k] == 0.0:
+            thrusters.pulses[k] += 1.0
+            thrusters.remaining[k] = thrusters.shortest_pulse[k]
+        left = thrusters.remaining[k] - 1.0
+        thrusters.remaining[k] = left if is_open and left > 0.0 else 0.0
+        thrusters.open[k] = 1.0 if is_open else 0.0
+        flow += thrusters.open[k] * thrusters.flow[k]
+    burnt = min(flow * period, thrusters.propellant)
+    share = burnt / (flow * period) if flow > 0.0 else 0.0
+    thrusters.burnt += burnt
+    thrusters.propellant -= burnt
+    for k in range(int(thrusters.count)):
+        thrust = share * thrusters.open[k] * thrusters.force[k]
+        thrusts[k] = thrust
+        for i in range(3):
+            base_wrench[i] += thrust * thrusters.direction[k, i]
+            base_wrench[3 + i] += thrust * thrusters.lever[k, i]
+
+
+_THRUSTER = Argument("", "", 0.0, 0.0, about=About.THRUSTER)
+THRUSTER_STUCK_ON = Kind("thruster_stuck_on", _THRUSTER, None, "a thruster's valve stays open")
+THRUSTER_STUCK_OFF = Kind("thruster_stuck_off", _THRUSTER, None, "a thruster's valve stays closed")
+
+
+class StuckThruster:
+    """Lets some valves stay open or closed for a while."""
+
+    KINDS: ClassVar[tuple[Kind, ...]] = (THRUSTER_STUCK_ON, THRUSTER_STUCK_OFF)
+
+    def __init__(self, schedule: Schedule) -> None:
+        self._on = TemporaryChange(schedule.of(THRUSTER_STUCK_ON))
+        self._off = TemporaryChange(schedule.of(THRUSTER_STUCK_OFF))
+
+    def apply(self, tick: int, part: Thrusters) -> None:
+        """Let those be stuck that should be from ``tick`` to the next."""
+        self._on.apply(tick, part.stuck_on, _stick)
+        self._off.apply(tick, part.stuck_off, _stick)
+
+
+def _stick(stuck: Array, fault: ScheduledFault) -> None:
+    stuck[list(fault.axes)] = 1.0

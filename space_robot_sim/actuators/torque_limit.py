@@ -23,7 +23,7 @@ class TorqueLimitSettings(StrictModel):
     """The largest torque of each actuator."""
 
     base_torque_limit: Limit = Field(
-        0.0, description="largest torque on each base axis, N m (0: none)"
+        0.0, description="largest torque on each base axis, N m (0: none); of an ideal base"
     )
     joint_torque_limit: Limit = Field(
         0.0, description="largest torque on each joint, N m (0: none)"
@@ -35,8 +35,6 @@ class TorqueLimit(Record):
 
     limit: Array = shaped(lambda n: (n + 3,))
     """Largest torque of each axis, N m: base x, y, z (base frame), then joints."""
-    saturated_ticks: float = shaped(lambda n: ())
-    """Ticks so far in which a torque was at its limit."""
 
     @classmethod
     def build(cls, n: int, settings: TorqueLimitSettings) -> TorqueLimit:
@@ -48,19 +46,23 @@ class TorqueLimit(Record):
 
 
 @kernel
-def limit_torque(limits: TorqueLimit, torque: Array) -> None:
-    """Cut ``torque`` (n+3,) N m to the limits in place, and count the tick if it exceeds one."""
+def limit_torque(limits: TorqueLimit, torque: Array) -> float:
+    """Cut ``torque`` (n+3,) N m to the limits in place.
+
+    Returns:
+        1 if it exceeded one, else 0.
+    """
     limit, saturated = limits.limit, 0.0
     for i in range(torque.size):
         wanted = torque[i]
         torque[i] = min(max(wanted, -limit[i]), limit[i])
         if torque[i] != wanted:
             saturated = 1.0
-    limits.saturated_ticks += saturated
+    return saturated
 
 
 _TORQUE = Argument("TORQUE", "N m", 0.0, 1e6)
-SATURATE_BASE = Kind("saturate_base", _TORQUE, None, "the base's actuators give no more")
+SATURATE_BASE = Kind("saturate_base", _TORQUE, None, "the actuators of an ideal base give no more")
 SATURATE_JOINTS = Kind("saturate_joints", _TORQUE, None, "the joints' motors give no more")
 
 

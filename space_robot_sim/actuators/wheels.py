@@ -1,17 +1,32 @@
-"""Reaction wheels that turn the base: their numbers, as files and parameters give them."""
+"""Reaction wheels that turn the base; a motor can push a wheel only up to a speed.
+
+The motor of wheel k gives the torque ``u_k`` about its axis ``a_k``, the base gets ``-a_k u_k``.
+It gives no more than its largest torque, nor more than would push the wheel past its largest
+momentum ``h`` within a tick of T:
+
+    -max(0, h + J Omega) / T <= u <= max(0, h - J Omega) / T
+
+How the wheels' rotation acts on the robot, and their friction, is the dynamics'
+(`space_robot_sim.dynamics`).
+"""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_WHEELS
 
+from ..faults.axes import About
+from ..faults.grammar import Argument, Kind
+from ..faults.schedule import Schedule, ScheduledFault, TemporaryChange
 from .mounting import (
     NO_VECTORS,
     Positive,
@@ -101,3 +116,94 @@ class WheelSettings(StrictModel):
                 "wheels.rotor_inertia: the base's inertia must be larger than its rotors', without "
                 f"them its smallest principal moment is {moments[0]:g} kg m2"
             )
+
+
+class Wheels(Record):
+    """The motors of one base's wheels; numbers beyond the last wheel are zero."""
+
+    count: float = shaped(lambda n: ())
+    axis: Array = shaped(lambda n: (MOST_WHEELS, 3))
+    """Unit vectors in the base frame."""
+    inertia: Array = shaped(lambda n: (MOST_WHEELS,))
+    """J of each rotor about its axis, kg m2."""
+    max_torque: Array = shaped(lambda n: (MOST_WHEELS,))
+    """N m."""
+    max_momentum: Array = shaped(lambda n: (MOST_WHEELS,))
+    """h, N m s."""
+    failed: Array = shaped(lambda n: (MOST_WHEELS,))
+    """1 for a wheel whose motor is dead."""
+    saturated: Array = shaped(lambda n: (MOST_WHEELS,))
+    """1 for a wheel that could not give over the last tick what was asked."""
+    saturated_ticks: Array = shaped(lambda n: (MOST_WHEELS,))
+    """Such ticks so far."""
+
+    @classmethod
+    def build(cls, n: int, settings: WheelSettings) -> Wheels:
+        """Read settings that fit one another, see `WheelSettings.check`."""
+        wheels, count = cls.allocate(n), settings.count
+        assign(wheels, count=count)
+        if count:
+            wheels.axis[:count] = settings.unit_axes
+            wheels.inertia[:count] = settings.values("rotor_inertia")
+            for name in ("max_torque", "max_momentum"):
+                limit = settings.values(name)
+                getattr(wheels, name)[:count] = np.where(limit > 0.0, limit, np.inf)
+        return wheels
+
+
+@kernel
+def drive_wheels(
+    wheels: Wheels, asked: Array, velocities: Array, period: float, torques: Array, base: Array
+) -> float:
+    """Write what the motors give over a tick into ``torques``; add what the base gets of it.
+
+    Args:
+        wheels: whose saturation is counted.
+        asked: (W,) or more, torque asked of each motor, N m.
+        velocities: (MOST_WHEELS,) relative to the base, rad/s.
+        period: of a tick, s.
+        torques: (MOST_WHEELS,) N m, written.
+        base: (3,) torque on the base, N m, base axes.
+
+    Returns:
+        1 if a wheel is saturated, else 0.
+    """
+    found = 0.0
+    for k in range(int(wheels.count)):
+        momentum, limit = wheels.inertia[k] * velocities[k], wheels.max_momentum[k]
+        upper = min(wheels.max_torque[k], max(0.0, limit - momentum) / period)
+        lower = -min(wheels.max_torque[k], max(0.0, limit + momentum) / period)
+        torque = min(max(asked[k], lower), upper)
+        saturated = 1.0 if torque != asked[k] else 0.0
+        if wheels.failed[k] != 0.0:
+            torque = saturated = 0.0
+        wheels.saturated[k] = saturated
+        wheels.saturated_ticks[k] += saturated
+        found = max(found, saturated)
+        torques[k] = torque
+        for i in range(3):
+            base[i] -= wheels.axis[k, i] * torque
+    return found
+
+
+WHEEL_FAIL = Kind(
+    "wheel_fail", Argument("", "", 0.0, 0.0, about=About.WHEEL), None,
+    "the motor of a reaction wheel is dead: the wheel runs on freely",
+)  # fmt: skip
+
+
+class DeadWheel:
+    """Lets the motors of some wheels give nothing for a while."""
+
+    KINDS: ClassVar[tuple[Kind, ...]] = (WHEEL_FAIL,)
+
+    def __init__(self, schedule: Schedule) -> None:
+        self._change = TemporaryChange(schedule.of(WHEEL_FAIL))
+
+    def apply(self, tick: int, part: Wheels) -> None:
+        """Let those be dead that should be from ``tick`` to the next."""
+        self._change.apply(tick, part.failed, _kill)
+
+
+def _kill(failed: Array, fault: ScheduledFault) -> None:
+    failed[list(fault.axes)] = 1.0

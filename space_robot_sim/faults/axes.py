@@ -1,49 +1,60 @@
-"""The axes that a fault is about, by name."""
+"""The axes and actuators that a fault is about, by name."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from enum import Enum
 
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import RobotNames
 from space_robot_msgs_py.topics import BASE_AXES
 
 
 class About(Enum):
-    """The axes that a kind of fault may be about."""
+    """The axes, or actuators of the base, that a kind of fault may be about."""
 
     AXIS = "AXIS a name, a joint counted from 1, base, joints or all"
     JOINT = "JOINT a name, counted from 1, or joints"
     BASE_AXIS = "BASE_AXIS a name, or base"
+    WHEEL = "WHEEL a name, counted from 1, or wheels"
+    THRUSTER = "THRUSTER a name, counted from 1, or thrusters"
 
 
-def axes_of(name: str, about: About, axis_names: Sequence[str]) -> tuple[int, ...]:
-    """Return the places, among a robot's n+3 axes, of the axes that a fault's ``name`` means.
+def axes_of(name: str, about: About, names: RobotNames) -> tuple[int, ...]:
+    """Return the places of what a fault's ``name`` means: among all axes, wheels or thrusters.
 
-    An axis of that name comes first, then a group of axes, then a joint's number.
+    A thing of that name comes first, then a group of them, then a number.
 
     Args:
         name: as written in the fault.
-        about: the axes that are allowed.
-        axis_names: base x, y, z, then the joints, as `space_robot_sim.robot.Robot.axis_names`.
+        about: the things that are allowed.
+        names: of what there is.
 
     Raises:
-        InputError: the robot has no such axis; it says which there are.
+        InputError: there is no such thing; it says which there are.
     """
-    base, every = len(BASE_AXES), range(len(axis_names))
+    base, every = len(BASE_AXES), range(len(names.axes))
     of_base, of_joints = {"base": tuple(every[:base])}, {"joints": tuple(every[base:])}
-    numbers = {str(1 + axis - base): (axis,) for axis in every[base:]}
-    meant, groups = {
-        About.AXIS: (every, {**of_base, **of_joints, "all": tuple(every)}),
-        About.JOINT: (every[base:], of_joints),
-        About.BASE_AXIS: (every[:base], of_base),
-    }[about]
-    numbers = {} if about is About.BASE_AXIS else numbers
-    names = {axis_names[axis]: (axis,) for axis in meant}
-    found = {**numbers, **groups, **names}.get(name)
+    those = names.axes
+    match about:
+        case About.AXIS:
+            meant, counted = every, every[base:]
+            groups = {**of_base, **of_joints, "all": tuple(every)}
+        case About.JOINT:
+            meant, counted, groups = every[base:], every[base:], of_joints
+        case About.BASE_AXIS:
+            meant, counted, groups = every[:base], every[:0], of_base
+        case _:
+            group = f"{about.name.lower()}s"
+            those = names.wheels if about is About.WHEEL else names.thrusters
+            meant = counted = range(len(those))
+            groups = {group: tuple(meant)} if those else {}
+    numbers = {str(1 + place - counted.start): (place,) for place in counted}
+    known = {those[place]: (place,) for place in meant}
+    found = {**numbers, **groups, **known}.get(name)
     if found is None:
-        counted = [f"1 to {len(numbers)}"] if numbers else []
-        what, allowed = about.name.lower().replace("_", " "), ", ".join((*names, *counted, *groups))
-        raise InputError(f"no {what} {short(name)}: choose one of {allowed}")
+        of_numbers = [f"1 to {len(numbers)}"] if numbers else []
+        allowed = ", ".join((*known, *of_numbers, *groups))
+        choice = f"choose one of {allowed}" if allowed else "there is none"
+        raise InputError(f"no {about.name.lower().replace('_', ' ')} {short(name)}: {choice}")
     return found

@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import RobotNames
 
 from .axes import axes_of
 from .grammar import Fault, Kind
 
 Array = NDArray[np.float64]
 
+NO_NAMES = RobotNames(())
 BLOCK_TICKS = 256
 """Random numbers are drawn for that many ticks at once."""
 
@@ -28,20 +30,21 @@ class ScheduledFault:
     """
 
     def __init__(
-        self, fault: Fault, index: int, seed: int, period: float, axis_names: Sequence[str] = ()
+        self, fault: Fault, index: int, seed: int, period: float, names: RobotNames = NO_NAMES
     ) -> None:
-        """Place ``fault``, the ``index``-th of the flight of a robot with these axes.
+        """Place ``fault``, the ``index``-th of the flight of a robot with these names.
 
         Raises:
-            InputError: it ends before the first tick it could act at, or names an axis that is
-                not there.
+            InputError: it ends before the first tick it could act at, or names something that
+                is not there.
         """
         self.kind, self.value = fault.kind, fault.value
         self.axes: tuple[int, ...] = ()
-        """Places of the axes it is about: 0 to 2 of the base, then the joints."""
+        """Places of what it is about: of axes 0 to 2 of the base, then the joints; of wheels or
+        thrusters among their like."""
         if fault.kind.argument and (about := fault.kind.argument.about):
             try:
-                self.axes = axes_of(fault.axis, about, axis_names)
+                self.axes = axes_of(fault.axis, about, names)
             except InputError as error:
                 raise InputError(f"fault '{fault}': {error}") from None
         self.first = _tick_from(fault.start_s, period)
@@ -84,16 +87,15 @@ class Schedule:
     """The faults of a flight in the order given, each seeded by ``seed`` and its place."""
 
     def __init__(
-        self, faults: Sequence[Fault], seed: int, period: float, axis_names: Sequence[str] = ()
+        self, faults: Sequence[Fault], seed: int, period: float, names: RobotNames = NO_NAMES
     ) -> None:
-        """Place all faults; ``axis_names``: those of the robot, for faults that name one.
+        """Place all faults; ``names``: of what the robot has, for faults that name one.
 
         Raises:
             InputError: see `ScheduledFault`.
         """
         self.faults = [
-            ScheduledFault(fault, index, seed, period, axis_names)
-            for index, fault in enumerate(faults)
+            ScheduledFault(fault, index, seed, period, names) for index, fault in enumerate(faults)
         ]
 
     def of(self, *kinds: Kind) -> list[ScheduledFault]:

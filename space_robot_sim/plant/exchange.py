@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from space_robot_msgs_py.samples import RobotState
+from space_robot_msgs_py.samples import RobotNames, RobotState
 from space_robot_msgs_py.wire.codecs import StateCodec
 
 from ..faults.link import awaited_stamp
-from ..robot import Robot
 from .command_guard import CommandGuard
 from .faults import FaultSettings, MessageFaults
 
@@ -89,10 +88,11 @@ class FaultyExchange(Exchange):
 
 
 def exchange_of(
-    settings: FaultSettings, robot: Robot, period: float, codec: StateCodec, guard: CommandGuard
-) -> Exchange:
-    """Return the exchange of a flight: a faulty one if any of its messages are to fail."""
+    settings: FaultSettings, names: RobotNames, period: float, codec: StateCodec,
+    guard: CommandGuard,
+) -> Exchange:  # fmt: skip
+    """Return the exchange of a robot's flight: a faulty one if any of its messages are to fail."""
     if not settings.has_message_faults:
         return Exchange(codec, guard)
-    faults = MessageFaults(settings.schedule(robot, period), robot.n)
+    faults = MessageFaults(settings.schedule(names, period), len(names.joints))
     return FaultyExchange(codec, guard, faults)

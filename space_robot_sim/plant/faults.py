@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Field
 
 from space_robot_msgs_py.config.settings import Texts
 from space_robot_msgs_py.config.validation import StrictModel
-from space_robot_msgs_py.samples import RobotState
+from space_robot_msgs_py.samples import RobotNames, RobotState
 
 from ..actuators import actuators
 from ..environment import environment
@@ -21,7 +21,6 @@ from ..faults.corruption import Corruption
 from ..faults.grammar import Fault, by_name, parse_faults
 from ..faults.link import COMMAND_LINK, STATE_LINK, Link
 from ..faults.schedule import Schedule
-from ..robot import Robot
 from ..sensors import sensors
 
 PARTS = {
@@ -65,13 +64,17 @@ class FaultSettings(StrictModel):
         """True if messages between plant and controller are to fail."""
         return any(fault.kind.name in MESSAGE_KINDS for fault in self.parsed_faults)
 
-    def schedule(self, robot: Robot, period: float) -> Schedule:
-        """Place the faults in a flight of ``robot`` in ticks of ``period`` seconds.
+    def schedule(self, names: RobotNames, period: float) -> Schedule:
+        """Place the faults in a flight of a robot in ticks of ``period`` seconds.
+
+        Args:
+            names: of what the robot has.
+            period: s.
 
         Raises:
-            InputError: a fault names an axis that is not there, or its time holds no tick.
+            InputError: a fault names what is not there, or its time holds no tick.
         """
-        return Schedule(self.parsed_faults, self.fault_seed, period, robot.axis_names)
+        return Schedule(self.parsed_faults, self.fault_seed, period, names)
 
 
 class PartFaults:

@@ -68,7 +68,9 @@ class PlantLoop:
         self._commands = CommandCodec(robot.axis_names, timebase)
         self._clock = ClockCodec()
         self._guard = CommandGuard(robot.n + 3, settings.hold_ticks)
-        self._exchange = exchange_of(settings, robot, settings.period, self._states, self._guard)
+        self._exchange = exchange_of(
+            settings, self._plant.names, settings.period, self._states, self._guard
+        )
         self._joint_states = RawPublisher(node, topics.JOINT_STATES)
         self._base_state = RawPublisher(node, topics.BASE_STATE)
         self._clock_out = RawPublisher(node, topics.CLOCK)

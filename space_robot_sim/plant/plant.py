@@ -12,10 +12,15 @@ from pydantic import Field
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.errors import DivergedError, InputError
-from space_robot_msgs_py.samples import Command, RobotState, State
+from space_robot_msgs_py.samples import Command, RobotNames, RobotState, State
 
-from ..actuators.actuators import Actuators, ActuatorSettings, actuate, reports_given
-from ..actuators.command_delay import command_delay_buffer
+from ..actuators.actuators import (
+    Actuators,
+    ActuatorSettings,
+    actuate,
+    command_delay_buffer,
+    reports_given,
+)
 from ..dynamics.model import Model
 from ..environment.environment import Environment, EnvironmentSettings
 from ..environment.payload import with_payload
@@ -94,17 +99,21 @@ class Plant:
         if not 1e-3 <= norm <= 1e3:
             raise InputError(f"initial_quaternion must have a norm near 1, got {norm:g}")
         settings.check(robot, getattr(settings, "actuators", "given"))
+        self.names = RobotNames.of(robot.joint_names, settings.names, settings.wheel_count)
+        """Those of all that is told of the robot and asked of it."""
         self.robot = with_payload(robot, settings.payload)
         self.period = period
         self.block = PlantMemory.block(n)
         """The plant's `PlantMemory`, for compiled loops."""
-        self.command_delay_buffer = command_delay_buffer(settings, n)
-        """Ring of the commands that are still on their way."""
         memory = self.memory
         assign(
             memory, model=self.robot.model, environment=Environment.build(n, settings),
             actuators=Actuators.build(n, settings, period), substeps=settings.substeps,
         )  # fmt: skip
+        self.command_delay_buffer = command_delay_buffer(
+            memory.actuators, len(self.names.commanded)
+        )
+        """Ring of the commands that are still on their way."""
         memory.x[3:7] = np.array(settings.initial_quaternion) / norm
         memory.x[7 : 7 + n] = np.radians(settings.initial_joints_deg)
         mount_wheels(memory, settings.wheels)
@@ -115,7 +124,7 @@ class Plant:
         self.truth.joint_positions[:] = memory.x[7 : 7 + n]
         self.truth.wheel_velocities[:] = memory.x[13 + 2 * n :]
         sensors = Sensors.build(n, settings, period, memory.truth)
-        self._part_faults = PartFaults(settings.schedule(robot, period))
+        self._part_faults = PartFaults(settings.schedule(self.names, period))
         if self._part_faults.are_in("sensors"):
             assign(sensors, are_ideal=False)
         assign(memory, sensors=sensors)
@@ -144,7 +153,7 @@ class Plant:
     @property
     def saturated_ticks(self) -> int:
         """Ticks so far in which a torque was at its limit."""
-        return int(self.memory.actuators.torque_limit.saturated_ticks)
+        return int(self.memory.actuators.saturated_ticks)
 
     def step(self, command: Command) -> None:
         """Hold ``command`` (or the one due, if commands are delayed) over one tick.
@@ -204,7 +213,7 @@ def measure(block: Block, tick: int, period: float) -> None:
 def advance(
     memory: PlantMemory, command_delay_buffer: Array, torque: Array, tick: int, period: float
 ) -> float:
-    """Fly from ``tick`` to the next under the command ``torque`` (n+3,), N m, given at ``tick``.
+    """Fly from ``tick`` to the next under the command ``torque`` (n+3+A,) given at ``tick``.
 
     The sensors have not measured the next tick then: see `sense`.
 
@@ -212,12 +221,13 @@ def advance(
         The fastest rate then, see `fastest_rate`.
     """
     truth, measured = memory.truth, memory.measured
-    given, n = truth.applied_torque, truth.joint_positions.size
-    actuate(memory.actuators, command_delay_buffer, torque, tick, measured.applied_torque, given)
+    n, actuation = truth.joint_positions.size, memory.stages.actuation
+    actuate(memory.actuators, command_delay_buffer, torque, tick, period, truth, measured)
     substeps = int(memory.substeps)
     step = period / substeps
-    memory.stages.actuation[3 : 6 + n] = given
-    memory.stages.actuation[6 + n :] = truth.wheel_torques
+    actuation[:6] = memory.actuators.base_wrench
+    actuation[6 : 6 + n] = truth.applied_torque[3:]
+    actuation[6 + n :] = truth.wheel_torques
     for k in range(substeps):
         integrate(
             memory.model, memory.environment, memory.x, tick * period + k * step, step,

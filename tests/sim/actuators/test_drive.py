@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
+from actuator_bench import NAMES, PERIOD, Bench, N
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -14,8 +13,6 @@ from scipy.linalg import expm
 
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Command
-from space_robot_msgs_py.topics import BASE_AXES
-from space_robot_sim.actuators.actuators import Actuators, ActuatorSettings, actuate
 from space_robot_sim.actuators.drive import DRIVE_BIAS, DRIVE_SCALE, WrongDrive, judge
 from space_robot_sim.faults.grammar import by_name, parse_faults
 from space_robot_sim.faults.schedule import Schedule
@@ -24,28 +21,8 @@ from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
 
-PERIOD = 5e-4
-N = 6
-NONE = np.zeros((0, N + 3))
-AXES = (*BASE_AXES, *(f"joint{k}" for k in range(1, N + 1)))
 SEEDS = st.integers(0, 2**31 - 1)
 SIZES = st.floats(1e-6, 1e3)
-
-
-class Drives:
-    """Actuators alone, driven from tick to tick."""
-
-    def __init__(self, **settings: Any) -> None:
-        built = Actuators.build(N, ActuatorSettings.model_validate(settings), PERIOD)
-        self.block = np.array([built], Actuators.dtype(N))
-        self.tick = 0
-
-    def drive(self, torque: Array) -> tuple[Array, Array]:
-        """Torque reported and torque given."""
-        reported, given_torque = np.empty(N + 3), np.empty(N + 3)
-        actuate(self.block[0], NONE, torque, self.tick, reported, given_torque)
-        self.tick += 1
-        return reported, given_torque
 
 
 def torques(seed: int, ticks: int = 50, size: float = 10.0) -> Array:
@@ -60,16 +37,16 @@ def per_axis(seed: int, low: float, high: float) -> list[float]:
 @given(SEEDS)
 def test_sound_drives_give_what_is_asked_to_the_bit(seed: int) -> None:
     """The sign of a zero too: a flight is the same with this code as without."""
-    drives = Drives()
+    drives = Bench()
     for torque in [*torques(seed), -np.zeros(N + 3), np.zeros(N + 3)]:
-        for out in drives.drive(torque):
+        for out in drives.act(torque):
             assert out.tobytes() == torque.tobytes()
 
 
 @given(SEEDS, st.floats(1e-5, 1.0), st.integers(1, 9))
 def test_a_lag_gives_the_mean_of_its_exact_response(seed: int, lag: float, hold: int) -> None:
     """Of ``tau dy/dt + y = u`` with the integral of y beside it, by a matrix exponential."""
-    drives, lags = Drives(drive_lag=[lag]), np.array([[-1 / lag, 1 / lag], [0.0, 0.0]])
+    drives, lags = Bench(drive_lag=[lag]), np.array([[-1 / lag, 1 / lag], [0.0, 0.0]])
     system = np.zeros((3, 3))
     system[:2, :2], system[2, 0] = lags, 1.0  # y, u, integral of y
     step = expm(PERIOD * system)
@@ -77,7 +54,7 @@ def test_a_lag_gives_the_mean_of_its_exact_response(seed: int, lag: float, hold:
     for torque in np.repeat(torques(seed, 8), hold, axis=0):
         state[1], state[2] = torque, 0.0
         state = step @ state
-        _, got = drives.drive(torque)
+        _, got = drives.act(torque)
         np.testing.assert_allclose(got, state[2] / PERIOD, rtol=1e-10, atol=1e-10)
         lagging = drives.block[0].drive.lagging
         np.testing.assert_allclose(lagging, state[0], rtol=1e-10, atol=1e-10)
@@ -85,17 +62,17 @@ def test_a_lag_gives_the_mean_of_its_exact_response(seed: int, lag: float, hold:
 
 def test_no_momentum_is_lost_in_a_lag() -> None:
     """A pulse brings all of its impulse, however slow the drive, once that has come to rest."""
-    drives = Drives(drive_lag=per_axis(1, 1e-5, 0.02))
+    drives = Bench(drive_lag=per_axis(1, 1e-5, 0.02))
     pulse = torques(2, 3)
-    impulse = sum((drives.drive(t)[1] for t in [*pulse, *np.zeros((2000, N + 3))]), np.zeros(9))
+    impulse = sum((drives.act(t)[1] for t in [*pulse, *np.zeros((2000, N + 3))]), np.zeros(9))
     np.testing.assert_allclose(impulse, pulse.sum(axis=0), rtol=1e-12)
 
 
 @given(SEEDS, SIZES)
 def test_quantised_torques_are_whole_steps_within_half_a_one(seed: int, step: float) -> None:
-    drives = Drives(drive_step=[step])
+    drives = Bench(drive_step=[step])
     for torque in torques(seed):
-        reported, got = drives.drive(torque)
+        reported, got = drives.act(torque)
         np.testing.assert_array_equal(reported, torque)
         np.testing.assert_allclose(got / step, np.round(got / step), rtol=1e-12)
         assert np.abs(got - torque).max() <= 0.5 * step * (1.0 + 1e-9) + 1e-12
@@ -103,10 +80,10 @@ def test_quantised_torques_are_whole_steps_within_half_a_one(seed: int, step: fl
 
 @given(SEEDS, SIZES)
 def test_a_dead_band_gives_nothing_or_all(seed: int, width: float) -> None:
-    drives = Drives(drive_dead_band=[width])
+    drives = Bench(drive_dead_band=[width])
     for torque in torques(seed):
         expected = np.where(np.abs(torque) < width, 0.0, torque)
-        np.testing.assert_array_equal(drives.drive(torque)[1], expected)
+        np.testing.assert_array_equal(drives.act(torque)[1], expected)
 
 
 @given(SEEDS)
@@ -115,7 +92,7 @@ def test_effects_come_in_their_order_on_each_axis_by_itself(seed: int) -> None:
     step, band = np.array(per_axis(seed, 0.1, 2.0)), np.array(per_axis(seed + 1, 0.0, 3.0))
     lag, scale = np.array(per_axis(seed + 2, 0.0, 0.01)), np.array(per_axis(seed + 3, 0.5, 1.5))
     bias, limit = np.array(per_axis(seed + 4, -1.0, 1.0)), 9.0
-    drives = Drives(
+    drives = Bench(
         drive_step=step.tolist(), drive_dead_band=band.tolist(), drive_lag=lag.tolist(),
         drive_scale=scale.tolist(), drive_bias=bias.tolist(), base_torque_limit=limit,
         joint_torque_limit=limit,
@@ -127,18 +104,18 @@ def test_effects_come_in_their_order_on_each_axis_by_itself(seed: int) -> None:
         asked[np.abs(asked) < band] = 0.0
         mean = asked + (lagging - asked) * -np.expm1(-ratio) / ratio
         lagging = asked + (lagging - asked) * np.exp(-ratio)
-        reported, got = drives.drive(torque)
+        reported, got = drives.act(torque)
         np.testing.assert_array_equal(reported, limited)
         np.testing.assert_allclose(got, scale * mean + bias, rtol=1e-9, atol=1e-9)
 
 
 def faults(*texts: str) -> WrongDrive:
     kinds = by_name(DRIVE_SCALE, DRIVE_BIAS)
-    return WrongDrive(Schedule(parse_faults(texts, kinds), 0, PERIOD, AXES))
+    return WrongDrive(Schedule(parse_faults(texts, kinds), 0, PERIOD, NAMES))
 
 
 def test_faults_are_wrong_in_their_time_on_their_axes_and_leave_no_trace() -> None:
-    drives = Drives(drive_scale=[1.1], drive_bias=per_axis(4, -1.0, 1.0))
+    drives = Bench(drive_scale=[1.1], drive_bias=per_axis(4, -1.0, 1.0))
     sound = drives.block.copy()
     wrong = faults(
         "drive_scale@0.005-0.015:base=0.5", "drive_scale@0.01-0.015:all=2",
@@ -155,24 +132,24 @@ def test_faults_are_wrong_in_their_time_on_their_axes_and_leave_no_trace() -> No
         if 10 <= tick < 20:
             more[3:] = 1.0
             more[5] += -2.0
-        _, got = drives.drive(torque)
+        _, got = drives.act(torque)
         np.testing.assert_allclose(got, scale * torque + bias + more, rtol=1e-14, atol=1e-14)
-    assert drives.block.tobytes() == sound.tobytes()
+    assert drives.record.drive.tobytes() == sound[0].drive.tobytes()
 
 
 def test_sound_drives_that_a_fault_spoils_are_sound_again() -> None:
-    drives, wrong = Drives(), faults("drive_scale@0.005-0.01:3=0.5")
+    drives, wrong = Bench(), faults("drive_scale@0.005-0.01:3=0.5")
     for tick, torque in enumerate(torques(6)):
         wrong.apply(tick, drives.block[0].drive)
-        spoilt = np.flatnonzero(drives.drive(torque)[1] != torque).tolist()
+        spoilt = np.flatnonzero(drives.act(torque)[1] != torque).tolist()
         assert spoilt == ([5] if 10 <= tick < 20 else [])
 
 
 def test_numbers_changed_in_flight_count_once_judged() -> None:
-    drives = Drives()
+    drives = Bench()
     drives.block[0].drive.dead_band[4] = 1e9
     judge(drives.block[0].drive)
-    assert np.flatnonzero(drives.drive(np.ones(N + 3))[1] == 0.0).tolist() == [4]
+    assert np.flatnonzero(drives.act(np.ones(N + 3))[1] == 0.0).tolist() == [4]
 
 
 @pytest.mark.parametrize("name", ["scale", "bias", "lag", "step", "dead_band"])

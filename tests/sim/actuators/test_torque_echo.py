@@ -2,53 +2,35 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
+from actuator_bench import NAMES, PERIOD, Bench, N
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.topics import BASE_AXES
-from space_robot_sim.actuators.actuators import Actuators, ActuatorSettings, actuate
 from space_robot_sim.actuators.torque_echo import TORQUE_BIAS, TORQUE_SCALE, WrongEcho
 from space_robot_sim.faults.grammar import by_name, parse_faults
 from space_robot_sim.faults.schedule import Schedule
 
 Array = NDArray[np.float64]
 
-PERIOD = 5e-4
-N = 6
-AXES = (*BASE_AXES, *(f"joint{k}" for k in range(1, N + 1)))
 TORQUES = 10.0 * np.random.default_rng(8).normal(size=(50, N + 3))
 WRONG = {"drive_scale": [0.9], "drive_bias": [0.1], "drive_lag": [0.01]}
 
 
-def built(**settings: Any) -> Any:
-    actuators = Actuators.build(N, ActuatorSettings.model_validate(settings), PERIOD)
-    return np.array([actuators], Actuators.dtype(N))[0]
-
-
-def act(actuators: Any, torque: Array, tick: int = 0) -> tuple[Array, Array]:
-    """Torque reported and torque given."""
-    reported, given = np.empty(N + 3), np.empty(N + 3)
-    actuate(actuators, np.zeros((0, N + 3)), torque, tick, reported, given)
-    return reported, given
-
-
 def test_the_command_within_its_limits_is_reported_whatever_the_drives_make_of_it() -> None:
-    sound, wrong = built(joint_torque_limit=5.0), built(joint_torque_limit=5.0, **WRONG)
+    sound, wrong = Bench(joint_torque_limit=5.0), Bench(joint_torque_limit=5.0, **WRONG)
     for torque in TORQUES:
-        reported, given = act(wrong, torque)
+        reported, given = wrong.act(torque)
         assert (given != reported).all()
-        for out in act(sound, torque):
+        for out in sound.act(torque):
             np.testing.assert_array_equal(reported, out)
 
 
 def test_a_torque_sensor_reports_what_is_given() -> None:
-    by_command, by_sensor = built(**WRONG), built(**WRONG, torque_echo="given")
+    by_command, by_sensor = Bench(**WRONG), Bench(**WRONG, torque_echo="given")
     for torque in TORQUES:
-        _, given = act(by_command, torque)
-        for out in act(by_sensor, torque):
+        _, given = by_command.act(torque)
+        for out in by_sensor.act(torque):
             np.testing.assert_array_equal(out, given)
 
 
@@ -56,11 +38,11 @@ def test_a_torque_sensor_reports_what_is_given() -> None:
 def test_the_echo_has_a_scale_and_a_bias_of_its_own(source: str) -> None:
     scale, bias = np.linspace(0.9, 1.1, N + 3), np.linspace(-1.0, 1.0, N + 3)
     errors = {"echo_scale": scale.tolist(), "echo_bias": bias.tolist(), "torque_echo": source}
-    sound, wrong = built(**WRONG), built(**WRONG, **errors)
+    sound, wrong = Bench(**WRONG), Bench(**WRONG, **errors)
     for torque in TORQUES:
-        reported, given = act(sound, torque)
+        reported, given = sound.act(torque)
         of = reported if source == "command" else given
-        found, still_given = act(wrong, torque)
+        found, still_given = wrong.act(torque)
         np.testing.assert_array_equal(still_given, given)
         np.testing.assert_allclose(found, scale * of + bias, rtol=1e-15, atol=1e-15)
 
@@ -68,11 +50,11 @@ def test_the_echo_has_a_scale_and_a_bias_of_its_own(source: str) -> None:
 def test_faults_of_the_echo_leave_what_is_given() -> None:
     texts = ("torque_scale@0.005-0.015:base=0.5", "torque_bias@0.01-0.015:5=3")
     kinds = by_name(TORQUE_SCALE, TORQUE_BIAS)
-    faults = WrongEcho(Schedule(parse_faults(texts, kinds), 0, PERIOD, AXES))
-    actuators = built()
+    faults = WrongEcho(Schedule(parse_faults(texts, kinds), 0, PERIOD, NAMES))
+    actuators = Bench()
     for tick, torque in enumerate(TORQUES):
-        faults.apply(tick, actuators.torque_echo)
-        reported, given = act(actuators, torque, tick)
+        faults.apply(tick, actuators.record.torque_echo)
+        reported, given = actuators.act(torque)
         np.testing.assert_array_equal(given, torque)
         scale, bias = np.ones(N + 3), np.zeros(N + 3)
         scale[:3] = 0.5 if 10 <= tick < 30 else 1.0

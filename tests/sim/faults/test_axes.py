@@ -7,19 +7,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import RobotNames
 from space_robot_msgs_py.topics import BASE_AXES
 from space_robot_sim.faults.axes import About, axes_of
 
-NAMES = st.lists(st.text(min_size=1, max_size=5), min_size=1, max_size=9, unique=True)
-PAPER = (*BASE_AXES, *(f"joint_{k}" for k in range(1, 7)))
+JOINTS = st.lists(st.text(min_size=1, max_size=5), min_size=1, max_size=9, unique=True)
+PAPER = RobotNames(tuple(f"joint_{k}" for k in range(1, 7)))
 
 
-@given(NAMES)
+@given(JOINTS)
 def test_every_name_is_its_own_axis(joints: list[str]) -> None:
     """A joint named ``2``, ``all`` or ``base`` too: what has a name is called by it."""
-    names = [*BASE_AXES, *joints]
-    for place, name in enumerate(names):
-        if names.index(name) == place and name not in names[place + 1 :]:
+    names = RobotNames(tuple(joints))
+    for place, name in enumerate(names.axes):
+        if names.axes.count(name) == 1:
             assert axes_of(name, About.AXIS, names) == (place,)
             if place >= len(BASE_AXES):
                 assert axes_of(name, About.JOINT, names) == (place,)
@@ -61,3 +62,22 @@ def test_a_joint_is_no_base_axis(name: str) -> None:
 def test_a_base_axis_is_no_joint(name: str) -> None:
     with pytest.raises(InputError, match=f"^no joint '{name}': choose one of joint_1, .*, joints$"):
         axes_of(name, About.JOINT, PAPER)
+
+
+HARDWARE = RobotNames(PAPER.joints, ("wheel_1", "wheel_2"), ("thruster_1",))
+
+
+def test_wheels_and_thrusters_are_counted_among_their_like() -> None:
+    for name, places in (("wheel_2", (1,)), ("1", (0,)), ("wheels", (0, 1))):
+        assert axes_of(name, About.WHEEL, HARDWARE) == places
+    for name in ("thruster_1", "1", "thrusters"):
+        assert axes_of(name, About.THRUSTER, HARDWARE) == (0,)
+
+
+@pytest.mark.parametrize("name", ["3", "thruster_1", "all", "joint_1"])
+def test_a_wheel_that_is_not_there(name: str) -> None:
+    allowed = "choose one of wheel_1, wheel_2, 1 to 2, wheels$"
+    with pytest.raises(InputError, match=f"^no wheel '{name}': {allowed}"):
+        axes_of(name, About.WHEEL, HARDWARE)
+    with pytest.raises(InputError, match=f"^no thruster '{name}': there is none$"):
+        axes_of(name, About.THRUSTER, PAPER)

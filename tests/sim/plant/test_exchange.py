@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from space_robot_msgs_py.samples import RobotState, Timebase
+from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.codecs import StateCodec
 from space_robot_sim.plant.command_guard import CommandGuard
 from space_robot_sim.plant.exchange import NONE, Exchange, FaultyExchange, exchange_of
@@ -21,8 +21,9 @@ class Way:
     def __init__(self, robot: Robot, *texts: str) -> None:
         self.guard = CommandGuard(robot.n + 3, 10**6)
         self.codec = StateCodec(robot.joint_names, Timebase(round(PERIOD * 1e9)))
+        names = RobotNames(robot.joint_names)
         settings = FaultSettings(faults=list(texts))
-        self.exchange = exchange_of(settings, robot, PERIOD, self.codec, self.guard)
+        self.exchange = exchange_of(settings, names, PERIOD, self.codec, self.guard)
         self.state = RobotState.allocate(robot.n)
 
     def fly(self, ticks: int) -> tuple[list[list[int]], list[list[int]], list[int]]:

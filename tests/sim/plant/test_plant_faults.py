@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from random_samples import assert_same
 
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.samples import STATE_FIELDS, Command
+from space_robot_msgs_py.samples import STATE_FIELDS, Command, RobotNames
 from space_robot_sim.faults.grammar import parse_fault, parse_faults
 from space_robot_sim.faults.link import awaited_stamp
 from space_robot_sim.faults.schedule import Schedule, ScheduledFault
@@ -36,7 +36,7 @@ def plant_of(robot: Robot, *faults: str, seed: int = 0, **settings: float) -> Pl
 
 def message_faults(robot: Robot, *texts: str, seed: int = 0) -> MessageFaults:
     settings = PlantSettings(faults=list(texts), fault_seed=seed)
-    return MessageFaults(settings.schedule(robot, PERIOD), robot.n)
+    return MessageFaults(settings.schedule(RobotNames(robot.joint_names), PERIOD), robot.n)
 
 
 @given(st.integers(0, 10**7), st.integers(1, 10**5), st.sampled_from([1e-4, 5e-4, 1e-3, 0.01]))

@@ -20,6 +20,7 @@ from paths import CONFIG
 from space_robot_control.flight.faults import KINDS
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.samples import RobotNames
 from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule, ScheduledFault
 from space_robot_sim.plant.faults import PLANT_KINDS
@@ -111,7 +112,7 @@ def seen(fly: Fly) -> Callable[[str], Seen]:
             parse_faults(texts, PLANT_KINDS),
             SEED,
             PERIOD,
-            Robot.from_yaml(CONFIG / "robots/paper.yaml").axis_names,
+            RobotNames(Robot.from_yaml(CONFIG / "robots/paper.yaml").joint_names),
         )
         expected = {
             fault.kind.name: sum(
