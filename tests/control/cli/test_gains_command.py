@@ -51,6 +51,23 @@ def test_laws_with_a_model_are_sound() -> None:
     assert report("--controller", "ctc")["laws"]["ctc"].keys() == {"is_sound", "noise_gain"}
 
 
+def test_a_free_base_leaves_the_joints_to_be_judged() -> None:
+    """Table IV: seven times the margin, so that it is sound; the base gets no torque of noise."""
+    result = run("check", "--actuators", "none")
+    assert result.exit_code == 0
+    assert "H_f^-1 h_bar" in result.stdout
+    found = report("--actuators", "none")
+    assert found["actuators"] == "none"
+    stc = found["laws"]["tde_stc"]
+    assert stc["torque_scale_margin"] == pytest.approx(0.0237, abs=5e-5)
+    for law in found["laws"].values():
+        assert law["noise_gain"][:3] == [0.0] * 3
+    assert stc["noise_gain"][3:6] == pytest.approx([5.0 / 5e-4 + 5.0] * 3)
+    turned = ("--set", "mission.base_quaternion=[0.0, 1.0, 0.0, 0.0]")
+    again = report("--actuators", "none", *turned)["laws"]["ctc"]
+    assert again["noise_gain"] == found["laws"]["ctc"]["noise_gain"]
+
+
 def test_parameters_count_as_in_a_flight() -> None:
     one = report("--controller", "tde_stc", "--set", "controller.tde_stc.h_bar=[0.5]")
     two = report("--controller", "tde_stc", "--set", "controller.tde_stc.h_bar=[1.0]")

@@ -47,7 +47,10 @@ class CommonBeginning:
     def taken_over_by(self, law: str) -> FlightLog:
         """The flight with another controller, as after a restart, from `TAKEOVER` on."""
         self._go_back()
-        new = Controller(self.flight.robot, self._law(law), self.flight.period)
+        new = Controller(
+            self.flight.robot, self._law(law), self.flight.period,
+            actuators=self.flight.believed_actuators,
+        )  # fmt: skip
         return self._fly(new, TAKEOVER, STOP)
 
     def _go_back(self) -> None:
@@ -113,3 +116,17 @@ def test_a_new_controller_finds_the_force_at_any_attitude(law: str) -> None:
     assert abs(log.quaternion[TAKEOVER, 2]) > 0.1
     torque = log.commanded_torque
     np.testing.assert_allclose(torque[TAKEOVER], torque[TAKEOVER - 1], rtol=1e-9, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("first", LAWS)
+def test_a_law_takes_over_smoothly_with_a_base_that_nothing_turns(first: str) -> None:
+    """From another and from none; the base gets no torque, whatever was on its axes."""
+    beginning = CommonBeginning(first, actuators="none")
+    for law in LAWS:
+        for log in (beginning.swapped_to(law), beginning.taken_over_by(law)):
+            torque = log.commanded_torque
+            steps = np.abs(np.diff(torque, axis=0))
+            own = steps[TAKEOVER : TAKEOVER + NEXT_10_MS].max(axis=0)
+            assert (steps[TAKEOVER - 1] <= own).all()
+            assert (torque[TAKEOVER:STOP, :3] == 0.0).all()
+            assert np.abs(tracking_error(log)[TAKEOVER:STOP, 3:]).max() < 1e-4

@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles import rho_space_inertia
-from random_robots import random_quaternion, random_robot
+from oracles import pinocchio_mass_matrix, rho_space_inertia
+from random_robots import State, random_quaternion, random_robot
 
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.tuning.inertia import (
+    free_inertia,
     inertia_along,
     inertia_in_rho,
     semi_floating_inertia,
 )
+from space_robot_control.tuning.spectrum import eigenvalues
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 6, 9]))
@@ -46,3 +48,45 @@ def test_a_mission_that_does_not_fit_is_refused() -> None:
     flight = Flight(FlightPlan())
     with pytest.raises(ValueError, match="need 21"):
         inertia_along(Flight(FlightPlan(robot="seven_joint")).robot, flight.mission_settings)
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 6, 9]))
+@settings(max_examples=25, deadline=None)
+def test_without_base_it_is_pinocchios_with_six_coordinates_eliminated(seed: int, n: int) -> None:
+    """From H_r and from H_S at any attitude."""
+    rng = np.random.default_rng(seed)
+    robot, quaternion = random_robot(rng, n), random_quaternion(rng)
+    theta = rng.uniform(-np.pi, np.pi, (2, n))
+    h_r = semi_floating_inertia(robot, theta)
+    zero = np.zeros(3)
+    for k, inertia in enumerate(free_inertia(h_r)):
+        h = pinocchio_mass_matrix(robot, State(quaternion, theta[k], zero, zero, 0.0 * theta[k]))
+        expected = h[6:, 6:] - h[6:, :6] @ np.linalg.solve(h[:6, :6], h[:6, 6:])
+        np.testing.assert_allclose(inertia, expected, rtol=0, atol=1e-10 * np.abs(h).max())
+    if abs(quaternion[0]) > 0.1:
+        found = free_inertia(inertia_in_rho(quaternion, h_r))
+        np.testing.assert_allclose(found, free_inertia(h_r), rtol=0, atol=1e-8 * np.max(h_r))
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 6, 9]))
+@settings(max_examples=25, deadline=None)
+def test_a_free_base_takes_no_margin_away(seed: int, n: int) -> None:
+    """Cauchy's interlacing: eigenvalues of H_f^-1 h_bar lie between those of H_S^-1 h_bar."""
+    rng = np.random.default_rng(seed)
+    robot, h_bar = random_robot(rng, n), rng.uniform(0.1, 100.0, n + 3)
+    upright = np.array([1.0, 0.0, 0.0, 0.0])
+    h_r = semi_floating_inertia(robot, rng.uniform(-np.pi, np.pi, (3, n)))
+    whole = eigenvalues(inertia_in_rho(upright, h_r), h_bar)
+    joints = eigenvalues(free_inertia(h_r), h_bar[3:])
+    slack = 1e-9 * whole[:, -1]
+    assert (joints[:, 0] >= whole[:, 0] - slack).all()
+    assert (joints[:, -1] <= whole[:, -1] + slack).all()
+
+
+def test_along_a_mission_without_base_no_attitude_is_singular() -> None:
+    flight = Flight(FlightPlan(actuators="none"))
+    found = inertia_along(flight.robot, flight.mission_settings, step=5.0, controls_base=False)
+    turned = flight.mission_settings.model_copy(update={"base_quaternion": [0.0, 1.0, 0.0, 0.0]})
+    again = inertia_along(flight.robot, turned, step=5.0, controls_base=False)
+    assert found.shape == (7, 6, 6)
+    np.testing.assert_array_equal(again, found)

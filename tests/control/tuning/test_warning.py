@@ -15,7 +15,9 @@ from space_robot_control.tuning.warning import margin_remarks
 def remarks(plan: FlightPlan, corner: float = 0.0) -> list[str]:
     flight = Flight(plan)
     laws = [flight.law, *(law for _, law in flight.swaps)]
-    return margin_remarks(laws, flight.plant.robot, flight.mission_settings, corner)
+    return margin_remarks(
+        laws, flight.plant.robot, flight.mission_settings, corner, flight.controls_base
+    )
 
 
 def with_h_bar(*values: float, law: str = "tde_stc") -> FlightPlan:
@@ -29,6 +31,10 @@ def test_table_iv_is_remarked_upon_once_a_law() -> None:
     assert line.endswith("see space-robot gains check")
     both = remarks(FlightPlan(swaps=["1:tde_smc", "2:ctc"]))
     assert [text.split(":")[1] for text in both] == [" tde_stc", " tde_smc"]
+
+
+def test_table_iv_is_enough_for_joints_whose_base_is_free() -> None:
+    assert remarks(FlightPlan(actuators="none")) == []
 
 
 def test_laws_with_a_model_have_no_margin_to_lack() -> None:

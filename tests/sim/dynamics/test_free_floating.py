@@ -13,9 +13,11 @@ from oracles import (
 )
 from random_robots import Case, State, cases
 
+from space_robot_msgs_py.samples import ReferenceChunk
 from space_robot_sim import Robot
 from space_robot_sim.dynamics.free_floating import free_floating_into
 from space_robot_sim.dynamics.rho_space import RhoSpaceModel
+from space_robot_sim.robot.dynamics import free_inverse_dynamics
 
 Array = NDArray[np.float64]
 
@@ -66,3 +68,21 @@ def test_torques_of_the_joints_alone_cause_the_acceleration_wanted(case: Case) -
     found = pinocchio_forward_dynamics(robot, s, force)[6:]
     size = 1.0 + np.abs(np.linalg.inv(inertia[3:, 3:])).max() * np.abs(force).max()
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-11 * size)
+
+
+@FEW
+@given(cases())
+def test_inverse_dynamics_is_pinocchios_without_momentum(case: Case) -> None:
+    """The base turns as momentum asks, and its axes get nothing."""
+    robot, s, rng = case
+    accelerations = rng.normal(size=robot.n)
+    joints = np.stack([s.theta, s.rate, accelerations])[np.newaxis]
+    base = np.concatenate([s.quaternion, rng.normal(size=6)])[np.newaxis]
+    torque = free_inverse_dynamics(robot, ReferenceChunk(0, joints, base).references())[0]
+    assert (torque[:3] == 0.0).all()
+    h = pinocchio_mass_matrix(robot, s)
+    turning = -np.linalg.solve(h[:6, :6], h[:6, 6:] @ s.rate)
+    moving = s._replace(v0=turning[:3], w0=turning[3:])
+    found = pinocchio_forward_dynamics(robot, moving, np.concatenate([np.zeros(3), torque]))[6:]
+    size = 1.0 + np.abs(np.linalg.inv(free_floating(robot, s)[0])).max() * np.abs(torque).max()
+    np.testing.assert_allclose(found, accelerations, rtol=0, atol=1e-11 * size)
