@@ -169,7 +169,8 @@ def _remark(errors: tuple[float, float] | None, simulated_s: float, wall_s: floa
     speed = f"{simulated_s / wall_s:.1f}x real time, " if wall_s > 0.5 else ""
     if errors is None:
         return speed
-    return f"{speed}errors: attitude {errors[0]:.1e}, joints {errors[1]:.1e} rad"
+    of_base = f"attitude {errors[0]:.1e}, " if errors[0] else ""  # the law of a free base sees none
+    return f"{speed}errors: {of_base}joints {errors[1]:.1e} rad"
 
 
 def _restart_command(parameters: Mapping[str, Any], absent: Collection[str]) -> list[str]:

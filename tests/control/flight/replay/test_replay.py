@@ -81,6 +81,14 @@ def test_the_law_that_flew_commands_the_same_bits(
     assert done.has_passed
 
 
+def test_a_flight_with_a_free_base_gives_the_same_bits(
+    recorded: Callable[..., Path], play: Callable[..., Replay]
+) -> None:
+    """The node that is played to learns of it from the bag."""
+    done = play(recorded(actuators="none", swaps=["0.05:ctc", "0.1:tde_smc"]))
+    assert done.comparison.is_identical, done.report()["first_difference"]
+
+
 def test_swaps_are_made_again_at_their_ticks(
     recorded: Callable[..., Path], play: Callable[..., Replay]
 ) -> None:
