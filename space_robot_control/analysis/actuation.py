@@ -96,10 +96,16 @@ class MissedDeadlines(Metric):
     k+1; commanded for it was the answer to tick ``k - latency_ticks``, clipped to the limits. In
     lockstep they are the same to the last bit. By the wall clock the plant holds the command
     before where an answer is late.
+
+    Hardware on the base gives what it can of a torque, and a free base has none: the joints
+    alone then tell whether a command was in time, for it is applied as a whole.
     """
 
-    def __init__(self, latency_ticks: int, limits: TorqueLimits) -> None:
+    def __init__(
+        self, latency_ticks: int, limits: TorqueLimits, base_is_ideal: bool = True
+    ) -> None:
         self._delay, self._limits = latency_ticks + 1, limits
+        self._axes = slice(0 if base_is_ideal else 3, None)
         self._before: FlightLog | None = None
         """The last row."""
         self._due: Array | None = None
@@ -128,12 +134,20 @@ class MissedDeadlines(Metric):
         limit = self._limits.of_axes(log.axes)
         commanded = np.clip(commands[: log.ticks - first], -limit, limit)
         known = np.isfinite(commanded).all(axis=1) & measured[first:]
-        differ = np.any(told.applied_torque[first:] != commanded, axis=1) & known
+        differ = self._differ(told, first, commanded) & known
         if told is not log:
-            differ &= np.any(log.applied_torque[first:] != commanded, axis=1)
+            differ &= self._differ(log, first, commanded)
         self.differing += int(np.count_nonzero(differ))
         self.compared += int(np.count_nonzero(known))
         self._due = commands[-self._delay :].copy()
+
+    def _differ(self, log: FlightLog, first: int, commanded: Array) -> NDArray[np.bool_]:
+        """(N - first,) true where another torque was applied than ``commanded``."""
+        axes = self._axes
+        differ: NDArray[np.bool_] = np.any(
+            log.applied_torque[first:, axes] != commanded[:, axes], axis=1
+        )
+        return differ
 
     def result(self) -> dict[str, int]:
         """Return the unanswered, compared and differing ticks."""

@@ -18,13 +18,12 @@ from space_robot_sim.actuators.wheels import WheelSettings
 
 from .base_demand import Demand
 from .capability import ThrusterTorques, limits_of, mass_rates, wheel_shares
+from .wheel_saturation import ROUNDING, WheelMotion, WheelRows
 
 Array = NDArray[np.float64]
 
 TINY = 1e-300
 """Keeps a thruster that turns nothing from being divided by zero."""
-ROUNDING = 1e-9
-"""Share of a limit by which a number at it may miss it."""
 
 
 class Requirement(NamedTuple):
@@ -68,6 +67,7 @@ class WheelLoad(Load):
 
     def __init__(self, wheels: WheelSettings) -> None:
         self._wheels = wheels
+        self._motion = WheelMotion(wheels)
         self._torque = np.zeros(wheels.count)
         self._momentum = np.zeros(wheels.count)
 
@@ -90,10 +90,9 @@ class WheelLoad(Load):
             ]
         return found
 
-    def _series(self, log: FlightLog, demand: Demand) -> tuple[Array, Array]:
-        """Return motor torque and momentum of the wheels, (N, W) N m and N m s."""
-        inertia = self._wheels.values("rotor_inertia")
-        return log.wheel_torques, log.wheel_velocities * inertia
+    def _series(self, log: FlightLog, demand: Demand) -> WheelRows:
+        """Return what the motors give and where they bring the wheels."""
+        return self._motion.add(log)
 
 
 class OtherWheelLoad(WheelLoad):
@@ -108,14 +107,14 @@ class OtherWheelLoad(WheelLoad):
         self._shares = wheel_shares(wheels)
         self._initial = wheels.values("rotor_inertia") * wheels.values("initial_speed")
 
-    def _series(self, log: FlightLog, demand: Demand) -> tuple[Array, Array]:
+    def _series(self, log: FlightLog, demand: Demand) -> WheelRows:
         wheels = self._wheels
         momentum = demand.momentum @ self._shares.T + self._initial
         turning = np.cross(demand.omega, momentum @ wheels.unit_axes)
         torque = -(demand.torque + turning) @ self._shares.T
         speed = momentum / wheels.values("rotor_inertia")
         friction = wheels.values("coulomb") * np.sign(speed) + wheels.values("viscous") * speed
-        return torque + friction, momentum
+        return WheelRows(torque + friction, momentum)
 
 
 class ThrusterLoad(Load):

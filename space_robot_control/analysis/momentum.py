@@ -128,8 +128,7 @@ class MomentumBudget(Metric):
         pushed = {"max": self._pushed, "end": self._end} if self._flown.thruster_count else None
         return {
             "peak_n_m_s": dict(self._largest),
-            "drift_n_m_s": self._drift,
-            "drift_relative": self._drift / size if size else None,
+            "drift": {"n_m_s": self._drift, "relative": self._drift / size if size else None},
             "pushed_m": pushed,
         }
 

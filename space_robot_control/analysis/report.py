@@ -33,6 +33,7 @@ from .pointing import Pointing
 from .ripple import Ripple
 from .settling import Settling
 from .sizing import ActuatorSet, Sizing
+from .wheel_saturation import WheelSaturation
 
 DESCRIBED = ("controller", "case", "gains", "robot")
 """Keys of a flight's description that a report repeats."""
@@ -42,6 +43,8 @@ OF_FREE_BASE = ("attitude_drift",)
 """Metrics that only flights have in which nothing turns the base."""
 OF_HARDWARE = ("momentum",)
 """Metrics that only flights have whose base was not turned by ideal torques."""
+OF_WHEELS = ("wheel_saturation",)
+"""Metrics that only flights have whose base has reaction wheels."""
 
 
 def analyze(log: FlightLog, actuators: ActuatorSet | None = None) -> dict[str, Any]:
@@ -131,6 +134,8 @@ class Analysis:
                 continue
             if name in OF_HARDWARE and not block.flight.get("base_actuators"):
                 continue
+            if name in OF_WHEELS and not block.wheel_velocities.shape[1]:
+                continue
             try:
                 self._metrics[name] = metric(block)
             except InputError as error:
@@ -153,7 +158,8 @@ def _missed_deadlines(log: FlightLog) -> MissedDeadlines:
         limits = torque_limits(log)
     except InputError:
         limits = TorqueLimits(np.inf, np.inf)
-    return MissedDeadlines(int(log.flight.get("command_latency_ticks", 0)), limits)
+    is_ideal = not log.flight.get("base_actuators")
+    return MissedDeadlines(int(log.flight.get("command_latency_ticks", 0)), limits, is_ideal)
 
 
 def _sizing(log: FlightLog, other: ActuatorSet | None) -> Sizing:
@@ -169,6 +175,7 @@ _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
     "ripple": lambda log: Ripple(log, robot_of(log)),
     "settling": Settling,
     "saturation": lambda log: Saturation(torque_limits(log)),
+    "wheel_saturation": lambda log: WheelSaturation(log, flown_actuators(log).wheels),
     "latency": lambda log: Latency(log.timebase.period),
     "missed_deadlines": _missed_deadlines,
     "estimate_error": lambda log: EstimateError(log, *estimator(log)),

@@ -32,7 +32,8 @@ DEFINITIONS = {
     "square of what is within 0.5 Hz of it",
     "settled after": "time from the last waypoint after which the error stays to the end within "
     f"{BAND:g} (rad on joints; on the attitude's quaternion, where it is 4.1 arcsec)",
-    "saturation": "ticks at which a torque was at the actuator's limit",
+    "saturation": "ticks at which a torque was at the actuator's limit; of each wheel those at its "
+    "largest torque and at its largest momentum",
     "latency": "from a state's sending to its command's, by the wall clock; in brackets in ticks",
     "commands": "ticks without an answer, and ticks after which the plant applied another torque "
     "than was commanded for them",
@@ -43,6 +44,11 @@ DEFINITIONS = {
     "rotation": "angle of the one rotation between the end effector's desired and measured frame",
     "tool position": "distance from the desired position, the base at its measured position",
     "base's drift": "of the base's centre of mass from where it began; nothing holds it",
+    "momentum": "largest angular momentum about the common centre of mass: of the robot with "
+    "its wheels locked, of its base in that, of the wheels' spin, and what came from outside; and "
+    "how far robot and wheels together drifted from what is conserved",
+    "pushed by thrusters": "of the centre of mass of the whole robot, from where it was at the "
+    "first tick",
     "asked of the base": "largest torque commanded on each axis of the base, and the largest "
     "momentum that wheels have to hold for it",
     "recording": "what is missing of the flight or was found wrong with the bag",
@@ -146,6 +152,7 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
     found += each("maximum", ("maxima",), unit_of)
     found += each("settled after", ("settling", "settled_s"), "s", text=_settled)
     found.append(one("saturation", "ticks at a limit", "", _saturated))
+    found += each("saturation", ("wheel_saturation", "wheels"), "", text=_full)
     for name in ("p50", "p99", "max"):
         found.append(one("latency", name, "ms", partial(_latency, name=name)))
     found.append(one("commands", "unanswered", "", lambda r: str(r["unanswered_ticks"])))
@@ -157,6 +164,12 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
         found += each(group, ("pointing", key), text=_angle, label=_upper)
     for group, key in (("tool position", "tool_position_m"), ("base's drift", "base_drift_m")):
         found += each(group, ("pointing", key), "m", label=_upper)
+    found += each("momentum", ("momentum", "peak_n_m_s"), "N m s", label="{} at most".format)
+    found += each(
+        "momentum", ("momentum", "drift"), lambda key: "N m s" if key == "n_m_s" else "",
+        text=_drift, label=lambda key: "drift" if key == "n_m_s" else "drift, relative",
+    )  # fmt: skip
+    found += each("pushed by thrusters", ("momentum", "pushed_m"), "m")
     if not brief:
         for key, name, unit in (
             ("peak_torque_n_m", "torque", "N m"), ("peak_momentum_n_m_s", "momentum", "N m s"),
@@ -226,6 +239,10 @@ def _peak(value: dict[str, float] | None) -> str:
     return f"{value['frequency_hz']:.4g} Hz\n{value['rms']:.2e} N m" if value else NONE
 
 
+def _drift(value: float | None) -> str:
+    return NONE if value is None else f"{value:.2e}"
+
+
 def _of_axis(axis: dict[str, float], key: str) -> str:
     return _number(axis[key])
 
@@ -245,6 +262,14 @@ def _saturated(report: Report) -> str:
     if found["base_torque_limit_n_m"] is None and found["joint_torque_limit_n_m"] is None:
         return "no limits"
     return f"{found['ticks']} ({found['share']:.2%})"
+
+
+def _full(wheel: dict[str, Any]) -> str:
+    """Write how long a wheel was at its limits, and since when."""
+    if wheel["first_s"] is None:
+        return "never"
+    torque, momentum = wheel["torque_limit_ticks"], wheel["momentum_limit_ticks"]
+    return f"torque {torque}, momentum {momentum}\nfirst at {wheel['first_s']:g} s"
 
 
 def _latency(report: Report, name: str) -> str:

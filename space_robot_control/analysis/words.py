@@ -46,6 +46,8 @@ def remarks(report: Report) -> list[str]:
             f"{FREE}: its attitude is no error but drift, {drift['max_deg']:.4g} deg at most and "
             f"{drift['end_deg']:.4g} deg at the end, which pointing includes"
         )
+    if full := report["wheel_saturation"]:
+        found += _saturated_wheels(full)
     found += [
         text for text in (report["unfinished"], *report["damage"], *report["foreign"]) if text
     ]
@@ -56,6 +58,18 @@ def remarks(report: Report) -> list[str]:
             f"ticks without a usable state, shown as the one before: {report['filled_ticks']}"
         )
     return found
+
+
+def _saturated_wheels(found: dict[str, Any]) -> list[str]:
+    """Say which wheel reached a limit first, and for how long any was at one."""
+    first = {n: w["first_s"] for n, w in found["wheels"].items() if w["first_s"] is not None}
+    if not first:
+        return []
+    name = min(first, key=lambda wheel: first[wheel])
+    return [
+        f"wheels were at a limit of torque or momentum at {found['ticks']} ticks "
+        f"({found['share']:.2%}), {name} first at {first[name]:g} s"
+    ]
 
 
 def notes(report: Report) -> list[str]:
