@@ -128,29 +128,39 @@ def pinocchio_acceleration(model: Any, data: Any, state: State, force: Array) ->
     return to_base.T @ spatial
 
 
-def mujoco_model(robot: Robot) -> mujoco.MjModel:
-    """The same robot in MuJoCo, without gravity: a free joint and n hinges about z."""
+def mujoco_numbers(values: Sequence[float] | Array) -> str:
+    """As MJCF has them, to the last digit."""
+    return " ".join(repr(float(value)) for value in values)
 
-    def numbers(values: Sequence[float] | Array) -> str:
-        return " ".join(repr(float(value)) for value in values)
+
+def mujoco_inertial(com: Array, mass: float, tensor: Array) -> str:
+    """A body's inertia in MJCF, ``tensor`` about its centre of mass."""
+    full = [tensor[ij] for ij in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    return (
+        f'<inertial pos="{mujoco_numbers(com)}" mass="{float(mass)!r}" '
+        f'fullinertia="{mujoco_numbers(full)}"/>'
+    )
+
+
+def mujoco_model(robot: Robot, base: str = "", on_base: str = "") -> mujoco.MjModel:
+    """The same robot in MuJoCo, without gravity: a free joint and n hinges about z.
+
+    In MJCF, ``base`` is another `mujoco_inertial` for the base, and ``on_base`` are more bodies on
+    it; their joints stand behind the robot's.
+    """
 
     def inertial(body: int) -> str:
-        tensor = robot.inertia[body]
-        full = [tensor[ij] for ij in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-        return (
-            f'<inertial pos="{numbers(robot.com[body])}" mass="{float(robot.mass[body])!r}" '
-            f'fullinertia="{numbers(full)}"/>'
-        )
+        return mujoco_inertial(robot.com[body], robot.mass[body], robot.inertia[body])
 
-    text = f'<body name="base"><freejoint/>{inertial(0)}'
+    text = f'<body name="base"><freejoint/>{base or inertial(0)}'
     for i in range(robot.n):
         twist = Rotation.from_euler("x", robot.alpha[i])
         offset = np.array([robot.a[i], 0, 0]) + twist.apply([0, 0, robot.d[i]])
         text += (
-            f'<body pos="{numbers(offset)}" quat="{numbers(quaternion_of(twist))}">'
+            f'<body pos="{mujoco_numbers(offset)}" quat="{mujoco_numbers(quaternion_of(twist))}">'
             f'<joint type="hinge" axis="0 0 1"/>{inertial(i + 1)}'
         )
-    text += "</body>" * (robot.n + 1)
+    text += "</body>" * robot.n + on_base + "</body>"
     return mujoco.MjModel.from_xml_string(
         f'<mujoco><option gravity="0 0 0"/><worldbody>{text}</worldbody></mujoco>'
     )
@@ -158,7 +168,11 @@ def mujoco_model(robot: Robot) -> mujoco.MjModel:
 
 def mujoco_forward_dynamics(robot: Robot, state: State, force: Array) -> Array:
     """``[v0dot, w0dot, thetadd]`` on inertial axes by MuJoCo."""
-    model = mujoco_model(robot)
+    return mujoco_acceleration(mujoco_model(robot), state, force)
+
+
+def mujoco_acceleration(model: mujoco.MjModel, state: State, force: Array) -> Array:
+    """`mujoco_forward_dynamics` with a model made before."""
     data = mujoco.MjData(model)
     rotation = rotation_of(state.quaternion).as_matrix()
     data.qpos[3:7], data.qpos[7:] = state.quaternion, state.theta
