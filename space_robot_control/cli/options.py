@@ -180,8 +180,8 @@ OPTIONS: dict[str, Decorator] = {
         help="ideal, fine, tactical, coarse, white_l1, white_l2, or a path to a YAML file."),
     "actuators": click.option(
         "--actuators", default="ideal", show_default=True,
-        help="Of the base: ideal, none (it floats freely), wheels, thrusters, or a path to a YAML "
-        "file."),
+        help="Of the base: ideal, none (it floats freely), wheels, small_wheels, thrusters, "
+        "wheels_and_thrusters, or a path to a YAML file."),
     "gains": click.option(
         "--gains", default="default", show_default=True,
         help="printed, tuned, robust, default (printed where it flies), or a path."),

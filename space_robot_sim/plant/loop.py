@@ -25,6 +25,7 @@ from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 
 from ..robot import Robot
+from .actuator_health import ActuatorHealth
 from .command_guard import CommandGuard
 from .exchange import NONE, SentState, exchange_of
 from .plant import Plant
@@ -62,6 +63,7 @@ class PlantLoop:
         self._plant = Plant(robot, settings, settings.period)
         at_rest = Command(0, np.zeros(robot.n + 3))
         Plant(robot, settings, settings.period).step(at_rest)
+        self._actuators = ActuatorHealth(self._plant)
         timebase = settings.timebase
         self._timebase = timebase
         self._states = StateCodec(robot.joint_names, timebase)
@@ -156,6 +158,7 @@ class PlantLoop:
             "missed_deadlines": self.missed_deadlines,
             "held_ticks": guard.held_ticks(tick),
             "saturated_ticks": self._plant.saturated_ticks,
+            **self._actuators.values,
             **{f"refused: {reason}": count for reason, count in guard.refused.items()},
             **self._command_in.counts("refused"),
             **({"faults": "injected"} if any(self._settings.faults) else {}),
@@ -169,6 +172,8 @@ class PlantLoop:
             return Health("safe: no good command, the torque is zero", Level.ERROR, values)
         if guard.held_ticks(tick) > HOLDING_TICKS:
             return Health("holding the last good command", Level.WARN, values)
+        if saturated := self._actuators.saturated():
+            return Health(f"saturated: {saturated}", Level.WARN, values)
         return Health("nominal", values=values)
 
     def _begin_tick(self) -> None:
