@@ -32,8 +32,10 @@ class RobotNames(NamedTuple):
     thrusters: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, joints: Sequence[str], actuators: Sequence[str], wheel_count: int) -> RobotNames:
-        """Split the names of the base's ``actuators``: wheels come before thrusters."""
+    def of(
+        cls, joints: Sequence[str], actuators: Sequence[str] = (), wheel_count: int = 0
+    ) -> RobotNames:
+        """Take the joints' names and those of the base's ``actuators``: wheels come first."""
         return cls(tuple(joints), tuple(actuators[:wheel_count]), tuple(actuators[wheel_count:]))
 
     @property

@@ -63,6 +63,8 @@ ALL = (
     TRUTH_JOINTS, TRUTH_BASE, WHEELS_STATE, THRUSTERS_STATE,
 )  # fmt: skip
 """All that are recorded."""
+STATES = (JOINT_STATES, BASE_STATE, WHEELS_STATE, THRUSTERS_STATE)
+"""The parts of a state."""
 TRUTH = (TRUTH_JOINTS, TRUTH_BASE)
 BY_NAME = {topic.name: topic for topic in ALL}
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100)

@@ -83,6 +83,16 @@ def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
         yield _each("believed_error", joints, "rad"), log.believed_error[:, 3:]
     if log.commanded_torque is not None:
         yield _each("commanded_torque", axes, "n_m"), log.commanded_torque
+    wheels, thrusters = log.wheel_velocities.shape[1], log.thrusts.shape[1]
+    yield _numbered("wheel_velocity", wheels, "rad_s"), log.wheel_velocities
+    yield _numbered("wheel_torque", wheels, "n_m"), log.wheel_torques
+    yield _numbered("thrust", thrusters, "n"), log.thrusts
+    asked = [
+        *_numbered("commanded_wheel_torque", wheels, "n_m"),
+        *_numbered("commanded_thrust", thrusters, "n"),
+    ]
+    if len(asked) == log.actuator_commands.shape[1]:
+        yield asked, log.actuator_commands
     if log.latency_s is not None:
         yield ["latency_s"], log.latency_s[:, np.newaxis]
     yield _each("reference_q", WXYZ), q_d[:, :4]
@@ -93,6 +103,10 @@ def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
     if controls_base(log):
         yield _each("error_q", XYZ), error[:, :3]
     yield _each("error", joints, "rad"), error[:, 3:]
+
+
+def _numbered(what: str, count: int, unit: str) -> list[str]:
+    return _each(what, [str(k + 1) for k in range(count)], unit)
 
 
 def _each(what: str, axes: Sequence[str], unit: str = "") -> list[str]:

@@ -13,7 +13,6 @@ from space_robot_msgs_py.wire.codecs import CommandCodec
 from space_robot_msgs_py.wire.controller_law import LawCodec
 from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
 from space_robot_msgs_py.wire.stamp_guard import StampGuard
-from space_robot_sim.robot import Robot
 
 from .controller import Controller
 from .law_choice import LawChoice
@@ -38,17 +37,18 @@ class Answering:
 
     def __init__(
         self, controller: Controller, laws: LawChoice, references: ReferenceBuffer,
-        settings: ControllerNodeSettings, robot: Robot,
+        settings: ControllerNodeSettings,
     ) -> None:  # fmt: skip
         """Answer with ``controller`` under the laws chosen, as the node's settings say.
 
         ``references`` are told what is now.
         """
         self._controller, self._laws, self._references = controller, laws, references
-        self.supervisor = Supervisor(controller, robot.n + 3, settings.hold_ticks)
+        names = controller.names
+        self.supervisor = Supervisor(controller, len(names.commanded), settings.hold_ticks)
         self.stamps = StampGuard(settings.longest_jump)
-        self._commands = CommandCodec(robot.axis_names, settings.timebase)
-        self._telemetry = TelemetryCodec(robot.axis_names)
+        self._commands = CommandCodec(names.commanded, settings.timebase)
+        self._telemetry = TelemetryCodec(names.axes)
         self._law = LawCodec(settings.timebase)
         self._telemetry_decimation = settings.telemetry_decimation
         self.answered = -1

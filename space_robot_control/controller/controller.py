@@ -57,19 +57,22 @@ class Controller:
         Raises:
             InputError: settings that do not fit the period.
         """
+        actuators = actuators or BaseActuatorSettings()
+        self.names = actuators.robot_names(robot)
+        """Those of all that the controller is told of the robot and asks of it."""
         self.period = period
         self.block = ControllerMemory.block(robot.n)
         """The controller's `ControllerMemory`, for compiled loops."""
         memory: ControllerMemory = self.block[0]
         assign(memory, model=robot.model, last_jacobian_inverse=2.0 * np.eye(3))
-        is_free = actuators is not None and actuators.base_actuation == "none"
+        is_free = actuators.base_actuation == "none"
         assign(memory, controls_base=0.0 if is_free else 1.0)
         assign(memory, transfer_ticks=max(1, round(TRANSFER_S / period)))
         assign(memory.pair, smoothing=low_pass_weight(acceleration_filter_hz, period))
         if navigation:
             assign(memory, navigation=Navigation.build(robot.n, navigation, period))
         self._memory = memory
-        self._command = Command(-1, np.zeros(robot.n + 3))
+        self._command = Command(-1, np.zeros(len(self.names.commanded)))
         self.signals = Signals.view(self.block["signals"])
         """The signals that the law saw at the last tick."""
         self.law = law

@@ -49,10 +49,10 @@ class ControllerLoop:
             settings.filter_settings, believed_actuators(settings.actuators, robot),
         )  # fmt: skip
         timebase = settings.timebase
-        self._states = StateInput(node, robot, timebase)
+        self._states = StateInput(node, self._controller.names, timebase)
         self._references = ReferenceInput(node, robot, timebase, settings.reference_timeout)
         self._answering = Answering(
-            self._controller, self._laws.choice, self._references.buffer, settings, robot
+            self._controller, self._laws.choice, self._references.buffer, settings
         )
         self._command_out = RawPublisher(node, topics.COMMAND)
         self._out = {

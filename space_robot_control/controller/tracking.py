@@ -67,9 +67,12 @@ def leave_base_out(signals: Signals, rate: Array, applied_force: Array) -> None:
 
 @kernel
 def torque_from_force(jacobian: Array, force: Array, torque: Array) -> None:
-    """``tau = J^T F_S``: torque in the base frame and on the joints from the generalised force."""
+    """``tau = J^T F_S``: torque in the base frame and on the joints from the generalised force.
+
+    What ``torque`` has behind them, for actuators of the base, is left alone.
+    """
     rotate_back(jacobian, force[:3], torque[:3])
-    torque[3:] = force[3:]
+    torque[3 : force.size] = force[3:]
 
 
 @kernel

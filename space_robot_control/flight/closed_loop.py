@@ -44,18 +44,19 @@ def _close_loop_compiled(
 ) -> None:
     """Fly ticks in which nothing but compiled code has to do anything, and begin ``stop``."""
     rows = log.rows(start - log.first_tick, stop - log.first_tick)
-    assert rows.commanded_torque is not None
     assert rows.telemetry is not None
     states = np.empty(rows.ticks, plant.state.block.dtype)
+    torques = np.zeros((rows.ticks, len(controller.names.commanded)))
     truths = np.empty(0 if rows.measured is None else rows.ticks, states.dtype)
     tick, fastest, status = fly_ticks(
         law.code, plant.block, plant.command_delay_buffer, controller.block, plant.state.block,
-        plant.truth.block, rows.references(start, stop), states, truths, rows.commanded_torque,
+        plant.truth.block, rows.references(start, stop), states, truths, torques,
         rows.telemetry, start, plant.period,
     )  # fmt: skip
     measured = tick - start + (status != USABLE)
     rows.put(start, states[:measured] if rows.measured is None else truths[:measured])
     rows.put_measured(start, states[:measured])
+    rows.put_commands(start, torques)
     plant.state.tick = plant.truth.tick = tick
     if status != USABLE:
         raise unusable(status, tick, plant.state.quaternion)
@@ -74,14 +75,13 @@ def measured_ticks(plant: Plant, error: Exception) -> int:
 
 
 def _close_loop_in_python(plant: Plant, controller: Controller, log: FlightLog) -> None:
-    assert log.commanded_torque is not None
     assert log.telemetry is not None
     for row in range(log.ticks):
         tick = log.first_tick + row
         log.put(tick, plant.state.block if log.measured is None else plant.truth.block)
         log.put_measured(tick, plant.state.block)
         command = controller.update(plant.state, log.references(tick, tick + 1))
-        log.commanded_torque[row] = command.torque
+        log.put_commands(tick, command.torque[np.newaxis])
         log.telemetry[row] = controller.telemetry()
         plant.step(command)
 

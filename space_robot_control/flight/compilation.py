@@ -43,19 +43,18 @@ def compile_kernels() -> None:
 
 def _step_plant() -> None:
     flight = Flight(FlightPlan())
-    flight.plant.step(Command(0, np.zeros(flight.robot.n + 3)))
+    flight.plant.step(Command(0, np.zeros(len(flight.plant.names.commanded))))
 
 
 def _answer_and_exchange() -> None:
     """The controller's entry under every law, and the messages."""
     for law in laws():
         flight = Flight(FlightPlan(controller=law, navigation="filtered"))
-        states = StateCodec(flight.robot.joint_names, flight.timebase)
-        commands = CommandCodec(flight.robot.axis_names, flight.timebase)
+        states = StateCodec(flight.plant.names, flight.timebase)
+        commands = CommandCodec(flight.plant.names.commanded, flight.timebase)
         state = RobotState.allocate(flight.robot.n)
-        joints, base = states.encode(state)
-        states.decode_joints(joints, state)
-        states.decode_base(base, state)
+        for topic, data in zip(states.topics, states.encode(state), strict=True):
+            states.decode(topic, data, state)
         command = flight.controller.update(state, Reference.at_rest(flight.robot.n))
         commands.decode(commands.encode(command), command)
 

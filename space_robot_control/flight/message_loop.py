@@ -33,18 +33,17 @@ class MessageLoop:
     ) -> None:
         """``tell_truth``: called with every true state that differs from what is told of it."""
         robot, settings = flight.robot, flight.plant_settings
+        names = flight.plant.names
         self._flight, self._plant, self._record = flight, flight.plant, record
         self._tell_truth = tell_truth
-        self._guard = CommandGuard(robot.n + 3, settings.hold_ticks)
-        self._states = StateCodec(robot.joint_names, flight.timebase)
-        self._commands = CommandCodec(robot.axis_names, flight.timebase)
-        self._exchange = exchange_of(
-            settings, flight.plant.names, flight.period, self._states, self._guard
-        )
+        self._guard = CommandGuard(len(names.commanded), settings.hold_ticks)
+        self._states = StateCodec(names, flight.timebase)
+        self._commands = CommandCodec(names.commanded, flight.timebase)
+        self._exchange = exchange_of(settings, names, flight.period, self._states, self._guard)
         self._references = ReferenceBuffer(robot.n)
         self._answering = Answering(
             flight.controller, LawChoice(flight.law, flight.swaps), self._references,
-            flight.controller_settings, robot,
+            flight.controller_settings,
         )  # fmt: skip
         self._state = RobotState.allocate(robot.n)
         self._streamed = 0
@@ -59,8 +58,8 @@ class MessageLoop:
         plant, tick = self._plant, self._plant.tick
         self._stream(tick)
         for sent in self._exchange.send(plant.state):
-            self._record(topics.JOINT_STATES, sent.joints)
-            self._record(topics.BASE_STATE, sent.base)
+            for message in zip(self._states.topics, sent.messages, strict=True):
+                self._record(*message)
             self._deliver(sent, tick)
         if not plant.measures_truth:
             self._tell_truth(plant.truth)
@@ -89,8 +88,8 @@ class MessageLoop:
         """
         state, references = self._state, self._references
         try:
-            stamp = self._states.decode_joints(sent.joints, state)
-            self._states.decode_base(sent.base, state)
+            parts = zip(self._states.topics, sent.messages, strict=True)
+            stamp, *_ = [self._states.decode(topic, data, state) for topic, data in parts]
         except MessageError:
             return NONE
         if self._answering.judge(stamp) is not Standing.NEW:

@@ -41,13 +41,13 @@ class Messages:
     """Writes a flight's messages into a bag, as the nodes would send them."""
 
     def __init__(self, flight: Flight, recorder: BagRecorder) -> None:
-        robot, timebase = flight.robot, flight.timebase
+        names, timebase = flight.plant.names, flight.timebase
         self.record, self._flight = recorder.record, flight
-        self._states = StateCodec(robot.joint_names, timebase)
-        self._truth = TruthWriter(robot.joint_names, timebase)
-        self._commands = CommandCodec(robot.axis_names, timebase)
-        self._references = ReferenceCodec(robot.joint_names, timebase)
-        self._telemetry = TelemetryCodec(robot.axis_names)
+        self._states = StateCodec(names, timebase)
+        self._truth = TruthWriter(names.joints, timebase)
+        self._commands = CommandCodec(names.commanded, timebase)
+        self._references = ReferenceCodec(names.joints, timebase)
+        self._telemetry = TelemetryCodec(names.axes)
         self._clock = ClockCodec()
         self._law = LawCodec(timebase)
 
@@ -84,15 +84,16 @@ class Messages:
         told = log.as_measured()
         for tick in range(start, stop):
             self.begin_tick(tick)
-            joints, base = self._states.encode(told.state(tick))
-            record(topics.JOINT_STATES, joints)
-            record(topics.BASE_STATE, base)
+            parts = self._states.encode(told.state(tick))
+            for topic, data in zip(self._states.topics, parts, strict=True):
+                record(topic, data)
             if told is not log:
                 self.tell_truth(log.state(tick))
             if tick >= answered:
                 continue
             row = tick - log.first_tick
-            record(topics.COMMAND, self._commands.encode(Command(tick, log.commanded_torque[row])))
+            torque = np.concatenate((log.commanded_torque[row], log.actuator_commands[row]))
+            record(topics.COMMAND, self._commands.encode(Command(tick, torque)))
             if laws and laws[0].tick == tick:
                 record(topics.LAW, self._law.encode(laws.pop(0)))
             if tick % flight.controller_settings.telemetry_decimation == 0:
@@ -123,7 +124,9 @@ def unflown(flight: Flight, start: int = 0, stop: int | None = None) -> FlightLo
     The reference alone is known.
     """
     ticks = (flight.ticks if stop is None else stop) - start
-    log = FlightLog.allocate(ticks, flight.robot.joint_names, flight.timebase)
+    names = flight.plant.names
+    counts = len(names.wheels), len(names.thrusters)
+    log = FlightLog.allocate(ticks, names.joints, flight.timebase, *counts)
     log.first_tick = start
     log.flight = flight.description
     log.lost = {topic.name: 0 for topic in topics.ALL}
@@ -282,7 +285,7 @@ def _ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:
     """The first ``measured`` rows; those from ``answered`` on have no command."""
     assert block.commanded_torque is not None
     assert block.telemetry is not None
-    block.commanded_torque[answered:] = np.nan
+    block.commanded_torque[answered:] = block.actuator_commands[answered:] = np.nan
     block.telemetry[answered:] = np.nan
     block.unanswered = measured - answered
     block.laws = tuple(law for law in block.laws if law.tick < block.first_tick + answered)

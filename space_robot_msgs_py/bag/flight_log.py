@@ -209,6 +209,14 @@ class FlightLog:
         if self.measured is not None:
             _put(self.measured, start - self.first_tick, states, STATE_FIELDS)
 
+    def put_commands(self, start: int, torques: Array) -> None:
+        """Copy what was commanded (k, n+3+W+T) in each tick from ``start`` on, see `Command`."""
+        assert self.commanded_torque is not None
+        row = start - self.first_tick
+        rows = slice(row, row + len(torques))
+        self.commanded_torque[rows] = torques[:, : self.axes]
+        self.actuator_commands[rows] = torques[:, self.axes :]
+
     def measure_apart(self) -> None:
         """Make room, NaN, for what the sensors tell and the law believes beside the truth."""
         self.measured = MeasuredStates.unknown(self)

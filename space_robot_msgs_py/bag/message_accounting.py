@@ -160,7 +160,7 @@ def topics_with_allowed_gaps(flight: Mapping[str, Any]) -> frozenset[str]:
     if any(flight.get(key) for key in ("realtime", "faults", "restart_controller")):
         excused += (topics.COMMAND, topics.TELEMETRY)
     if flight.get("faults"):
-        excused += (topics.JOINT_STATES, topics.BASE_STATE)
+        excused += topics.STATES
     return frozenset(topic.name for topic in excused)
 
 

@@ -15,6 +15,7 @@ from ..samples import LawInForce, RobotNames, Timebase, in_order
 from ..wire.controller_law import LawCodec
 from ..wire.controller_telemetry import SIGNALS
 from ..wire.message import description
+from .actuators import ACTUATOR_COLUMNS, MOST_ACTUATORS, described, names_in
 from .batch import Batch
 from .field_reader import Array, FieldReader, Places
 from .flight_log import FlightLog, MeasuredStates
@@ -60,16 +61,14 @@ class Rows:
         """The times when a state was whole and when its answer was sent, by tick."""
         self._wall_clock = False
         self._rows = self._believed = 0
-        described = {topic: description(topic) for topic in topics.ALL}
+        descriptions = {topic: description(topic) for topic in topics.ALL}
         self._readers = {
             topic: FieldReader(describe.of_robot(RobotNames(joint_names), timebase))
-            for topic, describe in described.items()
+            for topic, describe in descriptions.items()
             if describe
         }
-        self._names = tuple(
-            dict.fromkeys(c.name for reader in self._readers.values() for c in reader.columns)
-        )
-        """Columns of the log that messages fill."""
+        self._unnamed = set(MOST_ACTUATORS)
+        """Those of which no message has told the actuators' names yet."""
         self._apart: MeasuredStates | None = None
         """The true states, once one has come; after `tell_apart` what the sensors told."""
         self._errors: list[tuple[NDArray[np.int64], Array]] = []
@@ -109,6 +108,8 @@ class Rows:
             self._note_laws(batch, ticks)
             return
         self._grow(counted.last + 1)
+        if topic in self._unnamed:
+            self._learn_actuators(topic, batch)
         reader = self._readers.get(topic)
         if reader and reader.columns:
             if topic.per_tick:
@@ -118,6 +119,19 @@ class Rows:
             for which, values in reader.read(batch):
                 self._put(topic, ticks[which], values)
                 self._note_sending(topic, batch, which, ticks[which])
+
+    def _learn_actuators(self, topic: topics.Topic, batch: Batch) -> None:
+        """Make room for the base's actuators that the first message names, if it has any."""
+        log = self.log
+        if (names := names_in(topic, batch, log.joint_names)) is None:
+            return
+        self._unnamed.remove(topic)
+        if (describe := described(topic, names, log.joint_names, log.timebase)) is None:
+            return
+        self._readers[topic] = FieldReader(describe)
+        for name, _, width in describe.columns:
+            if name in ACTUATOR_COLUMNS:
+                setattr(log, name, np.full((self._rows, width), np.nan))
 
     def tell_apart(self) -> None:
         """Make the true states those of the log, if both their halves came; call it at the end."""
@@ -212,7 +226,7 @@ class Rows:
 
     def _columns(self) -> list[NDArray[Any]]:
         return [
-            *(getattr(self.log, name) for name in self._names),
+            *self.log.columns.values(),
             *(self._apart.columns.values() if self._apart is not None else ()),
             *self._sent_ns.values(),
         ]

@@ -17,11 +17,14 @@ class Commands(JointStates):
     fields = ("effort",)
     frame_id = topics.BASE_FRAME
 
-    def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
+    def __init__(self, names: Sequence[str], timebase: Timebase, actuators: int = 0) -> None:
+        """``actuators``: so many of the names, the last ones, are of the base's actuators."""
         super().__init__(names, timebase)
-        self.columns = (Column("commanded_torque", 0, len(self.names)),)
+        self.columns = (Column("commanded_torque", 0, len(self.names) - actuators),)
+        if actuators:
+            self.columns += (Column("actuator_commands", 0, actuators),)
 
     @classmethod
     def of_robot(cls, names: RobotNames, timebase: Timebase) -> Commands:
         """The base's axes come before the joints, its actuators after them."""
-        return cls(names.commanded, timebase)
+        return cls(names.commanded, timebase, len(names.actuators))

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import RobotNames
 
 from ..robot import Robot
 from .thrusters import ThrusterSettings
@@ -48,6 +49,10 @@ class BaseActuatorSettings(StrictModel):
         """Names of the actuators that are commanded one by one: wheels, then thrusters."""
         wheels = (f"wheel_{i + 1}" for i in range(self.wheel_count))
         return (*wheels, *(f"thruster_{i + 1}" for i in range(self.thruster_count)))
+
+    def robot_names(self, robot: Robot) -> RobotNames:
+        """Return the names of all that is told of ``robot`` and asked of it."""
+        return RobotNames.of(robot.joint_names, self.names, self.wheel_count)
 
     def check(self, robot: Robot, file: str) -> None:
         """See that the numbers fit one another and a robot.

@@ -23,8 +23,8 @@ NONE = -1
 class SentState(NamedTuple):
     """A measured state as it goes out."""
 
-    joints: bytes
-    base: bytes
+    messages: tuple[bytes, ...]
+    """Its parts, in the order of `StateCodec.topics`."""
     answered_by: int
     """Tick of the command that will come for it; `NONE`: no command will."""
 
@@ -37,8 +37,7 @@ class Exchange:
 
     def send(self, state: RobotState) -> Iterable[SentState]:
         """Return what reaches the controller in the tick of the measured ``state``."""
-        joints, base = self._codec.encode(state)
-        return (SentState(joints, base, state.tick),)
+        return (SentState(self._codec.encode(state), state.tick),)
 
     def take(self, tick: int) -> None:
         """Take the command in the guard's ``offered``, which has come at ``tick``."""
@@ -70,8 +69,7 @@ class FaultyExchange(Exchange):
             stamp = awaited_stamp([arriving], tick, self._asked)
             if stamp is not None:
                 self._asked = stamp
-            joints, base = arriving.item
-            yield SentState(joints, base, NONE if stamp is None else stamp)
+            yield SentState(arriving.item, NONE if stamp is None else stamp)
 
     def take(self, tick: int) -> None:
         """See `Exchange.take`; the command may act in a later tick, or never."""

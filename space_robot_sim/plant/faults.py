@@ -119,7 +119,7 @@ class MessageFaults:
         """Prepare those that ``schedule`` has, for a robot of ``n`` joints."""
         self.corruption = Corruption(schedule)
         self.states: Link[Any] = Link(schedule, STATE_LINK)
-        """Both messages of a tick are one item."""
+        """All messages of a tick's state are one item."""
         self.commands: Link[Any] = Link(schedule, COMMAND_LINK)
         self._measured = RobotState.allocate(n)
 

@@ -61,27 +61,23 @@ class PlantLoop:
         self._node, self._settings = node, settings
         robot = Robot.from_yaml(named_file("robots", settings.robot))
         self._plant = Plant(robot, settings, settings.period)
-        at_rest = Command(0, np.zeros(robot.n + 3))
+        names = self._plant.names
+        at_rest = Command(0, np.zeros(len(names.commanded)))
         Plant(robot, settings, settings.period).step(at_rest)
         self._actuators = ActuatorHealth(self._plant)
         timebase = settings.timebase
         self._timebase = timebase
-        self._states = StateCodec(robot.joint_names, timebase)
-        self._commands = CommandCodec(robot.axis_names, timebase)
+        self._states = StateCodec(names, timebase)
+        self._commands = CommandCodec(names.commanded, timebase)
         self._clock = ClockCodec()
-        self._guard = CommandGuard(robot.n + 3, settings.hold_ticks)
-        self._exchange = exchange_of(
-            settings, self._plant.names, settings.period, self._states, self._guard
-        )
-        self._joint_states = RawPublisher(node, topics.JOINT_STATES)
-        self._base_state = RawPublisher(node, topics.BASE_STATE)
+        self._guard = CommandGuard(len(names.commanded), settings.hold_ticks)
+        self._exchange = exchange_of(settings, names, settings.period, self._states, self._guard)
+        self._state_out = tuple(RawPublisher(node, topic) for topic in self._states.topics)
         self._clock_out = RawPublisher(node, topics.CLOCK)
         self._command_in = FollowedSubscription(node, topics.COMMAND, PolledCallbackGroup())
         self._for_answer = Wait(PATIENCE_S, (self._command_in,), is_brief=True)
         self._truth = TruthOutput(node, self._plant, timebase)
-        self.outputs = (
-            self._joint_states, self._base_state, self._clock_out, *self._truth.outputs,
-        )  # fmt: skip
+        self.outputs = (*self._state_out, self._clock_out, *self._truth.outputs)
         self.wait_for = settings.wait_for
         self.is_complete = False
         self._wall_clock = WallClock(settings.period)
@@ -95,7 +91,7 @@ class PlantLoop:
         self._unsent: deque[SentState] = deque()
         """States of this tick that are still to be sent: in lockstep, once the one before has been
         answered."""
-        self._sent, self._clock_sent = SentState(b"", b"", NONE), b""
+        self._sent, self._clock_sent = SentState((), NONE), b""
         self._answered_by = NONE
         """Tick of the newest command that can come."""
         self._awaits = False
@@ -198,8 +194,8 @@ class PlantLoop:
             self._awaited_since = self._sent_at
 
     def _publish(self) -> None:
-        self._joint_states.publish(self._sent.joints)
-        self._base_state.publish(self._sent.base)
+        for output, message in zip(self._state_out, self._sent.messages, strict=True):
+            output.publish(message)
         self._sent_at = time.monotonic()
 
     def _be_patient(self) -> Wait | None:

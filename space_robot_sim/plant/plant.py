@@ -12,7 +12,7 @@ from pydantic import Field
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.errors import DivergedError, InputError
-from space_robot_msgs_py.samples import Command, RobotNames, RobotState, State
+from space_robot_msgs_py.samples import Command, RobotState, State
 
 from ..actuators.actuators import (
     Actuators,
@@ -99,7 +99,7 @@ class Plant:
         if not 1e-3 <= norm <= 1e3:
             raise InputError(f"initial_quaternion must have a norm near 1, got {norm:g}")
         settings.check(robot, getattr(settings, "actuators", "given"))
-        self.names = RobotNames.of(robot.joint_names, settings.names, settings.wheel_count)
+        self.names = settings.robot_names(robot)
         """Those of all that is told of the robot and asked of it."""
         self.robot = with_payload(robot, settings.payload)
         self.period = period

@@ -96,8 +96,9 @@ class TimedPlantLoop(PlantLoop):
         super().__init__(node, settings)
         self._watch = watch = Stopwatch()
         watch.attach(self._states, "encode", "encode state")
-        watch.attach(self._joint_states, "publish", "publish joints")
-        watch.attach(self._base_state, "publish", "publish base")
+        joints, base = self._state_out
+        watch.attach(joints, "publish", "publish joints")
+        watch.attach(base, "publish", "publish base")
         watch.attach(self._command_in, "take", "take command")
         self._command_ticks = array("q")
         decode = self._commands.decode
@@ -130,11 +131,9 @@ class TimedControllerLoop(ControllerLoop):
         """See `ControllerLoop`."""
         super().__init__(node, settings)
         self._watch = watch = Stopwatch()
-        joints, base = self._states.inputs
-        watch.attach(joints, "take", "take joints")
-        watch.attach(self._states.codec, "decode_joints", "decode joints")
-        watch.attach(base, "take", "take base")
-        watch.attach(self._states.codec, "decode_base", "decode base")
+        for entry, part in zip(self._states.inputs, ("joints", "base"), strict=True):
+            watch.attach(entry, "take", f"take {part}")
+            watch.attach(self._states.codec.parts[entry.topic], "decode", f"decode {part}")
         if self.is_empty:
             empty_controller(self._controller)
         watch.attach(self._controller, "update", "update controller")

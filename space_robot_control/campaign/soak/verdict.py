@@ -13,7 +13,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import SpaceRobotError
-from space_robot_msgs_py.samples import Command, RobotState
+from space_robot_msgs_py.samples import Array, Command, RobotState
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_sim.faults.grammar import parse_faults
@@ -93,24 +93,19 @@ def not_finite(bag: Path, flight: Flight) -> list[str]:
     Raises:
         MessageError: a message that does not fit the flight's robot.
     """
-    robot, timebase = flight.robot, flight.timebase
-    states, commands = (
-        StateCodec(robot.joint_names, timebase),
-        CommandCodec(robot.axis_names, timebase),
-    )
-    state = RobotState.allocate(robot.n)
-    command = Command(0, np.zeros(robot.n + 3))
-    wanted = (topics.COMMAND, topics.JOINT_STATES, topics.BASE_STATE)
-    for name, data in open_bag(bag).messages(*wanted):
-        torque = state.applied_torque
+    names, timebase = flight.plant.names, flight.timebase
+    states, commands = StateCodec(names, timebase), CommandCodec(names.commanded, timebase)
+    state = RobotState.allocate(len(names.joints))
+    command = Command(0, np.zeros(len(names.commanded)))
+    told = (state.applied_torque, state.wheel_torques, state.thrusts)
+    for name, data in open_bag(bag).messages(topics.COMMAND, *states.topics):
+        torques: tuple[Array, ...] = told
         if name == topics.COMMAND.name:
             commands.decode(data, command)
-            torque = command.torque
-        elif name == topics.JOINT_STATES.name:
-            states.decode_joints(data, state)
+            torques = (command.torque,)
         else:
-            states.decode_base(data, state)
-        if not np.isfinite(torque).all():
+            states.decode(topics.BY_NAME[name], data, state)
+        if not all(np.isfinite(torque).all() for torque in torques):
             at_s = header_stamp_ns(data) / 1e9
             return [f"{name} at t = {at_s:.4f} s has a torque that is not finite"]
     return []

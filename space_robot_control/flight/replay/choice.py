@@ -13,7 +13,7 @@ import yaml
 from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.samples import LawInForce
+from space_robot_msgs_py.samples import LawInForce, RobotNames
 from space_robot_sim.robot import Robot
 
 from ...controller.gains import build_law, build_laws, gain_files, gains_as_path, split_gains
@@ -95,6 +95,8 @@ class ControllerChoice:
             raise InputError(
                 f"{error}; the gains flown are of {self._left_out!r}, read only with --trust"
             ) from None
+        self.names = RobotNames(self.robot.joint_names)
+        """Those of all that the controller is told and asks for."""
         self.is_as_flown = is_same_law and (
             not gains or gains == flown.get("gains") or _same(now.gain_values, recorded_gains)
         )

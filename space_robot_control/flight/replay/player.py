@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from array import array
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from types import TracebackType
 from typing import NamedTuple
 
@@ -19,7 +19,6 @@ from .commands import CommandList, Ticks
 from .recording import ReferenceMessage, StateMessages
 
 CONTROLLER = "controller_node"
-STATES = (topics.JOINT_STATES, topics.BASE_STATE)
 REFERENCES = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
 AHEAD = 10
 """Messages of each half of the reference that are sent ahead of need: as a rule half a second."""
@@ -45,8 +44,13 @@ class _Stream(NamedTuple):
 class Player:
     """Publishes recorded messages as a node ``replay_node``, and keeps the answers."""
 
-    def __init__(self, domain: int, answers: CommandList) -> None:
+    def __init__(self, domain: int, answers: CommandList, parts: Sequence[topics.Topic]) -> None:
         """Join the graph; `node` is for calling services.
+
+        Args:
+            domain: to join.
+            answers: to add the controller's to.
+            parts: of a state, in the order in which they are sent.
 
         Raises:
             InputError: a plant or a mission is in this domain.
@@ -63,12 +67,12 @@ class Player:
         self._visitor = TemporaryNode("replay_node", domain)
         self.node = self._visitor.node
         try:
-            self._claim = Claim(self.node, [topic.name for topic in (*STATES, *REFERENCES)])
+            self._claim = Claim(self.node, [topic.name for topic in (*parts, *REFERENCES)])
         except InputError:
             self._visitor.leave()
             raise
-        self._outs = {t.name: RawPublisher(self.node, t) for t in (*STATES, *REFERENCES)}
-        self._joints, self._base = (self._outs[topic.name] for topic in STATES)
+        self._outs = {t.name: RawPublisher(self.node, t) for t in (*parts, *REFERENCES)}
+        self._parts_out = [self._outs[topic.name] for topic in parts]
         self._commands = RawSubscription(self.node, topics.COMMAND, PolledCallbackGroup())
         self._waiter = Waiter(self.node)
         self._answers = answers
@@ -180,9 +184,12 @@ class Player:
         self._take_until(time.perf_counter() + LAST_ANSWER_S)
 
     def _send(self, state: StateMessages) -> None:
-        self._joints.publish(state.joints)
-        self._base.publish(state.base)
+        self._publish(state)
         self._played.append(state.tick)
+
+    def _publish(self, state: StateMessages) -> None:
+        for output, message in zip(self._parts_out, state.messages, strict=True):
+            output.publish(message)
 
     def _send_references(self, tick: int) -> None:
         """Keep both streams ahead of ``tick``."""
@@ -211,8 +218,7 @@ class Player:
                 return False
             if now > ask_again:
                 ask_again = now + ASK_AGAIN_S
-                self._joints.publish(state.joints)
-                self._base.publish(state.base)
+                self._publish(state)
 
     def _take_until(self, moment: float) -> None:
         while True:

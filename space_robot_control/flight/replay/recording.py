@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,11 +26,11 @@ from .commands import CommandList, Commands
 
 
 class StateMessages(NamedTuple):
-    """The two messages of a tick's state."""
+    """The messages of a tick's state."""
 
     tick: int
-    joints: bytes
-    base: bytes
+    messages: tuple[bytes, ...]
+    """One of each part that was asked for, in that order."""
 
 
 class ReferenceMessage(NamedTuple):
@@ -68,6 +68,8 @@ class Recording:
                 raise InputError(doubts[0])
         self.flight: dict[str, Any] = flight
         """The flight as recorded; empty for a bag of another recorder."""
+        self.parts = tuple(topic for topic in topics.STATES if counts[topic])
+        """The parts of states that are there."""
         self.states_count = counts[topics.JOINT_STATES]
         """Ticks, about."""
         self.has_commands = bool(counts[topics.COMMAND])
@@ -80,9 +82,9 @@ class Recording:
         ) and topics.COMMAND.name not in topics_with_allowed_gaps(flight)
         """True if the controller has answered every state, so that no answer means a loss."""
 
-    def commands(self, axis_names: tuple[str, ...]) -> Commands:
-        """The recorded answers."""
-        found = CommandList(axis_names, self.timebase)
+    def commands(self, names: tuple[str, ...]) -> Commands:
+        """The recorded answers; ``names``: see `RobotNames.commanded`."""
+        found = CommandList(names, self.timebase)
         for _, data in self._messages(topics.COMMAND) if self.has_commands else ():
             found.add(data)
         return found.commands()
@@ -95,22 +97,24 @@ class Recording:
                 found.append(LawCodec.decode(data, tick))
         return in_order(found)
 
-    def states(self, start: int = 0, stop: float = math.inf) -> Iterator[StateMessages]:
+    def states(
+        self, parts: Sequence[Topic], start: int = 0, stop: float = math.inf
+    ) -> Iterator[StateMessages]:
         """States of the ticks from ``start`` to before ``stop``, as they were sent.
 
-        One of which half is missing, or whose stamp is none, is passed over.
+        One of which any of the ``parts`` is missing, or whose stamp is none, is passed over.
         """
-        joints: deque[tuple[int, bytes]] = deque()
-        base: deque[tuple[int, bytes]] = deque()
-        for topic, tick, data in self._of_ticks(topics.JOINT_STATES, topics.BASE_STATE):
-            (joints if topic is topics.JOINT_STATES else base).append((tick, data))
-            while joints and base:
-                if joints[0][0] != base[0][0]:  # the earlier one has lost its other half
-                    min(joints, base, key=lambda queue: queue[0][0]).popleft()
+        queues: dict[Topic, deque[tuple[int, bytes]]] = {topic: deque() for topic in parts}
+        for topic, tick, data in self._of_ticks(*parts):
+            queues[topic].append((tick, data))
+            while all(queues.values()):
+                ticks = [queue[0][0] for queue in queues.values()]
+                if min(ticks) != max(ticks):  # the earliest one has lost another part
+                    min(queues.values(), key=lambda queue: queue[0][0]).popleft()
                     continue
-                (tick, one), (_, other) = joints.popleft(), base.popleft()
-                if start <= tick < stop:
-                    yield StateMessages(tick, one, other)
+                messages = tuple([queue.popleft()[1] for queue in queues.values()])
+                if start <= ticks[0] < stop:
+                    yield StateMessages(ticks[0], messages)
 
     def references(self, topic: Topic, start: int = 0) -> Iterator[ReferenceMessage]:
         """Messages of half the reference, from the last one that begins by tick ``start``."""

@@ -12,6 +12,8 @@ from pathlib import Path
 
 from space_robot_msgs_py.bag.law_history import within
 from space_robot_msgs_py.errors import FlightError, InputError
+from space_robot_msgs_py.topics import Topic
+from space_robot_msgs_py.wire.codecs import StateCodec
 
 from ..compilation import compile_kernels
 from ..graph.domain import ros_domain
@@ -57,17 +59,28 @@ class _Run:
         if math.isfinite(options.end_s):
             self._stop = math.ceil(options.end_s / period - 1e-6)
         self._recorded = self._read_commands()
-        if next(recording.states(self._start, self._stop), None) is None:
+        self._parts = self._choose_parts()
+        if next(recording.states(self._parts, self._start, self._stop), None) is None:
             raise InputError(f"{options.bag}: no states in the part to be replayed")
         self._laws = within(recording.laws(), self._start, self._stop)
         self._skipped = 0
         self._progress: FlightProgress | None = None
         self._shown_at = 0.0
 
+    def _choose_parts(self) -> tuple[Topic, ...]:
+        """The parts of a state that the controller needs."""
+        parts = StateCodec(self._choice.names, self._recording.timebase).control_topics
+        if lacking := [topic.name for topic in parts if topic not in self._recording.parts]:
+            raise InputError(
+                f"{self._options.bag}: no messages on {', '.join(lacking)}, which a controller of "
+                "these actuators needs"
+            )
+        return parts
+
     def _read_commands(self) -> Commands:
         """Those to compare with; nobody knows what came after an unfinished bag's last one."""
         recording = self._recording
-        commands = recording.commands(self._choice.robot.axis_names)
+        commands = recording.commands(self._choice.names.commanded)
         if recording.has_commands and not recording.is_finished and len(commands.ticks):
             self._stop = min(self._stop, int(commands.ticks[-1]) + 1)
         return commands.within(self._start, self._stop)
@@ -75,8 +88,8 @@ class _Run:
     def run(self) -> Replay:
         """Start the controller, play, stop it, compare."""
         options, recording, choice = self._options, self._recording, self._choice
-        axes, error = choice.robot.axis_names, None
-        answers = CommandList(axes, recording.timebase)
+        names, error = choice.names.commanded, None
+        answers = CommandList(names, recording.timebase)
         parameters = dict(choice.parameters)
         if options.rate is None and "reference_timeout" not in options.parameters:
             # there is time to wait; by the wall clock, where the flight may have been, there is not
@@ -86,7 +99,7 @@ class _Run:
         with (
             ros_domain(options.domain) as domain,
             stop_signals() as stopped,
-            Player(domain, answers) as player,
+            Player(domain, answers, self._parts) as player,
             Graph(command, node_environment(domain)) as graph,
         ):
             controller = graph.nodes["controller"]
@@ -103,7 +116,7 @@ class _Run:
         if error and not len(played):
             raise error
         comparison = Comparison(
-            axes, played, self._recorded_until(played, error), answers.commands()
+            names, played, self._recorded_until(played, error), answers.commands()
         )
         return Replay(
             options, choice, recording, comparison, self._laws, self._skipped, elapsed, error
@@ -134,7 +147,7 @@ class _Run:
     def _states(self) -> Iterator[StateMessages]:
         """The states that the controller took; where it did not answer all, those answered."""
         recording = self._recording
-        states = recording.states(self._start, self._stop)
+        states = recording.states(self._parts, self._start, self._stop)
         if not recording.has_commands or recording.answers_are_complete:
             yield from states
             return

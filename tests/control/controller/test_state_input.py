@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from paths import CONFIG
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.samples import RobotState, Timebase
+from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.codecs import StateCodec
 from space_robot_msgs_py.wire.source_guard import SourceGuard
 from space_robot_sim.robot import Robot
@@ -48,11 +48,12 @@ class Bench:
     """A plant that sends, and the input of a controller that has just joined."""
 
     def __init__(self, robot: Robot) -> None:
+        names = RobotNames(robot.joint_names)
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(state_input, "FollowedSubscription", Queue)
             no_node: Any = None
-            self.input = StateInput(no_node, robot, TIMEBASE)
-        self._codec = StateCodec(robot.joint_names, TIMEBASE)
+            self.input = StateInput(no_node, names, TIMEBASE)
+        self._codec = StateCodec(names, TIMEBASE)
         self._state = RobotState.allocate(robot.n)
 
     def send(self, tick: int, *halves: topics.Topic) -> None:

@@ -19,7 +19,7 @@ from space_robot_msgs_py.bag.message_accounting import MessageAccounting, lost_m
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.samples import Command, RobotState, Timebase
+from space_robot_msgs_py.samples import Command, RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.definitions import definition, jazzy
@@ -73,7 +73,7 @@ def test_definition_parses_to_the_type_it_names(topic: topics.Topic) -> None:
 
 def test_codecs_decode_what_ros2_bag_recorded() -> None:
     joint_names = tuple(f"joint{i}" for i in range(1, 7))
-    states = StateCodec(joint_names, TIMEBASE)
+    states = StateCodec(RobotNames.of(joint_names), TIMEBASE)
     state, decoded = RobotState.allocate(6), 0
     with Reader(SAMPLE) as reader:
         for connection, _, raw in reader.messages():
@@ -81,11 +81,11 @@ def test_codecs_decode_what_ros2_bag_recorded() -> None:
             if connection.topic == "/joint_states":
                 names = list(message.name)
                 order = [names.index(name) for name in joint_names]
-                states.decode_joints(bytes(raw), state)
+                states.decode(topics.JOINT_STATES, bytes(raw), state)
                 np.testing.assert_array_equal(state.joint_positions, message.position[order])
                 decoded += 1
             elif connection.topic == "/base/state":
-                states.decode_base(bytes(raw), state)
+                states.decode(topics.BASE_STATE, bytes(raw), state)
                 rotation = message.transforms[0].rotation
                 assert state.quaternion.tolist() == [rotation.w, rotation.x, rotation.y, rotation.z]
                 decoded += 1
@@ -99,7 +99,7 @@ def test_codecs_decode_what_ros2_bag_recorded() -> None:
 
 def test_recorder_counts_what_is_missing_and_drops_what_is_repeated(tmp_path: Path) -> None:
     recorder = BagRecorder(tmp_path / "bag", {}, TIMEBASE)
-    codec, state = StateCodec(("j",), TIMEBASE), RobotState.allocate(1)
+    codec, state = StateCodec(RobotNames.of(("j",)), TIMEBASE), RobotState.allocate(1)
     for state.tick in (0, 1, 1, 2, 5, 6):
         joints, base = codec.encode(state)
         recorder.record(topics.JOINT_STATES, joints)

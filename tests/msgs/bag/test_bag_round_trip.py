@@ -44,7 +44,8 @@ def test_every_message_serialised_again_is_the_same_bytes(bag: Path) -> None:
             message = store.deserialize_cdr(raw, connection.msgtype)
             assert bytes(store.serialize_cdr(message, connection.msgtype)) == bytes(raw)
             seen.add(connection.topic)
-    assert seen == topics.BY_NAME.keys()
+    sent = topics.BY_NAME.keys() - {topics.WHEELS_STATE.name, topics.THRUSTERS_STATE.name}
+    assert seen == sent
 
 
 def test_definitions_have_the_hashes_the_bag_tells(bag: Path) -> None:

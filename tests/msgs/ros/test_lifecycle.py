@@ -14,7 +14,7 @@ from flights import Start
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.process_environment import set_defaults
-from space_robot_msgs_py.samples import Command, RobotState, Timebase
+from space_robot_msgs_py.samples import Command, RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 
 set_defaults()
@@ -66,12 +66,13 @@ def test_deactivated_controller_leaves_no_torque_and_comes_back(
 ) -> None:
     nodes = [start("mission"), start("controller"), start("plant", silence_timeout=0.3)]
     robot = Robot.from_yaml("config/robots/paper.yaml")
-    codec, state = StateCodec(robot.joint_names, TIMEBASE), RobotState.allocate(robot.n)
+    codec = StateCodec(RobotNames(robot.joint_names), TIMEBASE)
+    state = RobotState.allocate(robot.n)
     joints = RawSubscription(ground.node, topics.JOINT_STATES, PolledCallbackGroup())
 
     def torque() -> float:
         while (data := joints.take()) is not None:
-            codec.decode_joints(data, state)
+            codec.decode(topics.JOINT_STATES, data, state)
         return float(np.abs(state.applied_torque[3:]).max())
 
     ground.until(lambda: torque() > 1e-3, "a torque")

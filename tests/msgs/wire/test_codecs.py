@@ -9,15 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from random_robots import JOINTS
+from random_robots import JOINTS as JOINT_COUNTS
 from random_samples import (
+    BASE,
     BASE_AXES,
+    JOINTS,
     TIMEBASE,
     assert_same,
     joint_names,
     random_sample,
     ros_type,
     serialization,
+    state_codec,
 )
 from rosbags.typesys import Stores, get_typestore
 
@@ -26,7 +29,7 @@ from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Command, LawInForce, RobotState, Timebase
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.clock import ClockCodec
-from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.codecs import CommandCodec
 from space_robot_msgs_py.wire.controller_law import LawCodec
 from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
 
@@ -63,7 +66,7 @@ def seconds(stamp: Any) -> tuple[int, int]:
 def test_state_is_read_as_ros_messages(n: int, read: Any) -> None:
     """JointState's effort and the wrench echo the applied torque; quaternions are x, y, z, w."""
     state = random_sample(n, seed=n)
-    joints_data, base_data = StateCodec(joint_names(n), TIMEBASE).encode(state)
+    joints_data, base_data = state_codec(joint_names(n)).encode(state)
     joints = read(joints_data, "sensor_msgs/msg/JointState")
     assert seconds(joints.header.stamp) == (2, 500_000)
     assert list(joints.name) == joint_names(n)
@@ -162,7 +165,7 @@ def test_a_parameter_event_that_names_no_law_is_an_error() -> None:
 
 def test_every_message_begins_with_its_stamp() -> None:
     """So that a recorder can tell the tick without decoding."""
-    joints, base = StateCodec(joint_names(2), TIMEBASE).encode(random_sample(2, 1, tick=9))
+    joints, base = state_codec(joint_names(2)).encode(random_sample(2, 1, tick=9))
     command = CommandCodec(BASE_AXES, TIMEBASE).encode(Command(9, np.zeros(3)))
     law = LawCodec(TIMEBASE).encode(LawInForce(9, "ctc", {}))
     for data in (joints, base, command, law, ClockCodec().encode(TIMEBASE.stamp_ns(9))):
@@ -172,17 +175,17 @@ def test_every_message_begins_with_its_stamp() -> None:
 # Round trips
 
 
-@given(st.sampled_from(JOINTS), st.integers(0, 2**32 - 1), st.integers(0, 4 * 10**9))
+@given(st.sampled_from(JOINT_COUNTS), st.integers(0, 2**32 - 1), st.integers(0, 4 * 10**9))
 def test_state_round_trip(n: int, seed: int, tick: int) -> None:
     """Any number of joints, any tick: the same bits come back."""
     state, back = random_sample(n, seed, tick), RobotState.allocate(n)
-    joints, base = StateCodec(joint_names(n), TIMEBASE).encode(state)
-    reader = StateCodec(joint_names(n), TIMEBASE)
-    assert reader.decode_joints(joints, back) == reader.decode_base(base, back) == tick
+    joints, base = state_codec(joint_names(n)).encode(state)
+    reader = state_codec(joint_names(n))
+    assert reader.decode(JOINTS, joints, back) == reader.decode(BASE, base, back) == tick
     assert_same(back, state)
 
 
-@given(st.sampled_from(JOINTS), st.integers(0, 2**32 - 1), st.integers(0, 4 * 10**9))
+@given(st.sampled_from(JOINT_COUNTS), st.integers(0, 2**32 - 1), st.integers(0, 4 * 10**9))
 def test_command_round_trip(n: int, seed: int, tick: int) -> None:
     torque = np.random.default_rng(seed).normal(size=n + 3)
     axes, back = BASE_AXES + joint_names(n), Command(-1, np.zeros(n + 3))
@@ -195,14 +198,16 @@ def test_command_round_trip(n: int, seed: int, tick: int) -> None:
 
 def test_decoded_samples_do_not_change_with_the_next_message() -> None:
     """The codec's buffer is its own."""
-    writer, reader = (StateCodec(joint_names(2), TIMEBASE) for _ in range(2))
+    writer, reader = (state_codec(joint_names(2)) for _ in range(2))
     first, back = random_sample(2, 1), RobotState.allocate(2)
     joints, base = writer.encode(first)
-    reader.decode_joints(joints, back)
-    reader.decode_base(base, back)
+    reader.decode(JOINTS, joints, back)
+    reader.decode(BASE, base, back)
     for data in writer.encode(random_sample(2, 2)):
         assert data not in (joints, base)
-    reader.decode_joints(writer.encode(random_sample(2, 3))[0], RobotState.allocate(2))
+    reader.decode(
+        topics.JOINT_STATES, writer.encode(random_sample(2, 3))[0], RobotState.allocate(2)
+    )
     assert_same(back, first)
 
 
@@ -232,8 +237,8 @@ def test_a_stamp_between_ticks_is_an_error(tick: int, offset: int) -> None:
 
 
 def test_a_state_of_another_period_is_an_error() -> None:
-    joints, base = StateCodec(["a"], TIMEBASE).encode(random_sample(1, 6, tick=3))
-    reader, back = StateCodec(["a"], Timebase(1_000_000)), RobotState.allocate(1)
-    for decode, data in ((reader.decode_joints, joints), (reader.decode_base, base)):
+    joints, base = state_codec(["a"]).encode(random_sample(1, 6, tick=3))
+    reader, back = state_codec(["a"], Timebase(1_000_000)), RobotState.allocate(1)
+    for topic, data in ((topics.JOINT_STATES, joints), (topics.BASE_STATE, base)):
         with pytest.raises(MessageError, match="1500000 ns is not a whole number of 1000000 ns"):
-            decode(data, back)
+            reader.decode(topic, data, back)

@@ -19,7 +19,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.samples import Command, ReferenceChunk, RobotState
+from space_robot_msgs_py.samples import Command, ReferenceChunk, RobotNames, RobotState
 from space_robot_msgs_py.wire import message as general_way
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
@@ -73,7 +73,7 @@ def expect_joints(data: bytes) -> Read:
 
 def read_joints(codec: StateCodec, data: bytes) -> Read:
     state = RobotState.allocate(2)
-    tick = codec.decode_joints(data, state)
+    tick = codec.decode(topics.JOINT_STATES, data, state)
     arrays = (state.joint_positions, state.joint_velocities, state.applied_torque[3:])
     return tick, numbers(*arrays)
 
@@ -89,7 +89,7 @@ def expect_base(data: bytes) -> Read:
 
 def read_base(codec: StateCodec, data: bytes) -> Read:
     state = RobotState.allocate(2)
-    tick = codec.decode_base(data, state)
+    tick = codec.decode(topics.BASE_STATE, data, state)
     parts = (state.base_position, state.quaternion, state.base_velocity, state.omega_base)
     return tick, numbers(*parts, state.applied_torque[:3])
 
@@ -149,7 +149,7 @@ def chunk() -> ReferenceChunk:
 
 
 def make_state_codec() -> StateCodec:
-    return StateCodec(NAMES, TIMEBASE)
+    return StateCodec(RobotNames.of(NAMES), TIMEBASE)
 
 
 def make_command_codec() -> CommandCodec:
@@ -289,7 +289,10 @@ def renamed(names: list[str], topic: topics.Topic, data: bytes) -> bytes:
 def test_a_base_of_another_name_is_an_error_that_names_both(names: list[str]) -> None:
     """In the state and in the reference."""
     for topic, decode in (
-        (topics.BASE_STATE, lambda d: make_state_codec().decode_base(d, RobotState.allocate(2))),
+        (
+            topics.BASE_STATE,
+            lambda d: make_state_codec().decode(topics.BASE_STATE, d, RobotState.allocate(2)),
+        ),
         (topics.REFERENCE_BASE, make_reference_codec().decode_base),
     ):
         data = STATE[1] if topic is topics.BASE_STATE else REFERENCE[1]

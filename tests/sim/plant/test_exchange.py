@@ -8,7 +8,7 @@ import pytest
 from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.codecs import StateCodec
 from space_robot_sim.plant.command_guard import CommandGuard
-from space_robot_sim.plant.exchange import NONE, Exchange, FaultyExchange, exchange_of
+from space_robot_sim.plant.exchange import NONE, Exchange, FaultyExchange, SentState, exchange_of
 from space_robot_sim.plant.faults import FaultSettings
 from space_robot_sim.robot import Robot
 
@@ -20,8 +20,8 @@ class Way:
 
     def __init__(self, robot: Robot, *texts: str) -> None:
         self.guard = CommandGuard(robot.n + 3, 10**6)
-        self.codec = StateCodec(robot.joint_names, Timebase(round(PERIOD * 1e9)))
         names = RobotNames(robot.joint_names)
+        self.codec = StateCodec(names, Timebase(round(PERIOD * 1e9)))
         settings = FaultSettings(faults=list(texts))
         self.exchange = exchange_of(settings, names, PERIOD, self.codec, self.guard)
         self.state = RobotState.allocate(robot.n)
@@ -33,7 +33,7 @@ class Way:
             self.state.tick = tick
             states = list(self.exchange.send(self.state))
             read = RobotState.allocate(len(self.state.joint_positions))
-            sent.append([self.codec.decode_joints(state.joints, read) for state in states])
+            sent.append([self._read(state, read) for state in states])
             awaited.append([s.answered_by for s in states if s.answered_by != NONE])
             for stamp in awaited[-1]:
                 self.guard.offered.tick, self.guard.offered.torque[:] = stamp, stamp
@@ -41,6 +41,12 @@ class Way:
             self.exchange.end(tick)
             acting.append(int(self.guard.act(tick).torque[0]) if self.guard.answered >= 0 else NONE)
         return sent, awaited, acting
+
+    def _read(self, sent: SentState, state: RobotState) -> int:
+        """The stamp that all parts have."""
+        parts = zip(self.codec.topics, sent.messages, strict=True)
+        (stamp,) = {self.codec.decode(topic, data, state) for topic, data in parts}
+        return stamp
 
 
 TICKS = list(range(12))

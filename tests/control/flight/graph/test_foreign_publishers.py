@@ -14,7 +14,7 @@ from flights import Start
 from space_robot_control.flight.graph.listeners import wait_for
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.process_environment import set_defaults
-from space_robot_msgs_py.samples import Command, ReferenceChunk, RobotState, Timebase
+from space_robot_msgs_py.samples import Command, ReferenceChunk, RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
@@ -62,8 +62,8 @@ def junk(robot: Robot) -> dict[str, list[bytes]]:
     future.tick, none.tick = 10**7, 3
     none.quaternion[:] = np.nan
     other = Robot.from_yaml("config/robots/seven_joint.yaml")
-    states = StateCodec(robot.joint_names, TIMEBASE)
-    foreign = StateCodec(other.joint_names, TIMEBASE)
+    states = StateCodec(RobotNames.of(robot.joint_names), TIMEBASE)
+    foreign = StateCodec(RobotNames.of(other.joint_names), TIMEBASE)
     pairs = [states.encode(future), states.encode(none)]
     pairs.append(foreign.encode(RobotState.allocate(other.n)))
     commands = CommandCodec(robot.axis_names, TIMEBASE)

@@ -25,6 +25,8 @@ from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.wire.definitions import jazzy
 
+STATES = (topics.JOINT_STATES, topics.BASE_STATE)
+
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -35,11 +37,11 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_states_come_as_recorded_each_with_both_halves(bag: Path) -> None:
     recording = Recording(bag)
-    states = list(recording.states())
+    states = list(recording.states(STATES))
     assert [state.tick for state in states] == list(range(400))
     recorded = [data for _, data in open_bag(bag).messages(topics.BASE_STATE)]
-    assert [state.base for state in states] == recorded
-    assert [state.tick for state in recording.states(100, 300)] == list(range(100, 300))
+    assert [state.messages[1] for state in states] == recorded
+    assert [state.tick for state in recording.states(STATES, 100, 300)] == list(range(100, 300))
 
 
 def test_a_state_without_its_other_half_is_passed_over(bag: Path, tmp_path: Path) -> None:
@@ -51,7 +53,7 @@ def test_a_state_without_its_other_half_is_passed_over(bag: Path, tmp_path: Path
         if counts[name] != lost:
             recorder.record(topics.BY_NAME[name], data)
     recorder.close()
-    ticks = [state.tick for state in Recording(tmp_path / "holes").states()]
+    ticks = [state.tick for state in Recording(tmp_path / "holes").states(STATES)]
     assert ticks == [tick for tick in range(400) if tick not in (10, 20)]
 
 
@@ -92,7 +94,7 @@ def test_topics_of_other_names_are_remapped(bag: Path, tmp_path: Path) -> None:
         Recording(tmp_path / "bag")
     remapped = Recording(tmp_path / "bag", {f"/arm{name}": name for name in topics.BY_NAME})
     here = Recording(bag)
-    assert list(remapped.states()) == list(here.states())
+    assert list(remapped.states(STATES)) == list(here.states(STATES))
     axes = Flight(FlightPlan()).robot.axis_names
     np.testing.assert_array_equal(remapped.commands(axes).torque, here.commands(axes).torque)
 

@@ -1,0 +1,46 @@
+"""The base's actuators in a bag: its messages name them, and so tell how many there are."""
+
+from __future__ import annotations
+
+from .. import topics
+from ..errors import MessageError
+from ..samples import ACTUATOR_FIELDS, MOST_THRUSTERS, MOST_WHEELS, RobotNames, Timebase
+from ..wire.definitions import decode
+from ..wire.message import MessageDescription, description
+from .batch import Batch
+
+MOST_ACTUATORS = {
+    topics.WHEELS_STATE: MOST_WHEELS,
+    topics.THRUSTERS_STATE: MOST_THRUSTERS,
+    topics.COMMAND: MOST_WHEELS + MOST_THRUSTERS,
+}
+"""Topics whose messages name actuators, and how many of them at most."""
+ACTUATOR_COLUMNS = (*ACTUATOR_FIELDS, "actuator_commands")
+"""Columns of a log that are as wide as there are actuators."""
+
+
+def names_in(topic: topics.Topic, batch: Batch, joints: tuple[str, ...]) -> tuple[str, ...] | None:
+    """Find the actuators' names in the first message that tells them; None: none does."""
+    for i in range(len(batch)):
+        try:
+            names = tuple(decode(batch.message(i), topic.type).name)
+        except MessageError:
+            continue
+        if topic is not topics.COMMAND:
+            return names
+        axes = RobotNames(joints).axes
+        if set(axes) <= set(names):
+            return tuple(name for name in names if name not in axes)
+    return None
+
+
+def described(
+    topic: topics.Topic, names: tuple[str, ...], joints: tuple[str, ...], timebase: Timebase
+) -> MessageDescription | None:
+    """Describe the messages of a topic for actuators of these names; None: there can be no such."""
+    describe = description(topic)
+    if describe is None or not 0 < len(names) <= MOST_ACTUATORS[topic]:
+        return None
+    wheels = names if topic is not topics.THRUSTERS_STATE else ()
+    thrusters = names if topic is topics.THRUSTERS_STATE else ()
+    return describe.of_robot(RobotNames(joints, wheels, thrusters), timebase)
