@@ -16,6 +16,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import LawInForce, RobotNames
 from space_robot_sim.robot import Robot
 
+from ...controller.allocation.believed_actuators import OWNER, believed_actuators
 from ...controller.gains import build_law, build_laws, gain_files, gains_as_path, split_gains
 from ...controller.settings import ControllerNodeSettings
 from ...controller.swaps import parse_swaps
@@ -80,6 +81,8 @@ class ControllerChoice:
         recorded_gains = flight.get("gains_used", {})
         if recorded_gains and is_same_law and not gains:
             self.parameters["gains"] = self._gains_folder(law, recorded_gains)
+        if "actuators" not in self._said:
+            self.parameters |= self._actuators(flown)
         if "navigation_sensors" not in self._said:
             self.parameters |= recorded_navigation(flight)
         self.parameters |= self._said
@@ -88,15 +91,13 @@ class ControllerChoice:
         self.swaps = [text for text in self.parameters.get("swaps", []) if text.strip()]
         """Laws swapped to in flight."""
         try:
-            self.robot, now = self._check()
+            self.robot, self.names, now = self._check()
         except InputError as error:
             if not self._left_out:
                 raise
             raise InputError(
                 f"{error}; the gains flown are of {self._left_out!r}, read only with --trust"
             ) from None
-        self.names = RobotNames(self.robot.joint_names)
-        """Those of all that the controller is told and asks for."""
         self.is_as_flown = is_same_law and (
             not gains or gains == flown.get("gains") or _same(now.gain_values, recorded_gains)
         )
@@ -120,7 +121,7 @@ class ControllerChoice:
 
     def _check_files(self, flown: Mapping[str, Any]) -> None:
         """See that no file is read whose path the bag tells."""
-        for what in ("robot", "gains", "navigation_sensors"):
+        for what in ("robot", "gains", "navigation_sensors", "actuators"):
             if what not in self._said and self.parameters.get(what) == flown.get(what, ""):
                 check_file(what, str(flown[what]))
 
@@ -133,6 +134,17 @@ class ControllerChoice:
         path = self._folder / f"{name if is_plain(name) else 'recorded'}.yaml"
         _write(path, content)
         return {"robot": str(path)}
+
+    def _actuators(self, flown: Mapping[str, Any]) -> dict[str, str]:
+        """The recorded hardware, as the controller knew it, as a file of its name."""
+        flight = self._flight
+        content = flight.get("controller_base_actuators", flight.get("base_actuators"))
+        if not content:
+            return {}
+        name = Path(str(flown.get("actuators", ""))).stem
+        path = self._folder / f"actuators_{name if is_plain(name) else 'recorded'}.yaml"
+        _write(path, {f"{OWNER}_node": {"ros__parameters": content}})
+        return {"actuators": str(path)}
 
     def _gains_folder(self, law: type[ControlLaw], recorded: Mapping[str, Any]) -> str:
         """The recorded gains, beside those of the other laws as far as they are found here."""
@@ -150,8 +162,8 @@ class ControllerChoice:
         _write(folder / f"{law.name}.yaml", {f"{NODE}_node": {"ros__parameters": section}})
         return str(folder)
 
-    def _check(self) -> tuple[Robot, ControlLaw]:
-        """The robot, and the law with the gains of the files, see `build_law`."""
+    def _check(self) -> tuple[Robot, RobotNames, ControlLaw]:
+        """The robot, the names in its messages, and the law with the gains of the files."""
         own, gains = split_gains(self.parameters)
         settings = ControllerNodeSettings.resolve(own)
         robot = Robot.from_yaml(named_file("robots", settings.robot))
@@ -159,7 +171,8 @@ class ControllerChoice:
         laws = build_laws(settings, axes, gains)
         for swap in parse_swaps(settings.swaps, settings.period):
             one_of(swap.name, laws, "controller", " of swaps")
-        return robot, build_law(settings.controller, settings, axes)
+        names = believed_actuators(settings.actuators, robot).robot_names(robot)
+        return robot, names, build_law(settings.controller, settings, axes)
 
 
 def recorded_parameters(flight: Mapping[str, Any]) -> dict[str, Any]:

@@ -19,8 +19,8 @@ class Way:
     """An exchange whose controller answers each tick with the tick's number as its torque."""
 
     def __init__(self, robot: Robot, *texts: str) -> None:
-        self.guard = CommandGuard(robot.n + 3, 10**6)
-        names = RobotNames(robot.joint_names)
+        names = RobotNames(robot.joint_names, ("wheel_1", "wheel_2"), ("thruster_1",))
+        self.guard = CommandGuard(len(names.commanded), 10**6)
         self.codec = StateCodec(names, Timebase(round(PERIOD * 1e9)))
         settings = FaultSettings(faults=list(texts))
         self.exchange = exchange_of(settings, names, PERIOD, self.codec, self.guard)
