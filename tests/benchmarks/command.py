@@ -17,7 +17,7 @@ from space_robot_control.cli.options import OUTPUT, put_json
 from space_robot_msgs_py.errors import SpaceRobotError
 
 SECTIONS = (
-    "plant", "laws", "simulate", "reproduce", "graph", "composed", "clock", "recorder",
+    "plant", "wheels", "laws", "simulate", "reproduce", "graph", "composed", "clock", "recorder",
     "start-up", "peers", "growth",
 )  # fmt: skip
 BESIDE_PEERS = {"peers", "growth"}
@@ -41,11 +41,12 @@ def bench(
 ) -> None:  # fmt: skip
     """Measure how fast it is on this machine, each figure beside its competitor in the same run.
 
-    SECTION is one of plant, laws, simulate, reproduce; on the ROS 2 graph: graph, composed,
-    clock, recorder (10 minutes), start-up; beside MuJoCo, Pinocchio and Basilisk: peers (one step
-    of the plant) and growth (over the number of joints) [default: all]. Shown are the median and
-    the spread of several repetitions, how many times better that is than what stands beside it,
-    and what was asked. A machine that does other work meanwhile shows in the spread.
+    SECTION is one of plant, wheels (beside Basilisk's), laws, simulate, reproduce; on the ROS 2
+    graph: graph, composed, clock, recorder (10 minutes), start-up; beside MuJoCo, Pinocchio and
+    Basilisk: peers (one step of the plant) and growth (over the number of joints)
+    [default: all]. Shown are the median and the spread of several repetitions, how many times
+    better that is than what stands beside it, and what was asked. A machine that does other work
+    meanwhile shows in the spread.
 
     Exit code 1: a peer moves otherwise than the plant, so it is not the same robot.
 
@@ -111,7 +112,7 @@ def _that_can_run(names: tuple[str, ...]) -> Iterator[str]:
         if name in BESIDE_PEERS and missing:
             _say(f"{name} is left out: no {' and no '.join(missing)} here (extra `bench`)")
             continue
-        if name in BESIDE_PEERS and not is_installed("Basilisk"):
+        if name in {"wheels", *BESIDE_PEERS} and not is_installed("Basilisk"):
             _say(f"{name}: without Basilisk, which is not installed (bsk, extra `bench`)")
         yield name
 

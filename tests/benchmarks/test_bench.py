@@ -227,6 +227,15 @@ def test_peers_fly_the_same_robot(tmp_path: Path) -> None:
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_step_with_wheels_stands_beside_one_without() -> None:
+    result = CliRunner().invoke(bench, ["wheels", "--short", "--json"], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    step, *checks = json.loads(result.stdout)["sections"]["wheels"]
+    assert step["beside"] == "ideal"
+    assert step["median"] > 0.0
+    assert [row["reached"] for row in checks] == [True] * len(checks)
+
+
 def test_a_peer_that_is_another_robot_ends_the_command_with_exit_code_1(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
