@@ -1,0 +1,64 @@
+"""Wheels and thrusters on the real graph: the flight that `simulate` flies, and replay, to the bit.
+
+Their states go the plant's way to the controller as the joints' and the base's do.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from flights import Flown, space_robot
+
+from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.flight.simulate import simulate
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.samples import ACTUATOR_FIELDS, STATE_FIELDS
+
+pytest.importorskip("rclpy")
+
+COLUMNS = (*STATE_FIELDS, *ACTUATOR_FIELDS, "commanded_torque", "actuator_commands")
+MESSAGE_FAULTS = ("drop_state@0.05-0.1:0.2", "delay_command@0.15-0.2:2", "nan_state@0.25-0.3:0.3")
+OPTIONS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
+    "wheels": ({"actuators": "wheels"}, ()),
+    "both": ({"actuators": "wheels_and_thrusters", "sensors": "fine"}, ("--composed",)),
+    "faults": (
+        {"actuators": "wheels", "seed": 2, "faults": ["wheel_fail@0.2:2", *MESSAGE_FAULTS]},
+        ("--composed",),
+    ),
+}
+
+
+@pytest.fixture(params=OPTIONS)
+def flown(request: pytest.FixtureRequest, fly: Callable[..., Flown]) -> tuple[Flown, FlightPlan]:
+    options, more = OPTIONS[request.param]
+    words = ["--duration", "0.4", *more]
+    for name, value in options.items():
+        if name == "faults":
+            words += [word for fault in value for word in ("--fault", fault)]
+        else:
+            words += [f"--{name}", str(value)]
+    return fly(*words), FlightPlan.model_validate({"duration": 0.4, **options})
+
+
+def test_actuators_fly_in_the_graph_as_in_one_process(flown: tuple[Flown, FlightPlan]) -> None:
+    log, expected = read_flight(flown[0].bag), simulate(Flight(flown[1]))
+    for one, other in ((log, expected), (log.as_measured(), expected.as_measured())):
+        for column in COLUMNS:
+            np.testing.assert_array_equal(getattr(one, column), getattr(other, column), column)
+    assert not any(log.lost.values())
+    assert log.flight == expected.flight
+
+
+def test_a_flight_with_actuators_is_replayed_to_the_bit(flown: tuple[Flown, FlightPlan]) -> None:
+    """The controller has all of its actuators' numbers from the bag."""
+    result = space_robot("replay", str(flown[0].bag), "--json")
+    assert result.returncode == 0, result.stdout + result.stderr
+    report = json.loads(result.stdout)
+    assert report["passed"]
+    assert report["equal"] == report["compared"] > 0
+    assert "effort[wheel_1]" not in result.stdout
+    assert report["axes"]["wheel_1"]["difference_max"] == 0.0
