@@ -4,6 +4,7 @@ Nothing here uses pyplot or leaves a trace in matplotlib's settings, so figures 
 worker processes. The same log gives the same bytes.
 """
 
+from .base_actuators import momentum, thrusters, wheels
 from .base_torque import chatter, junctions
 from .overlay import errors_and_torques, latency_histogram, pointing
 from .ripple import ripple
@@ -12,5 +13,5 @@ from .style import save_figure
 
 __all__ = [
     "chatter", "control_results", "desired_joints", "errors_and_torques", "junctions",
-    "latency_histogram", "pointing", "ripple", "save_figure",
+    "latency_histogram", "momentum", "pointing", "ripple", "save_figure", "thrusters", "wheels",
 ]  # fmt: skip

@@ -127,7 +127,7 @@ def power_spectral_density(values: Array, period: float) -> tuple[Array, Array]:
 
 def _draw_spectra(axes: Axes, spectra: Mapping[str, tuple[Array, Array]]) -> None:
     for index, (frequency, density) in enumerate(spectra.values()):
-        if len(frequency) == 0:
+        if not np.isfinite(density).any():  # too short, or no torque at all
             continue
         look = Look.of(index)
         even = np.geomspace(frequency[0], frequency[-1], 1000)
@@ -137,7 +137,7 @@ def _draw_spectra(axes: Axes, spectra: Mapping[str, tuple[Array, Array]]) -> Non
             color=look.colour, linestyle=look.dashes, marker=look.marker, markevery=marks.tolist(),
         )  # fmt: skip
     axes.set(xscale="log", yscale="log")
-    if not axes.get_lines():  # all too short: one mark alone gives no scale
+    if not axes.get_lines():  # one mark alone gives no scale
         axes.set_xlim(0.1 * CHATTER_FREQUENCY, 10.0 * CHATTER_FREQUENCY)
     mark_moments(axes, np.array([CHATTER_FREQUENCY]))
     axes.set(xlabel="frequency (Hz)", ylabel="PSD of base torque, x + y + z ((N m)²/Hz)")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,9 +12,12 @@ from matplotlib.figure import Figure
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, laws_of
+from space_robot_msgs_py.errors import InputError
 
+from ..described import flown_actuators, momentum_of
 from ..plot_series import PlotSeries
 from ..words import flown
+from .base_actuators import momentum, thrusters, wheels
 from .base_torque import chatter, junctions
 from .overlay import errors_and_torques, latency_histogram, pointing
 from .ripple import ripple
@@ -64,6 +68,8 @@ class FigureSet:
         self._flights: dict[str, PlotSeries] = {}
         self._missions: dict[bytes, tuple[str, Figure]] = {}
         self._first: Figure | None = None
+        self._hardware: dict[str, dict[str, tuple[str, Figure]]] = {}
+        """Caption and figure by file, of each flight whose base had other than ideal actuators."""
 
     def add(self, name: str, log: FlightLog) -> None:
         """Take a flight."""
@@ -72,6 +78,9 @@ class FigureSet:
         if not self._flights:
             self._first = control_results(log, title(name, log))
         self._flights[name] = PlotSeries.of(log)
+        if log.flight.get("base_actuators"):
+            with suppress(InputError):
+                self._hardware[name] = dict(_of_hardware(log.longest_stretch()))
 
     def save(self, folder: Path) -> list[SavedFigure]:
         """Draw all figures into ``folder``, each as PNG and SVG; older ones are replaced.
@@ -105,9 +114,33 @@ class FigureSet:
             yield "junctions", "Base torque x where two motions meet", junctions(torques)
             yield "chatter", "A stretch of base torque, and its spectrum", chatter(torques)
         yield "ripple", "Spectrum of the torques' ripple", ripple(flights)
+        for number, (name, figures) in enumerate(self._hardware.items(), start=1):
+            suffix, of = (f"_{number}", f" of {name}") if len(flights) > 1 else ("", "")
+            for stem, (caption, figure) in figures.items():
+                yield f"{stem}{suffix}", f"{caption}{of}", figure
         caption = "The end effector's pointing error in the inertial frame"
         yield "pointing", caption, pointing(flights)
         yield "latency", "Time from a state's sending to its command's", latency_histogram(flights)
+
+
+def _of_hardware(log: FlightLog) -> Iterator[tuple[str, tuple[str, Figure]]]:
+    """Draw what turned the base, or that nothing did: by the file's name, with the caption.
+
+    Raises:
+        InputError: robot, actuators or environment are not known, or there is no whole tick.
+    """
+    if not log.ticks:
+        raise InputError("no tick has both a state and a reference")
+    flown, found = flown_actuators(log), momentum_of(log).add(log)
+    caption = "Angular momentum about the common centre of mass"
+    yield "momentum", (caption, momentum(log, found, flown))
+    if flown.wheel_count:
+        caption = "Momentum and torque of the wheels, between their limits"
+        yield "wheels", (caption, wheels(log, flown.wheels))
+    if flown.thruster_count:
+        pushed = found.centre_of_mass - found.centre_of_mass[0]
+        caption = "Pulses and propellant, how far the robot was pushed, and the limit cycle"
+        yield "thrusters", (caption, thrusters(log, pushed, flown.thrusters))
 
 
 def title(name: str, log: FlightLog) -> str:

@@ -37,6 +37,8 @@ def ripple(flights: Mapping[str, PlotSeries]) -> Figure:
                 continue
             frequency = spectrum.frequency
             density = spectrum.group(column[key]) / (frequency[1] - frequency[0])
+            if not density.any():
+                continue
             look = Look.of(names.index(name))
             panel.plot(
                 frequency, np.where(density > 0.0, density, np.nan), color=look.colour,
