@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import shlex
+from collections.abc import Mapping
 
 from space_robot_msgs_py.topics import BASE_AXES
 from space_robot_sim.faults.axes import About
@@ -16,6 +17,13 @@ from ...laws import laws
 CASES = ("1", "2", "3", "4-1", "4-2")
 JOINTS = 6
 """Joints of the paper's robot."""
+Counts = Mapping[About, int]
+"""How many of each there are, counted from 1."""
+ACTUATORS: dict[str, Counts] = {
+    "ideal": {}, "wheels": {About.WHEEL: 4},
+    "wheels_and_thrusters": {About.WHEEL: 4, About.THRUSTER: 12},
+}  # fmt: skip
+"""Actuators that can fly a case, with how many wheels and thrusters they have."""
 MOST_FAULTS, MOST_SWAPS = 4, 2
 SHORTEST_S = 0.5
 """A flight is at least that long."""
@@ -47,12 +55,13 @@ EARLIEST_S = {"kill_recorder": 1.5}
 BREAKING = (
     "kill_controller", "stop_controller", "kill_mission", "stop_mission",
     "saturate_base", "saturate_joints", "stuck_joint", "tracker_blind", "encoder_stuck",
+    "wheel_fail", "thruster_stuck_on", "thruster_stuck_off",
 )  # fmt: skip
-"""Faults that take the torque, the reference or a measurement away."""
+"""Faults that take torque, reference or a measurement away, or give a torque nobody asked for."""
 
 
 def sample_flight(seed: int, index: int, duration_s: float = 5.0) -> FlightPlan:
-    """Return a random flight: law, case, swaps, one to four faults.
+    """Return a random flight: law, case, actuators, swaps, one to four faults.
 
     The same for the same arguments. Kinds differ within a flight, and recorder and mission fail
     at most once: a process that was killed cannot be stopped.
@@ -63,12 +72,13 @@ def sample_flight(seed: int, index: int, duration_s: float = 5.0) -> FlightPlan:
         duration_s: how long it flies, at least `SHORTEST_S`.
     """
     rng = random.Random(f"{seed}/{index}")
-    names = sorted(laws())
+    names, actuators = sorted(laws()), rng.choice(list(ACTUATORS))
     return FlightPlan(
         controller=rng.choice(names),
         case=rng.choice(CASES),
+        actuators=actuators,
         duration=duration_s,
-        faults=_faults(rng, duration_s),
+        faults=_faults(rng, duration_s, actuators),
         seed=rng.randrange(2**31),
         swaps=[
             f"{ms / 1000}:{rng.choice(names)}"
@@ -90,7 +100,7 @@ def command_line(plan: FlightPlan) -> str:
     """Return the command that flies a sampled flight again."""
     words = [
         "space-robot", "fly", "--controller", plan.controller, "--case", plan.case,
-        "--duration", str(plan.duration), "--seed", str(plan.seed),
+        "--actuators", plan.actuators, "--duration", str(plan.duration), "--seed", str(plan.seed),
     ]  # fmt: skip
     for option, texts in (("--swap", plan.swaps), ("--fault", plan.faults)):
         for text in texts:
@@ -103,9 +113,14 @@ def _within(duration_s: float) -> range:
     return range(round(100 * duration_s), round(900 * duration_s))
 
 
-def _faults(rng: random.Random, duration_s: float) -> list[str]:
+def _faults(rng: random.Random, duration_s: float, actuators: str) -> list[str]:
     latest_s = _within(duration_s)[-1] / 1000
-    kinds = [kind for kind in KINDS.values() if EARLIEST_S.get(kind.name, 0.0) < latest_s]
+    counts = {About.AXIS: JOINTS, About.JOINT: JOINTS, **ACTUATORS[actuators]}
+    kinds = [
+        kind
+        for kind in KINDS.values()
+        if EARLIEST_S.get(kind.name, 0.0) < latest_s and _is_there(kind, counts)
+    ]
     texts, failed = [], set()
     for kind in rng.sample(kinds, rng.randint(1, MOST_FAULTS)):
         node = NODE_OF.get(kind)
@@ -113,11 +128,11 @@ def _faults(rng: random.Random, duration_s: float) -> list[str]:
             if node in failed:
                 continue
             failed.add(node)
-        texts.append(_fault(rng, kind, duration_s))
+        texts.append(_fault(rng, kind, duration_s, counts))
     return texts
 
 
-def _fault(rng: random.Random, kind: Kind, duration_s: float) -> str:
+def _fault(rng: random.Random, kind: Kind, duration_s: float, counts: Counts) -> str:
     may_begin = _within(duration_s)
     start = rng.randrange(
         max(may_begin.start, round(1000 * EARLIEST_S.get(kind.name, 0.0))), may_begin.stop
@@ -130,22 +145,27 @@ def _fault(rng: random.Random, kind: Kind, duration_s: float) -> str:
         stop = f"-{rng.randint(start + 1, latest) / 1000}"
     argument = ""
     if kind.argument and not is_silence:
-        argument = f":{_argument(rng, kind.name, kind.argument)}"
+        argument = f":{_argument(rng, kind.name, kind.argument, counts)}"
     return f"{kind.name}@{start / 1000}{stop}{argument}"
 
 
-def _argument(rng: random.Random, kind: str, argument: Argument) -> str:
+def _is_there(kind: Kind, counts: Counts) -> bool:
+    about = kind.argument.about if kind.argument else None
+    return about in (None, About.BASE_AXIS) or about in counts
+
+
+def _argument(rng: random.Random, kind: str, argument: Argument, counts: Counts) -> str:
     if not argument.symbol:
-        return _axis(rng, argument)
+        return _axis(rng, argument, counts)
     low, high = LIMITS.get(kind, LIMITS[argument.symbol])
     if argument.whole:
         return str(rng.randint(round(low), round(high)))
     # as often from 1e-8 to 1e-7 as from 1e-7 to 1e-6
     number = f"{low * (high / low) ** rng.random():.4g}"
-    return f"{_axis(rng, argument)}={number}" if argument.about else number
+    return f"{_axis(rng, argument, counts)}={number}" if argument.about else number
 
 
-def _axis(rng: random.Random, argument: Argument) -> str:
-    if argument.about is About.BASE_AXIS:
+def _axis(rng: random.Random, argument: Argument, counts: Counts) -> str:
+    if argument.about is None or argument.about is About.BASE_AXIS:
         return rng.choice(BASE_AXES)
-    return str(rng.randint(1, JOINTS))
+    return str(rng.randint(1, counts[argument.about]))

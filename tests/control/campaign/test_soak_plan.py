@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from space_robot_control.campaign.soak.process_monitor import node_of
 from space_robot_control.campaign.soak.sampling import (
+    ACTUATORS,
     BREAKING,
     CASES,
     LONGEST_S,
@@ -26,9 +27,10 @@ from space_robot_control.campaign.soak.sampling import (
 from space_robot_control.campaign.soak.verdict import unplanned_deaths
 from space_robot_control.cli.main import cli
 from space_robot_control.flight.faults import KINDS
-from space_robot_control.flight.plan import Flight
+from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.laws import laws
 from space_robot_msgs_py.errors import InputError
+from space_robot_sim.faults.axes import About
 from space_robot_sim.faults.grammar import Fault, parse_faults
 
 SEEDS = st.integers(0, 2**63)
@@ -72,6 +74,7 @@ def test_everything_is_drawn() -> None:
     assert set(drawn) == set(KINDS)
     assert {plan.controller for plan in MANY} == set(laws())
     assert {plan.case for plan in MANY} == set(CASES)
+    assert {plan.actuators for plan in MANY} == set(ACTUATORS)
     assert {len(plan.faults) for plan in MANY} == set(range(1, MOST_FAULTS + 1))
     assert any(plan.swaps for plan in MANY)
 
@@ -120,7 +123,7 @@ def test_the_command_line_flies_the_same_plan(seed: int, number: int) -> None:
     assert (program, name) == ("space-robot", "fly")
     command = cli.commands["fly"]
     parsed = command.make_context("fly", words, parent=click.Context(cli)).params
-    for key in ("controller", "case", "duration", "seed", "restart_controller"):
+    for key in ("controller", "case", "actuators", "duration", "seed", "restart_controller"):
         assert parsed[key] == getattr(plan, key), key
     assert list(parsed["faults"]) == plan.faults
     assert list(parsed["swaps"]) == plan.swaps
@@ -157,3 +160,12 @@ def test_without_psutil_there_is_one_line(monkeypatch: pytest.MonkeyPatch) -> No
     result = CliRunner().invoke(cli, ["soak", "--minutes", "0.01"])
     assert isinstance(result.exception, InputError)
     assert str(result.exception) == "soak needs psutil: pip install 'space_robot[soak]'"
+
+
+@pytest.mark.parametrize("actuators", ACTUATORS)
+def test_actuators_have_as_many_wheels_and_thrusters_as_faults_are_drawn_for(
+    actuators: str,
+) -> None:
+    settings = Flight(FlightPlan(actuators=actuators)).plant_settings
+    counts = {About.WHEEL: settings.wheel_count, About.THRUSTER: settings.thruster_count}
+    assert {about: count for about, count in counts.items() if count} == ACTUATORS[actuators]
