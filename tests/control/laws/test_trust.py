@@ -138,6 +138,12 @@ def test_a_replay_reads_no_file_that_a_bag_names(tmp_path: Path) -> None:
         folder.mkdir()
         with pytest.raises(NotTrustedError, match="read only with --trust"):
             ControllerChoice(lacking, folder)
+    lacking = described(controller_node={"actuators": str(secret)})
+    (tmp_path / "actuators_named").mkdir()
+    with pytest.raises(
+        NotTrustedError, match=r"a file as its actuators, .*: read only with --trust"
+    ):
+        ControllerChoice(lacking, tmp_path / "actuators_named")
     swapped = described(controller_node={"gains": str(secret), "swaps": ["0.1:ctc"]})
     (tmp_path / "swapped").mkdir()
     with pytest.raises(InputError, match=r"secret.yaml', read only with --trust"):

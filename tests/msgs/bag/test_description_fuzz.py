@@ -42,7 +42,7 @@ fuzzed = settings(
 
 MODULE = "this"
 """Importing it prints, and it is in no one's way."""
-PLAN = FlightPlan(duration=0.02, swaps=["0.005:ctc"], case="3")
+PLAN = FlightPlan(duration=0.02, swaps=["0.005:ctc"], case="3", actuators="wheels")
 
 scalars = st.one_of(
     st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=12),
