@@ -116,13 +116,14 @@ class Plant:
         """Ring of the commands that are still on their way."""
         memory.x[3:7] = np.array(settings.initial_quaternion) / norm
         memory.x[7 : 7 + n] = np.radians(settings.initial_joints_deg)
-        mount_wheels(memory, settings.wheels)
+        speeds = memory.x[13 + 2 * n :]
+        mount_wheels(settings.wheels, memory.model, memory.environment.friction, speeds)
         self.truth = RobotState(0, self.block["truth"])
         self.state = RobotState(0, self.block["measured"])
         # at rest: what `write_truth` would say, without waiting for compiled code
         self.truth.quaternion[:] = memory.x[3:7]
         self.truth.joint_positions[:] = memory.x[7 : 7 + n]
-        self.truth.wheel_velocities[:] = memory.x[13 + 2 * n :]
+        self.truth.wheel_velocities[:] = speeds
         sensors = Sensors.build(n, settings, period, memory.truth)
         self._part_faults = PartFaults(settings.schedule(self.names, period))
         if self._part_faults.are_in("sensors"):

@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import numpy as np
+from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.records import assign
 
 from ..actuators.wheels import WheelSettings
+from ..dynamics.model import Model
 from ..environment.friction import Friction
 
-if TYPE_CHECKING:
-    from .plant import PlantMemory
+Array = NDArray[np.float64]
 
 
-def mount_wheels(memory: PlantMemory, wheels: WheelSettings) -> None:
-    """Let the plant's base carry ``wheels``, which turn as they do at tick 0."""
+def mount_wheels(
+    wheels: WheelSettings, model: Model, friction: Friction, velocities: Array
+) -> None:
+    """Let a plant's base carry ``wheels``, which turn as they do at tick 0.
+
+    Args:
+        wheels: which fit the base.
+        model: of the plant's robot.
+        friction: in which that of the wheels is put.
+        velocities: (MOST_WHEELS,) of the wheels in the plant's state, rad/s.
+    """
     count = wheels.count
     if not count:
         return
-    model, friction = memory.model, memory.environment.friction
     assign(model, wheel_count=count)
     model.wheel_axis[:count] = wheels.unit_axes
     model.wheel_inertia[:count] = wheels.values("rotor_inertia")
     Friction.add_wheels(friction, wheels.values("coulomb"), wheels.values("viscous"))
-    n = memory.truth.joint_positions.size
-    memory.x[13 + 2 * n :][:count] = wheels.values("initial_speed")
+    velocities[:count] = wheels.values("initial_speed")
