@@ -1,4 +1,4 @@
-"""``space-robot sweep``: laws beside one another over grades of sensors."""
+"""``space-robot sweep``: laws beside one another over grades of sensors and sets of actuators."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import click
 
 from .options import OUTPUT, flight_options, folder_option, put_json
 
+GRADES = ("ideal", "fine", "tactical", "coarse")
+
 
 @click.command()
 @click.option(
@@ -18,11 +20,15 @@ from .options import OUTPUT, flight_options, folder_option, put_json
 @click.option(
     "--sensors", multiple=True, metavar="NAME",
     help="Sensors of config/sensors, or a path; repeatable "
-    "[default: ideal, fine, tactical, coarse].",
+    "[default: ideal, fine, tactical, coarse; with --actuators: ideal].",
+)  # fmt: skip
+@click.option(
+    "--actuators", multiple=True, metavar="NAME",
+    help="Actuators of config/actuators, or a path; repeatable [default: ideal].",
 )  # fmt: skip
 @click.option(
     "--draws", type=click.IntRange(1, 100_000), default=1, show_default=True,
-    help="Flights of every law with every sensors.",
+    help="Flights of every law with all hardware.",
 )  # fmt: skip
 @click.option(
     "--spread", type=click.FloatRange(0.0, 1.0, max_open=True), default=0.0, show_default=True,
@@ -39,7 +45,6 @@ from .options import OUTPUT, flight_options, folder_option, put_json
     "mission",
     "duration",
     "navigation",
-    "actuators",
     "latency",
     "friction",
     "set",
@@ -49,6 +54,7 @@ from .options import OUTPUT, flight_options, folder_option, put_json
 def sweep(
     laws: tuple[str, ...],
     sensors: tuple[str, ...],
+    actuators: tuple[str, ...],
     draws: int,
     spread: float,
     seed: int,
@@ -58,7 +64,7 @@ def sweep(
     output: Path | None,
     **common: Any,
 ) -> None:
-    """Fly every law with every grade of sensors, and compare errors and ripple.
+    """Fly every law with all sensors and actuators, and compare errors and ripple.
 
     Errors are those of the truth. All laws fly the same draws of masses and noise. Exit code 0
     also if flights diverge: the table says how many.
@@ -68,6 +74,7 @@ def sweep(
       space-robot sweep --navigation filtered
       space-robot sweep --law tde_stc --law tde_tsmc=tuned --sensors white_l1 --case 3
       space-robot sweep --draws 15 --spread 0.2 --out sweep --json
+      space-robot sweep --actuators ideal --actuators wheels --actuators thrusters --actuators none
     """
     from space_robot_msgs_py.config.validation import validate
 
@@ -86,13 +93,14 @@ def sweep(
 
     given = {
         "laws": [Law.parse(text) for text in dict.fromkeys(laws or sorted(all_laws()))],
-        "sensors": list(dict.fromkeys(sensors or ("ideal", "fine", "tactical", "coarse"))),
+        "sensors": list(dict.fromkeys(sensors or (("ideal",) if actuators else GRADES))),
+        "actuators": list(dict.fromkeys(actuators or ("ideal",))),
         "draws": draws, "spread": spread, "seed": seed, "common": common,
     }  # fmt: skip
     study = validate(Sweep, given, "options")
     if out:
         make_folder(out)
-        for name in ("table.csv", "summary.md", "sensors.png", "sensors.svg"):
+        for name in ("table.csv", "summary.md", "sweep.png", "sweep.svg"):
             check_writable(out / name)
     compile_kernels()
     with counting_progress("flights") as progress:
@@ -105,11 +113,11 @@ def sweep(
         flights = Table.of(
             "", [Column(name) for name in names], [[r.get(n) for n in names] for r in records]
         )
-        summary = as_markdown("Laws over grades of sensors", [table])
+        summary = as_markdown("Laws over sensors and actuators", [table])
         for name, text in (("table.csv", as_csv(flights)), ("summary.md", summary)):
             with whole_file(out / name, replace=True) as file:
                 file.write(text.encode())
-        save_figure(figure(found), out / "sensors")
+        save_figure(figure(found), out / "sweep")
     put_json({"cells": as_records(found)}, as_json, output)
     if not as_json:
         print_table(table, terminal())

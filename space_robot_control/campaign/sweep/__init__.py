@@ -1,4 +1,4 @@
-"""Laws beside one another over grades of sensors, each under the same random robots."""
+"""Laws beside one another over sensors and actuators, each under the same random robots."""
 
 from .run import sweep
 from .scenario import Law, Sweep

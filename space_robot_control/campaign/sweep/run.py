@@ -29,10 +29,10 @@ class Row(NamedTuple):
 
     def as_record(self) -> dict[str, Any]:
         """Return it as a flat dictionary."""
-        law, sensors, number = self.draw
+        law, sensors, number, actuators = self.draw
         return {
-            "controller": law.controller, "gains": law.gains, "sensors": sensors, "draw": number,
-            "failure": self.failure, **self.metrics,
+            "controller": law.controller, "gains": law.gains, "sensors": sensors,
+            "actuators": actuators, "draw": number, "failure": self.failure, **self.metrics,
         }  # fmt: skip
 
 

@@ -1,8 +1,9 @@
-"""The flights of a sweep: every law with all sensors under every draw of the robot's masses."""
+"""The flights of a sweep: every law with all sensors and actuators under every draw of masses."""
 
 from __future__ import annotations
 
 import copy
+import itertools
 from collections.abc import Iterator
 from typing import Annotated, Any, NamedTuple
 
@@ -39,7 +40,8 @@ class Draw(NamedTuple):
     law: Law
     sensors: str
     number: int
-    """The same robot and noise for all laws and sensors."""
+    """The same robot and noise for all laws, sensors and actuators."""
+    actuators: str = "ideal"
 
 
 class Sweep(StrictModel):
@@ -47,8 +49,9 @@ class Sweep(StrictModel):
 
     laws: list[Law]
     sensors: list[str]
+    actuators: list[str] = Field(default_factory=lambda: ["ideal"])
     draws: Annotated[int, Field(ge=1, le=100_000)] = 1
-    """Flights of every law with every sensors."""
+    """Flights of every law with every sensors and actuators."""
     spread: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.0
     """Largest relative error of every mass and inertia; 0: the nominal robot."""
     seed: Annotated[int, Field(ge=0, le=2**30)] = 0
@@ -56,18 +59,18 @@ class Sweep(StrictModel):
     """Options of `FlightPlan` that all flights share."""
 
     def flights(self) -> Iterator[Draw]:
-        """Yield every flight: laws of one sensors and draw follow one another."""
-        for sensors in self.sensors:
+        """Yield every flight: laws of one hardware and draw follow one another."""
+        for actuators, sensors in itertools.product(self.actuators, self.sensors):
             for index in range(self.draws):
                 for law in self.laws:
-                    yield Draw(law, sensors, index)
+                    yield Draw(law, sensors, index, actuators)
 
     def plan(self, draw: Draw, robot: str | None) -> FlightPlan:
         """Return the plan of a flight; ``robot`` is the file of the plant's own robot, if any."""
-        law, sensors, number = draw
+        law, sensors, number, actuators = draw
         plan = FlightPlan(
-            controller=law.controller, gains=law.gains, sensors=sensors, seed=self.seed + number,
-            **self.common,
+            controller=law.controller, gains=law.gains, sensors=sensors, actuators=actuators,
+            seed=self.seed + number, **self.common,
         )  # fmt: skip
         if robot is None:
             return plan

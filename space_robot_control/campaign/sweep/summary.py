@@ -27,10 +27,11 @@ DRAWN = ("attitude", "ripple_base_torque", "joints_4_6", "ripple_torque_4_6")
 
 
 class Cell(NamedTuple):
-    """All flights of a law with some sensors."""
+    """All flights of a law with some sensors and actuators."""
 
     law: Law
     sensors: str
+    actuators: str
     flights: int
     failed: int
     metrics: dict[str, tuple[float, float, float]]
@@ -38,38 +39,50 @@ class Cell(NamedTuple):
 
 
 def cells(rows: Sequence[Row]) -> list[Cell]:
-    """Sum up the rows by sensors and law, in their order."""
-    found: dict[tuple[str, Law], list[Row]] = {}
+    """Sum up the rows by hardware and law, in their order."""
+    found: dict[tuple[Law, str, str], list[Row]] = {}
     for row in rows:
-        found.setdefault((row.draw.sensors, row.draw.law), []).append(row)
-    return [_cell(law, sensors, own) for (sensors, law), own in found.items()]
+        law, sensors, _, actuators = row.draw
+        found.setdefault((law, sensors, actuators), []).append(row)
+    return [_cell(*key, own) for key, own in found.items()]
 
 
-def _cell(law: Law, sensors: str, rows: Sequence[Row]) -> Cell:
+def _cell(law: Law, sensors: str, actuators: str, rows: Sequence[Row]) -> Cell:
     flown = [row.metrics for row in rows if not row.failure]
     metrics = {}
     for name in flown[0] if flown else ():
         low, middle, high = np.quantile([m[name] for m in flown], (0.05, 0.5, 0.95)).tolist()
         metrics[name] = low, middle, high
-    return Cell(law, sensors, len(rows), len(rows) - len(flown), metrics)
+    return Cell(law, sensors, actuators, len(rows), len(rows) - len(flown), metrics)
+
+
+def hardware(found: Sequence[Cell]) -> dict[str, list[str]]:
+    """Return what the cells fly with, a value a cell: sensors, actuators, or both if both vary."""
+    named = {
+        "sensors": [cell.sensors for cell in found],
+        "actuators": [cell.actuators for cell in found],
+    }
+    varying = {key: values for key, values in named.items() if len(set(values)) > 1}
+    return varying or {"sensors": named["sensors"]}
 
 
 def summary_table(found: Sequence[Cell]) -> Table:
-    """Tabulate the medians, a group a grade of sensors."""
+    """Tabulate the medians, a group for every hardware."""
+    flown_with = hardware(found)
     columns = (
         Column("law", is_label=True), Column("gains", is_label=True),
         *(Column(name, unit, ".2g") for name, unit in SHOWN.values()),
         Column("failed"),
     )  # fmt: skip
-    groups: dict[str, list[list[Any]]] = {}
-    for cell in found:
+    groups: dict[tuple[str, ...], list[list[Any]]] = {}
+    for cell, *names in zip(found, *flown_with.values(), strict=True):
         middles = [cell.metrics[name][1] if name in cell.metrics else None for name in SHOWN]
         row = [cell.law.controller, cell.law.gains, *middles, f"{cell.failed} of {cell.flights}"]
-        groups.setdefault(cell.sensors, []).append(row)
+        groups.setdefault(tuple(names), []).append([*names, *row])
     return Table(
         "Medians of errors and ripple",
-        (Column("sensors", is_label=True), *columns),
-        [Group([[name, *row] for row in rows]) for name, rows in groups.items()],
+        (*(Column(name, is_label=True) for name in flown_with), *columns),
+        [Group(rows) for rows in groups.values()],
     )
 
 
@@ -78,7 +91,7 @@ def as_records(found: Sequence[Cell]) -> list[dict[str, Any]]:
     return [
         {
             "controller": cell.law.controller, "gains": cell.law.gains, "sensors": cell.sensors,
-            "flights": cell.flights, "failed": cell.failed,
+            "actuators": cell.actuators, "flights": cell.flights, "failed": cell.failed,
             "metrics": {
                 name: dict(zip(("low", "median", "high"), values, strict=True))
                 for name, values in cell.metrics.items()
@@ -90,17 +103,22 @@ def as_records(found: Sequence[Cell]) -> list[dict[str, Any]]:
 
 @house_style()
 def figure(found: Sequence[Cell]) -> Figure:
-    """Draw errors (left) and ripple (right) of every law by sensors; bars from 5 % to 95 %."""
-    sensors = list(dict.fromkeys(cell.sensors for cell in found))
+    """Draw errors (left) and ripple (right) of every law by hardware; bars from 5 % to 95 %."""
+    titles = [", ".join(map(plain, names)) for names in zip(*hardware(found).values(), strict=True)]
+    kinds = list(dict.fromkeys(titles))
     laws = list(dict.fromkeys(cell.law for cell in found))
     sheet = page(130.0)
     legend_above(sheet, [law.title for law in laws], dashed=False)
     for axes, name in zip(grid(sheet, len(DRAWN), 2, shared=False), DRAWN, strict=True):
         for number, law in enumerate(laws):
             look, shift = Look.of(number), 0.09 * (number - 0.5 * (len(laws) - 1))
-            own = [c for c in found if c.law == law and name in c.metrics]
-            places = [sensors.index(c.sensors) + shift for c in own]
-            low, middle, high = np.array([c.metrics[name] for c in own]).reshape(-1, 3).T
+            own = [
+                (kinds.index(title) + shift, c.metrics[name])
+                for title, c in zip(titles, found, strict=True)
+                if c.law == law and name in c.metrics
+            ]
+            places = [place for place, _ in own]
+            low, middle, high = np.array([values for _, values in own]).reshape(-1, 3).T
             axes.errorbar(
                 places, middle, yerr=(middle - low, high - middle), color=look.colour,
                 marker=look.marker, linestyle="none", markersize=4,
@@ -108,6 +126,6 @@ def figure(found: Sequence[Cell]) -> Figure:
         heading, unit = SHOWN[name]
         axes.set_yscale("log")
         axes.set_ylabel(f"{heading} ({unit})" if unit else f"{heading} error")
-        axes.set_xticks(range(len(sensors)), [plain(name) for name in sensors])
-        axes.set_xlim(-0.5, len(sensors) - 0.5)
+        axes.set_xticks(range(len(kinds)), kinds)
+        axes.set_xlim(-0.5, len(kinds) - 0.5)
     return sheet

@@ -80,6 +80,21 @@ def test_medians_and_spread_leave_failures_out_and_count_them() -> None:
     assert len(figure([good, bad]).axes) == 4
 
 
+def test_sets_of_actuators_are_flown_like_grades_of_sensors() -> None:
+    plan = study(actuators=["ideal", "none"], sensors=["ideal", "white_l1"])
+    rows = sweep(plan)
+    assert [row.draw for row in rows] == list(plan.flights())
+    assert [row.as_record()["actuators"] for row in rows] == ["ideal"] * 4 + ["none"] * 4
+    found = cells(rows)
+    assert ["attitude" in cell.metrics for cell in found] == [True] * 4 + [False] * 4
+    table = summary_table(found)
+    assert [column.name for column in table.columns[:3]] == ["sensors", "actuators", "law"]
+    assert len(table.groups) == 4
+    assert figure(found).axes[0].get_xticklabels()[3].get_text() == "white_l1, none"
+    alone = summary_table(found[:2])
+    assert [column.name for column in alone.columns[:2]] == ["sensors", "law"]
+
+
 def test_a_bad_option_is_refused_before_anything_flies() -> None:
     with pytest.raises(InputError, match="nosuch"):
         sweep(study(sensors=["nosuch"]))
@@ -100,5 +115,5 @@ def test_the_command_writes_tables_and_a_figure(tmp_path: Path) -> None:
     rows = list(csv.DictReader((out / "table.csv").read_text().splitlines()))
     assert [line["sensors"] for line in rows] == ["ideal", "white_l1"]
     assert {path.name for path in out.iterdir()} == {
-        "table.csv", "summary.md", "sensors.png", "sensors.svg",
+        "table.csv", "summary.md", "sweep.png", "sweep.svg",
     }  # fmt: skip
