@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 
 FREE = "nothing turns the base"
 UNAVAILABLE = {
-    "attitude": f"{FREE}: its attitude drifts, and is no error",
-    "base_torque": f"{FREE}: it has no actuators",
+    "attitude": f"{FREE}, so its attitude drifts and is no error",
+    "base_torque": f"{FREE}, for it has no actuators",
 }
 """Columns that a flight with a free base does not have, and why."""
 
