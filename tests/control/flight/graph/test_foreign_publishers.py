@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from flights import Start
 
+from space_robot_control.controller.allocation.believed_actuators import believed_actuators
 from space_robot_control.flight.graph.listeners import wait_for
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.process_environment import set_defaults
@@ -30,10 +31,6 @@ from space_robot_msgs_py.ros.endpoints import RawPublisher, message_type, qos  #
 
 PATIENCE_S = 60.0
 TIMEBASE = Timebase(500_000)
-FLOODED = (
-    topics.JOINT_STATES, topics.BASE_STATE, topics.COMMAND, topics.REFERENCE_JOINTS,
-    topics.REFERENCE_BASE, topics.CLOCK,
-)  # fmt: skip
 
 
 @pytest.fixture
@@ -56,18 +53,23 @@ def pause() -> None:
     time.sleep(0.02)
 
 
-def junk(robot: Robot) -> dict[str, list[bytes]]:
+def junk(robot: Robot, names: RobotNames) -> dict[topics.Topic, list[bytes]]:
     """Messages of every kind of misfit, by topic."""
     future, none = RobotState.allocate(robot.n), RobotState.allocate(robot.n)
     future.tick, none.tick = 10**7, 3
-    none.quaternion[:] = np.nan
+    none.quaternion[:] = none.wheel_velocities[:] = np.nan
     other = Robot.from_yaml("config/robots/seven_joint.yaml")
-    states = StateCodec(RobotNames.of(robot.joint_names), TIMEBASE)
-    foreign = StateCodec(RobotNames.of(other.joint_names), TIMEBASE)
-    pairs = [states.encode(future), states.encode(none)]
-    pairs.append(foreign.encode(RobotState.allocate(other.n)))
-    commands = CommandCodec(robot.axis_names, TIMEBASE)
-    torque = np.full(robot.n + 3, np.nan)
+    states = StateCodec(names, TIMEBASE)
+    actuators = {part: ("other", *getattr(names, part)) for part in ("wheels", "thrusters")}
+    foreign = StateCodec(RobotNames(other.joint_names, **actuators), TIMEBASE)
+    sent = [
+        dict(zip(codec.topics, codec.encode(state), strict=True))
+        for codec, state in (
+            (states, future), (states, none), (foreign, RobotState.allocate(other.n)),
+        )
+    ]  # fmt: skip
+    commands = CommandCodec(names.commanded, TIMEBASE)
+    torque = np.full(len(names.commanded), np.nan)
     chunks = [
         ReferenceCodec(names, TIMEBASE).encode(ReferenceChunk(start, joints, base))
         for names, start, joints, base in (
@@ -77,34 +79,37 @@ def junk(robot: Robot) -> dict[str, list[bytes]]:
         )
     ]
     return {
-        topics.JOINT_STATES.name: [joints for joints, _ in pairs] + [b"\0\1\0\0junk"],
-        topics.BASE_STATE.name: [base for _, base in pairs] + [b"\0\1\0\0junk"],
-        topics.COMMAND.name: [
+        **{topic: [state[topic] for state in sent] + [b"\0\1\0\0junk"] for topic in states.topics},
+        topics.COMMAND: [
             commands.encode(Command(10**7, torque)), commands.encode(Command(1, torque)), b"\0\1",
         ],
-        topics.REFERENCE_JOINTS.name: [joints for joints, _ in chunks] + [b"\0\1\0\0junk"],
-        topics.REFERENCE_BASE.name: [base for _, base in chunks] + [b"\0\1\0\0junk"],
-        topics.CLOCK.name: [ClockCodec().encode(k) for k in (10**15, 7, 0)],
+        topics.REFERENCE_JOINTS: [joints for joints, _ in chunks] + [b"\0\1\0\0junk"],
+        topics.REFERENCE_BASE: [base for _, base in chunks] + [b"\0\1\0\0junk"],
+        topics.CLOCK: [ClockCodec().encode(k) for k in (10**15, 7, 0)],
     }  # fmt: skip
 
 
+@pytest.mark.parametrize("actuators", ["ideal", "wheels_and_thrusters"])
 def test_a_flood_of_junk_on_every_topic_changes_nothing(
-    start: Start, monitor: Monitor, paper_robot: Robot
+    actuators: str, start: Start, monitor: Monitor, paper_robot: Robot
 ) -> None:
     """The flight goes on, its reference never held; what came is counted."""
     start("mission")
-    start("controller")
+    start("controller", actuators=actuators)
     others = [name for name in wait_for("plant") if not name.startswith("recorder")]
-    plant = start("plant", wait_for=others)
+    plant = start("plant", wait_for=others, actuators=actuators)
     until(monitor, lambda: monitor.simulated_s > 0.0, pause)
-    outs = {topic.name: RawPublisher(monitor.node, topic) for topic in FLOODED}
-    until(monitor, lambda: all(out.listener_count for out in outs.values()), pause)
-    bursts, k, begun_s = junk(paper_robot), 0, monitor.simulated_s
+    names = believed_actuators(actuators, paper_robot).robot_names(paper_robot)
+    bursts = junk(paper_robot, names)
+    outs = {topic: RawPublisher(monitor.node, topic) for topic in bursts}
+    heard = [out for topic, out in outs.items() if topic is not topics.THRUSTERS_STATE]
+    until(monitor, lambda: all(out.listener_count for out in heard), pause)
+    k, begun_s = 0, monitor.simulated_s
 
     def flood() -> None:
         nonlocal k
-        for name, out in outs.items():
-            out.publish(bursts[name][k % len(bursts[name])])
+        for topic, out in outs.items():
+            out.publish(bursts[topic][k % len(bursts[topic])])
         k += 1
         time.sleep(0.001)  # leave the flight some of the processor
 
