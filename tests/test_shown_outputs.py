@@ -37,6 +37,13 @@ def test_the_example_of_analysis_is_what_analyze_prints(bags: Path) -> None:
     assert not missing, "\n".join([*missing, "", printed])
 
 
+def test_the_sizing_of_analysis_is_what_analyze_prints(bags: Path) -> None:
+    """Four small wheels beside what the first bag asked of its base."""
+    shown = block("docs/manual/analysis.md", "what actuators small_wheels", "wheels share what")
+    printed = run("analyze", str(bags / "one"), "--actuators", "small_wheels", columns=100)
+    check(shown, printed, "what actuators small_wheels")
+
+
 def test_a_bag_is_as_large_as_the_page_says(bags: Path) -> None:
     """To a hundredth: versions of lz4 compress a little differently."""
     text = (ROOT / "docs/manual/bags.md").read_text("utf-8")
