@@ -30,7 +30,11 @@ class Signals(Record):
     n_hat: Array = per_axis("time-delay estimate N_hat of (35), (36)", "N m")
     """Zero for laws without ``h_bar``."""
     nominal: RhoSpaceModel = nested(RhoSpaceModel)
-    """``inertia`` (m, m) H_S and ``bias`` (m,) c_S; filled only for laws with ``uses_model``."""
+    """``inertia`` (m, m) H_S and ``bias`` (m,) c_S; filled only for laws with ``uses_model``.
+
+    Of a base that nothing turns they are `space_robot_sim.dynamics.free_floating`'s, and all other
+    signals are zero on its axes.
+    """
 
 
 class LawGains(Record):

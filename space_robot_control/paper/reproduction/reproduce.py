@@ -18,6 +18,7 @@ from ...analysis.figures.figure_set import FigureFolder
 from ...analysis.tables import as_csv, as_markdown, as_records
 from ...analysis.template import template
 from ...campaign.processes import processes
+from ...flight.plan import Flight, FlightPlan
 from ...flight.software import commit, versions
 from .claims import claims, claims_table
 from .figures import figure_groups, start_comparisons
@@ -70,9 +71,14 @@ def reproduce(
         What is written as JSON.
 
     Raises:
-        InputError: the folder holds something else.
+        InputError: the folder holds something else, or nothing turns the base.
     """
     check_folder(folder)
+    if not Flight(FlightPlan(actuators=equipment.actuators)).controls_base:
+        raise InputError(
+            f"actuators {equipment.actuators}: Table V has attitude errors and base torques, which "
+            "a base that floats freely has not"
+        )
     folder.parent.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory(dir=folder.parent, prefix=".reproduce-") as temporary:
         work = Path(temporary) / folder.name

@@ -36,6 +36,19 @@ def test_the_rows_do_not_depend_on_the_number_of_processes() -> None:
     assert first != other
 
 
+def test_a_base_that_nothing_turns_has_dashes_beside_one_that_is_held() -> None:
+    found = cells(sweep(study(actuators=["ideal", "none"])))
+    held, free = ([cell for cell in found if cell.actuators == name] for name in ("ideal", "none"))
+    assert not [cell for cell in found if cell.failed]
+    assert all("attitude" in cell.metrics for cell in held)
+    for cell in free:
+        assert not {"attitude", "ripple_base_torque"} & cell.metrics.keys()
+        assert cell.metrics["joints_1_3"][1] > 0.0
+    for shown in (found, free):
+        summary_table(shown)
+        figure(shown).canvas.draw()
+
+
 def test_all_laws_fly_the_same_robot_and_noise() -> None:
     plan = study(draws=3, spread=0.2, seed=5)
     seeds = [plan.plan(Draw(law, "fine", 2), None).seed for law in (STC, CTC)]
