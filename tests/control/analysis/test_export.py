@@ -138,3 +138,21 @@ def test_a_folder_that_cannot_be_is_named(log: FlightLog, tmp_path: Path) -> Non
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="no folder can be made there"):
         write_parquet(log, tmp_path / "file" / "flight.parquet")
+
+
+def test_every_wheel_and_thruster_has_its_columns(tmp_path: Path) -> None:
+    log = FlightLog.allocate(3, ("a",), Timebase(500_000), wheels=2, thrusters=1)
+    log.commanded_torque = np.zeros((3, 4))
+    for k, values in enumerate(log.columns.values()):
+        values[:] = np.arange(values.size).reshape(values.shape) + 100.0 * k
+    write_csv(log, tmp_path / "flight.csv")
+    table = csv.read_csv(tmp_path / "flight.csv")
+    for name, expected in {
+        "wheel_velocity_2_rad_s": log.wheel_velocities[:, 1],
+        "wheel_torque_1_n_m": log.wheel_torques[:, 0],
+        "thrust_1_n": log.thrusts[:, 0],
+        "commanded_wheel_torque_2_n_m": log.actuator_commands[:, 1],
+        "commanded_thrust_1_n": log.actuator_commands[:, 2],
+    }.items():
+        np.testing.assert_array_equal(column(table, name), expected, err_msg=name)
+    assert not any("wheel_velocity_3" in name for name in table.column_names)
