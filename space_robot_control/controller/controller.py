@@ -12,6 +12,9 @@ from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
 from space_robot_sim.robot import Robot
 
 from ..laws import ControlLaw, Signals
+from .allocation.allocation import Allocation
+from .allocation.diagnosis import Diagnosis, diagnose
+from .allocation.settings import AllocationSettings
 from .kernels import (
     LARGEST,
     NOT_UNIT,
@@ -42,7 +45,7 @@ class Controller:
     def __init__(
         self, robot: Robot, law: ControlLaw, period: float, acceleration_filter_hz: float = 0.0,
         navigation: NavigationFilterSettings | None = None,
-        actuators: BaseActuatorSettings | None = None,
+        actuators: BaseActuatorSettings | None = None, allocation: AllocationSettings | None = None,
     ) -> None:  # fmt: skip
         """Build it for a robot and a law.
 
@@ -53,6 +56,7 @@ class Controller:
             acceleration_filter_hz: corner of the low-pass of the time-delay pair (0: none).
             navigation: settings of the navigation filter (None: the laws see what is measured).
             actuators: of the base, as the controller knows them (None: ideal ones).
+            allocation: how it uses them (None: as by default).
 
         Raises:
             InputError: settings that do not fit the period.
@@ -71,8 +75,13 @@ class Controller:
         assign(memory.pair, smoothing=low_pass_weight(acceleration_filter_hz, period))
         if navigation:
             assign(memory, navigation=Navigation.build(robot.n, navigation, period))
+        if actuators.names:
+            how = allocation or AllocationSettings()
+            assign(memory, allocation=Allocation.build(robot.n, actuators, how, period))
         self._memory = memory
         self._command = Command(-1, np.zeros(len(self.names.commanded)))
+        self.valves = slice(robot.n + 3 + actuators.wheel_count, None)
+        """The part of a command that opens thrusters."""
         self.signals = Signals.view(self.block["signals"])
         """The signals that the law saw at the last tick."""
         self.law = law
@@ -117,6 +126,11 @@ class Controller:
         apply_transfer(self.block, state.tick, law.force(self.signals), command.torque)
         command.tick = state.tick
         return command
+
+    @property
+    def allocation(self) -> Diagnosis:
+        """How the base's actuators are doing."""
+        return diagnose(self._memory.allocation)
 
     def telemetry(self) -> tuple[Array, Array, Array, Array]:
         """s, u, N_hat and e of the last tick, (m,) each."""

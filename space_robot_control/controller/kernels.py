@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
-from space_robot_msgs_py.samples import State
+from space_robot_msgs_py.samples import MOST_WHEELS, State
 from space_robot_sim.dynamics.attitude import SINGULAR_ETA, attitude_jacobian_inverse
 from space_robot_sim.dynamics.free_floating import free_floating_into
 from space_robot_sim.dynamics.model import Model
@@ -15,6 +15,7 @@ from space_robot_sim.dynamics.rho_space import rho_space_into
 
 from ..laws import Signals
 from ..laws.compiled import LawCode
+from .allocation.allocation import Allocation, allocate, observe_actuators
 from .navigation.navigation import Navigation, navigate
 from .time_delay_estimation import TimeDelayPair, follows, observe, time_delay_estimate
 from .tracking import (
@@ -68,6 +69,7 @@ class ControllerMemory(Record):
     transfer_left: float = shaped(lambda n: ())
     """Ticks until ``transfer`` has faded; -1: the law takes over at this tick."""
     navigation: Navigation = nested(Navigation)
+    allocation: Allocation = nested(Allocation)
 
 
 @kernel
@@ -83,7 +85,8 @@ def controller_tick(
         tick: of the state.
         state: of a `State`.
         reference: of a `Reference`.
-        torque: (m,) command to be written, if the state is `USABLE`; N m.
+        torque: (m+A,) command to be written, if the state is `USABLE`: torque of every axis,
+            N m, then what is asked of each of the base's actuators.
         period: s.
 
     Returns:
@@ -108,14 +111,16 @@ def compute_signals(
     Args: see `controller_tick`; ``h_bar`` is empty for a law without time-delay estimate.
 
     Returns:
-        `USABLE`, or why the state is not: then nothing was done, but that navigation may have taken
-        a measured state that was usable.
+        `USABLE`, or why the state is not: then nothing was done, but that navigation and allocation
+        may have taken a measured state that was usable.
     """
     memory, measured = block[0], state[0]
     signals, rate, controls_base = memory.signals, memory.rate, memory.controls_base == 1.0
     status: int = status_of(measured, controls_base)
     if status != USABLE:
         return status
+    if memory.allocation.is_used == 1.0:
+        observe_actuators(memory.allocation, tick, measured)
     if memory.navigation.is_filtered == 1.0:
         navigate(memory.navigation, tick, measured, period)
         measured = memory.navigation.estimate
@@ -171,6 +176,8 @@ def status_of(state: State, controls_base: bool) -> int:
         total += abs(state.joint_positions[i]) + abs(state.joint_velocities[i])
     for i in range(state.applied_torque.size):
         total += abs(state.applied_torque[i])
+    for k in range(MOST_WHEELS):
+        total += abs(state.wheel_velocities[k]) + abs(state.wheel_torques[k])
     if not np.isfinite(total):  # any number that is not makes the sum so
         return NOT_FINITE
     if total > LARGEST:
@@ -186,6 +193,7 @@ def apply_transfer(block: Block, tick: int, force: Array, torque: Array) -> None
 
     ``F_S + (F_applied - F_S at the takeover) fade``, the fade falling from 1 to 0. At tick 0
     nothing has been applied, so nothing is taken over. A base that is not controlled gets none.
+    What the base's actuators are asked for stands behind it.
     """
     memory = block[0]
     if memory.transfer_left < 0.0:
@@ -203,3 +211,5 @@ def apply_transfer(block: Block, tick: int, force: Array, torque: Array) -> None
     if memory.controls_base == 0.0:
         for k in range(3):
             memory.force[k] = torque[k] = 0.0
+    if memory.allocation.is_used == 1.0:
+        allocate(memory.allocation, tick, torque[:3], torque[force.size :])

@@ -47,6 +47,7 @@ class ControllerLoop:
         self._controller = Controller(
             robot, self._laws.choice.chosen, settings.period, settings.acceleration_filter_hz,
             settings.filter_settings, believed_actuators(settings.actuators, robot),
+            settings.allocation,
         )  # fmt: skip
         timebase = settings.timebase
         self._states = StateInput(node, self._controller.names, timebase)
@@ -130,10 +131,12 @@ class ControllerLoop:
         supervisor, references = self._answering.supervisor, self._references
         rejected = self._states.rejected + references.rejected + supervisor.rejected
         silence = time.monotonic() - self._state_at
+        allocation = self._controller.allocation
         values: dict[str, float | int | str] = {
             "tick": self._answering.answered,
             "controller": self._controller.law.name,
             "references_held": references.held,
+            **allocation.values,
             **{f"rejected: {reason}": count for reason, count in rejected.items()},
         }
         for entry in (*self._states.inputs, *references.inputs):
@@ -150,6 +153,8 @@ class ControllerLoop:
             return Health("safe: no new state, so no command", Level.ERROR, values)
         if references.is_missing:
             return Health("holding the reference: the mission is silent", Level.WARN, values)
+        if allocation.failed:
+            return Health(allocation.summary, Level.WARN, values)
         return Health("nominal", values=values)
 
     def _look_ahead(self, now: float) -> None:

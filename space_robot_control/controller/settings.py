@@ -13,6 +13,7 @@ from space_robot_msgs_py.config.files import config_directory, named_file
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 from space_robot_msgs_py.config.yaml_text import is_folder
 
+from .allocation.settings import AllocationSettings
 from .navigation.believed_sensors import completed
 from .navigation.settings import Mode, NavigationFilterSettings
 
@@ -62,6 +63,7 @@ class ControllerNodeSettings(NodeSettings):
         description="sensors that the filter is for: of config/sensors, or a path to their YAML",
     )
     navigation_filter: NavigationFilterSettings = NavigationFilterSettings()
+    allocation: AllocationSettings = AllocationSettings()
     hold_ticks: Annotated[int, Field(ge=0, le=10**6)] = Field(
         200, description="bad states over which the last torque is repeated; then it is zero"
     )

@@ -3,7 +3,8 @@
     nominal --bad state--> holding --hold_ticks of them--> safe --good state--> nominal
     nominal --attitude near 180 degrees--> safe
 
-Holding repeats the last good torque, safe commands none. Coming back, the law takes over from the
+Holding repeats the last good torque, but closes the valves of thrusters: how long a pulse is to be
+is not known there. Safe commands none. Coming back, the law takes over from the
 applied force (`Controller.engage`).
 """
 
@@ -84,6 +85,7 @@ class Supervisor:
         if self.mode is Mode.NOMINAL:
             self.mode, self._held_since = Mode.HOLDING, error.tick
             self._command = Command(error.tick, self._command.torque.copy())
+            self._command.torque[self.controller.valves] = 0.0
         self._command.tick = error.tick
         is_singular = isinstance(error, SingularAttitudeError)
         if is_singular or not 0 <= error.tick - self._held_since < self._hold_ticks:

@@ -167,7 +167,7 @@ class Flight:
         self.controller = Controller(
             self._robots.controller, self.law, self.period,
             settings.controller.acceleration_filter_hz, settings.controller.filter_settings,
-            self.believed_actuators,
+            self.believed_actuators, settings.controller.allocation,
         )  # fmt: skip
         self.ticks = self._ticks()
 

@@ -1,0 +1,59 @@
+"""How the base's actuators are doing, as the flight software tells it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .allocation import Allocation
+
+AXES = 3
+
+
+class Diagnosis(NamedTuple):
+    """What the allocation has found."""
+
+    failed: tuple[str, ...]
+    """Names of the wheels that have been taken out."""
+    summary: str
+    """One line; empty if all is well."""
+    values: dict[str, float | int | str]
+    """Numbers worth telling; none where there is nothing to allocate."""
+
+
+def diagnose(allocation: Allocation) -> Diagnosis:
+    """Read the allocation's memory."""
+    if allocation.is_used == 0.0:
+        return Diagnosis((), "", {})
+    wheels, thrusters = allocation.wheels, allocation.thrusters
+    count, rank = int(wheels.count), int(wheels.healthy.rank)
+    failed = tuple(
+        f"wheel_{k + 1}" for k in np.flatnonzero(wheels.healthy.takes_part[:count] == 0.0)
+    )
+    values: dict[str, float | int | str] = {}
+    if count:
+        shares = np.abs(wheels.momentum[:count]) / wheels.max_momentum[:count]
+        values |= {
+            "wheel_axes": rank,
+            "fullest_wheel": float(shares.max()),
+            "demand_scaled_ticks": int(wheels.scaled_ticks),
+            "wheel_full_ticks": int(wheels.full_ticks),
+        }
+    if failed:
+        values["failed"] = ", ".join(failed)
+    if thrusters.count:
+        values["pulses"] = int(allocation.modulation.pulses.sum())
+    if thrusters.count and count:
+        values["unloading"] = "yes" if allocation.unloading.is_under_way else "no"
+    return Diagnosis(failed, _summary(failed, rank, bool(thrusters.count)), values)
+
+
+def _summary(failed: tuple[str, ...], rank: int, has_thrusters: bool) -> str:
+    if not failed:
+        return ""
+    text = f"{', '.join(failed)} failed, left out"
+    if rank == AXES:
+        return text
+    rest = "thrusters take the others" if has_thrusters else "the base is not controlled fully"
+    return f"{text}: wheels turn {rank} of {AXES} axes, {rest}"
