@@ -41,7 +41,7 @@ class AllocationSettings(StrictModel):
         "more than commands are late (0: never)",
     )
     modulation: Modulation = Field(
-        "pwm", description="how thrusters make a mean torque: pwm, sigma_delta or schmitt"
+        "schmitt", description="how thrusters make a mean torque: pwm, sigma_delta or schmitt"
     )
     modulation_period: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
         0.1, description="of pwm: time from one pulse to the next, s"
