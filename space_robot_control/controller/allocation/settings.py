@@ -43,10 +43,10 @@ class AllocationSettings(StrictModel):
     modulation: Modulation = Field(
         "schmitt", description="how thrusters make a mean torque: pwm, sigma_delta or schmitt"
     )
-    modulation_period: Annotated[float, Field(gt=0.0, le=100.0)] = Field(
+    modulation_period: Annotated[float, Field(ge=1e-6, le=100.0)] = Field(
         0.1, description="of pwm: time from one pulse to the next, s"
     )
-    schmitt_on: Annotated[float, Field(gt=0.0, le=1e3)] = Field(
+    schmitt_on: Annotated[float, Field(ge=1e-3, le=1e3)] = Field(
         1.0, description="of schmitt: a thruster opens when it owes so many shortest pulses"
     )
     schmitt_off: Annotated[float, Field(ge=-1e3, le=1e3)] = Field(
@@ -61,7 +61,7 @@ class AllocationSettings(StrictModel):
         0.7, description="share of its largest momentum from which on thrusters unload a wheel"
     )
     unload_to: Share = Field(0.3, description="share at which they have unloaded all wheels")
-    unload_time: Annotated[float, Field(gt=0.0, le=1e6)] = Field(
+    unload_time: Annotated[float, Field(ge=1e-3, le=1e6)] = Field(
         20.0, description="time constant with which the wheels' momentum is unloaded, s"
     )
 

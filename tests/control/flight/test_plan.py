@@ -241,6 +241,12 @@ _SPECIAL: dict[str, st.SearchStrategy[Any]] = {
     ),
     "wheels.max_momentum": st.lists(st.integers(2, 30), min_size=4, max_size=4),
     "wheels.initial_speed": st.lists(st.floats(-1, 1), min_size=4, max_size=4),
+    "allocation.wheels": st.sampled_from(["pseudo_inverse", "least_largest"]),
+    "allocation.modulation": st.sampled_from(["pwm", "sigma_delta", "schmitt"]),
+    "allocation.schmitt_on": st.just(1) | st.floats(1.0, 5.0),
+    "allocation.schmitt_off": st.just(0) | st.floats(-1.0, 0.5),
+    "allocation.unload_above": st.just(1) | st.floats(0.7, 1.0),
+    "allocation.unload_to": st.just(0) | st.floats(0.0, 0.2),
     "waypoint_times": st.just([0, 1.5, 3]),
     "waypoints_deg": st.lists(st.integers(-90, 90), min_size=18, max_size=18),
     "compression": st.sampled_from(["none", "lz4", "zstd"]),
@@ -319,8 +325,10 @@ def test_all_that_is_made_of_a_plan_agrees(parameters: Parameters) -> None:
     robot = Robot.from_yaml(named_file("robots", controller.robot))
     assert believed_actuators(controller.actuators, robot) == flight.believed_actuators
     loop = Controller(
-        robot, law, controller.period, controller.acceleration_filter_hz, controller.filter_settings
-    )
+        robot, law, controller.period, controller.acceleration_filter_hz,
+        controller.filter_settings, believed_actuators(controller.actuators, robot),
+        controller.allocation,
+    )  # fmt: skip
     assert loop.block.tobytes() == flight.controller.block.tobytes()
     assert law.gains_block.tobytes() == flight.controller.law.gains_block.tobytes()
     reference = Mission(6, mission, mission.period).chunk(0, 100)
