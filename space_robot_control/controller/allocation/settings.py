@@ -23,7 +23,7 @@ class AllocationSettings(StrictModel):
         "least_largest (least largest load)",
     )
     null_gain: Annotated[float, Field(ge=0.0, le=1e3)] = Field(
-        0.1,
+        1.0,
         description="rate at which momentum that wheels hold against one another is corrected, "
         "1/s (0: never)",
     )
