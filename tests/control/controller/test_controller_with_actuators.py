@@ -42,7 +42,7 @@ def state_at(tick: int) -> RobotState:
     """Off the reference, so that the base is asked for a torque."""
     state = RobotState.allocate(6)
     state.tick = tick
-    state.quaternion[:] = [np.sqrt(1.0 - 3e-6), 1e-3, -1e-3, 1e-3]
+    state.quaternion[:] = [1.0, 1e-6, -1e-6, 1e-6]
     return state
 
 
