@@ -17,10 +17,10 @@ import pytest
 from flights import Flown
 from paths import CONFIG
 
+from space_robot_control.controller.allocation.believed_actuators import believed_actuators
 from space_robot_control.flight.faults import KINDS
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.samples import RobotNames
 from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule, ScheduledFault
 from space_robot_sim.plant.faults import PLANT_KINDS
@@ -57,6 +57,10 @@ FLIGHTS: dict[str, tuple[str, ...]] = {
         "torque_scale@0.45-0.5:all=0.99", "torque_bias@0.52-0.57:joint2=0.01",
         "drive_scale@0.91-0.94:joints=1.02", "drive_bias@0.95-0.98:base_x=0.01",
     ),
+    "bad hardware": (
+        "thruster_stuck_on@0.1-0.2:3", "wheel_fail@0.3-0.6:2",
+        "thruster_stuck_off@0.7-0.9:thrusters",
+    ),
     "long silences": (
         "scaled_quaternion@0.1-0.25", "drop_command@0.4-0.55", "drop_state@0.7-0.85",
     ),
@@ -67,6 +71,8 @@ OPTIONS = (
     "--duration", "1", "--seed", str(SEED), "--set", f"plant.hold_ticks={HOLD_TICKS}",
     "--set", f"controller.hold_ticks={HOLD_TICKS}",
 )  # fmt: skip
+ACTUATORS = {"bad hardware": "wheels_and_thrusters"}
+"""Of the flights that need others than ideal ones."""
 
 
 @dataclass
@@ -94,7 +100,12 @@ class Seen:
 
     def torque(self, start_s: float, stop_s: float) -> np.ndarray:
         """Applied torque in a stretch."""
-        return self.log.applied_torque[round(start_s / PERIOD) + 1 : round(stop_s / PERIOD)]
+        return self.log.applied_torque[stretch(start_s, stop_s)]
+
+
+def stretch(start_s: float, stop_s: float) -> slice:
+    """The rows of what was applied in a stretch: each tells of the interval before it."""
+    return slice(round(start_s / PERIOD) + 1, round(stop_s / PERIOD))
 
 
 def matters(fault: ScheduledFault, tick: int) -> bool:
@@ -107,12 +118,15 @@ def matters(fault: ScheduledFault, tick: int) -> bool:
 def seen(fly: Fly) -> Callable[[str], Seen]:
     def get(name: str) -> Seen:
         texts = FLIGHTS[name]
-        flown = fly(*OPTIONS, *(word for text in texts for word in ("--fault", text)))
+        actuators = ACTUATORS.get(name, "ideal")
+        words = (word for text in texts for word in ("--fault", text))
+        flown = fly(*OPTIONS, "--actuators", actuators, *words)
+        robot = Robot.from_yaml(CONFIG / "robots/paper.yaml")
         schedule = Schedule(
             parse_faults(texts, PLANT_KINDS),
             SEED,
             PERIOD,
-            RobotNames(Robot.from_yaml(CONFIG / "robots/paper.yaml").joint_names),
+            believed_actuators(actuators, robot).robot_names(robot),
         )
         expected = {
             fault.kind.name: sum(
@@ -199,6 +213,14 @@ MATRIX: list[tuple[str, str, str, Check]] = [
     ("torque_bias", "bad actuators", "flown through", tracks(0.52, 0.57, 1e-2)),
     ("drive_scale", "bad actuators", "the estimate has it", tracks(0.91, 0.94, 1e-2)),
     ("drive_bias", "bad actuators", "the estimate has it", tracks(0.95, 0.98, 1e-2)),
+    ("wheel_fail", "bad hardware", "a dead motor, three wheels go on",
+     lambda seen: not seen.log.wheel_torques[stretch(0.3, 0.6), 1].any()
+     and seen.error(0.3, 1.0) < 1e-2),
+    ("thruster_stuck_on", "bad hardware", "it burns, wheels hold against it",
+     lambda seen: bool(np.all(seen.log.thrusts[stretch(0.1, 0.2), 2] == 0.9))
+     and seen.error(0.1, 0.3) < 1e-2),
+    ("thruster_stuck_off", "bad hardware", "no thrust",
+     lambda seen: not seen.log.thrusts[stretch(0.7, 0.9)].any()),
     ("scaled_quaternion", "long silences", "the controller goes safe, then back",
      lambda seen: "safe: quaternion not unit" in " ".join(seen.modes("controller"))
      and seen.modes("controller")[-1] == "nominal"),
