@@ -24,15 +24,23 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
+from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_WHEELS, State
 
-from ..faults.schedule import PartFault
+from ..faults.schedule import PartFault, Schedule
+from ..robot import Robot
 from .base_actuation import BaseActuatorSettings
 from .command_delay import CommandDelaySettings, delay_command, ring_of
 from .drive import Drive, DriveSettings, WrongDrive, drive_torque
 from .thrusters import StuckThruster, Thrusters, fire
 from .torque_echo import TorqueEcho, TorqueEchoSettings, WrongEcho, report_torque
-from .torque_limit import TorqueLimit, TorqueLimitSettings, WeakActuators, limit_torque
+from .torque_limit import (
+    SATURATE_BASE,
+    TorqueLimit,
+    TorqueLimitSettings,
+    WeakActuators,
+    limit_torque,
+)
 from .wheels import DeadWheel, Wheels, drive_wheels
 
 Array = NDArray[np.float64]
@@ -43,6 +51,19 @@ class ActuatorSettings(
     CommandDelaySettings,
 ):  # fmt: skip
     """Settings of the actuators."""
+
+    def check(self, robot: Robot, file: str) -> None:
+        """See that the numbers fit, see `BaseActuatorSettings.check`.
+
+        Raises:
+            InputError: they do not.
+        """
+        super().check(robot, file)
+        if self.base_actuation != "ideal" and self.base_torque_limit:
+            raise InputError(
+                f"base_torque_limit is for base_actuation ideal, got {self.base_actuation!r} "
+                f"(actuators {file}): wheels have max_torque"
+            )
 
 
 class Actuators(Record):
@@ -97,6 +118,19 @@ FAULTS: dict[str, type[PartFault]] = {
     "thrusters": StuckThruster,
 }
 """The faults of each field of `Actuators`."""
+
+
+def check_faults(schedule: Schedule, settings: BaseActuatorSettings) -> None:
+    """See that the actuators of a base can fail as a flight's faults say.
+
+    Raises:
+        InputError: the torque of a base that is not ideal is to be limited.
+    """
+    if settings.base_actuation != "ideal" and schedule.of(SATURATE_BASE):
+        raise InputError(
+            f"fault {SATURATE_BASE.name} is for base_actuation ideal, got "
+            f"{settings.base_actuation!r}: wheels and thrusters have faults of their own"
+        )
 
 
 def reports_given(actuators: Actuators) -> bool:

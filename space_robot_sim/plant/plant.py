@@ -18,6 +18,7 @@ from ..actuators.actuators import (
     Actuators,
     ActuatorSettings,
     actuate,
+    check_faults,
     command_delay_buffer,
     reports_given,
 )
@@ -125,7 +126,9 @@ class Plant:
         self.truth.joint_positions[:] = memory.x[7 : 7 + n]
         self.truth.wheel_velocities[:] = speeds
         sensors = Sensors.build(n, settings, period, memory.truth)
-        self._part_faults = PartFaults(settings.schedule(self.names, period))
+        schedule = settings.schedule(self.names, period)
+        check_faults(schedule, settings)
+        self._part_faults = PartFaults(schedule)
         if self._part_faults.are_in("sensors"):
             assign(sensors, are_ideal=False)
         assign(memory, sensors=sensors)

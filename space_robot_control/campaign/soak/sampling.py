@@ -119,7 +119,9 @@ def _faults(rng: random.Random, duration_s: float, actuators: str) -> list[str]:
     kinds = [
         kind
         for kind in KINDS.values()
-        if EARLIEST_S.get(kind.name, 0.0) < latest_s and _is_there(kind, counts)
+        if EARLIEST_S.get(kind.name, 0.0) < latest_s
+        and _is_there(kind, counts)
+        and (actuators == "ideal" or kind.name != "saturate_base")
     ]
     texts, failed = [], set()
     for kind in rng.sample(kinds, rng.randint(1, MOST_FAULTS)):

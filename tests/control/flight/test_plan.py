@@ -223,6 +223,7 @@ _SPECIAL: dict[str, st.SearchStrategy[Any]] = {
     "torque_echo": st.sampled_from(["command", "given"]),
     "actuators": st.just("wheels"),
     "base_actuation": st.just("hardware"),
+    "base_torque_limit": st.just(0),
     "wheels.axes": st.just([1, 0, 0, 0, 1.5, 0, 0, 0, 1, 1, 1, 1]),
     "thrusters.positions": st.just([0.0]),
     "thrusters.directions": st.just([0.0]),

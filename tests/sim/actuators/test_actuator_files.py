@@ -143,6 +143,14 @@ def refuses(tmp_path: Path, text: str, why: str) -> None:
     assert caught.value.exit_code == 2
 
 
+@pytest.mark.parametrize("name", ["none", "wheels", "thrusters"])
+def test_a_limit_of_an_ideal_base_is_refused_with_any_other(name: str) -> None:
+    with pytest.raises(InputError, match="base_torque_limit is for base_actuation ideal, got '"):
+        Plant(PAPER, of(name, base_torque_limit=1.0), 5e-4)
+    with pytest.raises(InputError, match="fault saturate_base is for base_actuation ideal, got '"):
+        Plant(PAPER, of(name, faults=["saturate_base@1:0.5"]), 5e-4)
+
+
 def test_a_joint_that_is_called_like_a_wheel() -> None:
     content = yaml.safe_load((CONFIG / "robots/paper.yaml").read_text("utf-8"))
     content["robot"]["links"][2]["name"] = "wheel_2"

@@ -109,9 +109,9 @@ def test_commands_to_wheels_are_late_as_all_others() -> None:
 
 
 def test_the_echo_of_a_base_with_wheels_is_of_what_they_gave() -> None:
-    """Limits and drives of base axes have nothing to act on; joints keep theirs."""
+    """Drives of base axes have nothing to act on; joints keep theirs."""
     more = {
-        "base_torque_limit": 1e-3, "drive_scale": [0.5], "drive_bias": [0.1], "echo_scale": [2.0],
+        "drive_scale": [0.5], "drive_bias": [0.1], "echo_scale": [2.0],
         "echo_bias": [0.25],
     }  # fmt: skip
     found = bench(more=more)
