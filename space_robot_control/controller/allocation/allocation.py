@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.samples import State
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
@@ -97,7 +97,7 @@ def allocate(allocation: Allocation, tick: int, base_torque: Array, command: Arr
             command[k] = wheels.torque[k]
 
 
-@kernel
+@subroutine
 def _allocate_thrusters(allocation: Allocation, tick: int, base_torque: Array) -> None:
     wheels, demand = allocation.wheels, allocation.of_thrusters
     find_unloading(allocation.unloading, wheels, demand)
@@ -105,5 +105,8 @@ def _allocate_thrusters(allocation: Allocation, tick: int, base_torque: Array) -
         for i in range(3):
             for j in range(3):
                 demand[i] += wheels.healthy.beyond[i, j] * base_torque[j]
+    for i in range(3):
+        if not np.isfinite(demand[i]):  # no law's accident is to be owed for good
+            demand[i] = 0.0
     modulate(allocation.modulation, allocation.thrusters, tick, demand)
     expect_torque(allocation.thrusters, tick, allocation.expected)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 
 from .wheel_set import LEAST_SINE, WheelSet
 
@@ -49,13 +49,13 @@ def least_largest(wheels: WheelSet, count: int, wanted: Array, torque: Array) ->
         _correct(wheels, count, wanted, torque)
 
 
-@kernel
+@subroutine
 def _is_along(part: float, whole: float) -> bool:
     """Tell a component along a direction from one of rounding."""
     return abs(part) > LEAST_SINE * whole
 
 
-@kernel
+@subroutine
 def _share_in_plane(
     wheels: WheelSet, count: int, normal: Array, size: float, x: float, y: float, z: float,
     torque: Array,
@@ -106,7 +106,7 @@ def _share_in_plane(
                 torque[k] = (along if dot > 0.0 else -along) / reach * full_load[k]
 
 
-@kernel
+@subroutine
 def _is_in_plane(wheels: WheelSet, k: int, normal: Array, size: float) -> bool:
     """Tell if a wheel of the set turns about an axis across ``normal``."""
     if wheels.takes_part[k] == 0.0:
@@ -116,7 +116,7 @@ def _is_in_plane(wheels: WheelSet, k: int, normal: Array, size: float) -> bool:
     return not _is_along(part, size * wheels.full_load[k])
 
 
-@kernel
+@subroutine
 def _correct(wheels: WheelSet, count: int, wanted: Array, torque: Array) -> None:
     """Add what ``A torque`` lacks of what is wanted, by least squares."""
     x, y, z = wanted[0], wanted[1], wanted[2]

@@ -23,7 +23,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.samples import MOST_THRUSTERS
 
@@ -121,7 +121,7 @@ def modulate(modulation: Modulation, thrusters: Thrusters, tick: int, demand: Ar
             owed[i] -= is_open * thrusters.wrench[j, i] * thrusters.period
 
 
-@kernel
+@subroutine
 def _decide(modulation: Modulation, thrusters: Thrusters) -> None:
     """Set for how long each valve stays open."""
     impulse, open_for, period = modulation.impulse, modulation.open_for, thrusters.period
@@ -143,7 +143,7 @@ def _decide(modulation: Modulation, thrusters: Thrusters) -> None:
         _trigger(modulation, thrusters)
 
 
-@kernel
+@subroutine
 def _trigger(modulation: Modulation, thrusters: Thrusters) -> None:
     """Open and close thrusters by the Schmitt trigger; ``impulse`` is what is owed."""
     impulse, open_for = modulation.impulse, modulation.open_for
@@ -167,7 +167,7 @@ def owed_ticks(modulation: Modulation, thrusters: Thrusters, j: int) -> float:
     return ticks
 
 
-@kernel
+@subroutine
 def _open_best(
     modulation: Modulation, thrusters: Thrusters, threshold: float, slot: float
 ) -> bool:  # fmt: skip
@@ -190,14 +190,14 @@ def _open_best(
     return True
 
 
-@kernel
+@subroutine
 def _open(modulation: Modulation, thrusters: Thrusters, j: int, ticks: float) -> None:
     modulation.open_for[j] = ticks
     for i in range(6):
         modulation.impulse[i] -= thrusters.wrench[j, i] * ticks * thrusters.period
 
 
-@kernel
+@subroutine
 def _cut(modulation: Modulation, thrusters: Thrusters) -> None:
     """Cut the times to a period, and what is owed with them."""
     excess, longest = 1.0, modulation.slot * thrusters.period

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, shaped
 from space_robot_msgs_py.samples import MOST_THRUSTERS
 
@@ -72,7 +72,7 @@ def solve(problem: NonNegative, count: int) -> None:
             is_used[j] = max(is_used[j], 0.0)
 
 
-@kernel
+@subroutine
 def _step(problem: NonNegative, count: int) -> None:
     """Go towards the trial as far as no component becomes negative, until it is reached."""
     x, is_used, trial = problem.x, problem.is_used, problem.trial
@@ -95,7 +95,7 @@ def _step(problem: NonNegative, count: int) -> None:
         _solve_used(problem, count)
 
 
-@kernel
+@subroutine
 def _solve_used(problem: NonNegative, count: int) -> bool:
     """Solve on the columns in use by Cholesky's method; return False if they are dependent."""
     gram, factor, used, trial = problem.gram, problem.factor, problem.used, problem.trial

@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS
 
@@ -91,7 +91,7 @@ def add_null_motion(motion: NullMotion, wheels: Wheels) -> None:
         wheels.torque[k] += scale * motion.torque[k]
 
 
-@kernel
+@subroutine
 def _find_stored(motion: NullMotion, wheels: Wheels) -> None:
     x, y, z = 0.0, 0.0, 0.0
     for k in range(int(wheels.count)):
@@ -104,7 +104,7 @@ def _find_stored(motion: NullMotion, wheels: Wheels) -> None:
         motion.stored[k] = row[0] * x + row[1] * y + row[2] * z
 
 
-@kernel
+@subroutine
 def _choose(motion: NullMotion, wheels: Wheels) -> None:
     """Change c if it leaves a wheel too near to zero, or beyond its largest momentum."""
     if motion.least_speed == 0.0:

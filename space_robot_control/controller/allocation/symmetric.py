@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ def pseudo_inverse(matrix: Array, vectors: Array, inverse: Array) -> int:
     return rank
 
 
-@kernel
+@subroutine
 def _rotate(matrix: Array, vectors: Array, p: int, q: int) -> None:
     """Make ``matrix[p, q]`` zero."""
     if matrix[p, q] == 0.0:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS, State
 
@@ -78,7 +78,7 @@ def observe_wheels(health: WheelHealth, wheels: Wheels, tick: int, state: State)
         tabulate(healthy, wheels.axis, count)
 
 
-@kernel
+@subroutine
 def _is_asked(health: WheelHealth, wheels: Wheels, k: int) -> bool:
     """Tell if a wheel that has not failed, and is not full, should have given something."""
     return bool(

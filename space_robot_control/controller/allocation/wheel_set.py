@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS
 
@@ -82,7 +82,7 @@ def tabulate(wheels: WheelSet, axis: Array, count: int) -> None:
     _tabulate_null(wheels, axis, count)
 
 
-@kernel
+@subroutine
 def _tabulate_facets(wheels: WheelSet, count: int) -> None:
     """Two wheels each span a facet: the torques at which all others have full load."""
     wheels.pairs = 0.0
@@ -105,7 +105,7 @@ def _tabulate_facets(wheels: WheelSet, count: int) -> None:
             wheels.pairs += 1.0
 
 
-@kernel
+@subroutine
 def _tabulate_null(wheels: WheelSet, axis: Array, count: int) -> None:
     """Take the null vector whose least part is largest, of the projections of all sign patterns."""
     wheels.null[:] = 0.0
@@ -127,7 +127,7 @@ def _tabulate_null(wheels: WheelSet, axis: Array, count: int) -> None:
         wheels.null[k] = wheels.null[k] / largest if largest > 0.0 else 0.0
 
 
-@kernel
+@subroutine
 def _null_parts(
     wheels: WheelSet, axis: Array, count: int, pattern: int, is_chosen: bool
 ) -> tuple[float, float]:
@@ -159,7 +159,7 @@ def _null_parts(
     return least, largest
 
 
-@kernel
+@subroutine
 def _part(wheels: WheelSet, pattern: int, k: int, x: float, y: float, z: float) -> float:
     sign = wheels.takes_part[k] * (-1.0 if (pattern >> k) & 1 else 1.0)
     row = wheels.inverse[k]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS
 from space_robot_sim.actuators.wheels import WheelSettings
@@ -143,7 +143,7 @@ def room(wheels: Wheels, k: int, side: float) -> float:
     return most
 
 
-@kernel
+@subroutine
 def _is_any_full(wheels: Wheels) -> bool:
     for k in range(int(wheels.count)):
         if abs(wheels.torque[k]) > room(wheels, k, 1.0 if wheels.torque[k] > 0.0 else -1.0):
@@ -151,7 +151,7 @@ def _is_any_full(wheels: Wheels) -> bool:
     return False
 
 
-@kernel
+@subroutine
 def _take_out_full(wheels: Wheels) -> bool:
     """Leave each wheel that has no room what it has, out of the `free`; tell if there were any."""
     is_any = False

@@ -220,6 +220,16 @@ def test_thrusters_alone_take_all() -> None:
     np.testing.assert_allclose(given.mean(axis=0), [0.3, -0.2, 0.1], atol=5e-3)
 
 
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_demand_that_is_no_number_is_not_owed(wrong: float) -> None:
+    bench = Bench(thrusters=THRUSTERS, null_gain=0.0)
+    bench.allocation.wheels.healthy.beyond[:] = np.eye(3)  # as without wheels
+    bench.allocation.wheels.healthy.rank = 0.0
+    bench.step([0.3, wrong, 0.1])
+    assert np.isfinite(bench.allocation.modulation.owed).all()
+    assert np.isfinite(bench.command[4:]).all()
+
+
 def test_thrusters_unload_the_wheels_which_hold_the_base() -> None:
     bench = Bench(
         thrusters={**THRUSTERS, "force": [0.4]}, momenta=[14.2, 0.0, -14.2, 0.0], unload_above=0.7,
