@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
 from space_robot_sim.actuators.thrusters import ThrusterSettings
 from space_robot_sim.actuators.wheels import WheelSettings
@@ -85,8 +86,11 @@ class ThrusterTorques(NamedTuple):
 
         All torques are a zonotope, whose faces are spanned by two of the thrusters' torques. The
         torques for 1 kg/s are the convex hull of what each thruster gives for it.
+
+        Raises:
+            InputError: they are too unlike one another for that.
         """
-        from scipy.spatial import ConvexHull  # slow to import
+        from scipy.spatial import ConvexHull, QhullError  # slow to import
 
         torques = thrusters.torques
         sizes = np.linalg.norm(torques, axis=1)
@@ -96,7 +100,10 @@ class ThrusterTorques(NamedTuple):
         faces = pairs[length > PARALLEL * length.max()]
         normals = _unlike(np.vstack([faces, -faces]))
         reach = np.sum(np.maximum(normals @ torques.T, 0.0), axis=1)
-        hull = ConvexHull(torques / mass_rates(thrusters)[:, None]).equations
+        try:
+            hull = ConvexHull(torques / mass_rates(thrusters)[:, None]).equations
+        except QhullError:
+            raise InputError("the thrusters' torques hardly span all directions") from None
         return cls(normals / reach[:, None], -hull[:, :3] / hull[:, 3:])
 
     def share(self, torque: Array) -> Array:

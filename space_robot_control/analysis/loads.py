@@ -26,6 +26,11 @@ TINY = 1e-300
 """Keeps a thruster that turns nothing from being divided by zero."""
 
 
+AT_LIMIT = 1e-3
+"""Share of a limit within which a number is at it: a law that learns of the torque given settles
+at a limit little by little."""
+
+
 class Requirement(NamedTuple):
     """A number that is asked of a part of the base's actuators, and what the part has."""
 
@@ -40,7 +45,7 @@ class Requirement(NamedTuple):
     @property
     def is_met(self) -> bool:
         """True if the part has what is asked; at its limit it lacks it."""
-        return self.asked == 0.0 or self.asked < self.has * (1.0 - ROUNDING)
+        return self.asked == 0.0 or self.asked < self.has * (1.0 - AT_LIMIT)
 
     @property
     def margin(self) -> float | None:

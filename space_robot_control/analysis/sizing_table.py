@@ -40,7 +40,7 @@ def sizing_table(report: Report) -> Table | None:
         *((Column("has"), Column("margin")) if requirements else ()),
     )  # fmt: skip
     rows = [Group([row[: len(columns)] for row in g.rows], g.name) for g in groups]
-    return Table(_title(found), columns, rows, _notes(found))
+    return Table(_title(found), columns, rows, _notes(report))
 
 
 def _of_axis(name: str, axis: dict[str, Any], judged: dict[tuple[str, str], Any]) -> Iterator[Row]:
@@ -65,11 +65,16 @@ def _title(found: dict[str, Any]) -> str:
     return f"what the flight asks of its base, and what actuators {found['actuators']} {who}"
 
 
-def _notes(found: dict[str, Any]) -> list[str]:
+def _notes(report: Report) -> list[str]:
+    found, notes = report["sizing"], []
+    if (report["wheel_saturation"] or {}).get("ticks"):
+        notes.append(
+            "wheels were at their limits: a law that is told of it asks for no more, so that this "
+            "flight does not say what its mission asks; fly ideal actuators for that"
+        )
     if not found["requirements"] or found["flown"]:
-        return []
+        return notes
     parts = {requirement["part"] for requirement in found["requirements"]}
-    notes = []
     if "thrusters" in parts:
         notes.append("propellant: the least, were thrusters not on or off; pulses: fly them")
     if "wheel_1" in parts:

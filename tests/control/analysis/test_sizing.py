@@ -246,6 +246,8 @@ def test_at_its_limit_a_part_lacks_it() -> None:
 
     assert of(1.0, 4.0) == (True, 0.75)
     assert of(4.0, 4.0) == (False, 0.0)
+    assert not of(3.999, 4.0)[0]
+    assert of(3.99, 4.0)[0]
     assert of(6.0, 4.0) == (False, -0.5)
     assert of(0.0, 0.0) == (True, None)
     assert of(9.0, np.inf) == (True, None)

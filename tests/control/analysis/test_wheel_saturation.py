@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from space_robot_control.analysis import analyze
 from space_robot_control.analysis.report_tables import comparison_table
+from space_robot_control.analysis.sizing_table import sizing_table
 from space_robot_control.analysis.wheel_saturation import WheelSaturation
 from space_robot_control.analysis.words import remarks
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -74,6 +75,9 @@ def test_it_is_said_plainly(paper_robot: Robot) -> None:
     assert texts["saturation", "wheel_1"] == "never"
     assert texts["saturation", "wheel_3"] == "torque 10, momentum 0\nfirst at 0.005 s"
     sized = {(r["part"], r["quantity"]): r["is_met"] for r in report["sizing"]["requirements"]}
+    table = sizing_table(report)
+    assert table is not None
+    assert "does not say what its mission asks" in table.notes[0]
     assert not sized["wheel_3", "peak torque"]
     assert sized["wheel_1", "peak torque"]
 
