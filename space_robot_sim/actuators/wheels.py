@@ -133,7 +133,7 @@ class Wheels(Record):
     failed: Array = shaped(lambda n: (MOST_WHEELS,))
     """1 for a wheel whose motor is dead."""
     saturated: Array = shaped(lambda n: (MOST_WHEELS,))
-    """1 for a wheel that could not give over the last tick what was asked."""
+    """1 for a wheel that was asked over the last tick for all that it can give, or more."""
     saturated_ticks: Array = shaped(lambda n: (MOST_WHEELS,))
     """Such ticks so far."""
 
@@ -174,7 +174,8 @@ def drive_wheels(
         upper = min(wheels.max_torque[k], max(0.0, limit - momentum) / period)
         lower = -min(wheels.max_torque[k], max(0.0, limit + momentum) / period)
         torque = min(max(asked[k], lower), upper)
-        saturated = 1.0 if torque != asked[k] else 0.0
+        at_limit = asked[k] >= upper if asked[k] > 0.0 else asked[k] <= lower
+        saturated = 1.0 if at_limit and asked[k] != 0.0 else 0.0
         if wheels.failed[k] != 0.0:
             torque = saturated = 0.0
         wheels.saturated[k] = saturated

@@ -22,7 +22,7 @@ class ActuatorHealth:
         return {**self._of_wheels(), **self._of_thrusters()}
 
     def saturated(self) -> str:
-        """Name the wheels that could not give what was asked since this was called last."""
+        """Name the wheels that were at a limit since this was called last."""
         now = self._saturated_ticks
         names = [
             name

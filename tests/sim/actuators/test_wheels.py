@@ -71,12 +71,20 @@ def test_a_wheel_is_pushed_up_to_its_momentum_and_no_further(seed: int) -> None:
 
 def test_saturation_is_counted_wheel_by_wheel_and_a_tick_once() -> None:
     found = bench(more={"joint_torque_limit": 1.0})
-    found.ask(0.5, 0.4, -0.5, 0.0)
+    found.ask(0.5, 0.399, -0.4, 0.0)
     found.act(np.array([*np.zeros(3), *np.full(N, 2.0), 0.5, 0.0, 0.0, 0.0]))
     found.ask(0.0, 0.0, 0.0, 0.0)
     assert found.record.wheels.saturated_ticks[:5].tolist() == [2.0, 0.0, 1.0, 0.0, 0.0]
     assert found.record.wheels.saturated[:4].tolist() == [0.0, 0.0, 0.0, 0.0]
     assert found.record.saturated_ticks == 2.0
+
+
+def test_a_full_wheel_is_saturated_if_it_is_asked_for_more() -> None:
+    found = bench()
+    found.truth.wheel_velocities[:4] = [80.0, 80.0, 80.0, -80.0]
+    found.ask(0.0, -0.1, 0.1, -0.1)
+    assert found.record.wheels.saturated[:4].tolist() == [0.0, 0.0, 1.0, 1.0]
+    assert found.truth.wheel_torques[:4].tolist() == [0.0, -0.1, 0.0, 0.0]
 
 
 def test_without_limits_a_wheel_gives_what_it_is_asked() -> None:

@@ -46,7 +46,7 @@ def test_wheels_tell_saturation_momentum_and_failure(paper_robot: Robot) -> None
         "momentum_percent: wheel_3": 0.0, "momentum_percent: wheel_4": 0.0,
     }  # fmt: skip
     for _ in range(3):
-        watched.ask(0.1, 0.3, -0.2, 0.21)
+        watched.ask(0.1, 0.3, -0.19, 0.2)
     values = watched.health.values
     assert values["saturated_ticks: wheel_2"] == 3
     assert values["saturated_ticks: wheel_4"] == 2  # and dead since
