@@ -136,13 +136,13 @@ class MomentumBudget(Metric):
 def disturbance_impulse(disturbance: DisturbanceSettings, time: Array) -> Array:
     """(N,) N m s that (61) has given to each inertial axis of the base from 0 to ``time`` (N,) s.
 
-    ``integral sin(w t) = (1 - cos(w t)) / w``.
+    It acts as friction does, against the torque: ``-integral sin(w t) = (cos(w t) - 1) / w``.
     """
     found = np.zeros_like(time)
     for frequency in disturbance.base_frequencies:
         if frequency:
             omega = 2.0 * np.pi * frequency
-            found += (1.0 - np.cos(omega * time)) / omega
+            found += (np.cos(omega * time) - 1.0) / omega
     impulse: Array = disturbance.scale * disturbance.base_amplitude * found
     return impulse
 

@@ -20,6 +20,8 @@ from space_robot_control.analysis.momentum import (
     disturbance_impulse,
 )
 from space_robot_control.analysis.report_tables import comparison_table
+from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
 from space_robot_sim.environment.disturbance import DisturbanceSettings
@@ -149,11 +151,20 @@ def test_the_disturbances_impulse_is_its_integral() -> None:
     disturbance = DisturbanceSettings(scale=2.0, base_frequencies=[0.5, 0.0])
 
     def wave(t: float) -> float:
-        return 2.0 * disturbance.base_amplitude * float(np.sin(2.0 * np.pi * 0.5 * t))
+        return -2.0 * disturbance.base_amplitude * float(np.sin(2.0 * np.pi * 0.5 * t))
 
     for time in (0.3, 1.0, 7.7):
         wanted = quad(wave, 0.0, time)[0]
         assert disturbance_impulse(disturbance, np.array([time]))[0] == pytest.approx(wanted)
+
+
+def test_what_disturbs_a_flight_is_accounted_for() -> None:
+    """A base that floats freely, disturbed and with a payload that its arm does not know of."""
+    log = simulate(Flight(FlightPlan(actuators="none", case="4-2", duration=0.5)))
+    found = analyze(log)["momentum"]
+    assert found["peak_n_m_s"]["outside"] > 1e-3
+    assert found["peak_n_m_s"]["robot"] == pytest.approx(found["peak_n_m_s"]["outside"])
+    assert found["drift"]["n_m_s"] < 1e-9 * found["peak_n_m_s"]["outside"]
 
 
 def test_report_and_tables_have_it_of_bases_with_hardware(paper_robot: Robot) -> None:
