@@ -146,11 +146,11 @@ def read_accounts(bag: Path) -> dict[str, dict[str, Any]]:
 def redescribed(bag: Path, description: str | None) -> Path:
     """The bag with another text as its flight's description, or with none; changed in place."""
     file = bag / "metadata.yaml"
-    content = yaml.safe_load(file.read_text("utf-8"))
+    content = yaml.load(file.read_text("utf-8"), yaml.CSafeLoader)
     noted = content["rosbag2_bagfile_information"]["custom_data"]
     noted.pop(FLIGHT_KEY, None)
     if description is not None:
         noted[FLIGHT_KEY] = description
     noted["kept"] = "so that the copies in the MCAP file are not asked"
-    file.write_text(yaml.safe_dump(content), "utf-8")
+    file.write_text(yaml.dump(content, Dumper=yaml.CSafeDumper), "utf-8")
     return bag

@@ -56,11 +56,12 @@ def show(table: Table, console: Console) -> None:
     Columns that are justified to the right hold the numbers.
     """
     numbers = [column for column in table.columns if column.justify == "right"]
-    if not _has_room(table, numbers, console):
+    if not (has_room := _has_room(table, numbers, console)):
         for column in table.columns:
             column.no_wrap = column in numbers
             column.overflow = "fold"
-    if _has_room(table, numbers, console):
+        has_room = _has_room(table, numbers, console)
+    if has_room:
         console.print(table)
     else:
         _print_lines(table, numbers, console)
@@ -68,6 +69,10 @@ def show(table: Table, console: Console) -> None:
 
 def _has_room(table: Table, numbers: list[Column], console: Console) -> bool:
     """Tell if every word of the numbers is shown in one piece, and the start of each label's."""
+    padding = table.padding[1] + table.padding[3]
+    longest = (max((len(word) for word in _words(column)), default=0) for column in numbers)
+    if sum(length + padding for length in longest) > console.width:  # that is known at once
+        return False
     shown = {
         word
         for line in console.render_lines(table)
@@ -75,12 +80,16 @@ def _has_room(table: Table, numbers: list[Column], console: Console) -> bool:
     }
     starts = {word[:_START] for word in shown}
     for column in table.columns:
-        words = {word for cell in column.cells for word in _plain(cell).split()}
+        words = _words(column)
         if column in numbers and not words <= shown:
             return False
         if not {word[:_START] for word in words} <= starts:
             return False
     return True
+
+
+def _words(column: Column) -> set[str]:
+    return {word for cell in column.cells for word in _plain(cell).split()}
 
 
 def _print_lines(table: Table, numbers: list[Column], console: Console) -> None:

@@ -10,6 +10,7 @@ import json
 import os
 import shutil
 import sys
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -73,6 +74,12 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@cache
+def description() -> str:
+    """That of the flight in the bag, as JSON."""
+    return json.dumps(Flight(PLAN).description)
+
+
 def places(value: Any) -> list[tuple[Any, Any]]:
     """Every container in a value, with each of its keys, those near the top first."""
     found, waiting = [], [value]
@@ -121,7 +128,7 @@ def try_replay(bag: Path) -> None:
 def test_an_edited_description_is_told_or_followed(
     bag: Path, changes: list[tuple[str, float, int, Any]]
 ) -> None:
-    described = json.loads(json.dumps(Flight(PLAN).description))
+    described = json.loads(description())
     redescribed(bag, json.dumps(edited(described, changes)))
     log = read_flight(bag)
     assert log.ticks == 40
@@ -156,7 +163,7 @@ def test_what_is_no_json_is_told(bag: Path, text: str) -> None:
 )  # fmt: skip
 def test_each_wrong_key_is_named_in_a_line(bag: Path, changes: dict[str, Any]) -> None:
     """Once tracebacks of `replay`, and of `analyze`."""
-    described = {**json.loads(json.dumps(Flight(PLAN).description)), **changes}
+    described = {**json.loads(description()), **changes}
     redescribed(bag, json.dumps(described))
     (key,) = changes
     log = read_flight(bag)
@@ -170,7 +177,7 @@ def test_each_wrong_key_is_named_in_a_line(bag: Path, changes: dict[str, Any]) -
 
 
 def test_keys_of_newer_software_are_no_fault(bag: Path) -> None:
-    described = {**Flight(PLAN).description, "orbit": {"altitude": 4e5}}
+    described = {**json.loads(description()), "orbit": {"altitude": 4e5}}
     redescribed(bag, json.dumps(described))
     log = read_flight(bag)
     assert (log.damage, log.flight["orbit"]) == ((), {"altitude": 4e5})
@@ -181,7 +188,7 @@ MARKUP = (r"$\frac$", "[/red]", "$", "_x", ":smile:", "<b>&amp;", "[bold]", "\\"
 
 @pytest.mark.parametrize("name", MARKUP)
 def test_markup_in_names_is_drawn_as_it_is(bag: Path, tmp_path: Path, name: str) -> None:
-    described = json.loads(json.dumps(Flight(PLAN).description))
+    described = json.loads(description())
     redescribed(bag, json.dumps({**described, "controller": name, "case": name, "gains": name}))
     log = read_flight(shutil.copytree(bag, tmp_path / "bag"))
     log.joint_names = (name, *log.joint_names[1:])

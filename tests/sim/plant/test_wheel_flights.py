@@ -29,6 +29,8 @@ from space_robot_sim.robot import Robot
 Array = NDArray[np.float64]
 
 PERIOD = 5e-4
+N = 6
+"""Joints; for so many the kernels are there."""
 STUCK = FrictionSettings(coulomb=1e4, viscous=0.0)
 """The arm is a part of the base."""
 SMOOTH = FrictionSettings(coulomb=0.0, viscous=0.0)
@@ -96,15 +98,15 @@ def locked_inertia(robot: Robot, theta: Array) -> Array:
 def test_with_its_arm_locked_it_is_a_gyrostat(seed: int) -> None:
     """Hughes' equations of motion by DOP853, about the centre of mass of the whole."""
     rng = np.random.default_rng(seed)
-    robot = random_robot(rng, 1)
+    robot = random_robot(rng, N)
     rotors = random_rotors(rng, robot, 4)
     viscous = 1e-4
     speeds = 100.0 * rng.normal(size=4)
     flight = Flight(robot, rotors, STUCK, initial_speed=speeds.tolist(), viscous=[viscous])
-    flight.x[11:14] = 0.1 * rng.normal(size=3)
+    flight.x[10 + N : 13 + N] = 0.1 * rng.normal(size=3)
     base, motors = rng.normal(size=3), 0.2 * rng.normal(size=4)
     axes, spins = np.array([rotor.axis for rotor in rotors]).T, np.array([r.spin for r in rotors])
-    whole = locked_inertia(robot, flight.x[7:8])
+    whole = locked_inertia(robot, flight.x[7 : 7 + N])
     without = np.linalg.inv(whole - (axes * spins) @ axes.T)
 
     def derivative(_: float, y: Array) -> Array:
@@ -120,7 +122,7 @@ def test_with_its_arm_locked_it_is_a_gyrostat(seed: int) -> None:
     start = np.concatenate([flight.x[3:7], flight.omega, speeds])
     exact = solve_ivp(derivative, (0.0, 2.0), start, "DOP853", rtol=1e-13, atol=1e-13)
     for _ in range(round(2.0 / PERIOD)):
-        flight.step(base, np.zeros(1), motors)
+        flight.step(base, np.zeros(N), motors)
     end = exact.y[:, -1]
     assert np.abs(end[:7] - start[:7]).max() > 1e-2
     np.testing.assert_allclose(flight.x[3:7], end[:4], rtol=0.0, atol=1e-11)
@@ -131,7 +133,7 @@ def test_with_its_arm_locked_it_is_a_gyrostat(seed: int) -> None:
 def test_wheels_go_through_rest_and_come_to_rest_as_in_mujoco() -> None:
     """One is driven through zero speed, one stops and sticks, one breaks away, one stays."""
     rng = np.random.default_rng(3)
-    robot = random_robot(rng, 1)
+    robot = random_robot(rng, N)
     rotors = [rotor._replace(spin=0.02, transverse=0.015) for rotor in random_rotors(rng, robot, 4)]
     coulomb = 0.02
     speeds, motors = np.array([1.0, -0.4, 0.0, 0.0]), np.array([-0.07, 0.01, 0.05, -0.015])
@@ -140,19 +142,19 @@ def test_wheels_go_through_rest_and_come_to_rest_as_in_mujoco() -> None:
     model = mujoco_with_wheels(robot, rotors)
     model.opt.timestep = 1e-5
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-    model.dof_frictionloss[7:] = coulomb
-    model.dof_solimp[7:, :2] = 0.9999  # as stiff as its constraints can be
-    model.dof_solref[7:, 0] = 2.1e-5
+    model.dof_frictionloss[6 + N :] = coulomb
+    model.dof_solimp[6 + N :, :2] = 0.9999  # as stiff as its constraints can be
+    model.dof_solref[6 + N :, 0] = 2.1e-5
     data = mujoco.MjData(model)
-    data.qpos[7], data.qvel[7:] = flight.x[7], speeds
-    data.qfrc_applied[7:] = motors
+    data.qpos[7 : 7 + N], data.qvel[6 + N :] = flight.x[7 : 7 + N], speeds
+    data.qfrc_applied[6 + N :] = motors
 
     stood = []
     for _ in range(8):
         for _ in range(100):
-            flight.step(np.zeros(3), np.zeros(1), motors)
+            flight.step(np.zeros(3), np.zeros(N), motors)
         mujoco.mj_step(model, data, 5000)
-        np.testing.assert_allclose(flight.speeds, data.qvel[7:], rtol=0.0, atol=1e-4)
+        np.testing.assert_allclose(flight.speeds, data.qvel[6 + N :], rtol=0.0, atol=1e-4)
         np.testing.assert_allclose(flight.omega, data.qvel[3:6], rtol=0.0, atol=1e-6)
         stood.append(flight.speeds == 0.0)
     assert flight.speeds[0] < -0.4
