@@ -8,7 +8,8 @@ from typing import Any
 
 from space_robot_msgs_py.errors import FlightError
 
-TIMEOUT_S = 60.0
+TIMEOUT_S = 180.0
+"""A node that is configured for the first time with so many joints compiles its kernels first."""
 POLL_S = 0.02
 
 Check = Callable[[], None]
