@@ -48,6 +48,7 @@ class _Names(_Open):
     robot: Text = ""
     mission: Text = ""
     case: Text = ""
+    actuators: Text = ""
     controller: Text = ""
     gains: Text = ""
     swaps: list[Text] = Field(default_factory=list)
@@ -65,6 +66,8 @@ class _Description(_Names):
     parameters: dict[Text, _Names] = Field(default_factory=dict)
     gains_used: dict[Text, list[float]] = Field(default_factory=dict)
     robot_file: dict[Text, JsonValue] = Field(default_factory=dict)
+    base_actuators: dict[Text, JsonValue] = Field(default_factory=dict)
+    controller_base_actuators: dict[Text, JsonValue] = Field(default_factory=dict)
     controller_robot: Text = ""
     controller_robot_file: dict[Text, JsonValue] = Field(default_factory=dict)
 

@@ -24,8 +24,8 @@ LAWS = ("tde_stc", "ctc")
 
 
 def plan(actuators: str, law: str = "tde_stc", **options: object) -> FlightPlan:
-    given = {"controller": law, "actuators": actuators, "duration": 0.1, **options}
-    return FlightPlan.model_validate(given)
+    given = {"controller": law, "actuators": actuators, "duration": 0.1}
+    return FlightPlan.model_validate({**given, **options})
 
 
 def assert_same(one: FlightLog, other: FlightLog) -> None:
@@ -50,6 +50,7 @@ def test_its_bag_and_its_messages_are_the_flight(actuators: str, law: str, tmp_p
     assert log.wheel_velocities.shape == (200, len(names.wheels))
     assert log.actuator_commands.shape == (200, len(names.actuators))
     assert np.isfinite(log.actuator_commands).all()
+    assert log.wheel_torques.any() == bool(names.wheels)
 
 
 @pytest.mark.parametrize("actuators", ["wheels", "wheels_and_thrusters"])
@@ -67,6 +68,13 @@ def test_faults_of_messages_strike_all_parts_of_a_state_alike(
     }
     assert stamps[topics.WHEELS_STATE] == stamps[topics.BASE_STATE] == stamps[topics.JOINT_STATES]
     assert 0 < len(stamps[topics.BASE_STATE]) < 200
+
+
+def test_thrusters_that_fire_are_in_the_bag(tmp_path: Path) -> None:
+    log = simulate(Flight(plan("thrusters", "ctc", duration=0.2)), tmp_path / "bag")
+    assert log.actuator_commands.any()
+    assert log.thrusts.any()
+    assert_same(read_flight(tmp_path / "bag"), log)
 
 
 def test_late_commands_of_actuators_are_a_plant_that_applies_them_late() -> None:
