@@ -169,7 +169,7 @@ class PlantLoop:
         if guard.held_ticks(tick) > HOLDING_TICKS:
             return Health("holding the last good command", Level.WARN, values)
         if saturated := self._actuators.saturated():
-            return Health(f"saturated: {saturated}", Level.WARN, values)
+            return Health("wheels at their limits", Level.WARN, {**values, "saturated": saturated})
         return Health("nominal", values=values)
 
     def _begin_tick(self) -> None:
