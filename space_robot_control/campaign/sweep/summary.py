@@ -57,13 +57,13 @@ def _cell(law: Law, sensors: str, actuators: str, rows: Sequence[Row]) -> Cell:
 
 
 def hardware(found: Sequence[Cell]) -> dict[str, list[str]]:
-    """Return what the cells fly with, a value a cell: sensors, actuators, or both if both vary."""
+    """Return what the cells fly with, a value a cell: sensors, actuators, or both, but no ideal ones."""
     named = {
         "sensors": [cell.sensors for cell in found],
         "actuators": [cell.actuators for cell in found],
     }
-    varying = {key: values for key, values in named.items() if len(set(values)) > 1}
-    return varying or {"sensors": named["sensors"]}
+    told = {key: values for key, values in named.items() if set(values) != {"ideal"}}
+    return told or {"sensors": named["sensors"]}
 
 
 def summary_table(found: Sequence[Cell]) -> Table:
