@@ -57,7 +57,7 @@ def _cell(law: Law, sensors: str, actuators: str, rows: Sequence[Row]) -> Cell:
 
 
 def hardware(found: Sequence[Cell]) -> dict[str, list[str]]:
-    """Return what the cells fly with, a value a cell: sensors, actuators, or both, but no ideal ones."""
+    """Return what the cells fly with, a value a cell: sensors, actuators, or both, unless ideal."""
     named = {
         "sensors": [cell.sensors for cell in found],
         "actuators": [cell.actuators for cell in found],
