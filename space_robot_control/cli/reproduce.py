@@ -71,7 +71,7 @@ def reproduce(
     check_folder(out)
     named_file("sensors", sensors)
     named_file("actuators", actuators)
-    compile_kernels()
+    compile_kernels(actuators not in ("ideal", "none"))
     with counting_progress("flights") as progress:
         record = run(
             rows, out, duration=duration, brief=brief,

@@ -45,7 +45,7 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
             click.echo(remark, err=True)
     for remark in remarks_on_gains(flight):
         click.echo(remark, err=True)
-    compile_kernels()
+    compile_kernels(bool(flight.plant.names.actuators))
     period, analysis, began = flight.period, Analysis(), time.monotonic()
     with flight_progress(flight.ticks * period, flight.controller.law.name) as show:
 

@@ -102,7 +102,7 @@ def sweep(
         make_folder(out)
         for name in ("table.csv", "summary.md", "sweep.png", "sweep.svg"):
             check_writable(out / name)
-    compile_kernels()
+    compile_kernels(not {"ideal", "none"}.issuperset(study.actuators))
     with counting_progress("flights") as progress:
         rows = run(study, jobs or cores(), progress)
     found = cells(rows)

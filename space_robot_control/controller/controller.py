@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.compiled.kernels import RecordFunction
 from space_robot_msgs_py.compiled.records import Block, assign
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Command, RobotState
@@ -12,7 +15,7 @@ from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
 from space_robot_sim.robot import Robot
 
 from ..laws import ControlLaw, Signals
-from .allocation.allocation import Allocation
+from .allocation.allocation import Allocation, allocation_code
 from .allocation.diagnosis import Diagnosis, diagnose
 from .allocation.settings import AllocationSettings
 from .kernels import (
@@ -79,6 +82,10 @@ class Controller:
             how = allocation or AllocationSettings()
             assign(memory, allocation=Allocation.build(robot.n, actuators, how, period))
         self._memory = memory
+        allocated: Block = self.block["allocation"]
+        self._address = allocated.ctypes.data
+        self._actuators: Array = allocated["command"][0, : len(actuators.names)]
+        """What is asked of each of them."""
         self._command = Command(-1, np.zeros(len(self.names.commanded)))
         self.valves = slice(robot.n + 3 + actuators.wheel_count, None)
         """The part of a command that opens thrusters."""
@@ -124,8 +131,16 @@ class Controller:
         if status != USABLE:
             raise unusable(status, state.tick, state.quaternion)
         apply_transfer(self.block, state.tick, law.force(self.signals), command.torque)
+        if self._actuators.size:
+            self.allocate.call(self._address, state.tick)
+            command.torque[-self._actuators.size :] = self._actuators
         command.tick = state.tick
         return command
+
+    @cached_property
+    def allocate(self) -> RecordFunction:
+        """The allocation of the torque on the base, for compiled loops; may have to be compiled."""
+        return allocation_code(is_used=bool(self._actuators.size))
 
     @property
     def allocation(self) -> Diagnosis:

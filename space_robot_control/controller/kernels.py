@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS, State
 from space_robot_sim.dynamics.attitude import SINGULAR_ETA, attitude_jacobian_inverse
@@ -15,7 +15,7 @@ from space_robot_sim.dynamics.rho_space import rho_space_into
 
 from ..laws import Signals
 from ..laws.compiled import LawCode
-from .allocation.allocation import Allocation, allocate, observe_actuators
+from .allocation.allocation import Allocation
 from .navigation.navigation import Navigation, navigate
 from .time_delay_estimation import TimeDelayPair, follows, observe, time_delay_estimate
 from .tracking import (
@@ -74,14 +74,15 @@ class ControllerMemory(Record):
 
 @kernel
 def controller_tick(
-    block: Block, law: LawCode, tick: int, state: Block, reference: Block, torque: Array,
-    period: float,
+    block: Block, law: LawCode, allocate: RecordFunction, tick: int, state: Block,
+    reference: Block, torque: Array, period: float,
 ) -> int:  # fmt: skip
     """A whole tick of the controller under a law in compiled code.
 
     Args:
         block: of the `ControllerMemory`.
         law: a `CompiledLaw.code`.
+        allocate: an `allocation_code`.
         tick: of the state.
         state: of a `State`.
         reference: of a `Reference`.
@@ -96,6 +97,10 @@ def controller_tick(
     if status == USABLE:
         law.run(block[0].signals, law.gains[0], law.memory[0], period)
         apply_transfer(block, tick, law.memory[0].force, torque)
+        allocation, axes = block[0].allocation, law.memory[0].force.size
+        allocate(allocation, float(tick))
+        for k in range(axes, torque.size):
+            torque[k] = allocation.command[k - axes]
     return status
 
 
@@ -111,16 +116,16 @@ def compute_signals(
     Args: see `controller_tick`; ``h_bar`` is empty for a law without time-delay estimate.
 
     Returns:
-        `USABLE`, or why the state is not: then nothing was done, but that navigation and allocation
-        may have taken a measured state that was usable.
+        `USABLE`, or why the state is not: then nothing was done, but that navigation may have taken
+        a measured state that was usable.
     """
     memory, measured = block[0], state[0]
     signals, rate, controls_base = memory.signals, memory.rate, memory.controls_base == 1.0
     status: int = status_of(measured, controls_base)
     if status != USABLE:
         return status
-    if memory.allocation.is_used == 1.0:
-        observe_actuators(memory.allocation, tick, measured)
+    memory.allocation.reported_speeds[:] = measured.wheel_velocities
+    memory.allocation.reported_torques[:] = measured.wheel_torques
     if memory.navigation.is_filtered == 1.0:
         navigate(memory.navigation, tick, measured, period)
         measured = memory.navigation.estimate
@@ -193,7 +198,7 @@ def apply_transfer(block: Block, tick: int, force: Array, torque: Array) -> None
 
     ``F_S + (F_applied - F_S at the takeover) fade``, the fade falling from 1 to 0. At tick 0
     nothing has been applied, so nothing is taken over. A base that is not controlled gets none.
-    What the base's actuators are asked for stands behind it.
+    The base's part is what its actuators are asked for.
     """
     memory = block[0]
     if memory.transfer_left < 0.0:
@@ -211,5 +216,4 @@ def apply_transfer(block: Block, tick: int, force: Array, torque: Array) -> None
     if memory.controls_base == 0.0:
         for k in range(3):
             memory.force[k] = torque[k] = 0.0
-    if memory.allocation.is_used == 1.0:
-        allocate(memory.allocation, tick, torque[:3], torque[force.size :])
+    memory.allocation.demand[:] = torque[:3]

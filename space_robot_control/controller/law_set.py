@@ -14,6 +14,7 @@ from space_robot_msgs_py.errors import SpaceRobotError
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.parameters import overrides
 from space_robot_msgs_py.samples import Reference, RobotState
+from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
 from space_robot_sim.robot import Robot
 
 from ..laws import ControlLaw
@@ -48,11 +49,11 @@ class LawSet:
         node.set_descriptor("controller", descriptor)
         node.add_on_set_parameters_callback(self._on_set)
 
-    def warm_up(self, robot: Robot) -> None:
-        """Load every law's compiled code, so that no first tick and no swap comes late."""
+    def warm_up(self, robot: Robot, actuators: BaseActuatorSettings) -> None:
+        """Load all compiled code, every law's too, so that no first tick and no swap comes late."""
         rest = RobotState.allocate(robot.n)
         for law in self._laws.values():
-            controller = Controller(robot, law, self._settings.period)
+            controller = Controller(robot, law, self._settings.period, actuators=actuators)
             controller.update(rest, Reference.at_rest(robot.n))
 
     def tell(self, change: LawChange) -> None:

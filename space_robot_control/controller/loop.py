@@ -43,11 +43,11 @@ class ControllerLoop:
         self._node, self._settings = node, settings
         robot = Robot.from_yaml(named_file("robots", settings.robot))
         self._laws = LawSet(node, settings, robot.n + 3)
-        self._laws.warm_up(robot)
+        actuators = believed_actuators(settings.actuators, robot)
+        self._laws.warm_up(robot, actuators)
         self._controller = Controller(
             robot, self._laws.choice.chosen, settings.period, settings.acceleration_filter_hz,
-            settings.filter_settings, believed_actuators(settings.actuators, robot),
-            settings.allocation,
+            settings.filter_settings, actuators, settings.allocation,
         )  # fmt: skip
         timebase = settings.timebase
         self._states = StateInput(node, self._controller.names, timebase)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import DivergedError
 from space_robot_sim.plant.plant import RATE_LIMIT, Plant, advance
@@ -49,8 +49,8 @@ def _close_loop_compiled(
     torques = np.zeros((rows.ticks, len(controller.names.commanded)))
     truths = np.empty(0 if rows.measured is None else rows.ticks, states.dtype)
     tick, fastest, status = fly_ticks(
-        law.code, plant.block, plant.command_delay_buffer, controller.block, plant.state.block,
-        plant.truth.block, rows.references(start, stop), states, truths, torques,
+        law.code, controller.allocate, plant.block, plant.command_delay_buffer, controller.block,
+        plant.state.block, plant.truth.block, rows.references(start, stop), states, truths, torques,
         rows.telemetry, start, plant.period,
     )  # fmt: skip
     measured = tick - start + (status != USABLE)
@@ -88,9 +88,9 @@ def _close_loop_in_python(plant: Plant, controller: Controller, log: FlightLog) 
 
 @kernel
 def fly_ticks(
-    law: LawCode, plant_block: Block, command_delay_buffer: Array, controller_block: Block,
-    state: Block, truth: Block, references: Block, states: Block, truths: Block, torques: Array,
-    telemetry: Array, start: int, period: float,
+    law: LawCode, allocate: RecordFunction, plant_block: Block, command_delay_buffer: Array,
+    controller_block: Block, state: Block, truth: Block, references: Block, states: Block,
+    truths: Block, torques: Array, telemetry: Array, start: int, period: float,
 ) -> tuple[int, float, int]:  # fmt: skip
     """Fly from the tick ``start`` on, a tick for each reference; the loop of `close_loop`.
 
@@ -110,7 +110,7 @@ def fly_ticks(
         if truths.size > 0:
             truths[k] = truth[0]
         status = controller_tick(
-            controller_block, law, tick, state, references[k : k + 1], torque, period
+            controller_block, law, allocate, tick, state, references[k : k + 1], torque, period
         )
         if status != USABLE:
             return tick, fastest, status

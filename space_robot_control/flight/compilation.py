@@ -13,19 +13,33 @@ from space_robot_msgs_py.ros.run_module import module_command
 from space_robot_msgs_py.samples import Command, Reference, RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 
+from ..controller.allocation.allocation import allocation_code
 from ..laws import laws
 from .child_process import child_process
 from .plan import Flight, FlightPlan
 from .simulate import simulate
 
-MARK = "complete"
+MARK, ALLOCATION_MARK = "complete", "allocation"
 
 
-def compile_kernels() -> None:
-    """Fly a few ticks under every law, unless that has been done since the last change.
+def compile_kernels(with_allocation: bool = False) -> None:
+    """Compile all that flights need, unless that has been done since the last change.
 
-    Else the nodes would compile the same functions side by side in their first tick. The
-    controller's kernels are compiled by a second process while this one compiles the plant's.
+    Else the nodes would compile the same functions side by side in their first tick. The allocation
+    is for bases whose actuators are hardware.
+    """
+    _compile_flights()
+    mark = cache_directory() / ALLOCATION_MARK
+    if with_allocation and not mark.exists():
+        click.echo("compiling the allocation (once, about a quarter of a minute) ...", err=True)
+        allocation_code(is_used=True)
+        mark.touch()
+
+
+def _compile_flights() -> None:
+    """Fly a few ticks under every law.
+
+    The controller's kernels are compiled by a second process while this one compiles the plant's.
     """
     mark = cache_directory() / MARK
     if mark.exists():

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from space_robot_control.controller.kernels import controller_tick
 from space_robot_control.laws.compiled import LawCode
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_sim.dynamics.aba import aba
 from space_robot_sim.plant.integrator import state_derivative
@@ -55,13 +55,15 @@ def state_derivatives(block: Block, disturbance: Array, calls: int) -> None:
 
 @kernel
 def controller_ticks(
-    law: LawCode, block: Block, states: Block, references: Block, ticks: int, torque: Array,
-    period: float,
+    law: LawCode, allocate: RecordFunction, block: Block, states: Block, references: Block,
+    ticks: int, torque: Array, period: float,
 ) -> None:  # fmt: skip
     """All that an on-board computer does in a tick, over the rows of a recorded flight."""
     for i in range(ticks):
         k = i % states.size
-        controller_tick(block, law, k, states[k : k + 1], references[k : k + 1], torque, period)
+        controller_tick(
+            block, law, allocate, k, states[k : k + 1], references[k : k + 1], torque, period
+        )
 
 
 @kernel

@@ -137,9 +137,9 @@ def soak(
     folder = bags or Path(tempfile.mkdtemp(prefix="space_robot_soak_"))
     done = Soak(seed)
     at_start = shared_memory_files()
-    until = time.monotonic() + seconds
     try:
-        compile_kernels()
+        compile_kernels(with_allocation=True)
+        until = time.monotonic() + seconds
         while time.monotonic() < until:
             number = len(done.flights) + 1
             plan = sample_flight(seed, number, duration_s)

@@ -10,12 +10,14 @@ torque, so the time-delay estimate is not misled by limits, failures or pulses.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel, subroutine
+from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
-from space_robot_msgs_py.samples import State
+from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_WHEELS
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
 
 from .modulation import Modulation, modulate
@@ -46,6 +48,14 @@ class Allocation(Record):
     """Torque that they are expected to give from the present tick to the next, N m."""
     of_wheels: Array = shaped(lambda n: (3,))
     """Torque demanded of the wheels, N m."""
+    demand: Array = shaped(lambda n: (3,))
+    """Torque demanded of the base, N m, base frame."""
+    reported_speeds: Array = shaped(lambda n: (MOST_WHEELS,))
+    """Of the wheels at the present tick, rad/s."""
+    reported_torques: Array = shaped(lambda n: (MOST_WHEELS,))
+    """Those that the wheels' motors gave since the last tick, N m."""
+    command: Array = shaped(lambda n: (MOST_WHEELS + MOST_THRUSTERS,))
+    """Torque of each wheel's motor, N m, then force of each thruster, N."""
 
     @classmethod
     def build(
@@ -65,31 +75,24 @@ class Allocation(Record):
 
 
 @kernel
-def observe_actuators(allocation: Allocation, tick: int, state: State) -> None:
-    """Take what the wheels report in the ``state`` of a ``tick``."""
-    if allocation.wheels.count > 0.0:
-        observe_wheels(allocation.health, allocation.wheels, tick, state)
+def allocate(allocation: Allocation, tick: float) -> None:
+    """Write the ``command`` that gives the base what is demanded from ``tick`` to the next.
 
-
-@kernel
-def allocate(allocation: Allocation, tick: int, base_torque: Array, command: Array) -> None:
-    """Write the commands that give the base a torque from ``tick`` to the next.
-
-    Args:
-        allocation: has observed the state of ``tick``.
-        tick: of the command.
-        base_torque: (3,) demanded, N m, base frame.
-        command: torque of each wheel's motor, N m, then force of each thruster, N; written.
+    ``demand`` and what the wheels report at ``tick`` are read.
     """
-    wheels, thrusters = allocation.wheels, allocation.thrusters
+    wheels, thrusters, command = allocation.wheels, allocation.thrusters, allocation.command
     wheel_count, thruster_count = int(wheels.count), int(thrusters.count)
+    if wheel_count > 0:
+        observe_wheels(
+            allocation.health, wheels, tick, allocation.reported_speeds, allocation.reported_torques
+        )
     if thruster_count > 0:
-        _allocate_thrusters(allocation, tick, base_torque)
+        _allocate_thrusters(allocation, int(tick))
         for j in range(thruster_count):
             command[wheel_count + j] = thrusters.is_open[j] * thrusters.force[j]
     if wheel_count > 0:
         for i in range(3):
-            allocation.of_wheels[i] = base_torque[i] - allocation.expected[i]
+            allocation.of_wheels[i] = allocation.demand[i] - allocation.expected[i]
         share_torque(wheels, allocation.of_wheels)
         add_null_motion(allocation.null_motion, wheels)
         remember_asked(allocation.health, wheels, tick)
@@ -98,15 +101,30 @@ def allocate(allocation: Allocation, tick: int, base_torque: Array, command: Arr
 
 
 @subroutine
-def _allocate_thrusters(allocation: Allocation, tick: int, base_torque: Array) -> None:
+def _allocate_thrusters(allocation: Allocation, tick: int) -> None:
     wheels, demand = allocation.wheels, allocation.of_thrusters
     find_unloading(allocation.unloading, wheels, demand)
     if wheels.healthy.rank < 3.0:
         for i in range(3):
             for j in range(3):
-                demand[i] += wheels.healthy.beyond[i, j] * base_torque[j]
+                demand[i] += wheels.healthy.beyond[i, j] * allocation.demand[j]
     for i in range(3):
         if not np.isfinite(demand[i]):  # no law's accident is to be owed for good
             demand[i] = 0.0
     modulate(allocation.modulation, allocation.thrusters, tick, demand)
     expect_torque(allocation.thrusters, tick, allocation.expected)
+
+
+@kernel
+def _leave_alone(allocation: Allocation, tick: float) -> None:
+    """Do what there is to do without hardware: nothing."""
+
+
+@cache
+def allocation_code(is_used: bool) -> RecordFunction:
+    """Return `allocate`, or without hardware nothing, as compiled loops take it.
+
+    Given as a value it is compiled once, and not into every loop; without hardware not at all.
+    """
+    layout = [Allocation.dtype(0)]  # that of any number of joints
+    return RecordFunction(allocate if is_used else _leave_alone, layout, layout)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
-from space_robot_msgs_py.samples import MOST_WHEELS, State
+from space_robot_msgs_py.samples import MOST_WHEELS
 
 from .settings import AllocationSettings
 from .wheel_set import tabulate
@@ -42,7 +42,9 @@ class WheelHealth(Record):
 
 
 @kernel
-def observe_wheels(health: WheelHealth, wheels: Wheels, tick: int, state: State) -> None:
+def observe_wheels(
+    health: WheelHealth, wheels: Wheels, tick: float, speeds: Array, torques: Array
+) -> None:
     """Take the wheels' speeds and torques at ``tick``; take failed ones out of the allocation.
 
     A wheel counts as silent by size alone: with a sign, commands that are some ticks late would
@@ -51,13 +53,13 @@ def observe_wheels(health: WheelHealth, wheels: Wheels, tick: int, state: State)
     """
     count, healthy = int(wheels.count), wheels.healthy
     for k in range(count):
-        wheels.momentum[k] = wheels.inertia[k] * state.wheel_velocities[k] * healthy.takes_part[k]
+        wheels.momentum[k] = wheels.inertia[k] * speeds[k] * healthy.takes_part[k]
     if health.failure_ticks == 0.0 or tick != health.tick + 1.0:
         return
     heard, silent = 0.0, 0.0
     for k in range(count):
         if _is_asked(health, wheels, k):
-            is_silent = abs(state.wheel_torques[k]) < LEAST_GIVEN * abs(health.asked[k])
+            is_silent = abs(torques[k]) < LEAST_GIVEN * abs(health.asked[k])
             silent += 1.0 if is_silent else 0.0
             heard += 0.0 if is_silent else 1.0
     if heard == 0.0 and silent > 1.0:
@@ -66,7 +68,7 @@ def observe_wheels(health: WheelHealth, wheels: Wheels, tick: int, state: State)
     for k in range(count):
         if not _is_asked(health, wheels, k):
             continue
-        if abs(state.wheel_torques[k]) >= LEAST_GIVEN * abs(health.asked[k]):
+        if abs(torques[k]) >= LEAST_GIVEN * abs(health.asked[k]):
             health.silent_ticks[k] = 0.0
             continue
         health.silent_ticks[k] += 1.0
@@ -89,7 +91,7 @@ def _is_asked(health: WheelHealth, wheels: Wheels, k: int) -> bool:
 
 
 @kernel
-def remember_asked(health: WheelHealth, wheels: Wheels, tick: int) -> None:
+def remember_asked(health: WheelHealth, wheels: Wheels, tick: float) -> None:
     """Remember what is asked for at ``tick``."""
     health.tick = tick
     for k in range(int(wheels.count)):

@@ -56,7 +56,7 @@ def fly(
     """
     check_bag_path(bag)
     require_ros()
-    compile_kernels()
+    compile_kernels(bool(flight.plant.names.actuators))
     with ros_domain(flight.plan.domain) as domain, stop_signals() as stopped:
         _claim(bag)
         begin = time.monotonic()

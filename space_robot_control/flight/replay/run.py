@@ -94,7 +94,7 @@ class _Run:
         if options.rate is None and "reference_timeout" not in options.parameters:
             # there is time to wait; by the wall clock, where the flight may have been, there is not
             parameters.pop("reference_timeout", None)
-        compile_kernels()
+        compile_kernels(bool(choice.names.actuators))
         command = {"controller": node_command("controller", {**parameters, "autostart": False})}
         with (
             ros_domain(options.domain) as domain,

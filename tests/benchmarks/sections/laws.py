@@ -66,7 +66,14 @@ class Recorded:
         law = self._law()
         torque, period = np.zeros_like(law.memory[0].force), self.controller.period
         return lambda ticks: controller_ticks(
-            law, self.controller.block, self.states, self.references, ticks, torque, period
+            law,
+            self.controller.allocate,
+            self.controller.block,
+            self.states,
+            self.references,
+            ticks,
+            torque,
+            period,
         ), torque
 
     def equation(self) -> Competitor:

@@ -9,11 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from wheel_layouts import PYRAMID
 
-from space_robot_control.controller.allocation.allocation import (
-    Allocation,
-    allocate,
-    observe_actuators,
-)
+from space_robot_control.controller.allocation.allocation import Allocation, allocate
 from space_robot_control.controller.allocation.settings import AllocationSettings
 from space_robot_msgs_py.samples import State
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
@@ -55,10 +51,12 @@ class Bench:
         """Return the torque that the base got over a tick."""
         state = self.state
         state.wheel_velocities[: self.count] = self.momenta / INERTIA
-        observe_actuators(self.allocation, self.tick, state)
-        command = np.zeros(self.count + self.thruster_count)
-        allocate(self.allocation, self.tick, np.asarray(demand, dtype=float), command)
-        self.command = command
+        allocation = self.allocation
+        allocation.reported_speeds[:] = state.wheel_velocities
+        allocation.reported_torques[:] = state.wheel_torques
+        allocation.demand[:] = demand
+        allocate(allocation, float(self.tick))
+        self.command = command = allocation.command[: self.count + self.thruster_count].copy()
         self._late.append(command[: self.count].copy())
         given = self._late.pop(0)
         given[list(self.failed)] = 0.0
