@@ -134,3 +134,25 @@ def test_the_page_on_real_spacecraft_has_what_its_commands_give(tmp_path: Path) 
         shown = [float(text) for text in row.group(1).split("|")]
         found = [cell["metrics"][name]["median"] for name in names]
         np.testing.assert_allclose(shown, found, rtol=0.06)
+
+
+def test_the_page_on_bases_has_what_its_commands_give() -> None:
+    """Two laws' rows on three bases, and the row of `robust` gains on thrusters."""
+    page = (ROOT / "docs/explanation/base_actuators.md").read_text("utf-8")
+    names = ("attitude", "joints_1_3", "joints_4_6", "ripple_base_torque", "ripple_torque_4_6")
+    sets = [f"--actuators={name}" for name in ("wheels", "small_wheels", "none")]
+    studies = {
+        "": (*sets, "--law=ctc_smc", "--law=tde_stc"),
+        ", `robust`": ("--actuators=thrusters", "--law=tde_stc=robust"),
+    }
+    for suffix, options in studies.items():
+        for cell in json.loads(run("sweep", "--json", *options))["cells"]:
+            title = re.escape(f"{cell['actuators']}{suffix}")
+            row = re.search(rf"^\| {title} \| {cell['controller']} \|(.*)\|$", page, re.MULTILINE)
+            assert row is not None
+            for name, text in zip(names, row.group(1).split("|"), strict=True):
+                if name in cell["metrics"]:
+                    found = cell["metrics"][name]["median"]
+                    assert float(text) == pytest.approx(found, rel=0.06)
+                else:
+                    assert text.strip() == "-"
