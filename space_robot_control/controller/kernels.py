@@ -9,9 +9,9 @@ from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS, State
 from space_robot_sim.dynamics.attitude import SINGULAR_ETA, attitude_jacobian_inverse
-from space_robot_sim.dynamics.free_floating import free_floating_into
+from space_robot_sim.dynamics.free_floating import eliminate_rotation
 from space_robot_sim.dynamics.model import Model
-from space_robot_sim.dynamics.rho_space import rho_space_into
+from space_robot_sim.dynamics.rho_space import semi_floating_into, to_rho_space
 
 from ..laws import Signals
 from ..laws.compiled import LawCode
@@ -155,16 +155,15 @@ def compute_signals(
     observe(memory.pair, tick, memory.applied_force, rate, signals.acceleration_desired, period)
     if h_bar.size > 0:
         time_delay_estimate(memory.pair, h_bar, signals.n_hat)
-    if uses_model and controls_base:
-        rho_space_into(
+    if uses_model:
+        semi_floating_into(
             memory.model, near, measured.joint_positions, measured.omega_base,
             measured.joint_velocities, signals.nominal,
         )  # fmt: skip
-    elif uses_model:
-        free_floating_into(
-            memory.model, near, measured.joint_positions, measured.omega_base,
-            measured.joint_velocities, signals.nominal,
-        )  # fmt: skip
+        if controls_base:
+            to_rho_space(near, signals.nominal)
+        else:
+            eliminate_rotation(signals.nominal)
     return USABLE
 
 

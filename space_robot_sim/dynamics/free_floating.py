@@ -41,13 +41,20 @@ def free_floating_into(
 ) -> None:  # fmt: skip
     """Fill the joints' part of ``out.inertia`` and ``out.bias`` with H_f and c_f.
 
-    The base's axes stand apart, with an inertia of 1 (that a law may invert the matrix) and no
-    bias: no acceleration asked of them, no force.
-
     Args: see `rho_space_into`.
     """
-    inertia, bias = out.inertia, out.bias
     semi_floating_into(model, quaternion, joint_positions, omega_base, joint_velocities, out)
+    eliminate_rotation(out)
+
+
+@kernel
+def eliminate_rotation(out: RhoSpaceModel) -> None:
+    """Turn H_r and c_r, as `semi_floating_into` leaves them, into H_f and c_f of the joints.
+
+    The base's axes stand apart, with an inertia of 1 (that a law may invert the matrix) and no
+    bias: no acceleration asked of them, no force.
+    """
+    inertia, bias = out.inertia, out.bias
     mobility, base_bias = _base_mobility(inertia), vector(bias, 0)
     for j in range(3, bias.size):
         turned = transform_symmetric(mobility, (inertia[0, j], inertia[1, j], inertia[2, j]))

@@ -58,9 +58,15 @@ def rho_space_into(
         joint_velocities: (n,) rad/s.
         out: results and scratch.
     """
+    semi_floating_into(model, quaternion, joint_positions, omega_base, joint_velocities, out)
+    to_rho_space(quaternion, out)
+
+
+@kernel
+def to_rho_space(quaternion: Array, out: RhoSpaceModel) -> None:
+    """Turn H_r and c_r, as `semi_floating_into` leaves them, into H_S and c_S."""
     inertia, bias = out.inertia, out.bias
     omega, convective, moved = out.vectors[0], out.vectors[1], out.vectors[2]
-    semi_floating_into(model, quaternion, joint_positions, omega_base, joint_velocities, out)
     # J0 on inertial axes is the transpose of J0 in the base frame, so its J0^-T is the latter's
     # inverse. For a unit quaternion J0dot w0 = -|w0|^2 eps / 4.
     attitude_jacobian_inverse(quaternion, out.to_force)
