@@ -269,9 +269,11 @@ def remarks_on_gains(flight: Flight) -> list[str]:
 
     flown = [flight.law, *(law for _, law in flight.swaps)]
     corner = pair_corner(flight.controller_settings)
+    names = flight.plant.names
     return margin_remarks(
-        flown, flight.plant.robot, flight.mission_settings, corner, flight.controls_base
-    )
+        flown, flight.plant.robot, flight.mission_settings, corner, flight.controls_base,
+        on_thrusters=bool(names.thrusters and not names.wheels),
+    )  # fmt: skip
 
 
 OUTPUT = file_option("--output", help="File to write the JSON to as well.")

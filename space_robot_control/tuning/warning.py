@@ -23,6 +23,7 @@ def margin_remarks(
     mission: MissionSettings,
     acceleration_filter_hz: float = 0.0,
     controls_base: bool = True,
+    on_thrusters: bool = False,
 ) -> list[str]:
     """Return a line for each of the laws that diverges, or nearly does, for its h_bar alone.
 
@@ -32,6 +33,8 @@ def margin_remarks(
         mission: its reference.
         acceleration_filter_hz: corner of the low-pass of the time-delay pair (0: none).
         controls_base: whether anything turns the base.
+        on_thrusters: whether thrusters alone do: their pulses come back into the demand, all but
+            the share ``H^-1 h_bar``.
     """
     laws = {law.name: law for law in flown if law.h_bar.size}
     if not laws:
@@ -51,6 +54,8 @@ def margin_remarks(
                 f"h_bar leaves {found.margin:.2%} of margin in torque scale, "
                 f"{LEAST_MARGIN:.0%} is wise"
             )
+            if on_thrusters:
+                why += ", and thrusters' pulses come back into the demand (--gains robust)"
         else:
             continue
         remarks.append(f"warning: {name}: {why}; see space-robot gains check")
