@@ -77,7 +77,7 @@ class BaseDemand:
     def _held(self, log: FlightLog, axes: Array) -> Array:
         """Return what the flight's own wheels hold beyond what they held at its first row."""
         wheels = self._flown.wheels
-        held = (log.wheel_velocities * wheels.values("rotor_inertia")) @ wheels.unit_axes
+        held = wheels.spin_momenta(log.wheel_velocities) @ wheels.unit_axes
         if self._axes is None:
             self._taken = to_inertial(axes[:, :, :1], held[:1].T)
         at_first = to_base(axes, np.broadcast_to(self._taken, (3, len(held)))).T

@@ -18,17 +18,10 @@ from space_robot_sim.actuators.wheels import WheelSettings
 
 Array = NDArray[np.float64]
 
-STANDARD_GRAVITY = 9.80665
-"""m/s2, of the specific impulse."""
 BATCH = 8192
 """Ticks at a time; this bounds the memory."""
 PARALLEL = 1e-9
 """Share of two torques' product below which they are along one line."""
-
-
-def limits_of(values: Array) -> Array:
-    """Return limits with infinity where a setting's 0 says that there is none."""
-    return np.where(values > 0.0, values, np.inf)
 
 
 def largest_torque(hardware: BaseActuatorSettings) -> Array:
@@ -37,15 +30,15 @@ def largest_torque(hardware: BaseActuatorSettings) -> Array:
     However they share it: a linear programme, see `_largest`.
     """
     wheels, thrusters = hardware.wheels, hardware.thrusters
-    columns = np.vstack([wheels.unit_axes, thrusters.torques]).T
-    high = np.concatenate([limits_of(wheels.values("max_torque")), np.ones(thrusters.count)])
-    low = np.concatenate([-limits_of(wheels.values("max_torque")), np.zeros(thrusters.count)])
+    columns, limit = np.vstack([wheels.unit_axes, thrusters.torques]).T, wheels.limits("max_torque")
+    high = np.concatenate([limit, np.ones(thrusters.count)])
+    low = np.concatenate([-limit, np.zeros(thrusters.count)])
     return _largest(columns, low, high)
 
 
 def largest_momentum(wheels: WheelSettings) -> Array:
     """(3,) N m s that wheels can hold about each axis both ways, and none about another."""
-    limit = limits_of(wheels.values("max_momentum"))
+    limit = wheels.limits("max_momentum")
     return _largest(wheels.unit_axes.T, -limit, limit)
 
 
@@ -101,7 +94,7 @@ class ThrusterTorques(NamedTuple):
         normals = _unlike(np.vstack([faces, -faces]))
         reach = np.sum(np.maximum(normals @ torques.T, 0.0), axis=1)
         try:
-            hull = ConvexHull(torques / mass_rates(thrusters)[:, None]).equations
+            hull = ConvexHull(torques / thrusters.mass_flow[:, None]).equations
         except QhullError:
             raise InputError("the thrusters' torques hardly span all directions") from None
         return cls(normals / reach[:, None], -hull[:, :3] / hull[:, 3:])
@@ -113,14 +106,6 @@ class ThrusterTorques(NamedTuple):
     def propellant(self, torque: Array) -> Array:
         """(N,) kg/s, the least that gives each torque (N, 3), N m, were the valves continuous."""
         return _largest_product(self.of_mass, torque)
-
-
-def mass_rates(thrusters: ThrusterSettings) -> Array:
-    """(T,) kg/s that each open thruster uses: ``F / (I_sp g_0)``."""
-    rate: Array = thrusters.values("force") / (
-        thrusters.values("specific_impulse") * STANDARD_GRAVITY
-    )
-    return rate
 
 
 def _unlike(vectors: Array) -> Array:

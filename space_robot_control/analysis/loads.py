@@ -17,7 +17,7 @@ from space_robot_sim.actuators.thrusters import ThrusterSettings
 from space_robot_sim.actuators.wheels import WheelSettings
 
 from .base_demand import Demand
-from .capability import ThrusterTorques, limits_of, mass_rates, wheel_shares
+from .capability import ThrusterTorques, wheel_shares
 from .wheel_saturation import ROUNDING, WheelMotion, WheelRows
 
 Array = NDArray[np.float64]
@@ -84,7 +84,7 @@ class WheelLoad(Load):
 
     def requirements(self, period: float) -> list[Requirement]:
         """Return both of every wheel."""
-        limits = [limits_of(self._wheels.values(f"max_{key}")) for key in ("torque", "momentum")]
+        limits = [self._wheels.limits(f"max_{key}") for key in ("torque", "momentum")]
         found = []
         for i in range(self._wheels.count):
             name = f"wheel_{i + 1}"
@@ -110,7 +110,7 @@ class OtherWheelLoad(WheelLoad):
     def __init__(self, wheels: WheelSettings) -> None:
         super().__init__(wheels)
         self._shares = wheel_shares(wheels)
-        self._initial = wheels.values("rotor_inertia") * wheels.values("initial_speed")
+        self._initial = wheels.spin_momenta(wheels.values("initial_speed"))
 
     def _series(self, log: FlightLog, demand: Demand) -> WheelRows:
         wheels = self._wheels
@@ -172,7 +172,7 @@ class ThrusterLoad(Load):
         self._open = is_open[-1:].copy()
         self._pulses += np.bincount(self._main, np.sum(begun, axis=0), minlength=3).astype(np.intp)
         shares = np.sum(log.thrusts, axis=0) / self._thrusters.values("force")
-        rate = shares * mass_rates(self._thrusters)
+        rate = shares * self._thrusters.mass_flow
         self._rate += float(np.sum(rate))
         if self._rate_of_axes is not None:
             self._rate_of_axes += rate @ self._parts

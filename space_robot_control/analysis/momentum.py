@@ -68,7 +68,7 @@ class MomentumSeries:
         )  # fmt: skip
         found = robot_momentum(self._robot, motion)
         wheels = self.flown.wheels
-        spin = (rows.wheel_velocities * wheels.values("rotor_inertia")) @ wheels.unit_axes
+        spin = wheels.spin_momenta(rows.wheel_velocities) @ wheels.unit_axes
         outside = self._from_outside(rows, axes, found.centre_of_mass)
         self._before, self._outside = last_rows(log, 1), outside[-1].copy()
         whole = Momentum(

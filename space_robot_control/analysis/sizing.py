@@ -46,7 +46,7 @@ class Sizing(Metric):
         Raises:
             InputError: the base floated freely.
         """
-        if flown.settings.base_actuation == "none":
+        if not flown.settings.controls_base:
             raise InputError("the base floated freely: nothing was asked of it")
         self._period, self._is_flown = log.timebase.period, other is None
         self._name, self._set = other or flown

@@ -12,8 +12,6 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.wheels import WheelSettings
 
-from .capability import limits_of
-
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-9
@@ -33,7 +31,7 @@ class WheelMotion:
     """Follows what the motors give and where they bring the wheels, block by block."""
 
     def __init__(self, wheels: WheelSettings) -> None:
-        self._inertia = wheels.values("rotor_inertia")
+        self._wheels = wheels
         self._before: Array | None = None
         """(1, W) N m s at the last row."""
 
@@ -43,7 +41,7 @@ class WheelMotion:
         A motor stops at its wheel's limit whatever friction takes, and whatever the base does
         meanwhile: ``h + u T`` is what it looks at.
         """
-        momentum = log.wheel_velocities * self._inertia
+        momentum = self._wheels.spin_momenta(log.wheel_velocities)
         before = momentum[:1] if self._before is None else self._before
         begun = np.concatenate([before, momentum[:-1]])
         reached = begun + log.wheel_torques * log.timebase.period
@@ -65,7 +63,7 @@ class WheelSaturation(Metric):
         if not wheels.count:
             raise InputError("the base has no wheels")
         self._first_tick, self._period = log.first_tick, log.timebase.period
-        self._limits = [limits_of(wheels.values(f"max_{key}")) for key in ("torque", "momentum")]
+        self._limits = [wheels.limits(f"max_{key}") for key in ("torque", "momentum")]
         self._motion = WheelMotion(wheels)
         self._ticks = np.zeros((2, wheels.count), dtype=np.intp)
         self._first = np.full(wheels.count, -1)

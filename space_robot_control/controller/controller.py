@@ -72,8 +72,7 @@ class Controller:
         """The controller's `ControllerMemory`, for compiled loops."""
         memory: ControllerMemory = self.block[0]
         assign(memory, model=robot.model, last_jacobian_inverse=2.0 * np.eye(3))
-        is_free = actuators.base_actuation == "none"
-        assign(memory, controls_base=0.0 if is_free else 1.0)
+        assign(memory, controls_base=actuators.controls_base)
         assign(memory, transfer_ticks=max(1, round(TRANSFER_S / period)))
         assign(memory.pair, smoothing=low_pass_weight(acceleration_filter_hz, period))
         if navigation:

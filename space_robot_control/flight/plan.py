@@ -197,7 +197,7 @@ class Flight:
     @property
     def controls_base(self) -> bool:
         """True if anything turns the base; else it floats freely."""
-        return self.plant_settings.base_actuation != "none"
+        return self.plant_settings.controls_base
 
     def _check_actuators(self) -> None:
         flown, believed = self.plant_settings, self.believed_actuators

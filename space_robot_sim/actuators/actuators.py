@@ -105,7 +105,7 @@ class Actuators(Record):
         )
         if settings.thruster_count:
             first = n + 3 + settings.wheel_count
-            delays = np.round(settings.thrusters.values("delay") / period)
+            delays = settings.thrusters.ticks("delay", period)
             actuators.latency[first : first + settings.thruster_count] += delays
         return actuators
 

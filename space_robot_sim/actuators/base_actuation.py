@@ -35,6 +35,11 @@ class BaseActuatorSettings(StrictModel):
     thrusters: ThrusterSettings = ThrusterSettings()
 
     @property
+    def controls_base(self) -> bool:
+        """True if anything turns the base; else it floats freely."""
+        return self.base_actuation != "none"
+
+    @property
     def wheel_count(self) -> int:
         """Number of wheels, W."""
         return self.wheels.count

@@ -107,6 +107,17 @@ class ThrusterSettings(StrictModel):
         """
         return values_of(getattr(self, name), f"thrusters.{name}", self.count, "thruster")
 
+    @property
+    def mass_flow(self) -> Array:
+        """(T,) propellant that each open thruster burns, ``F / (I_sp g_0)``, kg/s."""
+        impulse = self.values("specific_impulse") * STANDARD_GRAVITY
+        flow: Array = self.values("force") / impulse
+        return flow
+
+    def ticks(self, name: str, period: float) -> Array:
+        """Return the times of the setting ``name`` in whole ticks of ``period``, s, (T,)."""
+        return np.round(self.values(name) / period)
+
     def check(self) -> None:
         """See that the numbers fit one another.
 
@@ -169,10 +180,8 @@ class Thrusters(Record):
             thrusters.force[:count] = force
             thrusters.direction[:count] = settings.unit_directions
             thrusters.lever[:count] = settings.torques / force[:, None]
-            thrusters.flow[:count] = force / (
-                settings.values("specific_impulse") * STANDARD_GRAVITY
-            )
-            ticks = np.round(settings.values("shortest_pulse") / period)
+            thrusters.flow[:count] = settings.mass_flow
+            ticks = settings.ticks("shortest_pulse", period)
             thrusters.shortest_pulse[:count] = np.maximum(1.0, ticks)
         return thrusters
 

@@ -91,6 +91,15 @@ class WheelSettings(StrictModel):
         """
         return values_of(getattr(self, name), f"wheels.{name}", self.count, "wheel")
 
+    def limits(self, name: str) -> Array:
+        """Return the `values` of a limit, infinite where its 0 says that there is none."""
+        values = self.values(name)
+        return np.where(values > 0.0, values, np.inf)
+
+    def spin_momenta(self, speeds: Array) -> Array:
+        """Return ``J Omega`` (..., W), N m s, of speeds relative to the base (..., W), rad/s."""
+        return speeds * self.values("rotor_inertia")
+
     def check(self, base_inertia: Array) -> None:
         """See that the numbers fit one another and a base.
 
@@ -146,8 +155,7 @@ class Wheels(Record):
             wheels.axis[:count] = settings.unit_axes
             wheels.inertia[:count] = settings.values("rotor_inertia")
             for name in ("max_torque", "max_momentum"):
-                limit = settings.values(name)
-                getattr(wheels, name)[:count] = np.where(limit > 0.0, limit, np.inf)
+                getattr(wheels, name)[:count] = settings.limits(name)
         return wheels
 
 

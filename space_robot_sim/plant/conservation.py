@@ -34,7 +34,7 @@ def momentum(
     angular = base[3:] + np.cross(state.base_position, base[:3])
     rotation = np.empty((3, 3))
     rotation_matrix(state.quaternion, rotation)
-    return base[:3], angular + rotation @ wheels.unit_axes.T @ spin_momentum(wheels, state)
+    return base[:3], angular + rotation @ wheels.unit_axes.T @ _spin_momenta(wheels, state)
 
 
 def kinetic_energy(robot: Robot, state: RobotState, wheels: WheelSettings = NO_WHEELS) -> float:
@@ -42,11 +42,9 @@ def kinetic_energy(robot: Robot, state: RobotState, wheels: WheelSettings = NO_W
     velocity = generalised_velocity(state)
     inertia = mass_matrix(robot, state.quaternion, state.joint_positions)
     of_base, of_wheels = wheels.unit_axes @ state.omega_base, state.wheel_velocities[: wheels.count]
-    spin = spin_momentum(wheels, state) @ (of_base + 0.5 * of_wheels)
+    spin = _spin_momenta(wheels, state) @ (of_base + 0.5 * of_wheels)
     return float(0.5 * velocity @ inertia @ velocity + spin)
 
 
-def spin_momentum(wheels: WheelSettings, state: RobotState) -> Array:
-    """Return ``J Omega`` (W,) of the wheels, N m s: what they have beyond turning with the base."""
-    momenta: Array = wheels.values("rotor_inertia") * state.wheel_velocities[: wheels.count]
-    return momenta
+def _spin_momenta(wheels: WheelSettings, state: RobotState) -> Array:
+    return wheels.spin_momenta(state.wheel_velocities[: wheels.count])

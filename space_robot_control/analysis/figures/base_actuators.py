@@ -13,7 +13,6 @@ from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
 from space_robot_sim.actuators.thrusters import ThrusterSettings
 from space_robot_sim.actuators.wheels import WheelSettings
 
-from ..capability import mass_rates
 from ..metrics import tracking_error
 from ..momentum import Momentum
 from ..plot_series import tick_times
@@ -59,7 +58,7 @@ def wheels(log: FlightLog, settings: WheelSettings) -> Figure:
     """Draw momentum and motor torque of every wheel between their limits, where they have any."""
     figure = page(18.0 + 55.0 * 2)
     above, below = figure.subplots(2, 1, sharex=True)
-    time, held = tick_times(log), log.wheel_velocities * settings.values("rotor_inertia")
+    time, held = tick_times(log), settings.spin_momenta(log.wheel_velocities)
     plot_lines(above, time, held)
     plot_lines(below, time, log.wheel_torques)
     _mark_limits(above, settings.values("max_momentum"))
@@ -86,7 +85,7 @@ def thrusters(log: FlightLog, pushed: Array, settings: ThrusterSettings) -> Figu
     used, place = (figure.add_subplot(rows[i], sharex=pulses) for i in (1, 2))
     cycle = figure.add_subplot(rows[3])
     _draw_pulses(pulses, time, log.thrusts / settings.values("force"), log.timebase.period)
-    rates = log.thrusts / settings.values("force") * mass_rates(settings)
+    rates = log.thrusts / settings.values("force") * settings.mass_flow
     mass = log.timebase.period * np.cumsum(rates.sum(axis=1))
     plot_lines(used, time, 1e3 * mass[:, np.newaxis])
     used.set_ylabel("propellant (g)")

@@ -60,9 +60,8 @@ class Thrusters(Record):
         size, shortest, delay = np.zeros((3, MOST_THRUSTERS))
         if count:
             torque, size[:count] = believed.torques, believed.values("force")
-            pulses, delays = believed.values("shortest_pulse"), believed.values("delay")
-            shortest[:count] = np.maximum(1.0, np.round(pulses / period))
-            delay[:count] = np.minimum(np.round(delays / period), LONGEST_DELAY - 1.0)
+            shortest[:count] = np.maximum(1.0, believed.ticks("shortest_pulse", period))
+            delay[:count] = np.minimum(believed.ticks("delay", period), LONGEST_DELAY - 1.0)
             arm = float(np.mean(np.linalg.norm(torque, axis=1) / size[:count]))
             force = believed.unit_directions * size[:count, None]
             wrench[:count] = np.hstack([torque, settings.force_weight * arm * force])

@@ -63,9 +63,8 @@ class Wheels(Record):
         """Read the numbers of the settings; ``period`` of a tick in s."""
         wheels, count = cls.allocate(n), believed.count
         torque, momentum = np.full((2, MOST_WHEELS), np.inf)
-        for values, name in ((torque, "max_torque"), (momentum, "max_momentum")):
-            given = believed.values(name)
-            values[:count] = np.where(given > 0.0, given, np.inf)
+        torque[:count] = believed.limits("max_torque")
+        momentum[:count] = believed.limits("max_momentum")
         load = torque if np.all(np.isfinite(torque[:count])) else np.ones(MOST_WHEELS)
         axis, inertia = np.zeros((MOST_WHEELS, 3)), np.ones(MOST_WHEELS)
         axis[:count], inertia[:count] = believed.unit_axes, believed.values("rotor_inertia")

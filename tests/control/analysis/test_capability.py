@@ -16,7 +16,6 @@ from space_robot_control.analysis.capability import (
     ThrusterTorques,
     largest_momentum,
     largest_torque,
-    mass_rates,
     wheel_shares,
 )
 
@@ -65,7 +64,7 @@ def test_the_share_of_thrusters_is_the_zonotopes(seed: int) -> None:
 def test_the_least_propellant_is_the_linear_programmes(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     thrusters = random_thrusters(rng, count).thrusters
-    rates, torques = mass_rates(thrusters), thrusters.torques
+    rates, torques = thrusters.mass_flow, thrusters.torques
     np.testing.assert_allclose(
         rates,
         np.array(thrusters.force) / np.array(thrusters.specific_impulse) / 9.80665,
