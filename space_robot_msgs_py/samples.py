@@ -19,29 +19,40 @@ from .topics import BASE_AXES
 
 Array = NDArray[np.float64]
 
-MOST_WHEELS, MOST_THRUSTERS = 8, 24
-"""The base has no more reaction wheels and thrusters. A state has room for as many, so that their
-number is no part of its layout, and another number compiles nothing anew."""
+MOST_WHEELS, MOST_THRUSTERS, MOST_PASSIVE = 8, 24, 24
+"""The base has no more reaction wheels and thrusters, a robot no more passive joints. A state has
+room for as many, so that their number is no part of its layout, and another number compiles nothing
+anew."""
 
 
 class RobotNames(NamedTuple):
     """The names that a robot's numbers go by in messages."""
 
     joints: tuple[str, ...]
+    """Those with motors."""
     wheels: tuple[str, ...] = ()
     thrusters: tuple[str, ...] = ()
+    passive: tuple[str, ...] = ()
+    """The joints without motors."""
 
     @classmethod
     def of(
-        cls, joints: Sequence[str], actuators: Sequence[str] = (), wheel_count: int = 0
-    ) -> RobotNames:
+        cls, joints: Sequence[str], actuators: Sequence[str] = (), wheel_count: int = 0,
+        passive: Sequence[str] = (),
+    ) -> RobotNames:  # fmt: skip
         """Take the joints' names and those of the base's ``actuators``: wheels come first."""
-        return cls(tuple(joints), tuple(actuators[:wheel_count]), tuple(actuators[wheel_count:]))
+        wheels, thrusters = actuators[:wheel_count], actuators[wheel_count:]
+        return cls(tuple(joints), tuple(wheels), tuple(thrusters), tuple(passive))
 
     @property
     def axes(self) -> tuple[str, ...]:
         """Those of the controlled axes: base x, y, z, then joints."""
         return (*BASE_AXES, *self.joints)
+
+    @property
+    def all_joints(self) -> tuple[str, ...]:
+        """Those of all joints: with motors, then without."""
+        return (*self.joints, *self.passive)
 
     @property
     def actuators(self) -> tuple[str, ...]:
@@ -96,11 +107,12 @@ class State(Record):
     omega_base: Array = shaped(lambda n: (3,))
     """Base angular velocity in the *base* frame, as a gyro measures it, rad/s."""
     joint_positions: Array = shaped(lambda n: (n,))
-    """Joint angles, rad."""
+    """Positions of the joints with motors: rad of those that turn, m of prismatic ones."""
     joint_velocities: Array = shaped(lambda n: (n,))
-    """Joint velocities, rad/s."""
+    """Their velocities, rad/s or m/s."""
     applied_torque: Array = shaped(lambda n: (n + 3,))
-    """Torque applied over the last interval, N m: base x, y, z in the base frame, then joints."""
+    """Torque applied over the last interval, N m: base x, y, z in the base frame, then joints; the
+    force, N, of a prismatic one."""
     wheel_velocities: Array = shaped(lambda n: (MOST_WHEELS,))
     """Speeds of the reaction wheels about their axes relative to the base, rad/s; 0 where the base
     has no wheel."""
@@ -108,12 +120,20 @@ class State(Record):
     """Torques that the motors gave the wheels over the last interval, N m."""
     thrusts: Array = shaped(lambda n: (MOST_THRUSTERS,))
     """Forces of the thrusters, means over the last interval, N."""
+    passive_positions: Array = shaped(lambda n: (MOST_PASSIVE,))
+    """Positions of the joints without motors, rad or m; 0 where the robot has none."""
+    passive_velocities: Array = shaped(lambda n: (MOST_PASSIVE,))
+    """Their velocities, rad/s or m/s."""
 
 
+ALL_FIELDS = tuple(State.__annotations__)
+"""Names of all numbers of a state, in their order in memory."""
 ACTUATOR_FIELDS = ("wheel_velocities", "wheel_torques", "thrusts")
-"""Names of the numbers of a state that are of the base's actuators; no sensor spoils them."""
-STATE_FIELDS = tuple(name for name in State.__annotations__ if name not in ACTUATOR_FIELDS)
-"""Names of the others, in their order in memory, before those of the actuators."""
+"""Names of those that are of the base's actuators; no sensor spoils them."""
+PASSIVE_FIELDS = ("passive_positions", "passive_velocities")
+"""Names of those of the joints without motors; no sensor spoils and no controller reads them."""
+STATE_FIELDS = tuple(n for n in ALL_FIELDS if n not in ACTUATOR_FIELDS + PASSIVE_FIELDS)
+"""Names of the others, which come first in memory."""
 
 
 class RobotState:
@@ -122,7 +142,7 @@ class RobotState:
     Each field of `State` is an attribute, a view of ``block``, which compiled code reads whole.
     """
 
-    __slots__ = ("block", "numbers", "tick", *STATE_FIELDS, *ACTUATOR_FIELDS)
+    __slots__ = ("block", "numbers", "tick", *ALL_FIELDS)
     base_position: Array
     quaternion: Array
     base_velocity: Array
@@ -133,13 +153,15 @@ class RobotState:
     wheel_velocities: Array
     wheel_torques: Array
     thrusts: Array
+    passive_positions: Array
+    passive_velocities: Array
 
     def __init__(self, tick: int, block: Block) -> None:
         """``block``: (1,) array of a `State`."""
         self.tick, self.block = tick, block
         self.numbers: Array = block.view(np.float64)
         """All fields one behind the other, the same memory."""
-        for name in STATE_FIELDS + ACTUATOR_FIELDS:
+        for name in ALL_FIELDS:
             setattr(self, name, block[0][name])
 
     @classmethod
