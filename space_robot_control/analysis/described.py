@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import laws_of
-from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
@@ -23,11 +22,12 @@ from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.payload import with_payload
 from space_robot_sim.plant.settings import PlantNodeSettings
 from space_robot_sim.robot import Robot
+from space_robot_sim.robot.find import find_robot
 
 from ..controller.gains import build_law
 from ..controller.navigation.low_pass import low_pass_weight
 from ..controller.settings import ControllerNodeSettings
-from ..laws.trust import check_file, check_law
+from ..laws.trust import check_file, check_law, is_plain
 from .actuation import TorqueLimits
 from .estimate_error import HBar
 from .momentum import MomentumSeries
@@ -56,7 +56,7 @@ def robot_of(log: FlightLog) -> Robot:
         robot = Robot.from_dict(content, where="robot_file of the bag")
     elif name := flight.get("robot"):
         _check_files(log, {"robot": name})
-        robot = Robot.from_yaml(named_file("robots", str(name)))
+        robot = find_robot(str(name))
     else:
         raise NotDescribedError("the bag does not say which robot was flown")
     if robot.joint_names != log.joint_names:
@@ -109,10 +109,20 @@ def _plant_settings(log: FlightLog, keys: Sequence[str] = ()) -> PlantNodeSettin
         raise NotDescribedError("the bag does not say what the plant was told")
     if keys and all(key in given for key in keys):
         given = {key: given[key] for key in keys}
+    given = _without_told_robot(log, given)
     _check_files(log, given)
     # their numbers are in the bag, while their files may be elsewhere
     given = {key: value for key, value in given.items() if key not in ("actuators", "sensors")}
     return PlantNodeSettings.resolve(given)
+
+
+def _without_told_robot(log: FlightLog, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Leave out the files of a robot and a mission all of which the bag tells."""
+    told = {
+        "robot": isinstance(log.flight.get("robot_file"), dict),
+        "mission": "waypoints_deg" in _parameters(log, "mission"),
+    }
+    return {key: value for key, value in given.items() if not told.get(key) or is_plain(str(value))}
 
 
 def estimator(log: FlightLog) -> tuple[HBar, float]:

@@ -3,34 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.config.files import config_directory, node_parameters
+from space_robot_msgs_py.config.files import node_parameters
 from space_robot_msgs_py.config.trees import Tree, nest
 from space_robot_msgs_py.config.validation import one_of, read_yaml, short
 from space_robot_msgs_py.config.yaml_text import check_file, is_folder
 from space_robot_msgs_py.errors import InputError
+from space_robot_sim.robot.find import robot_files
 
 from ..laws import ControlLaw, find_law, laws
-from .settings import OF_THE_SET, ControllerNodeSettings
+from .settings import DEFAULT, DEFAULT_SETS, OF_THE_SET, ControllerNodeSettings
 
 Array = NDArray[np.float64]
 
 STRICTLY_POSITIVE = ("h_bar", "delta")
 """Gains that divide or invert something; the others may be zero."""
-DEFAULT_SETS = "default_sets.yaml"
 PARAMETERS = "controller parameters"
 
 
 def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
     """The file of each law's gains by the law's name, for a robot (name or path) and a set.
 
-    ``gain_set`` is ``default``, a folder's name in ``config/gains/<robot>``, or a path to a
-    folder of ``<law>.yaml`` or to one such file.
+    ``gain_set`` is ``default``, a folder's name among the robot's gains (``config/gains/<robot>``,
+    or ``gains`` in its own folder), or a path to a folder of ``<law>.yaml`` or to one such file.
 
     Raises:
         InputError: there is no such set; names the ones there are.
@@ -41,17 +42,18 @@ def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
         return {path.stem: path}
     if "/" in gain_set:
         return _gains_folder(path)
-    folder = config_directory() / "gains" / Path(robot).stem
-    sets = _shipped_sets(robot)
-    if not sets:
+    found = robot_files(robot)
+    if (folder := found.gains) is None:
         raise InputError(
-            f"no gains for robot {short(Path(robot).stem)} in {folder.parent}: "
-            "name a folder of <law>.yaml files as gains"
+            f"robot {short(robot)} has no gains of its own: `space-robot new {found.file}` makes "
+            "it some, with a mission; or name a folder of <law>.yaml files as gains"
         )
-    if gain_set == "default":
+    if gain_set == DEFAULT:
+        if not (folder / DEFAULT_SETS).is_file():
+            return _gains_folder(folder)
         chosen = read_yaml(folder / DEFAULT_SETS)
-        return {law: folder / name / f"{law}.yaml" for law, name in chosen.items()}
-    one_of(gain_set, ["default", *sets], "gain set", f" of robot {short(Path(robot).stem)}")
+        return {law: folder / str(name) / f"{law}.yaml" for law, name in chosen.items()}
+    one_of(gain_set, [DEFAULT, *_sets(folder)], "gain set", f" of robot {short(found.name)}")
     return _files(folder / gain_set)
 
 
@@ -60,15 +62,16 @@ def gains_as_path(gain_set: str, robot: str) -> str:
 
     Not for names out of bags: these open no folder of the user's.
     """
-    if "/" in gain_set or gain_set in ("default", *_shipped_sets(robot)):
+    if "/" in gain_set or gain_set == DEFAULT:
         return gain_set
+    with suppress(InputError):  # of a bag: a robot that is not here
+        if (own := robot_files(robot).gains) and gain_set in _sets(own):
+            return gain_set
     return f"{gain_set}/" if gain_set and is_folder(Path(gain_set)) else gain_set
 
 
-def _shipped_sets(robot: str) -> list[str]:
-    folder = config_directory() / "gains" / Path(robot).stem
-    entries = folder.iterdir() if is_folder(folder) else ()
-    return sorted(entry.name for entry in entries if entry.is_dir())
+def _sets(folder: Path) -> list[str]:
+    return sorted(entry.name for entry in folder.iterdir() if entry.is_dir())
 
 
 def _gains_folder(path: Path) -> dict[str, Path]:

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.compiled.records import Block
-from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.ros.endpoints import RawPublisher, flush
 from space_robot_msgs_py.ros.health import Health, Level
 from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
-from space_robot_sim.robot import Robot
+from space_robot_sim.robot.find import find_robot
 
 from .allocation.believed_actuators import believed_actuators
 from .answering import Answering, Standing
@@ -41,7 +40,7 @@ class ControllerLoop:
     ) -> None:
         """Load the laws' compiled code, so that no tick comes late for it."""
         self._node, self._settings = node, settings
-        robot = Robot.from_yaml(named_file("robots", settings.robot))
+        robot = find_robot(settings.robot)
         self._laws = LawSet(node, settings, robot.n + 3)
         actuators = believed_actuators(settings.actuators, robot)
         self._laws.warm_up(robot, actuators)

@@ -9,9 +9,10 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.config.files import config_directory, named_file
+from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
-from space_robot_msgs_py.config.yaml_text import is_folder
+from space_robot_msgs_py.config.validation import read_yaml
+from space_robot_sim.robot.find import robot_files
 
 from .allocation.settings import AllocationSettings
 from .navigation.believed_sensors import completed
@@ -19,13 +20,29 @@ from .navigation.settings import Mode, NavigationFilterSettings
 
 OF_THE_SET = "controller.yaml"
 """A file of a gain set with the controller's parameters that belong to its gains; need not be."""
+DEFAULT, DEFAULT_SETS = "default", "default_sets.yaml"
+"""The set that is flown unless another is named, and the file of a robot's gains that says for each
+law which one that is; without such a file the set is the robot's folder of gains itself."""
 
 
 def set_file(robot: str, gains: str) -> list[Path]:
-    """Return the `OF_THE_SET` of a gain set (name, or path to a folder), if it has one."""
-    is_path = "/" in gains
-    folder = Path(gains) if is_path else config_directory() / "gains" / Path(robot).stem / gains
-    return [file for file in (folder / OF_THE_SET,) if is_folder(folder) and file.is_file()]
+    """Return the `OF_THE_SET` of a gain set (name, or path to a folder), if it has one.
+
+    The default set has one if it is the same set for all laws.
+
+    Raises:
+        InputError: there is no such robot.
+    """
+    folder = Path(gains) if "/" in gains else robot_files(robot).gains
+    if folder is None or gains.endswith((".yaml", ".yml")):
+        return []
+    if gains == DEFAULT:
+        default = folder / DEFAULT_SETS
+        chosen = set(read_yaml(default).values()) if default.is_file() else {"."}
+        folder = folder / str(chosen.pop()) if len(chosen) == 1 else folder / DEFAULT
+    elif "/" not in gains:
+        folder = folder / gains
+    return [file for file in (folder / OF_THE_SET,) if file.is_file()]
 
 
 class ControllerNodeSettings(NodeSettings):

@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
-from space_robot_msgs_py.config.files import named_file, node_parameters
+from space_robot_msgs_py.config.files import config_directory, named_file, node_parameters
 from space_robot_msgs_py.config.settings import NodeSettings
 from space_robot_msgs_py.config.trees import Tree, flatten, merge, nest
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.settings import PlantNodeSettings
+from space_robot_sim.robot.find import mission_file
 
 from ..controller.gains import gains_as_path, split_gains
 from ..controller.settings import ControllerNodeSettings, set_file
@@ -66,6 +67,12 @@ class FlightSettings(NamedTuple):
             for node in NODES
         }
         plant = PlantNodeSettings.resolve(given["plant"])
+        mission = MissionNodeSettings.resolve(given["mission"])
+        for node in (plant, mission):  # a file that is not shipped: a bag tells all of it
+            file = mission_file(node.robot, node.mission)
+            if config_directory() not in file.parents:
+                told = dict(flatten(node_parameters(file, node.node)))
+                given[node.node] = {**told, **given[node.node]}
         given["controller"].setdefault("actuators", plant.actuators)
         if plant.realtime:  # by the wall clock there is no time to wait
             given["controller"] = {"reference_timeout": 0.0, **given["controller"]}
@@ -87,7 +94,7 @@ class FlightSettings(NamedTuple):
         settings = cls(
             plant,
             controller.model_copy(update={"gains": path}),
-            MissionNodeSettings.resolve(given["mission"]),
+            mission,
             RecorderNodeSettings.resolve(given["recorder"]),
             gains,
             {node: tuple(names) for node, names in given.items()},

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import ByteSize, Field
@@ -16,6 +15,7 @@ from space_robot_sim.faults.grammar import Kinds, parse_faults
 from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import MOST_TICKS
+from space_robot_sim.robot.find import robot_as_path, robot_files
 
 from ..controller.allocation.believed_actuators import believed_actuators
 from ..controller.controller import Controller
@@ -82,12 +82,13 @@ class FlightPlan(StrictModel):
 
     def options(self) -> dict[str, dict[str, Any]]:
         """Return what the options, without ``parameters``, say to each node, by dotted name."""
+        robot = robot_as_path(self.robot)
         period = {} if self.period is None else {"period": self.period}
         return {
             "plant": {
                 **period,
                 **({} if self.substeps is None else {"substeps": self.substeps}),
-                "robot": self.robot,
+                "robot": robot,
                 "mission": self.mission,
                 "case": self.case,
                 "sensors": self.sensors,
@@ -101,14 +102,14 @@ class FlightPlan(StrictModel):
             },
             "controller": {
                 **period,
-                "robot": self.robot,
+                "robot": robot,
                 "controller": self.controller,
                 "gains": self.gains,
                 "fifo_priority": self.fifo_priority,
                 "swaps": self.swaps,
                 **({} if self.navigation is None else {"navigation": self.navigation}),
             },
-            "mission": {**period, "robot": self.robot, "mission": self.mission},
+            "mission": {**period, "robot": robot, "mission": self.mission},
             "recorder": {
                 **period,
                 **({} if self.compression is None else {"compression": self.compression}),
@@ -142,6 +143,8 @@ class Flight:
         self.timebase = settings.plant.timebase
         self._robots = Robots(settings)
         self.robot = self._robots.plant
+        mission = settings.mission
+        self._mission_name = mission.mission or robot_files(mission.robot).name
         axes = self.robot.n + 3
         laws = build_laws(settings.controller, axes, settings.gains)
         self.swaps = [
@@ -272,9 +275,7 @@ class Flight:
 
         The same plan with the same software gives the same one: it tells no time and no machine.
         """
-        plant, controller, mission = (
-            self.plant_settings, self.controller_settings, self.mission_settings,
-        )  # fmt: skip
+        plant, controller = self.plant_settings, self.controller_settings
         swaps = [text for text in controller.swaps if text.strip()]
         return {
             "controller": self.law.name,
@@ -284,7 +285,7 @@ class Flight:
             **self._base_actuators,
             "gains": controller.gains,
             "robot": self.robot.name,
-            "mission": mission.mission or Path(mission.robot).stem,
+            "mission": self._mission_name,
             "period": self.period,
             "ticks": self.ticks,
             "command_latency_ticks": plant.command_latency_ticks,

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from space_robot_msgs_py.config.files import named_file
-from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.robot import Robot
+from space_robot_sim.robot.find import robot_content
 
 from .node_settings import FlightSettings
 
@@ -35,13 +34,13 @@ class Robots:
                 )
 
     def _read(self, name: str) -> Robot:
-        file = named_file("robots", name)
-        content = self._contents.setdefault(name, read_yaml(file))
-        return Robot.from_dict(content, where=str(file))
+        if name not in self._contents:
+            self._contents[name] = robot_content(name)
+        return Robot.from_dict(self._contents[name], where=f"robot {name}")
 
     @property
     def description(self) -> dict[str, Any]:
-        """The plant's robot as its file has it, and the controller's where that is another."""
+        """The numbers of the plant's robot, and of the controller's where that is another."""
         plant, controller = (self._contents[name] for name in self._names)
         own = {"controller_robot": self.controller.name, "controller_robot_file": controller}
         return {"robot_file": plant, **({} if controller == plant else own)}

@@ -11,6 +11,7 @@ from space_robot_msgs_py.errors import InputError
 from . import laws
 
 _LONGEST_NAME = 100
+FILES = (".yaml", ".yml", ".urdf", ".xacro")
 
 
 class NotTrustedError(InputError):
@@ -19,7 +20,7 @@ class NotTrustedError(InputError):
 
 def is_plain(name: str) -> bool:
     """True if a name is looked up among what is shipped; else it is a path to somewhere."""
-    is_path = "/" in name or name.endswith((".yaml", ".yml")) or name in (".", "..")
+    is_path = "/" in name or name.endswith(FILES) or name in (".", "..")
     return name.isprintable() and not is_path and len(name) <= _LONGEST_NAME
 
 

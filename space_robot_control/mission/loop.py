@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.ros.endpoints import (
     FollowedSubscription,
@@ -18,7 +17,7 @@ from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 from space_robot_msgs_py.wire.stamp_guard import StampGuard
-from space_robot_sim.robot import Robot
+from space_robot_sim.robot.find import find_robot
 
 from .mission import Mission
 from .settings import MissionNodeSettings
@@ -43,7 +42,7 @@ class MissionLoop:
     ) -> None:
         """Read the robot and the mission."""
         self._node, self._settings = node, settings
-        robot = Robot.from_yaml(named_file("robots", settings.robot))
+        robot = find_robot(settings.robot)
         self._mission = Mission(robot.n, settings, settings.period)
         self._codec = ReferenceCodec(robot.joint_names, settings.timebase)
         self._joints = RawPublisher(node, topics.REFERENCE_JOINTS)

@@ -8,8 +8,8 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from space_robot_msgs_py.config.files import mission_file
 from space_robot_msgs_py.config.settings import NodeSettings
+from space_robot_sim.robot.find import mission_file
 
 from .mission import MissionSettings
 

@@ -48,22 +48,6 @@ def named_file(kind: str, name: str) -> Path:
     return folder / f"{name}.yaml"
 
 
-def mission_file(robot: str, mission: str) -> Path:
-    """Return the file of a mission, of the robot's own if the name is empty.
-
-    Raises:
-        InputError: there is none, or no such robot; names those there are.
-    """
-    if mission:
-        return named_file("missions", mission)
-    named_file("robots", robot)  # first: else its mission would be said to be unknown
-    name = Path(robot).stem
-    try:
-        return named_file("missions", name)
-    except InputError as error:
-        raise InputError(f"robot {short(robot)} has no mission of its own, {error}") from None
-
-
 def node_parameters(path: Path, node: str) -> Tree:
     """Read what a ROS parameter file says to a node (keys ``/**``, then its ROS name), as a tree.
 

@@ -35,7 +35,9 @@ class NodeSettings(StrictModel):
     sends: ClassVar[tuple[Topic, ...]] = ()
     """Topics whose listeners the node can be told to wait for (parameter ``wait_for``)."""
 
-    robot: str = Field("paper", description="a robot of config/robots, or a path to its YAML")
+    robot: str = Field(
+        "paper", description="a robot of config/robots, or a path to its YAML, URDF or folder"
+    )
     period: Annotated[float, Field(ge=1e-5, le=0.1)] = Field(
         0.0005, description="length of a tick, s; the same for all nodes"
     )

@@ -9,7 +9,6 @@ from collections import deque
 import numpy as np
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.ros.endpoints import (
     FollowedSubscription,
@@ -24,7 +23,7 @@ from space_robot_msgs_py.samples import Command
 from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 
-from ..robot import Robot
+from ..robot.find import find_robot
 from .actuator_health import ActuatorHealth
 from .command_guard import CommandGuard
 from .exchange import NONE, SentState, exchange_of
@@ -59,7 +58,7 @@ class PlantLoop:
     def __init__(self, node: ManagedNode[PlantNodeSettings], settings: PlantNodeSettings) -> None:
         """Make the plant and load its compiled code, so that no tick comes late for it."""
         self._node, self._settings = node, settings
-        robot = Robot.from_yaml(named_file("robots", settings.robot))
+        robot = find_robot(settings.robot)
         self._plant = Plant(robot, settings, settings.period)
         names = self._plant.names
         at_rest = Command(0, np.zeros(len(names.commanded)))

@@ -9,9 +9,10 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.config.files import mission_file, named_file
+from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 
+from ..robot.find import mission_file
 from .plant import PlantSettings
 
 MOST_TICKS = 10**10

@@ -10,8 +10,8 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from space_robot_msgs_py.config.files import named_file
-from space_robot_msgs_py.config.validation import StrictModel, read_yaml
+from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_sim.robot.find import mission_file, robot_as_path, robot_content
 
 from ...flight.plan import FlightPlan
 
@@ -75,7 +75,7 @@ class Sweep(StrictModel):
         if robot is None:
             return plan
         # the plant's alone: controller and mission keep the nominal one
-        mission = plan.mission or plan.robot
+        mission = plan.mission or str(mission_file(robot_as_path(plan.robot)))
         return plan.with_parameters("plant", {"robot": robot, "mission": mission})
 
     def robot_file(self, index: int) -> dict[str, Any] | None:
@@ -86,9 +86,7 @@ class Sweep(StrictModel):
         """
         if not self.spread:
             return None
-        content: dict[str, Any] = copy.deepcopy(
-            read_yaml(named_file("robots", self.common.get("robot", "paper")))
-        )
+        content = copy.deepcopy(robot_content(robot_as_path(self.common.get("robot", "paper"))))
         bodies = [content["robot"]["base"], *content["robot"]["links"]]
         rng = np.random.default_rng((self.seed, index))
         factors = rng.uniform(1.0 - self.spread, 1.0 + self.spread, (len(bodies), 2)).tolist()

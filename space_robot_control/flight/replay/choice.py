@@ -10,11 +10,11 @@ from typing import Any
 
 import yaml
 
-from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import LawInForce, RobotNames
 from space_robot_sim.robot import Robot
+from space_robot_sim.robot.find import OWN, find_robot
 
 from ...controller.allocation.believed_actuators import OWNER, believed_actuators
 from ...controller.gains import build_law, build_laws, gain_files, gains_as_path, split_gains
@@ -62,6 +62,7 @@ class ControllerChoice:
             )
         gains = gains_as_path(gains, str(flown.get("robot", "paper")))
         self._flight, self._folder, self._trust = flight, folder, trust
+        self._flown = flown
         self._said = {
             **({"controller": controller} if controller else {}),
             **({"gains": gains} if gains else {}),
@@ -131,7 +132,7 @@ class ControllerChoice:
         if content is None:
             return {}
         name = Path(str(flown.get("robot", "paper"))).stem
-        path = self._folder / f"{name if is_plain(name) else 'recorded'}.yaml"
+        path = self._folder / f"{name if is_plain(name) and name != OWN else 'recorded'}.yaml"
         _write(path, content)
         return {"robot": str(path)}
 
@@ -153,7 +154,8 @@ class ControllerChoice:
         files: dict[str, Path] = {}
         if self._trust or is_plain(self.gains_name):
             with suppress(InputError):  # recorded elsewhere
-                files = gain_files(str(self.parameters.get("robot", "paper")), self.gains_name)
+                robot = (self._flown if self._trust else self.parameters).get("robot", "paper")
+                files = gain_files(str(robot), self.gains_name)
         else:
             self._left_out = self.gains_name
         for name, file in files.items():
@@ -166,7 +168,7 @@ class ControllerChoice:
         """The robot, the names in its messages, and the law with the gains of the files."""
         own, gains = split_gains(self.parameters)
         settings = ControllerNodeSettings.resolve(own)
-        robot = Robot.from_yaml(named_file("robots", settings.robot))
+        robot = find_robot(settings.robot)
         axes = robot.n + 3
         laws = build_laws(settings, axes, gains)
         for swap in parse_swaps(settings.swaps, settings.period):

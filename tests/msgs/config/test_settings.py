@@ -112,8 +112,10 @@ def test_unknown_names_list_the_known_ones() -> None:
         named_file("cases", "7")
     with pytest.raises(InputError, match="unknown gain set 'best' of robot 'paper': choose"):
         gain_files("paper", "best")
-    with pytest.raises(InputError, match="no gains for robot 'mine'"):
-        gain_files("mine.yaml", "default")
+    with pytest.raises(
+        InputError, match=r"unknown robot 'mine': choose one of .*paper, seven_joint"
+    ):
+        gain_files("mine", "default")
 
 
 def test_file_that_is_no_parameter_file(tmp_path: Path) -> None:

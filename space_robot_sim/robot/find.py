@@ -1,0 +1,150 @@
+"""A robot by its name or its files, and where its mission and its gains are.
+
+A robot is named by a name of ``config/robots``, by a path to a ``.yaml``, ``.urdf`` or ``.xacro``,
+or by a folder of its own:
+
+    robot.yaml (or robot.urdf, robot.xacro)
+    mission.yaml
+    gains/<set>/<law>.yaml, gains/default_sets.yaml
+
+The mission and the gains of a robot that has no such folder are those of ``config/`` that are
+called as its file is. A name without a slash is never a folder's (see `robot_as_path`), so that
+names out of bags open nothing but what is shipped.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from space_robot_msgs_py.config.files import config_directory, named_file
+from space_robot_msgs_py.config.validation import read_yaml, short
+from space_robot_msgs_py.config.yaml_text import check_file, is_folder
+from space_robot_msgs_py.errors import InputError
+
+from .robot import Robot
+
+YAML, URDF = (".yaml", ".yml"), (".urdf", ".xacro")
+OWN = "robot"
+"""Name, less its ending, of the robot's file in a folder of its own."""
+OWN_MISSION, OWN_GAINS = "mission.yaml", "gains"
+
+
+@dataclass(frozen=True)
+class RobotFiles:
+    """Where a robot and what belongs to it are."""
+
+    name: str
+    """That its mission and gains go by: a name of ``config/``, of a file, or of a folder."""
+    file: Path
+    mission: Path | None
+    """None: it has none of its own."""
+    gains: Path | None
+    """The folder of its gain sets; None: it has none."""
+
+
+def robot_names() -> list[str]:
+    """Return the names of the shipped robots."""
+    return sorted(file.stem for file in (config_directory() / "robots").glob("*.yaml"))
+
+
+def robot_files(robot: str) -> RobotFiles:
+    """Find the files of a robot, by name or path.
+
+    Raises:
+        InputError: there is no such robot; names those there are.
+    """
+    path = Path(robot)
+    if robot.endswith((*YAML, *URDF)):
+        check_file(path)
+        return _own_folder(path) if path.stem == OWN else _in_config(path)
+    if "/" in robot:
+        return _own_folder(_file_of(path))
+    if robot not in (names := robot_names()):
+        raise InputError(
+            f"unknown robot {short(robot)}: choose one of {', '.join(names)}, or a path to a "
+            ".yaml or .urdf file or to a folder"
+        )
+    return _in_config(config_directory() / "robots" / f"{robot}.yaml")
+
+
+def find_robot(robot: str, base: str | None = None, repair: bool = False) -> Robot:
+    """Read a robot by name or path.
+
+    Args:
+        robot: see above.
+        base: the link that is the satellite, of a URDF (None: its root).
+        repair: whether a URDF's defects are repaired.
+
+    Raises:
+        InputError: there is no such robot, or its file is wrong.
+    """
+    file = robot_files(robot).file
+    if file.suffix in URDF:
+        raise InputError(f"{file}: URDF is not read yet")
+    return Robot.from_yaml(file)
+
+
+def robot_content(robot: str) -> dict[str, Any]:
+    """Return what `Robot.from_dict` builds a robot of, by name or path: complete in itself.
+
+    Raises:
+        InputError: see `find_robot`.
+    """
+    return read_yaml(robot_files(robot).file)
+
+
+def mission_file(robot: str, mission: str = "") -> Path:
+    """Return the file of a mission, of the robot's own if the name is empty.
+
+    Raises:
+        InputError: there is none, or no such robot; says what to do.
+    """
+    if mission:
+        return named_file("missions", mission)
+    found = robot_files(robot)
+    if found.mission is None:
+        raise InputError(
+            f"robot {short(robot)} has no mission of its own: `space-robot new {found.file}` "
+            "makes it one, with gains; or name a mission"
+        )
+    return found.mission
+
+
+def robot_as_path(robot: str) -> str:
+    """Return what a user means by a robot's name: ``r`` is the folder ``r/`` if none is called so.
+
+    Not for names out of bags: these open no folder of the user's.
+    """
+    if not robot or "/" in robot or robot.endswith((*YAML, *URDF)) or robot in robot_names():
+        return robot
+    return f"{robot}/" if is_folder(Path(robot)) else robot
+
+
+def _in_config(file: Path) -> RobotFiles:
+    config, name = config_directory(), file.stem
+    mission, gains = config / "missions" / f"{name}.yaml", config / "gains" / name
+    return RobotFiles(
+        name, file, mission if mission.is_file() else None, gains if is_folder(gains) else None
+    )
+
+
+def _own_folder(file: Path) -> RobotFiles:
+    folder = file.parent
+    mission, gains = folder / OWN_MISSION, folder / OWN_GAINS
+    return RobotFiles(
+        folder.resolve().name, file, mission if mission.is_file() else None,
+        gains if is_folder(gains) else None,
+    )  # fmt: skip
+
+
+def _file_of(folder: Path) -> Path:
+    """Return the robot's file in a folder of its own."""
+    if not is_folder(folder):
+        raise InputError(f"robot {short(str(folder))}: no such folder")
+    names = [OWN + ending for ending in (*YAML, *URDF)]
+    for name in names:
+        if (folder / name).is_file():
+            return folder / name
+    raise InputError(f"{folder}: no robot in this folder ({', '.join(names)})")
