@@ -55,6 +55,9 @@ class FlightPlan(StrictModel):
     fifo_priority: int = 0
     faults: list[str] = Field(default_factory=list)
     """The faults, each as ``KIND@T[-END][:ARGUMENT]``, see `space_robot_control.flight.faults`."""
+    events: list[str] = Field(default_factory=list)
+    """What is captured and released, see `space_robot_sim.environment.events`; none: what the
+    mission says."""
     seed: Annotated[int, Field(ge=0)] = 0
     """Seed of the random numbers of faults and sensors."""
     swaps: list[str] = Field(default_factory=list)
@@ -98,6 +101,7 @@ class FlightPlan(StrictModel):
                 "fifo_priority": self.fifo_priority,
                 "faults": self.faults_of(PLANT_KINDS),
                 "fault_seed": self.seed,
+                **({"events": self.events} if self.events else {}),
                 **({} if self.friction else NO_FRICTION),
             },
             "controller": {

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pydantic import Field
+
 from space_robot_msgs_py.compiled.records import Record, assign, nested
 from space_robot_msgs_py.config.validation import StrictModel
 
 from ..faults.schedule import PartFault
 from .disturbance import Disturbance, DisturbanceSettings
+from .events import EventTexts
 from .friction import Friction, FrictionSettings, StuckJoint
 from .payload import PayloadSettings
 
@@ -17,6 +20,11 @@ class EnvironmentSettings(StrictModel):
     friction: FrictionSettings = FrictionSettings()
     disturbance: DisturbanceSettings = DisturbanceSettings()
     payload: PayloadSettings = PayloadSettings()
+    events: EventTexts = Field(
+        [""],
+        description="what is captured and released: capture@T:TARGET, release@T[:SPEED], see "
+        "docs/manual",
+    )
 
 
 class Environment(Record):

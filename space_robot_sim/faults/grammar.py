@@ -16,9 +16,9 @@ from space_robot_msgs_py.errors import InputError
 
 from .axes import About
 
-_NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FAULT = re.compile(
-    rf"(?P<kind>[^@]*)@(?P<start>{_NUMBER})(?:-(?P<stop>{_NUMBER}))?(?::(?P<argument>.+))?",
+    rf"(?P<kind>[^@]*)@(?P<start>{NUMBER})(?:-(?P<stop>{NUMBER}))?(?::(?P<argument>.+))?",
     re.ASCII,
 )
 _AXIS_AND_NUMBER = re.compile(r"(?P<axis>(?!0+=).+)=(?P<number>[^=]+)", re.ASCII)
@@ -128,9 +128,9 @@ class Fault:
     """As given; empty if it was left out."""
 
     def __str__(self) -> str:
-        stop = "" if math.isinf(self.stop_s) else f"-{_shortest(self.stop_s)}"
+        stop = "" if math.isinf(self.stop_s) else f"-{shortest(self.stop_s)}"
         argument = f":{self.argument}" if self.argument else ""
-        return f"{self.kind.name}@{_shortest(self.start_s)}{stop}{argument}"
+        return f"{self.kind.name}@{shortest(self.start_s)}{stop}{argument}"
 
     @property
     def value(self) -> float:
@@ -175,7 +175,8 @@ def parse_faults(texts: Iterable[str], kinds: Kinds) -> list[Fault]:
     return [parse_fault(text, kinds) for text in texts if text.strip()]
 
 
-def _shortest(seconds: float) -> str:
+def shortest(seconds: float) -> str:
+    """Write a time with as few digits as give the same number again."""
     return repr(seconds).removesuffix(".0")
 
 

@@ -47,9 +47,9 @@ class ScheduledFault:
                 self.axes = axes_of(fault.axis, about, names)
             except InputError as error:
                 raise InputError(f"fault '{fault}': {error}") from None
-        self.first = _tick_from(fault.start_s, period)
+        self.first = tick_from(fault.start_s, period)
         """Tick from which it acts."""
-        self.stop = _tick_from(fault.stop_s, period)
+        self.stop = tick_from(fault.stop_s, period)
         """Tick from which it no longer acts (inf: it lasts)."""
         if not self.first < self.stop:
             raise InputError(f"fault '{fault}': there is no tick of {period:g} s in that time")
@@ -142,6 +142,6 @@ class TemporaryChange:
         return True
 
 
-def _tick_from(seconds: float, period: float) -> float:
+def tick_from(seconds: float, period: float) -> float:
     """Return the first tick at or after a time; a millionth of a tick counts as rounding."""
     return math.ceil(seconds / period - 1e-6) if math.isfinite(seconds) else seconds

@@ -1,0 +1,176 @@
+"""Events of a mission: something is captured, or let go; at the begin of a tick.
+
+As text ``capture@T:TARGET`` and ``release@T[:SPEED]``, T in simulated seconds. TARGET is a name of
+``config/targets``, a path to a YAML file, or the target itself in braces, as JSON has it: so the
+text of a `Capture` holds all its numbers.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import AfterValidator
+
+from space_robot_msgs_py.config.settings import Texts
+from space_robot_msgs_py.config.validation import one_of, short
+from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
+from space_robot_msgs_py.errors import InputError
+
+from ..faults.grammar import NUMBER, shortest
+from .target import Target, find_target
+
+_EVENT = re.compile(rf"(?P<kind>[^@]*)@(?P<time>{NUMBER})(?::(?P<argument>.+))?", re.ASCII)
+FASTEST = 100.0
+"""m/s, of a release."""
+
+
+@dataclass(frozen=True)
+class Capture:
+    """The tool grasps a target, which moves with it from then on; ``str`` gives its text."""
+
+    time_s: float
+    """Simulated time, s."""
+    target: Target
+
+    def __str__(self) -> str:
+        return f"capture@{shortest(self.time_s)}:{self.target.inline}"
+
+    @property
+    def label(self) -> str:
+        """The event in a few words."""
+        return f"capture@{shortest(self.time_s)}:{self.target.name}"
+
+
+@dataclass(frozen=True)
+class Release:
+    """The tool lets go what it holds; ``str`` gives its text."""
+
+    time_s: float
+    """Simulated time, s."""
+    speed: float = 0.0
+    """m/s at which a spring pushes it off along z of the tool's frame; 0: there is none."""
+
+    def __str__(self) -> str:
+        speed = f":{shortest(self.speed)}" if self.speed else ""
+        return f"release@{shortest(self.time_s)}{speed}"
+
+    @property
+    def label(self) -> str:
+        """The event in a few words."""
+        return str(self)
+
+
+Event = Capture | Release
+FORMS = {
+    "capture@T:TARGET": "the tool grasps TARGET, of config/targets, or a path to its YAML",
+    "release@T[:SPEED]": "the tool lets go what it holds, at SPEED m/s (0: without a push)",
+}
+"""What is done, by the text of each kind of event."""
+
+
+def parse_events(texts: Iterable[str], folder: Path = Path()) -> list[Event]:
+    """Read the events of several texts, in the order of their times; empty ones are none.
+
+    Args:
+        texts: as in ``capture@10:small_satellite``.
+        folder: where a target's file may be, see `find_target`.
+
+    Raises:
+        InputError: names the event, what is wrong with it, what is allowed.
+    """
+    return in_order([_read(text, folder) for text in texts if text.strip()])
+
+
+def in_order(events: Sequence[Event]) -> list[Event]:
+    """Return the events by their times.
+
+    Raises:
+        InputError: something is captured while something is held, or released while nothing is.
+    """
+    found = sorted(events, key=lambda event: event.time_s)
+    held: Capture | None = None
+    for event in found:
+        if isinstance(event, Release):
+            if held is None:
+                raise InputError(f"event {event.label!r}: nothing is held then")
+            held = None
+        elif held is not None:
+            raise InputError(
+                f"event {event.label!r}: {held.target.name!r} is held since "
+                f"{shortest(held.time_s)} s: it must be released first"
+            )
+        else:
+            held = event
+    return found
+
+
+def check_events(texts: list[str]) -> list[str]:
+    """Return texts that can be events; no file is opened.
+
+    Raises:
+        InputError: see `parse_events`.
+    """
+    for text in texts:
+        if text.strip():
+            kind, _, argument = _split(text)
+            if kind == "release":
+                _speed(text, argument)
+            elif argument.startswith("{"):
+                _inline(text, argument)
+    return texts
+
+
+EventTexts = Annotated[Texts, AfterValidator(check_events)]
+
+
+def _read(text: str, folder: Path) -> Event:
+    kind, time_s, argument = _split(text)
+    if kind == "release":
+        return Release(time_s, _speed(text, argument))
+    if argument.startswith("{"):
+        return Capture(time_s, _inline(text, argument))
+    try:
+        return Capture(time_s, find_target(argument, folder))
+    except InputError as error:
+        raise InputError(f"event {short(text)}: {error}") from None
+
+
+def _split(text: str) -> tuple[str, float, str]:
+    """Return kind, time (s) and argument; a capture has one."""
+    where = f"event {short(text)}"
+    match = _EVENT.fullmatch(text.strip())
+    if match is None:
+        raise InputError(f"{where}: {' or '.join(FORMS)} expected, as capture@10:small_satellite")
+    kind = one_of(match["kind"], ("capture", "release"), "kind", f" in {where}")
+    time_s, argument = float(match["time"]), (match["argument"] or "").strip()
+    if not time_s < float("inf"):
+        raise InputError(f"{where}: T must be a number of seconds, got {match['time']}")
+    if kind == "capture" and not argument:
+        raise InputError(f"{where}: a target is needed: capture@T:TARGET")
+    return kind, time_s, argument
+
+
+def _speed(text: str, argument: str) -> float:
+    try:
+        speed = float(argument or 0.0)
+    except ValueError:
+        speed = -1.0
+    if not 0.0 <= speed <= FASTEST:
+        raise InputError(
+            f"event {short(text)}: SPEED must be a number from 0 to {FASTEST:g} (m/s), "
+            f"got {short(argument)}"
+        )
+    return speed
+
+
+def _inline(text: str, argument: str) -> Target:
+    where = f"event {short(text)}"
+    try:
+        content = parse_yaml(argument)
+    except YamlTextError as error:
+        raise InputError(f"{where}: {error}") from None
+    return Target.from_dict({"target": content}, where)

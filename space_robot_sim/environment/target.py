@@ -1,0 +1,125 @@
+"""A target to be captured: a rigid body with its place in the tool's frame and its motion."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, Field
+
+from space_robot_msgs_py.config.files import named_file
+from space_robot_msgs_py.config.validation import StrictModel, read_yaml, validate
+
+from ..dynamics.attitude import rotation_matrix
+from ..robot.file import Inertia, Mass, Vector, inertia_tensor
+
+Array = NDArray[np.float64]
+
+
+def _unit(quaternion: list[float]) -> list[float]:
+    norm = float(np.linalg.norm(quaternion))
+    if not 1e-3 <= norm <= 1e3:
+        raise ValueError("a quaternion must have a norm near 1")
+    return quaternion
+
+
+Speed = Annotated[float, Field(ge=-1e3, le=1e3)]
+Speeds = Annotated[list[Speed], Field(min_length=3, max_length=3)]
+Quaternion = Annotated[list[float], Field(min_length=4, max_length=4), AfterValidator(_unit)]
+Name = Annotated[str, Field(min_length=1, max_length=80, pattern=r"^[\w .+-]+$")]
+
+
+class Place(StrictModel):
+    """``target.place``: where the target is in the frame of the tool that holds it."""
+
+    position: Vector = Field([0.0, 0.0, 0.0])
+    """Of its centre of mass, m."""
+    quaternion: Quaternion = Field([1.0, 0.0, 0.0, 0.0])
+    """``[w, x, y, z]`` of its axes; its norm does not count."""
+
+
+class Motion(StrictModel):
+    """``target.motion``: how the target moves when it is grasped.
+
+    On inertial axes, as seen from the inertial frame; or on the tool's axes, as seen from a tool
+    that moves and turns itself (by default it stands still there).
+    """
+
+    relative_to: Literal["tool", "inertial"] = "tool"
+    velocity: Speeds = Field([0.0, 0.0, 0.0])
+    """Of its centre of mass, m/s."""
+    angular_velocity: Speeds = Field([0.0, 0.0, 0.0])
+    """rad/s."""
+
+
+class Target(StrictModel):
+    """``target``, the whole of a target's YAML; ``inertia`` (kg m2) is about its CoM, its axes."""
+
+    name: Name = "target"
+    mass: Mass
+    inertia: Inertia
+    tool: str = ""
+    """The tool that grasps it, by name; empty: the robot's first."""
+    place: Place = Place()
+    motion: Motion = Motion()
+
+    @classmethod
+    def from_yaml(cls, path: str | Path) -> Target:
+        """Read and check a target's file.
+
+        Raises:
+            InputError: naming file, key, value given and values allowed.
+        """
+        return cls.from_dict(read_yaml(Path(path)), where=str(path))
+
+    @classmethod
+    def from_dict(cls, content: dict[str, Any], where: str = "target") -> Target:
+        """Build from the mapping a target's file holds (key ``target`` at its top)."""
+        return validate(_Document, content, where).target
+
+    @property
+    def inline(self) -> str:
+        """The target as an event's text holds it: JSON, a line; all digits are kept."""
+        return json.dumps(self.model_dump(exclude_defaults=True))
+
+    @property
+    def rotation(self) -> Array:
+        """(3, 3) rotation from the target's axes to the tool's."""
+        out, quaternion = np.empty((3, 3)), np.array(self.place.quaternion)
+        rotation_matrix(quaternion / np.linalg.norm(quaternion), out)
+        return out
+
+    @property
+    def inertia_on_tool(self) -> Array:
+        """(3, 3) kg m2 about the target's CoM, on the tool's axes."""
+        turned: Array = self.rotation @ inertia_tensor(self.inertia) @ self.rotation.T
+        return turned
+
+
+class _Document(StrictModel):
+    target: Target
+
+
+def find_target(name: str, folder: Path) -> Target:
+    """Read the target of a file's name: one of ``config/targets``, or a path.
+
+    A path that is not absolute begins where the program was started or, if nothing is there, in
+    ``folder``, which is that of the mission's file.
+
+    Raises:
+        InputError: there is no such file, or it is wrong.
+    """
+    path = Path(name)
+    if path.suffix in (".yaml", ".yml") and not _is_there(path) and _is_there(folder / path):
+        path = folder / path
+    return Target.from_yaml(named_file("targets", str(path)))
+
+
+def _is_there(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # what cannot be the name of a file
+        return False
