@@ -44,7 +44,7 @@ class Messages:
         names, timebase = flight.plant.names, flight.timebase
         self.record, self._flight = recorder.record, flight
         self._states = StateCodec(names, timebase)
-        self._truth = TruthWriter(names.joints, timebase)
+        self._truth = TruthWriter(names, timebase)
         self._commands = CommandCodec(names.commanded, timebase)
         self._references = ReferenceCodec(names.joints, timebase)
         self._telemetry = TelemetryCodec(names.axes)
@@ -126,7 +126,7 @@ def unflown(flight: Flight, start: int = 0, stop: int | None = None) -> FlightLo
     ticks = (flight.ticks if stop is None else stop) - start
     names = flight.plant.names
     counts = len(names.wheels), len(names.thrusters)
-    log = FlightLog.allocate(ticks, names.joints, flight.timebase, *counts)
+    log = FlightLog.allocate(ticks, names.joints, flight.timebase, *counts, names.passive)
     log.first_tick = start
     log.flight = flight.description
     log.lost = {topic.name: 0 for topic in topics.ALL}

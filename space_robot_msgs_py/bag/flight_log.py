@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from ..compiled.records import Block
 from ..samples import (
-    ACTUATOR_FIELDS,
+    ALL_FIELDS,
+    PASSIVE_FIELDS,
     STATE_FIELDS,
     LawInForce,
     ReferenceChunk,
@@ -24,6 +25,8 @@ Array = NDArray[np.float64]
 
 REFERENCE = ("reference_joints", "reference_base")
 """The columns the desired motion fills."""
+TOLD = STATE_FIELDS + PASSIVE_FIELDS
+"""The columns of a `FlightLog` that `MeasuredStates` has once more."""
 
 
 @dataclass(slots=True)
@@ -39,16 +42,20 @@ class MeasuredStates:
     omega_base: Array
     """(N, 3) rad/s, base frame."""
     joint_positions: Array
-    """(N, n) rad."""
+    """(N, n) rad, of prismatic joints m."""
     joint_velocities: Array
-    """(N, n) rad/s."""
+    """(N, n) rad/s, of prismatic joints m/s."""
     applied_torque: Array
     """(N, n+3) N m, reported for the interval that ended at the tick; base frame, then joints."""
+    passive_positions: Array
+    """(N, p) rad or m."""
+    passive_velocities: Array
+    """(N, p) rad/s or m/s."""
 
     @classmethod
     def of(cls, log: FlightLog) -> MeasuredStates:
         """Return the state columns of ``log`` themselves, not copies."""
-        return cls(*(getattr(log, name) for name in STATE_FIELDS))
+        return cls(*(getattr(log, name) for name in TOLD))
 
     @classmethod
     def unknown(cls, log: FlightLog) -> MeasuredStates:
@@ -63,7 +70,7 @@ class MeasuredStates:
     @property
     def columns(self) -> dict[str, Array]:
         """All of them, by name."""
-        return {name: getattr(self, name) for name in STATE_FIELDS}
+        return {name: getattr(self, name) for name in TOLD}
 
     def each(self, change: Callable[[str, Array], Array]) -> MeasuredStates:
         """Return what ``change`` makes of each column, given its name."""
@@ -80,6 +87,7 @@ class FlightLog:
 
     timebase: Timebase
     joint_names: tuple[str, ...]
+    """Of the joints with motors."""
     base_position: Array
     """(N, 3) m, inertial frame."""
     quaternion: Array
@@ -89,11 +97,12 @@ class FlightLog:
     omega_base: Array
     """(N, 3) rad/s, base frame."""
     joint_positions: Array
-    """(N, n) rad."""
+    """(N, n) rad, of prismatic joints m."""
     joint_velocities: Array
-    """(N, n) rad/s."""
+    """(N, n) rad/s, of prismatic joints m/s."""
     applied_torque: Array
-    """(N, n+3) N m given over the interval that ended at the tick; base frame, then joints."""
+    """(N, n+3) N m given over the interval that ended at the tick; base frame, then joints, whose
+    prismatic ones have N."""
     reference_joints: Array
     """(N, 3, n) desired position, velocity, acceleration."""
     reference_base: Array
@@ -107,6 +116,12 @@ class FlightLog:
     actuator_commands: Array
     """(N, W+T) the controller's answer to the tick: torques of the wheels' motors, N m, then forces
     of the thrusters, N (NaN: none)."""
+    passive_positions: Array
+    """(N, p) rad, of prismatic joints m, as many as the robot has joints without motors."""
+    passive_velocities: Array
+    """(N, p) rad/s, of prismatic joints m/s."""
+    passive_names: tuple[str, ...] = ()
+    """Of the joints without motors."""
     flight: dict[str, Any] = field(default_factory=dict)
     """The flight as recorded: controller, case, ..."""
     lost: dict[str, int] = field(default_factory=dict)
@@ -145,16 +160,19 @@ class FlightLog:
     @classmethod
     def allocate(
         cls, ticks: int, joint_names: tuple[str, ...], timebase: Timebase, wheels: int = 0,
-        thrusters: int = 0,
+        thrusters: int = 0, passive_names: tuple[str, ...] = (),
     ) -> FlightLog:  # fmt: skip
         """A log of ``ticks`` rows of NaN, for a base with so many wheels and thrusters."""
-        n = len(joint_names)
+        n, passive = len(joint_names), len(passive_names)
         shapes = [
             *((3,), (4,), (3,), (3,), (n,), (n,), (n + 3,), (3, n), (10,)),
             *((wheels,), (wheels,), (thrusters,), (wheels + thrusters,)),
+            *((passive,), (passive,)),
         ]
         columns: list[Any] = [np.full((ticks, *shape), np.nan) for shape in shapes]
-        return cls(timebase, joint_names, *columns)
+        log = cls(timebase, joint_names, *columns)
+        log.passive_names = passive_names
+        return log
 
     @property
     def ticks(self) -> int:
@@ -202,12 +220,12 @@ class FlightLog:
 
     def put(self, start: int, states: Block) -> None:
         """Copy the `State` of each tick from ``start`` on into its row."""
-        _put(self, start - self.first_tick, states, STATE_FIELDS + ACTUATOR_FIELDS)
+        _put(self, start - self.first_tick, states, ALL_FIELDS)
 
     def put_measured(self, start: int, states: Block) -> None:
         """Copy what the sensors told of each tick from ``start`` on into its row of `measured`."""
         if self.measured is not None:
-            _put(self.measured, start - self.first_tick, states, STATE_FIELDS)
+            _put(self.measured, start - self.first_tick, states, TOLD)
 
     def put_commands(self, start: int, torques: Array) -> None:
         """Copy what was commanded (k, n+3+W+T) in each tick from ``start`` on, see `Command`."""
@@ -232,7 +250,7 @@ class FlightLog:
     def state(self, tick: int) -> RobotState:
         """The state of a tick: the true one, where that is known."""
         block = State.block(len(self.joint_names))
-        for name in STATE_FIELDS + ACTUATOR_FIELDS:
+        for name in ALL_FIELDS:
             row = getattr(self, name)[tick - self.first_tick]
             block[name][0, : len(row)] = row
         return RobotState(tick, block)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..samples import ACTUATOR_FIELDS, STATE_FIELDS
+from ..samples import ACTUATOR_FIELDS, PASSIVE_FIELDS, STATE_FIELDS
 from .flight_log import REFERENCE, FlightLog, MeasuredStates, finite_rows
 
 
@@ -23,6 +23,8 @@ def fill_gaps(log: FlightLog) -> None:
     end = len(known) - int(np.argmax(known[::-1])) if known.any() else 0
     log.filled = int(np.count_nonzero(~states[:end]))
     _repeat_before(told, STATE_FIELDS, states, end)
+    passive = finite_rows(getattr(told, name) for name in PASSIVE_FIELDS)
+    _repeat_before(told, PASSIVE_FIELDS, passive, end)
     _repeat_before(log, ACTUATOR_FIELDS, log.finite(ACTUATOR_FIELDS), end)
     references = log.finite(REFERENCE)
     _repeat_before(log, REFERENCE, references, end)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from .. import topics
 from ..config.text import printable
 from ..errors import InputError, MessageError
-from ..samples import Timebase
+from ..samples import MOST_PASSIVE, RobotNames, Timebase
 from ..wire.definitions import decode
 from .accounts import Account, foreign, noted_accounts, paused
 from .batch import Batch
@@ -111,23 +111,35 @@ def _description(bag: Bag) -> tuple[dict[str, Any], list[str]]:
         return {}, [str(error)]
 
 
-def first_states(bag: Bag, selection: Selection) -> tuple[tuple[str, ...], list[int]]:
+def first_states(bag: Bag, selection: Selection) -> tuple[RobotNames, list[int]]:
     """Names of the joints, and the first stamps in ns.
 
     Raises:
         InputError: there is none, or none that can be read.
     """
     names: tuple[str, ...] = ()
+    referenced: list[tuple[str, ...]] = []
     stamps: list[int] = []
     for topic, batch in selection.batches():
         if topic is topics.JOINT_STATES:
-            names = names or _joint_names(batch)
+            names = names or next(_joint_names(topic, batch), ())
             stamps += stamps_of(batch).tolist()
-        if names and len(stamps) >= _STAMPS_LOOKED_AT:
+        elif topic is topics.REFERENCE_JOINTS and not _moved(names, referenced):
+            referenced += dict.fromkeys(_joint_names(topic, batch))
+        if len(stamps) >= _STAMPS_LOOKED_AT and _moved(names, referenced):
             break
     if not names:
         raise missing(topics.JOINT_STATES, bag, selection)
-    return names, stamps
+    moved = _moved(names, referenced)
+    passive = tuple(name for name in names if name not in moved) if moved else ()
+    if len(passive) > MOST_PASSIVE:
+        passive = ()
+    return RobotNames(tuple(name for name in names if name not in passive), passive=passive), stamps
+
+
+def _moved(names: tuple[str, ...], referenced: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+    """Return the joints of the first reference that names no others; the rest have no motor."""
+    return next((moved for moved in referenced if moved and set(moved) <= set(names)), ())
 
 
 def _empty_rows(bag: Bag, selection: Selection, flight: dict[str, Any], damage: list[str]) -> Rows:
@@ -140,12 +152,12 @@ def _empty_rows(bag: Bag, selection: Selection, flight: dict[str, Any], damage: 
     return Rows(names, timebase, 0 if counted else stamps[0])
 
 
-def _joint_names(batch: Batch) -> tuple[str, ...]:
-    """The joints in the first message of a batch that can be read."""
+def _joint_names(topic: topics.Topic, batch: Batch) -> Iterator[tuple[str, ...]]:
+    """The joints in each message of a batch that can be read."""
     for i in range(len(batch)):
         with suppress(MessageError):
-            return tuple(decode(batch.message(i), topics.JOINT_STATES.type).name)
-    return ()
+            message = decode(batch.message(i), topic.type)
+            yield tuple(message.name if topic is topics.JOINT_STATES else message.joint_names)
 
 
 def timebase_of(

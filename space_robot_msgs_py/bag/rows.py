@@ -40,17 +40,16 @@ def stamps_of(batch: Batch) -> NDArray[np.int64]:
 class Rows:
     """Takes batches in their order; the log grows with its ticks."""
 
-    def __init__(self, joint_names: tuple[str, ...], timebase: Timebase, origin_ns: int) -> None:
+    def __init__(self, names: RobotNames, timebase: Timebase, origin_ns: int) -> None:
         """Begin with no tick.
 
         Args:
-            joint_names: in the order of the columns.
+            names: of the joints, in the order of the columns.
             timebase: of the stamps.
             origin_ns: stamp of tick 0.
         """
-        n = len(joint_names)
-        self.log = FlightLog.allocate(0, joint_names, timebase)
-        self.log.commanded_torque = np.empty((0, n + 3))
+        self.log = FlightLog.allocate(0, names.joints, timebase, passive_names=names.passive)
+        self.log.commanded_torque = np.empty((0, len(names.axes)))
         self.accounting: dict[str, MessageAccounting] = {}
         self.counts: Counter[str] = Counter()
         """Messages a topic, of every kind."""
@@ -63,7 +62,7 @@ class Rows:
         self._rows = self._believed = 0
         descriptions = {topic: description(topic) for topic in topics.ALL}
         self._readers = {
-            topic: FieldReader(describe.of_robot(RobotNames(joint_names), timebase))
+            topic: FieldReader(describe.of_robot(names, timebase))
             for topic, describe in descriptions.items()
             if describe
         }

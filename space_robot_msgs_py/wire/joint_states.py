@@ -7,25 +7,37 @@ from typing import Any
 
 from .. import topics
 from ..errors import MessageError
-from ..samples import Timebase
+from ..samples import RobotNames, Timebase
 from .message import Column, MessageDescription, Run, name_order
 
 
 class JointStates(MessageDescription):
-    """A sensor_msgs/JointState; its efforts are the torques applied to the joints."""
+    """A sensor_msgs/JointState; its efforts are the torques and forces applied to the joints.
+
+    Joints without motors stand behind those that have one; nothing is applied to them.
+    """
 
     topic = topics.JOINT_STATES
     fields: tuple[str, ...] = ("position", "velocity", "effort")
     frame_id = ""
 
-    def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
+    def __init__(self, names: Sequence[str], timebase: Timebase, passive: int = 0) -> None:
+        """``passive``: so many of the names, the last ones, are of joints without motors."""
         super().__init__(names, timebase)
-        n = len(self.names)
+        self._passive = passive
+        n = len(self.names) - passive
         self.columns = (
             Column("joint_positions", 0, n),
+            Column("passive_positions", 0, passive),
             Column("joint_velocities", 0, n),
+            Column("passive_velocities", 0, passive),
             Column("applied_torque", 3, n),
         )
+
+    @classmethod
+    def of_robot(cls, names: RobotNames, timebase: Timebase) -> JointStates:
+        """All joints."""
+        return cls(names.all_joints, timebase, len(names.passive))
 
     def content(self, rows: int = 1) -> Mapping[str, Any]:
         """Our names, and the numbers of our fields."""
@@ -45,4 +57,4 @@ class JointStates(MessageDescription):
                 raise MessageError(
                     f"{self.topic.name}: {count} values of {field} for {len(order)} names", "size"
                 )
-            yield Run(field, order)
+            yield Run(field, order[: count - self._passive] if field == "effort" else order)

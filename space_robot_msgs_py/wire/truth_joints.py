@@ -7,7 +7,7 @@ from typing import Any
 
 from .. import topics
 from ..errors import MessageError
-from ..samples import Timebase
+from ..samples import RobotNames, Timebase
 from .message import Column, Run
 from .trajectory import Trajectory
 
@@ -18,21 +18,30 @@ class TruthJoints(Trajectory):
     """A trajectory_msgs/JointTrajectory of base x, y, z and the joints, as in /command.
 
     The base's positions are the vector part of its quaternion, its velocities are on base axes.
+    Joints without motors stand behind the others; nothing is given to them.
     """
 
     topic = topics.TRUTH_JOINTS
 
-    def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
-        """``names``: of the joints."""
-        n = len(names)
+    def __init__(self, names: Sequence[str], timebase: Timebase, passive: int = 0) -> None:
+        """``names``: of the joints; so many of them, the last ones, are ``passive``."""
+        n = len(names) - passive
         super().__init__((*topics.BASE_AXES, *names), timebase)
+        self._passive = passive
         self.columns = (
             Column("quaternion", 1, 3),
             Column("joint_positions", 0, n),
+            Column("passive_positions", 0, passive),
             Column("omega_base", 0, 3),
             Column("joint_velocities", 0, n),
+            Column("passive_velocities", 0, passive),
             Column("applied_torque", 0, n + 3),
         )
+
+    @classmethod
+    def of_robot(cls, names: RobotNames, timebase: Timebase) -> TruthJoints:
+        """All joints."""
+        return cls(names.all_joints, timebase, len(names.passive))
 
     def point(self) -> Mapping[str, Any]:
         """A number an axis of each field."""
@@ -43,4 +52,4 @@ class TruthJoints(Trajectory):
         for field in FIELDS:
             if len(getattr(point, field)) != len(order):
                 raise MessageError(f"{self.topic.name}: a point lacks {field} of some axis", "size")
-            yield Run(field, order)
+            yield Run(field, order[: len(order) - self._passive] if field == "effort" else order)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 
 from .. import topics
-from ..samples import RobotState, State, Timebase
+from ..samples import RobotNames, RobotState, State, Timebase
 from .codec import Codec
 from .message import MessageDescription
 from .truth_base import TruthBase
@@ -22,13 +22,13 @@ Messages = Iterable[tuple[topics.Topic, bytes]]
 class TruthWriter:
     """Collects the true state of every tick; gives /truth/joints and /truth/base now and then."""
 
-    def __init__(self, joint_names: Sequence[str], timebase: Timebase) -> None:
+    def __init__(self, names: RobotNames, timebase: Timebase) -> None:
         descriptions: tuple[MessageDescription, ...] = (
-            TruthJoints(joint_names, timebase), TruthBase(joint_names, timebase),
+            TruthJoints.of_robot(names, timebase), TruthBase.of_robot(names, timebase),
         )  # fmt: skip
         self._codecs = [(describe, Codec(describe)) for describe in descriptions]
         self._timebase = timebase
-        self._rows = np.empty(CHUNK_TICKS, State.dtype(len(joint_names)))
+        self._rows = np.empty(CHUNK_TICKS, State.dtype(len(names.joints)))
         self._numbers = self._rows.view(np.float64).reshape(CHUNK_TICKS, -1)
         self._start = self._count = 0
 

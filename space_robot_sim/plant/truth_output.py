@@ -17,7 +17,7 @@ class TruthOutput:
 
     def __init__(self, node: Node, plant: Plant, timebase: Timebase) -> None:
         """Open the topics, or none."""
-        self._writer = TruthWriter(plant.robot.joint_names, timebase)
+        self._writer = TruthWriter(plant.names, timebase)
         self._outputs: dict[topics.Topic, RawPublisher] = {}
         if not plant.measures_truth:
             self._outputs = {topic: RawPublisher(node, topic) for topic in topics.TRUTH}

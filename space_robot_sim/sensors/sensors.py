@@ -76,12 +76,14 @@ FAULTS: dict[str, type[PartFault]] = {
 def sense(sensors: Sensors, truth: State, tick: int, period: float, measured: State) -> None:
     """Write into ``measured`` what the sensors tell of ``truth`` at ``tick``; call it once a tick.
 
-    The torques in ``measured`` are left alone; position and velocity of the base, and the speeds of
-    its wheels, have no error.
+    The torques in ``measured`` are left alone; position and velocity of the base, the speeds of its
+    wheels, and the motion of joints without motors have no error.
     """
     measured.base_position[:] = truth.base_position
     measured.base_velocity[:] = truth.base_velocity
     measured.wheel_velocities[:] = truth.wheel_velocities
+    measured.passive_positions[:] = truth.passive_positions
+    measured.passive_velocities[:] = truth.passive_velocities
     if sensors.are_ideal == 1.0:
         measured.quaternion[:] = truth.quaternion
         measured.omega_base[:] = truth.omega_base

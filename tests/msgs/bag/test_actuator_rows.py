@@ -33,7 +33,7 @@ def flown(names: RobotNames = NAMES) -> FlightLog:
     """A flight by hand, another number everywhere."""
     rng = np.random.default_rng(3)
     counts = len(names.wheels), len(names.thrusters)
-    log = FlightLog.allocate(TICKS, names.joints, TIMEBASE, *counts)
+    log = FlightLog.allocate(TICKS, names.joints, TIMEBASE, *counts, names.passive)
     log.commanded_torque = np.empty((TICKS, len(names.axes)))
     for column in log.columns.values():
         column[:] = rng.normal(size=column.shape)
