@@ -1,6 +1,6 @@
 """Accelerations from forces, ``qdd = H^-1 (F - c)``, by the articulated-body algorithm.
 
-Featherstone's recursion, linear in the number of joints. With every quantity on inertial axes
+Featherstone's recursion over a tree of bodies, linear in the number of joints. With every quantity on inertial axes
 about one origin the usual changes of frame between links vanish. A spatial inertia is held in
 three blocks: ``[[J, G], [G^T, M]]``, angular part first, J and M symmetric.
 
@@ -35,6 +35,7 @@ from .algebra import (
     transform_transposed,
     vector,
 )
+from .branches import hand_in, keep_motion, kept_motion, taken_in
 from .kinematics import forward_kinematics, spatial_velocities
 from .model import Data, Model
 from .wheels import take_wheels, turn_wheels
@@ -47,9 +48,9 @@ def aba(
     model: Model, quaternion: Array, joint_positions: Array, omega_inertial: Array,
     joint_velocities: Array, force: Array, data: Data, out: Array,
 ) -> None:  # fmt: skip
-    """Write the acceleration ``[v0dot, w0dot, thetadd]`` (n+6,) into ``out``.
+    """Write the acceleration ``[v0dot, w0dot, thetadd]`` (N+6,) into ``out``.
 
-    ``force`` (n+6,) is ``[f0, tau0, tau]``, the base's part on inertial axes, N and N m. Joints
+    ``force`` (N+6,) is ``[f0, tau0, tau]``, the base's part on inertial axes, N and N m. Joints
     that are locked in ``data`` do not accelerate, and ``data.holding`` tells what that takes.
     Of a base with wheels they stand behind the joints, in velocities, force and ``out``.
     """
@@ -60,22 +61,26 @@ def aba(
     coupling = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     mass = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     bias_moment, bias_force = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for i in range(model.mass.size - 1, -1, -1):
+    for k in range(int(model.joint_count) - 1, -1, -1):
+        j = int(model.order[k])
+        i = j + 1
+        if model.branches[i] != 0.0:
+            inertia, coupling, mass, bias_moment, bias_force = taken_in(
+                data.inwards[i], inertia, coupling, mass, bias_moment, bias_force
+            )
         inertia = add_symmetric(inertia, symmetric(data.inertia[i]))
         coupling = skew_added(coupling, vector(data.first_moment[i], 0))
         m = model.mass[i]
         mass = (mass[0] + m, mass[1] + m, mass[2] + m, mass[3], mass[4], mass[5])
         bias_moment = add(bias_moment, vector(data.bias[i], 0))
         bias_force = add(bias_force, vector(data.bias[i], 3))
-        if i == 0:
-            break
         angular, linear = vector(data.motion[i], 0), vector(data.motion[i], 3)
         # U = I^A S, D = S^T U, u = tau - S^T p^A
         U_angular = add(transform_symmetric(inertia, angular), transform(coupling, linear))
         U_linear = add(transform_transposed(coupling, angular), transform_symmetric(mass, linear))
-        u = force[5 + i] - dot(angular, bias_moment) - dot(linear, bias_force)
+        u = force[6 + j] - dot(angular, bias_moment) - dot(linear, bias_force)
         inverse = 1.0 / (dot(angular, U_angular) + dot(linear, U_linear))
-        if data.locked[i] != 0.0:
+        if data.locked[j] != 0.0:
             inverse = 1.0  # U and u themselves: `holding` needs them
         u_over_d = u * inverse
         U_over_D_angular, U_over_D_linear = scale(U_angular, inverse), scale(U_linear, inverse)
@@ -83,7 +88,7 @@ def aba(
         store(U_over_D_linear, data.U_over_D[i], 3)
         data.u_over_d[i] = u_over_d
         # I^a = I^A - U U^T / D,  p^a = p^A + I^a c + U u / D; of a locked joint only p^A + I^A c
-        if data.locked[i] == 0.0:
+        if data.locked[j] == 0.0:
             inertia = outer_subtracted(inertia, U_over_D_angular, U_angular)
             coupling = outer_subtracted_general(coupling, U_over_D_angular, U_linear)
             mass = outer_subtracted(mass, U_over_D_linear, U_linear)
@@ -94,6 +99,22 @@ def aba(
         bias_moment = add(bias_moment, transform(coupling, linear))
         bias_force = add(bias_force, transform_transposed(coupling, angular))
         bias_force = add(bias_force, transform_symmetric(mass, linear))
+        if model.continues[j] == 0.0:
+            row = data.inwards[int(model.parent[j])]
+            hand_in(row, inertia, coupling, mass, bias_moment, bias_force)
+            inertia = mass = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            coupling = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            bias_moment = bias_force = (0.0, 0.0, 0.0)
+    if model.branches[0] != 0.0:
+        inertia, coupling, mass, bias_moment, bias_force = taken_in(
+            data.inwards[0], inertia, coupling, mass, bias_moment, bias_force
+        )
+    inertia = add_symmetric(inertia, symmetric(data.inertia[0]))
+    coupling = skew_added(coupling, vector(data.first_moment[0], 0))
+    m = model.mass[0]
+    mass = (mass[0] + m, mass[1] + m, mass[2] + m, mass[3], mass[4], mass[5])
+    bias_moment = add(bias_moment, vector(data.bias[0], 0))
+    bias_force = add(bias_force, vector(data.bias[0], 3))
     if model.wheel_count > 0.0:
         inertia, bias_moment = take_wheels(
             model, omega_inertial, joint_velocities, force, data, inertia, bias_moment
@@ -107,17 +128,25 @@ def aba(
     store(angular, out, 3)
     # outwards: the accelerations
     turn_wheels(model, angular, force, data, out)
-    for i in range(1, model.mass.size):
+    if model.branches[0] != 0.0:
+        keep_motion(angular, linear, data.outwards[0])
+    for k in range(int(model.joint_count)):
+        j = int(model.order[k])
+        i = j + 1
+        if model.continues[j] == 0.0:
+            angular, linear = kept_motion(data.outwards[int(model.parent[j])])
         angular = add(angular, vector(data.coriolis[i], 0))
         linear = add(linear, vector(data.coriolis[i], 3))
         acceleration = data.u_over_d[i] - dot(vector(data.U_over_D[i], 0), angular)
         acceleration -= dot(vector(data.U_over_D[i], 3), linear)
-        if data.locked[i] != 0.0:
-            data.holding[i] = acceleration  # u - U^T a, not divided by D
+        if data.locked[j] != 0.0:
+            data.holding[j] = acceleration  # u - U^T a, not divided by D
             acceleration = 0.0
-        out[5 + i] = acceleration
+        out[6 + j] = acceleration
         angular = add(angular, scale(vector(data.motion[i], 0), acceleration))
         linear = add(linear, scale(vector(data.motion[i], 3), acceleration))
+        if model.branches[i] != 0.0:
+            keep_motion(angular, linear, data.outwards[i])
 
 
 @kernel

@@ -1,6 +1,6 @@
 """The inertia matrix H of ``H qdd + c = F`` by the composite-rigid-body algorithm, (8)-(10).
 
-Generalised velocity ``qdot = [v0, w0, thetadot]`` (n+6), base part on inertial axes; H's rows have
+Generalised velocity ``qdot = [v0, w0, thetadot]`` (N+6,), base part on inertial axes; H's rows have
 the same order. The sums of (8)-(10) are taken on inertial axes about the base CoM.
 """
 
@@ -9,9 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 
 from .algebra import (
+    Symmetric,
+    Vector,
     add,
     add_symmetric,
     cross,
@@ -29,33 +31,48 @@ Array = NDArray[np.float64]
 
 @kernel
 def crba(model: Model, data: Data, out: Array) -> None:
-    """Write the inertia matrix H (n+6, n+6) into ``out``, after `forward_kinematics`.
+    """Write the inertia matrix H (N+6, N+6) into ``out``, after `forward_kinematics`.
 
-    The momentum of all bodies from link j outwards, per unit velocity of joint j, gives column j
-    of H; its base rows are ``J_Tw`` and ``H_wphi``, its joint rows ``H_M``.
+    The momentum of all bodies from joint j outwards, per unit of its velocity, gives column j of H;
+    its base rows are ``J_Tw`` and ``H_wphi``, its joint rows ``H_M``: zero for joints of another
+    branch.
     """
     mass = 0.0
     moment = (0.0, 0.0, 0.0)
     inertia = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    for j in range(model.mass.size - 1, -1, -1):
-        mass += model.mass[j]
-        moment = add(moment, vector(data.first_moment[j], 0))
-        inertia = add_symmetric(inertia, symmetric(data.inertia[j]))
-        if j == 0:
-            break
-        angular, linear = vector(data.motion[j], 0), vector(data.motion[j], 3)
+    for r in range(out.shape[0]):
+        for c in range(out.shape[1]):
+            out[r, c] = 0.0
+    for k in range(int(model.joint_count) - 1, -1, -1):
+        j = int(model.order[k])
+        if model.branches[j + 1] != 0.0:
+            mass, moment, inertia = _taken_in(data.inwards[j + 1], mass, moment, inertia)
+        mass += model.mass[j + 1]
+        moment = add(moment, vector(data.first_moment[j + 1], 0))
+        inertia = add_symmetric(inertia, symmetric(data.inertia[j + 1]))
+        angular, linear = vector(data.motion[j + 1], 0), vector(data.motion[j + 1], 3)
         linear_momentum = add(scale(linear, mass), cross(angular, moment))
         angular_momentum = add(transform_symmetric(inertia, angular), cross(moment, linear))
-        column = out[5 + j]
+        column = out[6 + j]
         store(linear_momentum, column, 0)
         store(angular_momentum, column, 3)
-        for i in range(1, j + 1):
+        for r in range(6):  # the paper puts v0 before w0
+            out[r, 6 + j] = column[r]
+        i = j + 1
+        while i > 0:
             angular, linear = vector(data.motion[i], 0), vector(data.motion[i], 3)
-            column[5 + i] = dot(angular, angular_momentum) + dot(linear, linear_momentum)
-    for r in range(6):  # the paper puts v0 before w0
-        for c in range(6):
-            out[r, c] = 0.0
-    xx, yy, zz, xy, xz, yz = inertia
+            element = dot(angular, angular_momentum) + dot(linear, linear_momentum)
+            column[5 + i] = out[5 + i, 6 + j] = element
+            i = int(model.parent[i - 1])
+        if model.continues[j] == 0.0:
+            _hand_in(data.inwards[int(model.parent[j])], mass, moment, inertia)
+            mass, moment = 0.0, (0.0, 0.0, 0.0)
+            inertia = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if model.branches[0] != 0.0:
+        mass, moment, inertia = _taken_in(data.inwards[0], mass, moment, inertia)
+    mass += model.mass[0]
+    moment = add(moment, vector(data.first_moment[0], 0))
+    xx, yy, zz, xy, xz, yz = add_symmetric(inertia, symmetric(data.inertia[0]))
     for k in range(3):
         out[k, k] = mass
     out[3, 3], out[4, 4], out[5, 5] = xx, yy, zz
@@ -69,6 +86,25 @@ def crba(model: Model, data: Data, out: Array) -> None:
     out[2, 3] = out[3, 2] = moment[1]
     out[1, 5] = out[5, 1] = moment[0]
     out[2, 4] = out[4, 2] = -moment[0]
-    for j in range(6, out.shape[0]):
-        for i in range(j):
-            out[i, j] = out[j, i]
+
+
+@subroutine
+def _hand_in(row: Array, mass: float, moment: Vector, inertia: Symmetric) -> None:
+    """Add a branch's composite body to its parent's ``row``."""
+    row[0] += mass
+    for k in range(3):
+        row[1 + k] += moment[k]
+    for k in range(6):
+        row[4 + k] += inertia[k]
+
+
+@subroutine
+def _taken_in(
+    row: Array, mass: float, moment: Vector, inertia: Symmetric
+) -> tuple[float, Vector, Symmetric]:
+    """Return the sum of the arguments and of what branches have handed in; clear it."""
+    mass, moment = mass + row[0], add(moment, vector(row, 1))
+    inertia = add_symmetric(inertia, symmetric(row[4:]))
+    for k in range(10):
+        row[k] = 0.0
+    return mass, moment, inertia

@@ -11,13 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.samples import Reference
 
-from .algebra import add, cross, dot, scale, store, symmetric, transform_symmetric, vector
+from .algebra import Vector, add, cross, dot, scale, store, vector
 from .attitude import rotate, rotate_back
+from .branches import hand_in_wrench, keep_motion, kept_motion, taken_in_wrench
 from .kinematics import forward_kinematics, spatial_velocities
 from .model import Data, Model
+from .rnea import force_of_body
 
 Array = NDArray[np.float64]
 Block = NDArray[Any]
@@ -51,33 +53,49 @@ def inverse_dynamics(
     rotate(data.rotation, reference.alpha_base, vectors[1])
     angular = vector(vectors[1], 0)
     linear = (0.0, 0.0, 0.0)
-    mass = 0.0
-    force = (0.0, 0.0, 0.0)
-    for i in range(model.mass.size):
-        if i > 0:
-            acceleration = reference.joint_accelerations[i - 1]
-            angular = add(angular, vector(data.coriolis[i], 0))
-            angular = add(angular, scale(vector(data.motion[i], 0), acceleration))
-            linear = add(linear, vector(data.coriolis[i], 3))
-            linear = add(linear, scale(vector(data.motion[i], 3), acceleration))
-        moment = vector(data.first_moment[i], 0)
-        torque = add(
-            transform_symmetric(symmetric(data.inertia[i]), angular), cross(moment, linear)
-        )
-        push = add(scale(linear, model.mass[i]), cross(angular, moment))
-        store(add(vector(data.bias[i], 0), torque), data.bias[i], 0)
-        push = add(vector(data.bias[i], 3), push)
-        store(push, data.bias[i], 3)
-        mass, force = mass + model.mass[i], add(force, push)
+    force_of_body(model, 0, angular, linear, data)
+    if model.branches[0] != 0.0:
+        keep_motion(angular, linear, data.outwards[0])
+    count = int(model.joint_count)
+    for k in range(count):
+        j = int(model.order[k])
+        if model.continues[j] == 0.0:
+            angular, linear = kept_motion(data.outwards[int(model.parent[j])])
+        coriolis, motion = data.coriolis[j + 1], data.motion[j + 1]
+        acceleration = reference.joint_accelerations[j]
+        angular = add(add(angular, vector(coriolis, 0)), scale(vector(motion, 0), acceleration))
+        linear = add(add(linear, vector(coriolis, 3)), scale(vector(motion, 3), acceleration))
+        force_of_body(model, j + 1, angular, linear, data)
+        if model.branches[j + 1] != 0.0:
+            keep_motion(angular, linear, data.outwards[j + 1])
+    mass, force = model.mass[0], vector(data.bias[0], 3)
+    for k in range(count):
+        i = int(model.order[k]) + 1
+        mass, force = mass + model.mass[i], add(force, vector(data.bias[i], 3))
     drift = scale(force, -1.0 / mass)  # v0dot
-    moment = (0.0, 0.0, 0.0)
-    force = (0.0, 0.0, 0.0)
-    for i in range(model.mass.size - 1, -1, -1):
-        moment = add(moment, vector(data.bias[i], 0))
-        moment = add(moment, cross(vector(data.first_moment[i], 0), drift))
-        force = add(force, add(vector(data.bias[i], 3), scale(drift, model.mass[i])))
-        if i > 0:
-            angular, linear = vector(data.motion[i], 0), vector(data.motion[i], 3)
-            out[2 + i] = dot(angular, moment) + dot(linear, force)
+    moment = force = (0.0, 0.0, 0.0)
+    for k in range(count - 1, -1, -1):
+        j = int(model.order[k])
+        if model.branches[j + 1] != 0.0:
+            moment, force = taken_in_wrench(data.inwards[j + 1], moment, force)
+        moment, force = _moved_along(model, j + 1, drift, moment, force, data)
+        angular, linear = vector(data.motion[j + 1], 0), vector(data.motion[j + 1], 3)
+        out[3 + j] = dot(angular, moment) + dot(linear, force)
+        if model.continues[j] == 0.0:
+            hand_in_wrench(data.inwards[int(model.parent[j])], moment, force)
+            moment = force = (0.0, 0.0, 0.0)
+    if model.branches[0] != 0.0:
+        moment, force = taken_in_wrench(data.inwards[0], moment, force)
+    moment, force = _moved_along(model, 0, drift, moment, force, data)
     store(moment, vectors[0], 0)
     rotate_back(data.rotation, vectors[0], out[:3])
+
+
+@subroutine
+def _moved_along(
+    model: Model, i: int, drift: Vector, moment: Vector, force: Vector, data: Data
+) -> tuple[Vector, Vector]:
+    """Add to moment and force those of body i, which the whole robot's ``drift`` moves along."""
+    moment = add(moment, vector(data.bias[i], 0))
+    moment = add(moment, cross(vector(data.first_moment[i], 0), drift))
+    return moment, add(force, add(vector(data.bias[i], 3), scale(drift, model.mass[i])))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 
 from .algebra import (
     Matrix,
@@ -23,6 +23,7 @@ from .algebra import (
     vector,
 )
 from .attitude import rotation_matrix
+from .branches import keep_frame, keep_motion, kept_frame, kept_motion
 from .model import Data, Model
 
 Array = NDArray[np.float64]
@@ -30,10 +31,12 @@ Array = NDArray[np.float64]
 
 @kernel
 def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, data: Data) -> None:
-    """Fill ``data.motion, first_moment, inertia`` (modified Denavit-Hartenberg).
+    """Fill ``data.motion, first_moment, inertia``, along every branch of the tree.
 
-    ``T(i-1 -> i) = Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(theta_i) Tz(d_i)``; ``quaternion`` (4,) is the
-    base's attitude, ``joint_positions`` (n,) rad.
+    A joint's frame at zero lies at ``rotation`` and ``offset`` of its parent's; from there it turns
+    about its z axis or slides along it. For modified Denavit-Hartenberg numbers that is
+    ``T(i-1 -> i) = Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(theta_i) Tz(d_i)``. ``quaternion`` (4,) is the
+    base's attitude, ``joint_positions`` (N,) rad, or m of prismatic joints.
     """
     rotation_matrix(quaternion, data.rotation)
     r = data.rotation
@@ -42,21 +45,41 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
     )  # fmt: skip
     joint = (0.0, 0.0, 0.0)
     _place(model, 0, axes, joint, data)
-    for i in range(1, model.mass.size):
-        ca, sa = model.cos_alpha[i - 1], model.sin_alpha[i - 1]
-        ct, st = np.cos(joint_positions[i - 1]), np.sin(joint_positions[i - 1])
+    if model.branches[0] != 0.0:
+        keep_frame(axes, joint, data.frame[0])
+    for k in range(int(model.joint_count)):
+        j = int(model.order[k])
+        if model.continues[j] == 0.0:
+            axes, joint = kept_frame(data.frame[int(model.parent[j])])
         x = (axes[0], axes[3], axes[6])
         y = (axes[1], axes[4], axes[7])
         z = (axes[2], axes[5], axes[8])
-        twisted_y = add(scale(y, ca), scale(z, sa))
-        z = subtract(scale(z, ca), scale(y, sa))
-        joint = add(joint, add(scale(x, model.a[i - 1]), scale(z, model.d[i - 1])))
-        y = subtract(scale(twisted_y, ct), scale(x, st))
-        x = add(scale(x, ct), scale(twisted_y, st))
+        e, offset, motion = model.rotation[j], model.offset[j], data.motion[j + 1]
+        x, y, z = (
+            _combined(x, y, z, e[0], e[3], e[6]),
+            _combined(x, y, z, e[1], e[4], e[7]),
+            _combined(x, y, z, e[2], e[5], e[8]),
+        )
+        joint = add(joint, _combined(x, y, z, offset[0], offset[1], offset[2]))
+        if model.is_prismatic[j] == 0.0:
+            ct, st = np.cos(joint_positions[j]), np.sin(joint_positions[j])
+            x, y = add(scale(x, ct), scale(y, st)), subtract(scale(y, ct), scale(x, st))
+            store(z, motion, 0)
+            store(cross(joint, z), motion, 3)
+        else:
+            joint = add(joint, scale(z, joint_positions[j]))
+            store((0.0, 0.0, 0.0), motion, 0)
+            store(z, motion, 3)
         axes = (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])
-        store(z, data.motion[i], 0)
-        store(cross(joint, z), data.motion[i], 3)
-        _place(model, i, axes, joint, data)
+        _place(model, j + 1, axes, joint, data)
+        if model.branches[j + 1] != 0.0:
+            keep_frame(axes, joint, data.frame[j + 1])
+
+
+@subroutine
+def _combined(x: Vector, y: Vector, z: Vector, a: float, b: float, c: float) -> Vector:
+    """Return ``a x + b y + c z``."""
+    return add(add(scale(x, a), scale(y, b)), scale(z, c))
 
 
 @kernel
@@ -102,15 +125,22 @@ def spatial_velocities(
     w = vector(omega_inertial, 0)
     v = (0.0, 0.0, 0.0)
     _momentum_rate(model, 0, w, v, data)
-    for i in range(1, model.mass.size):
-        velocity = joint_velocities[i - 1]
-        angular = scale(vector(data.motion[i], 0), velocity)
-        linear = scale(vector(data.motion[i], 3), velocity)
+    if model.branches[0] != 0.0:
+        keep_motion(w, v, data.outwards[0])
+    for k in range(int(model.joint_count)):
+        j = int(model.order[k])
+        if model.continues[j] == 0.0:
+            w, v = kept_motion(data.outwards[int(model.parent[j])])
+        motion, coriolis = data.motion[j + 1], data.coriolis[j + 1]
+        angular = scale(vector(motion, 0), joint_velocities[j])
+        linear = scale(vector(motion, 3), joint_velocities[j])
         # velocity of the parent times the joint's own: what (13), (14) add without qdd
-        store(cross(w, angular), data.coriolis[i], 0)
-        store(add(cross(v, angular), cross(w, linear)), data.coriolis[i], 3)
+        store(cross(w, angular), coriolis, 0)
+        store(add(cross(v, angular), cross(w, linear)), coriolis, 3)
         w, v = add(w, angular), add(v, linear)
-        _momentum_rate(model, i, w, v, data)
+        _momentum_rate(model, j + 1, w, v, data)
+        if model.branches[j + 1] != 0.0:
+            keep_motion(w, v, data.outwards[j + 1])
 
 
 @kernel

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 
-from .algebra import add, cross, dot, scale, store, symmetric, transform_symmetric, vector
+from .algebra import Vector, add, cross, dot, scale, store, symmetric, transform_symmetric, vector
+from .branches import hand_in_wrench, keep_motion, kept_motion, taken_in_wrench
 from .model import Data, Model
 
 Array = NDArray[np.float64]
@@ -15,7 +16,7 @@ Array = NDArray[np.float64]
 
 @kernel
 def rnea_bias(model: Model, data: Data, out: Array) -> None:
-    """Write ``c = f_NE(qdd = 0)`` (n+6,) into ``out``.
+    """Write ``c = f_NE(qdd = 0)`` (N+6,) into ``out``.
 
     Call it after `forward_kinematics` and `spatial_velocities`. The accelerations (13), (14) run
     outwards, the forces (17), (18) inwards, with the sign of the child's moment corrected; then
@@ -23,23 +24,45 @@ def rnea_bias(model: Model, data: Data, out: Array) -> None:
     """
     angular = (0.0, 0.0, 0.0)
     linear = (0.0, 0.0, 0.0)
-    for i in range(1, model.mass.size):
+    if model.branches[0] != 0.0:
+        keep_motion(angular, linear, data.outwards[0])
+    for k in range(int(model.joint_count)):
+        j = int(model.order[k])
+        i = j + 1
+        if model.continues[j] == 0.0:
+            angular, linear = kept_motion(data.outwards[int(model.parent[j])])
         angular = add(angular, vector(data.coriolis[i], 0))
         linear = add(linear, vector(data.coriolis[i], 3))
-        first_moment = vector(data.first_moment[i], 0)
-        force = add(scale(linear, model.mass[i]), cross(angular, first_moment))
-        moment = add(
-            transform_symmetric(symmetric(data.inertia[i]), angular), cross(first_moment, linear)
-        )
-        store(add(vector(data.bias[i], 0), moment), data.bias[i], 0)
-        store(add(vector(data.bias[i], 3), force), data.bias[i], 3)
+        force_of_body(model, i, angular, linear, data)
+        if model.branches[i] != 0.0:
+            keep_motion(angular, linear, data.outwards[i])
     moment = (0.0, 0.0, 0.0)
     force = (0.0, 0.0, 0.0)
-    for i in range(model.mass.size - 1, -1, -1):
+    for k in range(int(model.joint_count) - 1, -1, -1):
+        j = int(model.order[k])
+        i = j + 1
+        if model.branches[i] != 0.0:
+            moment, force = taken_in_wrench(data.inwards[i], moment, force)
         moment = add(moment, vector(data.bias[i], 0))
         force = add(force, vector(data.bias[i], 3))
-        if i > 0:
-            angular, linear = vector(data.motion[i], 0), vector(data.motion[i], 3)
-            out[5 + i] = dot(angular, moment) + dot(linear, force)
-    store(force, out, 0)
-    store(moment, out, 3)
+        angular, linear = vector(data.motion[i], 0), vector(data.motion[i], 3)
+        out[6 + j] = dot(angular, moment) + dot(linear, force)
+        if model.continues[j] == 0.0:
+            hand_in_wrench(data.inwards[int(model.parent[j])], moment, force)
+            moment = force = (0.0, 0.0, 0.0)
+    if model.branches[0] != 0.0:
+        moment, force = taken_in_wrench(data.inwards[0], moment, force)
+    store(add(force, vector(data.bias[0], 3)), out, 0)
+    store(add(moment, vector(data.bias[0], 0)), out, 3)
+
+
+@subroutine
+def force_of_body(model: Model, i: int, angular: Vector, linear: Vector, data: Data) -> None:
+    """Add to ``data.bias`` of body i what its acceleration asks for: (15), (16)."""
+    first_moment = vector(data.first_moment[i], 0)
+    force = add(scale(linear, model.mass[i]), cross(angular, first_moment))
+    moment = add(
+        transform_symmetric(symmetric(data.inertia[i]), angular), cross(first_moment, linear)
+    )
+    store(add(vector(data.bias[i], 0), moment), data.bias[i], 0)
+    store(add(vector(data.bias[i], 3), force), data.bias[i], 3)

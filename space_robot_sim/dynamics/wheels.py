@@ -47,13 +47,13 @@ def take_wheels(
     Args:
         model: of the robot.
         omega_inertial: (3,) rad/s, of the base on inertial axes.
-        velocities: (n+W,) of joints and wheels, rad/s.
-        force: (n+6+W,) as in `aba`; the last W are the torques on the wheels, N m.
+        velocities: (N+W,) of joints and wheels, rad/s.
+        force: (N+6+W,) as in `aba`; the last W are the torques on the wheels, N m.
         data: with the base's ``rotation``; its ``wheel_axis`` is filled.
         inertia: of the base and its links about the base's CoM, kg m2.
         bias_moment: of the same, N m.
     """
-    n, r = model.mass.size - 1, data.rotation
+    n, r = int(model.joint_count), data.rotation
     momentum = (0.0, 0.0, 0.0)
     for k in range(int(model.wheel_count)):
         a = vector(model.wheel_axis[k], 0)
@@ -65,7 +65,7 @@ def take_wheels(
         store(axis, data.wheel_axis[k], 0)
         spin_inertia = model.wheel_inertia[k]
         momentum = add(momentum, scale(axis, spin_inertia * velocities[n + k]))
-        if data.locked[1 + n + k] == 0.0:
+        if data.locked[n + k] == 0.0:
             inertia = outer_subtracted(inertia, axis, scale(axis, spin_inertia))
             bias_moment = add(bias_moment, scale(axis, force[6 + n + k]))
     return inertia, add(bias_moment, cross(vector(omega_inertial, 0), momentum))
@@ -78,11 +78,11 @@ def turn_wheels(model: Model, angular: Vector, force: Array, data: Data, out: Ar
     ``angular`` is the base's acceleration, rad/s2. What holds a locked wheel goes into
     ``data.holding``, N m.
     """
-    n = model.mass.size - 1
+    n = int(model.joint_count)
     for k in range(int(model.wheel_count)):
         of_base = dot(vector(data.wheel_axis[k], 0), angular)
-        if data.locked[1 + n + k] == 0.0:
+        if data.locked[n + k] == 0.0:
             out[6 + n + k] = force[6 + n + k] / model.wheel_inertia[k] - of_base
         else:
             out[6 + n + k] = 0.0
-            data.holding[1 + n + k] = force[6 + n + k] - model.wheel_inertia[k] * of_base
+            data.holding[n + k] = force[6 + n + k] - model.wheel_inertia[k] * of_base

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import itertools
+from dataclasses import replace
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
+from scipy.spatial.transform import Rotation
+from typing_extensions import Self
 
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.topics import BASE_AXES
+
+from .tree import Body, Joint, JointFriction, JointLimits, Spring, Tool
 
 Array = NDArray[np.float64]
 
@@ -46,6 +52,10 @@ Inertia = Annotated[
     list[float], Field(min_length=6, max_length=6), AfterValidator(_physical_inertia)
 ]
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Coefficient = Annotated[float, Field(ge=0.0)]
+
+BASE = "base"
+"""The name of the base in a robot's file."""
 
 
 class BaseFile(StrictModel):
@@ -55,27 +65,112 @@ class BaseFile(StrictModel):
     inertia: Inertia
 
 
-class LinkFile(StrictModel):
-    """One entry of ``robot.links``: the joint towards the base, and the body it moves.
+class OriginFile(StrictModel):
+    """A frame on its parent's axes: place in m, then turned about x, y, z of the parent."""
 
-    Lengths in m, mass in kg, inertia about the CoM in kg m2 on the link's axes.
-    """
-
-    name: Annotated[str, Field(min_length=1)]
-    alpha_deg: float
-    a: float
-    d: float
-    mass: Mass
-    inertia: Inertia
-    com: Vector
+    xyz: Vector = [0.0, 0.0, 0.0]
+    rpy_deg: Vector = [0.0, 0.0, 0.0]
 
 
-class ToolFile(StrictModel):
-    """``robot.tool``: from the last link's frame to the end effector's; lengths in m."""
+class FrameFile(StrictModel):
+    """A frame by modified Denavit-Hartenberg numbers, lengths in m, or by its ``origin``."""
 
     alpha_deg: float = 0.0
     a: float = 0.0
     d: float = 0.0
+    origin: OriginFile | None = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if self.origin and self.model_fields_set & {"alpha_deg", "a", "d"}:
+            raise ValueError("either origin, or alpha_deg, a and d, place a frame; not both")
+        return self
+
+    @property
+    def rotation(self) -> Array:
+        """(3, 3) its axes, as columns, on its parent's axes; exact at right angles."""
+        if self.origin:
+            turned = Rotation.from_euler("xyz", self.origin.rpy_deg, degrees=True).as_matrix()
+            return _exact_at_right_angles(turned)
+        alpha = np.radians(self.alpha_deg)
+        c, s = _exact_at_right_angles(np.array([np.cos(alpha), np.sin(alpha)]))
+        return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+
+    @property
+    def offset(self) -> Array:
+        """(3,) m, from the parent's frame to this one, on the axes of this one."""
+        if self.origin:
+            placed: Array = self.rotation.T @ np.array(self.origin.xyz)
+            return placed
+        return np.array([self.a, 0.0, self.d])
+
+
+class LimitsFile(StrictModel):
+    """The range of a joint; a prismatic one has m in the place of degrees, and N."""
+
+    position_deg: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
+    velocity_deg: Annotated[float, Field(gt=0.0)] | None = None
+    effort: Annotated[float, Field(gt=0.0)] | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.position_deg and not self.position_deg[0] < self.position_deg[1]:
+            raise ValueError("position_deg must be a lower limit, then a higher one")
+        return self
+
+
+class FrictionFile(StrictModel):
+    """The friction of a joint, in place of the settings': N m and N m s/rad, or N and N s/m."""
+
+    coulomb: Coefficient
+    viscous: Coefficient
+
+
+class PassiveFile(StrictModel):
+    """What holds a joint without a motor: N m/rad and N m s/rad, or N/m and N s/m."""
+
+    stiffness: Coefficient
+    damping: Coefficient
+    rest_deg: float = 0.0
+
+
+class LinkFile(FrameFile):
+    """One entry of ``robot.links``: a joint, its place on its parent, and the body it moves.
+
+    Lengths in m, mass in kg, inertia about the CoM in kg m2 on the link's axes. Without a
+    ``parent`` it is joined to the link above it in the file, the first one to the base.
+    """
+
+    name: Annotated[str, Field(min_length=1)]
+    parent: str = ""
+    joint: Literal["revolute", "continuous", "prismatic", "fixed"] = "revolute"
+    axis: Vector = [0.0, 0.0, 1.0]
+    mass: Annotated[float, Field(ge=0.0)]
+    inertia: Annotated[list[float], Field(min_length=6, max_length=6)]
+    com: Vector
+    limits: LimitsFile = LimitsFile()
+    friction: FrictionFile | None = None
+    passive: PassiveFile | None = None
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> Self:
+        if self.joint == "fixed" and (self.passive or self.friction):
+            raise ValueError(f"link {self.name!r} is fixed: it has no friction and no spring")
+        if self.joint != "fixed" or self.mass > 0.0:
+            _physical_inertia(self.inertia)
+        if self.joint != "fixed" and self.mass == 0.0:
+            raise ValueError(f"link {self.name!r} moves: its mass must be greater than 0")
+        if not np.linalg.norm(self.axis) > 1e-9:
+            raise ValueError(f"the axis of link {self.name!r} must not be zero")
+        return self
+
+
+class ToolFile(FrameFile):
+    """``robot.tool``, or one entry of ``robot.tools``: an end effector's frame on a link."""
+
+    name: Annotated[str, Field(min_length=1)] = "tool"
+    link: str = ""
+    """The last one in the file where none is named."""
 
 
 def _distinct_names(links: list[LinkFile]) -> list[LinkFile]:
@@ -85,6 +180,8 @@ def _distinct_names(links: list[LinkFile]) -> list[LinkFile]:
             raise ValueError(f"joint names must differ, {name!r} occurs twice")
         if name in BASE_AXES:
             raise ValueError(f"{name!r} is the name of a base axis, not of a joint")
+        if name == BASE:
+            raise ValueError(f"{name!r} is the name of the base, not of a joint")
     return links
 
 
@@ -94,7 +191,60 @@ class RobotFile(StrictModel):
     name: Annotated[str, Field(min_length=1)]
     base: BaseFile
     links: Annotated[list[LinkFile], Field(min_length=1), AfterValidator(_distinct_names)]
-    tool: ToolFile = ToolFile()
+    tool: ToolFile | None = None
+    tools: list[ToolFile] = []
+
+    def bodies(self) -> list[Body]:
+        """Return the tree that the file tells."""
+        tools = [*([self.tool] if self.tool else []), *self.tools] or [ToolFile()]
+        last = self.links[-1].name
+        base = Body(BASE, self.base.mass, inertia_tensor(self.base.inertia), np.zeros(3))
+        found = [replace(base, tools=_tools_of(BASE, tools, last))]
+        for above, link in itertools.pairwise((None, *self.links)):
+            assert link
+            above_name = above.name if above else BASE
+            body = _body(link, link.parent or above_name)
+            found.append(replace(body, tools=_tools_of(link.name, tools, last)))
+        return found
+
+
+def _tools_of(body: str, tools: list[ToolFile], last: str) -> tuple[Tool, ...]:
+    return tuple(
+        Tool(tool.name, tool.rotation, tool.rotation @ tool.offset)
+        for tool in tools if (tool.link or last) == body
+    )  # fmt: skip
+
+
+def _body(link: LinkFile, parent: str) -> Body:
+    kind = "revolute" if link.joint == "continuous" else link.joint
+    is_prismatic, given = kind == "prismatic", link.limits
+
+    def number(value: float) -> float:
+        return value if is_prismatic else float(np.radians(value))
+
+    limits = JointLimits(effort=given.effort or np.inf)
+    if given.position_deg:
+        lower, upper = (number(value) for value in given.position_deg)
+        limits = limits._replace(lower=lower, upper=upper)
+    if given.velocity_deg:
+        limits = limits._replace(velocity=number(given.velocity_deg))
+    spring, friction = None, JointFriction()
+    if link.passive:
+        p = link.passive
+        spring = Spring(p.stiffness, p.damping, number(p.rest_deg))
+    if link.friction:
+        friction = JointFriction(link.friction.coulomb, link.friction.viscous)
+    axis = np.array(link.axis) / np.linalg.norm(link.axis)
+    return Body(
+        link.name, link.mass, inertia_tensor(link.inertia), np.array(link.com), parent,
+        Joint(link.name, kind, link.rotation, link.offset, axis, limits, friction, spring),
+    )  # fmt: skip
+
+
+def _exact_at_right_angles(values: Array) -> Array:
+    """Rid sines and cosines of multiples of 90 degrees of the rounding error of pi."""
+    rounded = np.round(values)
+    return np.where(np.abs(values - rounded) < 1e-15, rounded, values)
 
 
 class _Document(StrictModel):

@@ -1,55 +1,95 @@
-"""The robot is data: its numbers from YAML, checked for physical sense."""
+"""The robot is data: its numbers from YAML or URDF, checked for physical sense."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.config.validation import read_yaml, validate
+from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
-from ..dynamics.model import Model
-from .file import _Document, inertia_elements, inertia_tensor
+from ..dynamics.model import MOST_JOINTS, Model
+from .file import _Document, inertia_tensor
+from .model import model_of
+from .tree import Body, Joint, JointFriction, JointLimits, Moved, Spring, Tool, Visual, flatten
 
 Array = NDArray[np.float64]
 
+MOST_PASSIVE = 24
+"""More passive joints than that no state has room for."""
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, eq=False)
 class Robot:
-    """A satellite base with a serial arm of n revolute joints (modified Denavit-Hartenberg)."""
+    """A satellite base with bodies in a tree, each moved by one joint: N joints, n with a motor.
+
+    Arrays over joints list the n actuated ones first, then the passive ones, which have springs
+    for motors; each group is in the order of the file. Body 0 is the base, body j + 1 the one that
+    joint j moves; its frame has the joint's axis as z. The base's frame sits at its CoM.
+    """
 
     name: str
     joint_names: tuple[str, ...]
+    """Those of the n actuated joints: the order of all arrays that the flight software has."""
+    passive_names: tuple[str, ...]
+    body_names: tuple[str, ...]
     mass: Array
-    """(n+1,) kg, base first."""
+    """(N+1,) kg, base first."""
     inertia: Array
-    """(n+1, 3, 3) kg m2 about each body's CoM, in its frame."""
+    """(N+1, 3, 3) kg m2 about each body's CoM, in its frame."""
     com: Array
-    """(n+1, 3) m, ``a_i`` in frame i; the base's frame sits at its CoM."""
-    alpha: Array
-    """(n,) rad, ``alpha_{i-1}``."""
-    a: Array
-    """(n,) m, ``a_{i-1}``."""
-    d: Array
-    """(n,) m, ``d_i``."""
-    tool: tuple[float, float, float]
-    """``(alpha rad, a m, d m)`` from the last link to the end effector."""
+    """(N+1, 3) m, in the body's frame."""
+    parent: NDArray[np.int64]
+    """(N,) the body that each joint moves against, by number."""
+    rotation: Array
+    """(N, 3, 3) axes of each joint's frame at zero, as columns, on the axes of the parent."""
+    offset: Array
+    """(N, 3) m, from the parent's frame to the joint's, on the joint's axes at zero."""
+    is_prismatic: NDArray[np.bool_]
+    """(N,) True for a joint that slides along its axis, False for one that turns about it."""
+    limits: tuple[JointLimits, ...]
+    """Of the n actuated joints."""
+    friction: tuple[JointFriction, ...]
+    """Of all N joints."""
+    springs: tuple[Spring, ...]
+    """Of the passive joints."""
+    tools: tuple[Tool, ...]
+    """Frames of the end effectors; the first one is *the* tool."""
+    visuals: tuple[Visual, ...] = ()
+    order: tuple[int, ...] = field(default=())
+    """The joints as a walk down each branch meets them: a parent's before its children's."""
 
     @property
     def n(self) -> int:
-        """Number of joints."""
+        """Number of actuated joints."""
         return len(self.joint_names)
 
     @property
+    def joint_count(self) -> int:
+        """Number N of all joints."""
+        return len(self.joint_names) + len(self.passive_names)
+
+    @property
+    def all_joint_names(self) -> tuple[str, ...]:
+        """Names of all N joints."""
+        return self.joint_names + self.passive_names
+
+    @property
     def axis_names(self) -> tuple[str, ...]:
-        """Names of the n+3 controlled coordinates: base x, y, z, then the joints."""
+        """Names of the n+3 controlled coordinates: base x, y, z, then the actuated joints."""
         return BASE_AXES + self.joint_names
+
+    @property
+    def tool(self) -> Tool:
+        """The end effector."""
+        return self.tools[0]
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> Robot:
@@ -64,49 +104,141 @@ class Robot:
     def from_dict(cls, content: dict[str, Any], where: str = "robot") -> Robot:
         """Build from the mapping a robot file holds (key ``robot`` at its top)."""
         file = validate(_Document, content, where).robot
-        links = file.links
+        return cls.of_tree(file.name, file.bodies(), where)
+
+    @classmethod
+    def of_tree(cls, name: str, bodies: Sequence[Body], where: str = "robot") -> Robot:
+        """Build from bodies in any order: see `space_robot_sim.robot.tree.flatten`.
+
+        Raises:
+            InputError: they make no tree, or none that can be flown; ``where`` names the file.
+        """
+        walked = flatten(bodies, where)
+        listed = {body.joint.name: number for number, body in enumerate(bodies) if body.joint}
+        moved = sorted(walked[1:], key=lambda m: (_joint(m).spring is not None, listed[_joint(m).name]))
+        joints = [_joint(m) for m in moved]
+        actuated = tuple(joint for joint in joints if not joint.spring)
+        springs = tuple(joint.spring for joint in joints if joint.spring)
+        for number, most, what in (
+            (len(joints), MOST_JOINTS, "moving joints"), (len(springs), MOST_PASSIVE, "passive joints")
+        ):  # fmt: skip
+            if number > most:
+                raise InputError(f"{where}: at most {most} {what} can be flown, here are {number}")
+        if not actuated:
+            raise InputError(f"{where}: a robot needs one actuated joint at least")
+        all_moved = [walked[0], *moved]
+        number_of = {id(m): number for number, m in enumerate(all_moved)}
+        members = [m.body for m in all_moved]
         return cls(
-            name=file.name,
-            joint_names=tuple(link.name for link in links),
-            mass=np.array([file.base.mass, *(link.mass for link in links)]),
-            inertia=np.array(
-                [inertia_tensor(i) for i in (file.base.inertia, *(k.inertia for k in links))]
+            name,
+            tuple(joint.name for joint in actuated),
+            tuple(joint.name for joint in joints[len(actuated) :]),
+            tuple(body.name for body in members),
+            mass=np.array([body.mass for body in members]),
+            inertia=np.array([body.inertia for body in members]),
+            com=np.array([body.com for body in members]),
+            parent=np.array([number_of[id(walked[m.parent])] for m in moved]),
+            rotation=np.array([joint.rotation for joint in joints]),
+            offset=np.array([joint.offset for joint in joints]),
+            is_prismatic=np.array([joint.kind == "prismatic" for joint in joints]),
+            limits=tuple(joint.limits for joint in actuated),
+            friction=tuple(joint.friction for joint in joints),
+            springs=springs,
+            tools=_numbered_tools(members),
+            visuals=tuple(
+                replace(visual, body=number)
+                for number, body in enumerate(members)
+                for visual in body.visuals
             ),
-            com=np.array([[0.0, 0.0, 0.0], *(link.com for link in links)]),
-            alpha=np.radians([link.alpha_deg for link in links]),
-            a=np.array([link.a for link in links]),
-            d=np.array([link.d for link in links]),
-            tool=(float(np.radians(file.tool.alpha_deg)), file.tool.a, file.tool.d),
+            order=tuple(number_of[id(m)] - 1 for m in walked[1:]),
         )
 
+    def bodies(self) -> list[Body]:
+        """Return the tree that `of_tree` makes this robot of."""
+        found = []
+        for number, name in enumerate(self.body_names):
+            body = Body(
+                name, float(self.mass[number]), self.inertia[number], self.com[number],
+                tools=tuple(tool for tool in self.tools if tool.body == number),
+                visuals=tuple(visual for visual in self.visuals if visual.body == number),
+            )  # fmt: skip
+            if number:
+                j = number - 1
+                passive = j - self.n
+                joint = Joint(
+                    self.all_joint_names[j], "prismatic" if self.is_prismatic[j] else "revolute",
+                    self.rotation[j], self.offset[j],
+                    limits=self.limits[j] if passive < 0 else JointLimits(),
+                    friction=self.friction[j],
+                    spring=self.springs[passive] if passive >= 0 else None,
+                )  # fmt: skip
+                body = replace(body, parent=self.body_names[self.parent[j]], joint=joint)
+            found.append(body)
+        return found
+
+    @cached_property
+    def nominal(self) -> Robot:
+        """The robot that the flight software knows: its passive joints are locked at rest."""
+        if not self.springs:
+            return self
+        bodies = self.bodies()
+        for number, body in enumerate(bodies):
+            if body.joint and body.joint.spring:
+                bodies[number] = replace(body, joint=_locked(body.joint, body.joint.spring.rest))
+        return Robot.of_tree(self.name, bodies)
+
+    def from_degrees(self, values: ArrayLike) -> Array:
+        """Return positions of the n actuated joints in rad, and m of prismatic ones, as given.
+
+        ``values`` (..., n) are in degrees, and in m of prismatic joints.
+        """
+        given, n = np.asarray(values, dtype=np.float64), self.n
+        return np.where(self.is_prismatic[:n], given, np.radians(given))
+
+    def to_degrees(self, values: ArrayLike) -> Array:
+        """Invert `from_degrees`."""
+        given, n = np.asarray(values, dtype=np.float64), self.n
+        return np.where(self.is_prismatic[:n], given, np.degrees(given))
+
     def with_last_link(self, mass: float, inertia: list[float]) -> Robot:
-        """Return the robot with a payload as its last link, CoM kept.
+        """Return the robot with a payload on the body that carries the tool, CoM kept.
 
         Args:
-            mass: mass of the last link, kg.
+            mass: mass of that body, kg.
             inertia: ``[Ixx, Iyy, Izz, Ixy, Ixz, Iyz]`` about its CoM on its axes, kg m2.
         """
-        masses, tensors = self.mass.copy(), self.inertia.copy()
-        masses[-1], tensors[-1] = mass, inertia_tensor(inertia)
-        return Robot(
-            self.name, self.joint_names, masses, tensors, self.com, self.alpha, self.a, self.d,
-            self.tool,
-        )  # fmt: skip
+        masses, tensors, last = self.mass.copy(), self.inertia.copy(), self.tool.body
+        masses[last], tensors[last] = mass, inertia_tensor(inertia)
+        return replace(self, mass=masses, inertia=tensors)
 
     @cached_property
     def model(self) -> Model:
         """The numbers in the form the compiled algorithms read."""
-        model = Model.allocate(self.n)
-        assign(
-            model, mass=self.mass, inertia=inertia_elements(self.inertia), com=self.com,
-            a=self.a, d=self.d,
-            cos_alpha=_exact_at_right_angles(np.cos(self.alpha)),
-            sin_alpha=_exact_at_right_angles(np.sin(self.alpha)),
-        )  # fmt: skip
-        return model
+        return model_of(self)
 
 
-def _exact_at_right_angles(values: Array) -> Array:
-    """Rid sines and cosines of multiples of 90 degrees of the rounding error of pi."""
-    rounded = np.round(values)
-    return np.where(np.abs(values - rounded) < 1e-15, rounded, values)
+def _joint(moved: Moved) -> Joint:
+    assert moved.body.joint
+    return moved.body.joint
+
+
+def _locked(joint: Joint, position: float) -> Joint:
+    """Return the fixed joint that this one is at ``position``, rad or m."""
+    offset, rotation = joint.offset, joint.rotation
+    if joint.kind == "prismatic":
+        offset = offset + np.array([0.0, 0.0, position])
+    else:
+        c, s = np.cos(position), np.sin(position)
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        offset, rotation = turn.T @ offset, rotation @ turn
+    return Joint(joint.name, "fixed", rotation, offset)
+
+
+def _numbered_tools(members: Sequence[Body]) -> tuple[Tool, ...]:
+    """Return the tools of all bodies; a robot without any has one on its last body."""
+    found = tuple(
+        replace(tool, body=number)
+        for number, body in enumerate(members)
+        for tool in body.tools
+    )  # fmt: skip
+    return found or (Tool("tool", np.eye(3), np.zeros(3), len(members) - 1),)

@@ -1,0 +1,285 @@
+"""A robot as files tell it: bodies in any order, joints about any axis, some of them fixed.
+
+`flatten` brings such a tree into the form of the algorithms: fixed joints merged into the bodies
+that carry them, every joint about (or along) the z axis of its body's frame, the base's frame at
+its centre of mass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.errors import InputError
+
+Array = NDArray[np.float64]
+JointKind = Literal["revolute", "prismatic", "fixed"]
+
+
+class JointLimits(NamedTuple):
+    """The range of an actuated joint; infinite where none is known."""
+
+    lower: float = -np.inf
+    """rad, or m of a prismatic joint."""
+    upper: float = np.inf
+    """rad or m."""
+    velocity: float = np.inf
+    """rad/s or m/s."""
+    effort: float = np.inf
+    """N m or N."""
+
+
+class JointFriction(NamedTuple):
+    """The friction of a joint; NaN where the robot does not tell and the settings' holds."""
+
+    coulomb: float = np.nan
+    """N m, or N of a prismatic joint."""
+    viscous: float = np.nan
+    """N m s/rad or N s/m."""
+
+
+class Spring(NamedTuple):
+    """What holds a passive joint, which has no motor: ``-stiffness (theta - rest) - damping v``."""
+
+    stiffness: float
+    """N m/rad, or N/m of a prismatic joint."""
+    damping: float
+    """N m s/rad or N s/m."""
+    rest: float = 0.0
+    """rad or m."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """How a body is joined to its parent."""
+
+    name: str
+    kind: JointKind = "revolute"
+    """A continuous joint is a revolute one without limits of position."""
+    rotation: Array = field(default_factory=lambda: np.eye(3))
+    """(3, 3) axes of the body's frame at joint position zero, as columns, on its parent's axes."""
+    offset: Array = field(default_factory=lambda: np.zeros(3))
+    """(3,) m, from the parent's frame to the body's at zero, on the *body's* axes at zero."""
+    axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    """(3,) unit vector on the body's axes: turned about, or moved along."""
+    limits: JointLimits = JointLimits()
+    friction: JointFriction = JointFriction()
+    spring: Spring | None = None
+    """Of a passive joint; None: the joint is actuated, or fixed."""
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A frame that a robot works with: an end effector's."""
+
+    name: str
+    rotation: Array
+    """(3, 3) its axes, as columns, on the axes of its body."""
+    position: Array
+    """(3,) m, on the axes of its body."""
+    body: int = 0
+    """Number of the body that carries it; of no meaning before `flatten`."""
+
+
+@dataclass(frozen=True)
+class Visual:
+    """A shape that shows where a body is."""
+
+    shape: Literal["box", "cylinder", "sphere", "mesh"]
+    size: tuple[float, ...]
+    """m: edges x, y, z; radius and length along z; radius; scale x, y, z of a mesh."""
+    rotation: Array
+    """(3, 3) its axes, as columns, on the axes of its body."""
+    position: Array
+    """(3,) m, on the axes of its body."""
+    mesh: str = ""
+    """File of the mesh."""
+    colour: tuple[float, float, float, float] | None = None
+    """Red, green, blue, alpha, from 0 to 1."""
+    body: int = 0
+    """Number of the body that it shows; of no meaning before `flatten`."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body, with all vectors on the axes of its own frame."""
+
+    name: str
+    mass: float
+    """kg; 0 only where a fixed joint adds the body to another one."""
+    inertia: Array
+    """(3, 3) kg m2 about its centre of mass."""
+    com: Array
+    """(3,) m, its centre of mass."""
+    parent: str = ""
+    """Name of the body that it is joined to; empty for the base."""
+    joint: Joint | None = None
+    """How; None for the base."""
+    tools: tuple[Tool, ...] = ()
+    visuals: tuple[Visual, ...] = ()
+
+
+@dataclass
+class Moved:
+    """A body of the flattened tree and the joint that moves it; the base has none.
+
+    Its frame has the joint's axis as z axis; `body.com`, tools and visuals are on that frame.
+    """
+
+    body: Body
+    parent: int
+    """The `Moved` that its joint moves against, by number; the base is 0."""
+
+
+def flatten(bodies: Sequence[Body], where: str = "robot") -> list[Moved]:
+    """Merge fixed bodies, turn every joint's axis to z, put the base's frame at its CoM.
+
+    Returns:
+        The base, then the bodies with a moving joint, a parent always before its children and
+        else as a walk down each branch in the order of ``bodies`` meets them.
+
+    Raises:
+        InputError: names occur twice, a parent is unknown, there is not one base, or a body has no
+            mass or inertia once what is fixed to it is counted.
+    """
+    by_name = _check_names(bodies, where)
+    found: list[Moved] = []
+    parts: list[list[Body]] = []
+    place: dict[str, tuple[int, Array, Array]] = {}
+    """Of each body: its carrier, and its own frame in the carrier's."""
+    for body in _outwards(bodies, by_name, where):
+        joint = body.joint
+        if joint is None:
+            place[body.name] = (0, np.eye(3), np.zeros(3))
+        else:
+            carrier, turned, at = place[body.parent]
+            if joint.kind == "fixed":
+                rotation = turned @ joint.rotation
+                place[body.name] = (carrier, rotation, at + rotation @ joint.offset)
+            else:
+                axes = axes_with_z(joint.axis)
+                rotation = turned @ joint.rotation @ axes
+                offset = rotation.T @ at + axes.T @ joint.offset
+                joint = replace(joint, rotation=rotation, offset=offset, axis=np.eye(3)[2])
+                place[body.name] = (len(found), axes.T, np.zeros(3))
+        number, rotation, at = place[body.name]
+        if number == len(found):
+            found.append(Moved(replace(body, joint=joint), 0 if joint is None else carrier))
+            parts.append([])
+        parts[number].append(_moved_to(body, rotation, at))
+    for moved, members in zip(found, parts, strict=True):
+        moved.body = _merged(moved.body, members, where)
+    _put_base_at_com(found)
+    return found
+
+
+def axes_with_z(axis: Array) -> Array:
+    """Return a rotation whose third column is the unit vector ``axis``; exact for z, -x, ..."""
+    helper = np.zeros(3)
+    helper[np.argmin(np.abs(axis))] = 1.0
+    x = helper - (helper @ axis) * axis
+    x /= np.linalg.norm(x)
+    return np.column_stack((x, np.cross(axis, x), axis))
+
+
+def _check_names(bodies: Sequence[Body], where: str) -> dict[str, Body]:
+    by_name = {body.name: body for body in bodies}
+    names = [body.name for body in bodies]
+    joints = [body.joint.name for body in bodies if body.joint]
+    for kind, given in (("body", names), ("joint", joints)):
+        for name in given:
+            if given.count(name) > 1:
+                raise InputError(f"{where}: {kind} names must differ, {name!r} occurs twice")
+    bases = [body.name for body in bodies if body.joint is None]
+    if len(bases) != 1:
+        raise InputError(f"{where}: a robot has one base, here are {len(bases)}: {bases}")
+    for body in bodies:
+        if body.joint and body.parent not in by_name:
+            raise InputError(
+                f"{where}: parent {body.parent!r} of {body.name!r} is no body, there are "
+                f"{', '.join(names)}"
+            )
+    return by_name
+
+
+def _outwards(bodies: Sequence[Body], by_name: dict[str, Body], where: str) -> Iterator[Body]:
+    """Walk down each branch from the base, in the order of ``bodies``."""
+    children: dict[str, list[Body]] = {name: [] for name in by_name}
+    for body in reversed(bodies):
+        if body.joint:
+            children[body.parent].append(body)
+    waiting, seen = [body for body in bodies if body.joint is None], 0
+    while waiting:
+        body = waiting.pop()
+        waiting += children[body.name]
+        seen += 1
+        yield body
+    if seen < len(bodies):
+        raise InputError(f"{where}: some bodies are not joined to the base, but in a circle")
+
+
+def _moved_to(body: Body, rotation: Array, position: Array) -> Body:
+    """Return the body on the axes of another frame, in which its own is so turned and placed."""
+
+    def at(vector: Array) -> Array:
+        turned: Array = position + rotation @ vector
+        return turned
+
+    return replace(
+        body,
+        inertia=rotation @ body.inertia @ rotation.T,
+        com=at(body.com),
+        tools=tuple(
+            replace(tool, rotation=rotation @ tool.rotation, position=at(tool.position))
+            for tool in body.tools
+        ),
+        visuals=tuple(
+            replace(seen, rotation=rotation @ seen.rotation, position=at(seen.position))
+            for seen in body.visuals
+        ),
+    )
+
+
+def _merged(first: Body, members: list[Body], where: str) -> Body:
+    """Return one rigid body that is all ``members``, which are on its axes."""
+    mass = sum(body.mass for body in members)
+    if not mass > 0.0:
+        raise InputError(f"{where}: body {first.name!r} moves and has no mass ({mass:g} kg)")
+    heavy = [body for body in members if body.mass > 0.0]
+    com, inertia = heavy[0].com, heavy[0].inertia
+    if len(heavy) > 1:
+        com = np.sum([body.mass * body.com for body in heavy], axis=0) / mass
+        inertia = np.sum([_about(body, com) for body in heavy], axis=0)
+    if not np.linalg.eigvalsh(inertia)[0] > 0.0:
+        raise InputError(
+            f"{where}: the inertia of body {first.name!r} must be positive definite, its smallest "
+            f"principal moment is {np.linalg.eigvalsh(inertia)[0]:g} kg m2"
+        )
+    return replace(
+        first, mass=mass, com=com, inertia=inertia,
+        tools=tuple(tool for body in members for tool in body.tools),
+        visuals=tuple(visual for body in members for visual in body.visuals),
+    )  # fmt: skip
+
+
+def _about(body: Body, point: Array) -> Array:
+    """Return the body's inertia about ``point``, kg m2 (parallel axes)."""
+    arm = body.com - point
+    moved: Array = body.inertia + body.mass * ((arm @ arm) * np.eye(3) - np.outer(arm, arm))
+    return moved
+
+
+def _put_base_at_com(found: list[Moved]) -> None:
+    shift = -found[0].body.com
+    if not shift.any():
+        return
+    found[0].body = _moved_to(found[0].body, np.eye(3), shift)
+    for moved in found[1:]:
+        joint = moved.body.joint
+        if moved.parent == 0 and joint:
+            offset = joint.offset + joint.rotation.T @ shift
+            moved.body = replace(moved.body, joint=replace(joint, offset=offset))
