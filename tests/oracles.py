@@ -53,21 +53,37 @@ def attitude_jacobian_base(quaternion: ArrayLike) -> Array:
 
 
 def pinocchio_model(robot: Robot) -> pin.Model:
-    """The same robot in Pinocchio, without gravity: a free-flyer and n joints about z."""
+    """The same robot in Pinocchio, without gravity: a free-flyer and joints of z.
+
+    Its joints are in the order of ``robot.order``, see `visited`.
+    """
     model = pin.Model()
     identity = pin.SE3.Identity()
     joint = model.addJoint(0, pin.JointModelFreeFlyer(), identity, "base")
     model.appendBodyToJoint(
         joint, pin.Inertia(robot.mass[0], np.zeros(3), robot.inertia[0]), identity
     )
-    for i in range(robot.n):
-        twist = pin.SE3(Rotation.from_euler("x", robot.alpha[i]).as_matrix(), np.zeros(3))
-        placement = twist * pin.SE3(np.eye(3), np.array([robot.a[i], 0.0, robot.d[i]]))
-        joint = model.addJoint(joint, pin.JointModelRZ(), placement, f"joint{i + 1}")
+    numbers = {0: joint}
+    for i in robot.order:
+        placement = pin.SE3(robot.rotation[i], robot.rotation[i] @ robot.offset[i])
+        kind = pin.JointModelPZ() if robot.is_prismatic[i] else pin.JointModelRZ()
+        joint = model.addJoint(numbers[robot.parent[i]], kind, placement, f"joint{i + 1}")
+        numbers[i + 1] = joint
         inertia = pin.Inertia(robot.mass[i + 1], robot.com[i + 1], robot.inertia[i + 1])
         model.appendBodyToJoint(joint, inertia, identity)
     model.gravity = pin.Motion.Zero()
     return model
+
+
+def visited(robot: Robot, state: State) -> State:
+    """The state with its joints in the order of Pinocchio's and MuJoCo's models of the robot."""
+    order = list(robot.order)
+    return state._replace(theta=state.theta[order], rate=state.rate[order])
+
+
+def visited_rows(robot: Robot) -> list[int]:
+    """The rows of generalised vectors, [v0, w0, joints], in the order of those models."""
+    return [*range(6), *(6 + joint for joint in robot.order)]
 
 
 def pinocchio_state(state: State, position: ArrayLike = (0.0, 0.0, 0.0)) -> tuple[Array, Array]:
@@ -89,7 +105,7 @@ def pinocchio_mass_matrix(robot: Robot, state: State, position: ArrayLike = (0, 
     """H of (7) by composite rigid bodies."""
     model = pinocchio_model(robot)
     upper = np.triu(pin.crba(model, model.createData(), pinocchio_state(state, position)[0]))
-    to_base = to_base_axes(state.quaternion, robot.n + 6)
+    to_base = to_base_axes(state.quaternion, robot.joint_count + 6)
     return to_base.T @ (upper + np.triu(upper, 1).T) @ to_base
 
 
@@ -107,10 +123,10 @@ def pinocchio_bias_force(robot: Robot, state: State, position: ArrayLike = (0, 0
     """c of (7) by recursive Newton-Euler, where the base CoM's acceleration is zero."""
     model = pinocchio_model(robot)
     configuration, velocity = pinocchio_state(state, position)
-    spatial = np.zeros(robot.n + 6)
+    spatial = np.zeros(robot.joint_count + 6)
     spatial[:3] = -np.cross(velocity[3:6], velocity[:3])
     force = pin.rnea(model, model.createData(), configuration, velocity, spatial)
-    return to_base_axes(state.quaternion, robot.n + 6).T @ force
+    return to_base_axes(state.quaternion, robot.joint_count + 6).T @ force
 
 
 def pinocchio_forward_dynamics(robot: Robot, state: State, force: Array) -> Array:
@@ -143,7 +159,7 @@ def mujoco_inertial(com: Array, mass: float, tensor: Array) -> str:
 
 
 def mujoco_model(robot: Robot, base: str = "", on_base: str = "") -> mujoco.MjModel:
-    """The same robot in MuJoCo, without gravity: a free joint and n hinges about z.
+    """The same robot in MuJoCo, without gravity: a free joint, and hinges and slides of z.
 
     In MJCF, ``base`` is another `mujoco_inertial` for the base, and ``on_base`` are more bodies on
     it; their joints stand behind the robot's.
@@ -152,15 +168,23 @@ def mujoco_model(robot: Robot, base: str = "", on_base: str = "") -> mujoco.MjMo
     def inertial(body: int) -> str:
         return mujoco_inertial(robot.com[body], robot.mass[body], robot.inertia[body])
 
-    text = f'<body name="base"><freejoint/>{base or inertial(0)}'
-    for i in range(robot.n):
-        twist = Rotation.from_euler("x", robot.alpha[i])
-        offset = np.array([robot.a[i], 0, 0]) + twist.apply([0, 0, robot.d[i]])
-        text += (
-            f'<body pos="{mujoco_numbers(offset)}" quat="{mujoco_numbers(quaternion_of(twist))}">'
-            f'<joint type="hinge" axis="0 0 1"/>{inertial(i + 1)}'
-        )
-    text += "</body>" * robot.n + on_base + "</body>"
+    def branch(body: int) -> str:
+        text = inertial(body)
+        for i in robot.order:
+            if robot.parent[i] != body:
+                continue
+            place = robot.rotation[i] @ robot.offset[i]
+            kind = "slide" if robot.is_prismatic[i] else "hinge"
+            turn = mujoco_numbers(quaternion_of(Rotation.from_matrix(robot.rotation[i])))
+            text += (
+                f'<body pos="{mujoco_numbers(place)}" quat="{turn}">'
+                f'<joint type="{kind}" axis="0 0 1"/>{branch(i + 1)}'
+                "</body>"
+            )
+        return text
+
+    text = branch(0).replace(inertial(0), base or inertial(0), 1)
+    text = f'<body name="base"><freejoint/>{text}{on_base}</body>'
     return mujoco.MjModel.from_xml_string(
         f'<mujoco><option gravity="0 0 0"/><worldbody>{text}</worldbody></mujoco>'
     )

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.samples import ReferenceChunk
 from space_robot_sim.robot import Robot
+from space_robot_sim.robot.frames import BodyFrame, body_frames
 
 from ..mission.mission import Mission, MissionSettings
 
@@ -87,44 +88,34 @@ def inertia_in_rho(quaternion: Array, inertia: Array) -> Array:
 
 
 def semi_floating_inertia(robot: Robot, joint_positions: Array) -> Array:
-    """Return H_r (K, m, m) about the base's axes for ``joint_positions`` (K, n), rad."""
+    """Return H_r (K, m, m) about the base's axes for ``joint_positions`` (K, n), rad or m.
+
+    The robot has no passive joints.
+    """
     count, n = joint_positions.shape
-    rotation = np.broadcast_to(np.eye(3), (count, 3, 3))
-    joint = np.zeros((count, 3))
     angular = np.zeros((n + 1, count, 3, n + 3))
     linear = np.zeros_like(angular)
-    axes, joints = [], []
-    for body in range(n + 1):
-        if body:
-            i = body - 1
-            twist = _about(np.array(robot.alpha[i]), axis=0)
-            joint = joint + rotation @ np.array([robot.a[i], 0.0, 0.0])
-            rotation = rotation @ twist
-            joint = joint + rotation @ np.array([0.0, 0.0, robot.d[i]])
-            rotation = rotation @ _about(joint_positions[:, i], axis=2)
-            axes.append(rotation[:, :, 2])
-            joints.append(joint)
-        com = joint + rotation @ robot.com[body]
+    x, y, z = (np.repeat(axis[:, np.newaxis], count, axis=1) for axis in np.eye(3))
+    frames: dict[int, BodyFrame] = {}
+    for frame in body_frames(robot, (x, y, z), joint_positions.T):
+        body = frame.body
+        frames[body] = frame
+        com = (frame.origin + frame.on_outer_axes(robot.com[body])).T
         angular[body, :, :, :3] = np.eye(3)
         linear[body, :, :, :3] = np.cross(np.eye(3), com[:, np.newaxis, :]).swapaxes(1, 2)
-        for column, (axis, origin) in enumerate(zip(axes, joints, strict=True), start=3):
-            angular[body, :, :, column] = axis
-            linear[body, :, :, column] = np.cross(axis, com - origin)
+        mover = body
+        while mover:  # every joint on the way to the base
+            joint, axis = mover - 1, frames[mover].z.T
+            if robot.is_prismatic[joint]:
+                linear[body, :, :, 3 + joint] = axis
+            else:
+                angular[body, :, :, 3 + joint] = axis
+                linear[body, :, :, 3 + joint] = np.cross(axis, com - frames[mover].origin.T)
+            mover = int(robot.parent[joint])
         # from here on in the body's own axes, where its inertia is constant
-        angular[body] = rotation.swapaxes(1, 2) @ angular[body]
+        angular[body] = np.stack((frame.x.T, frame.y.T, frame.z.T), axis=1) @ angular[body]
     linear -= np.tensordot(robot.mass / robot.mass.sum(), linear, axes=1)
     turning = angular.swapaxes(2, 3) @ robot.inertia[:, np.newaxis] @ angular
     moving = linear.swapaxes(2, 3) @ (robot.mass[:, np.newaxis, np.newaxis, np.newaxis] * linear)
     total: Array = (turning + moving).sum(axis=0)
     return total
-
-
-def _about(angle: Array, axis: int) -> Array:
-    """Return the rotation (..., 3, 3) by ``angle`` (...), rad, about the axis x (0) or z (2)."""
-    rotation = np.zeros((*angle.shape, 3, 3))
-    first, second = (axis + 1) % 3, (axis + 2) % 3
-    rotation[..., axis, axis] = 1.0
-    rotation[..., first, first] = rotation[..., second, second] = np.cos(angle)
-    rotation[..., second, first] = np.sin(angle)
-    rotation[..., first, second] = -np.sin(angle)
-    return rotation

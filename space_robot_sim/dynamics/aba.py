@@ -1,8 +1,8 @@
 """Accelerations from forces, ``qdd = H^-1 (F - c)``, by the articulated-body algorithm.
 
-Featherstone's recursion over a tree of bodies, linear in the number of joints. With every quantity on inertial axes
-about one origin the usual changes of frame between links vanish. A spatial inertia is held in
-three blocks: ``[[J, G], [G^T, M]]``, angular part first, J and M symmetric.
+Featherstone's recursion over a tree of bodies, linear in the number of joints. With every quantity
+on inertial axes about one origin the usual changes of frame between links vanish. A spatial inertia
+is held in three blocks: ``[[J, G], [G^T, M]]``, angular part first, J and M symmetric.
 
 A locked joint passes its link's whole inertia and force on to the parent (hybrid dynamics,
 Featherstone 2008, chapter 9), which costs less than a free one. Wheels are leaves on the base.

@@ -52,6 +52,14 @@ class Model(Record):
     """1 for a joint whose parent is the body visited before it; 0: a branch begins."""
     branches: Array = shaped(lambda n: (MOST_JOINTS + 1,))
     """1 for a body that a branch begins at after another one has been visited."""
+    actuated_count: float = shaped(lambda n: ())
+    """Number of joints with a motor; the passive ones are behind them."""
+    stiffness: Array = shaped(lambda n: (MOST_JOINTS,))
+    """Of the passive joints' springs, N m/rad, or N/m of prismatic joints."""
+    damping: Array = shaped(lambda n: (MOST_JOINTS,))
+    """Of the same, N m s/rad or N s/m."""
+    rest: Array = shaped(lambda n: (MOST_JOINTS,))
+    """Where the spring of each is at rest, rad or m."""
     wheel_count: float = shaped(lambda n: ())
     """Reaction wheels of the base, see `space_robot_sim.dynamics.wheels`; at most MOST_WHEELS."""
     wheel_axis: Array = shaped(lambda n: (MOST_WHEELS, 3))

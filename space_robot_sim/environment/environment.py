@@ -8,6 +8,7 @@ from space_robot_msgs_py.compiled.records import Record, assign, nested
 from space_robot_msgs_py.config.validation import StrictModel
 
 from ..faults.schedule import PartFault
+from ..robot import Robot
 from .disturbance import Disturbance, DisturbanceSettings
 from .events import EventTexts
 from .friction import Friction, FrictionSettings, StuckJoint
@@ -34,13 +35,13 @@ class Environment(Record):
     disturbance: Disturbance = nested(Disturbance)
 
     @classmethod
-    def build(cls, n: int, settings: EnvironmentSettings) -> Environment:
-        """Read the numbers of the settings for a robot of ``n`` joints."""
-        environment = cls.allocate(n)
+    def build(cls, robot: Robot, settings: EnvironmentSettings) -> Environment:
+        """Read the numbers of the settings for a robot."""
+        environment = cls.allocate(robot.n)
         assign(
             environment,
-            friction=Friction.build(n, settings.friction),
-            disturbance=Disturbance.build(n, settings.disturbance),
+            friction=Friction.build(robot, settings.friction),
+            disturbance=Disturbance.build(robot.n, settings.disturbance),
         )
         return environment
 

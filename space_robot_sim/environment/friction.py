@@ -19,9 +19,11 @@ from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.samples import MOST_WHEELS
 from space_robot_msgs_py.topics import BASE_AXES
 
+from ..dynamics.model import MOST_JOINTS
 from ..faults.axes import About
 from ..faults.grammar import Argument, Kind
 from ..faults.schedule import Schedule, ScheduledFault, TemporaryChange
+from ..robot import Robot
 
 Array = NDArray[np.float64]
 Coefficient = Annotated[float, Field(ge=0.0, le=1e6)]
@@ -44,28 +46,31 @@ class Friction(Record):
 
     count: float = shaped(lambda n: ())
     """Joints and wheels that there are; the rest of the arrays is unused."""
-    coulomb: Array = shaped(lambda n: (n + MOST_WHEELS,))
+    coulomb: Array = shaped(lambda n: (MOST_JOINTS + MOST_WHEELS,))
     """f_C, N m."""
-    viscous: Array = shaped(lambda n: (n + MOST_WHEELS,))
+    viscous: Array = shaped(lambda n: (MOST_JOINTS + MOST_WHEELS,))
     """f_V, N m s/rad."""
     set_valued: float = shaped(lambda n: ())
     """0 for the sign alone, 1 for friction that holds joints at rest."""
 
     @classmethod
-    def build(cls, n: int, settings: FrictionSettings) -> Friction:
-        """Give each of ``n`` joints the same friction; of wheels it has none."""
-        friction = cls.allocate(n)
-        assign(friction, count=n, set_valued=settings.set_valued)
-        friction.coulomb[:n], friction.viscous[:n] = settings.coulomb, settings.viscous
+    def build(cls, robot: Robot, settings: FrictionSettings) -> Friction:
+        """Give each joint its own friction, or the settings', which passive joints do not have."""
+        friction = cls.allocate(robot.n)
+        assign(friction, count=robot.joint_count, set_valued=settings.set_valued)
+        for j, own in enumerate(robot.friction):
+            usual = (settings.coulomb, settings.viscous) if j < robot.n else (0.0, 0.0)
+            coulomb, viscous = np.where(np.isnan(own), usual, own)
+            friction.coulomb[j], friction.viscous[j] = coulomb, viscous
         return friction
 
     @staticmethod
     def add_wheels(friction: Friction, coulomb: Array, viscous: Array) -> None:
         """Let wheels of this friction (W,), N m and N m s/rad, stand behind the joints."""
-        n = friction.coulomb.size - MOST_WHEELS
-        stop = n + coulomb.size
+        joints = int(friction.count)
+        stop = joints + coulomb.size
         assign(friction, count=stop)
-        friction.coulomb[n:stop], friction.viscous[n:stop] = coulomb, viscous
+        friction.coulomb[joints:stop], friction.viscous[joints:stop] = coulomb, viscous
 
 
 @kernel

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS
 
 from ..dynamics.aba import aba
 from ..dynamics.attitude import quaternion_rate, rotate, rotation_matrix
-from ..dynamics.model import Data, Model
+from ..dynamics.model import MOST_JOINTS, Data, Model
 from ..environment.disturbance import disturbance_torque
 from ..environment.environment import Environment
 from ..environment.friction import friction_torque
@@ -19,39 +19,53 @@ from ..environment.friction import friction_torque
 Array = NDArray[np.float64]
 
 
-def state_size(n: int) -> int:
-    """Return how many numbers the state of a robot of ``n`` joints has, see `Stages`."""
-    return 2 * n + 13 + MOST_WHEELS
+MOST_MOVING = MOST_JOINTS + MOST_WHEELS
+"""Joints and wheels that a state has room for."""
+MOST_NUMBERS = 13 + 2 * MOST_JOINTS + MOST_WHEELS
+"""Numbers that a state has room for."""
 
 
 class Stages(Record):
     """Scratch of the integrator.
 
-    A state ``x`` is ``[r0 (3), quaternion (4), theta (n), v0 (3), w0 (3), thetadot (n), Omega]``,
-    velocities on inertial axes; ``Omega`` (MOST_WHEELS,) are those of the wheels against the base.
+    A state ``x`` is ``[r0 (3), quaternion (4), theta (N), v0 (3), w0 (3), thetadot (N), Omega]``,
+    velocities on inertial axes; ``Omega`` are those of the wheels against the base. Joints are the
+    actuated ones, then the passive ones; what is behind the last wheel is unused.
     """
 
-    stage: Array = shaped(lambda n: (state_size(n),))
+    stage: Array = shaped(lambda n: (MOST_NUMBERS,))
     """State at which the current stage is evaluated."""
-    slope: Array = shaped(lambda n: (4, state_size(n)))
+    slope: Array = shaped(lambda n: (4, MOST_NUMBERS))
     """Time derivatives."""
-    end: Array = shaped(lambda n: (state_size(n),))
+    end: Array = shaped(lambda n: (MOST_NUMBERS,))
     """State at the end of a step."""
-    actuation: Array = shaped(lambda n: (n + 6 + MOST_WHEELS,))
+    actuation: Array = shaped(lambda n: (6 + MOST_MOVING,))
     """What the actuators give over the step: force (N) and torque (N m) on the base's axes, which
-    turn with it, torques on the joints, torques of the wheels' motors, N m."""
-    force: Array = shaped(lambda n: (n + 6 + MOST_WHEELS,))
+    turn with it, torques on the N joints, torques of the wheels' motors, N m."""
+    force: Array = shaped(lambda n: (6 + MOST_MOVING,))
     """Generalised force, base part on inertial axes."""
-    disturbance: Array = shaped(lambda n: (n + 3,))
-    """f_d of (61), N m."""
-    friction: Array = shaped(lambda n: (n + MOST_WHEELS,))
+    disturbance: Array = shaped(lambda n: (3 + MOST_JOINTS,))
+    """f_d of (61), N m; none on passive joints."""
+    friction: Array = shaped(lambda n: (MOST_MOVING,))
     """f_f of each joint, then of each wheel, N m."""
-    directions: Array = shaped(lambda n: (n + MOST_WHEELS,))
+    directions: Array = shaped(lambda n: (MOST_MOVING,))
     """The sense in which each of them slides over the step, see `friction_torque`."""
-    held: Array = shaped(lambda n: (n + MOST_WHEELS,))
+    held: Array = shaped(lambda n: (MOST_MOVING,))
     """1 for those that came back to rest within the step in which they broke away."""
     data: Data = nested(Data)
     """Its ``locked`` joints and wheels stand over the step."""
+
+
+@subroutine
+def first_velocity(model: Model) -> int:
+    """Return where in a state the velocity of the first joint stands."""
+    return 13 + int(model.joint_count)
+
+
+@subroutine
+def state_size(model: Model) -> int:
+    """Return how many numbers a state of the robot has, its wheels included."""
+    return 13 + 2 * int(model.joint_count) + int(model.wheel_count)
 
 
 @kernel
@@ -65,12 +79,12 @@ def state_derivative(
         model: the plant's robot.
         environment: its friction.
         x: the state, see `Stages`.
-        disturbance: (n+3,) f_d, N m, about inertial axes, then on the joints.
+        disturbance: (n+3,) f_d, N m, about inertial axes, then on the actuated joints.
         stages: ``actuation``, and which joints and wheels slide in which sense and which stand;
             scratch.
         out: as ``x``.
     """
-    n, friction = model.mass.size - 1, environment.friction
+    n, friction = int(model.joint_count), environment.friction
     quaternion, theta = x[3:7], x[7 : 7 + n]
     v0, w0, velocities = x[7 + n : 10 + n], x[10 + n : 13 + n], x[13 + n :]
     force, actuation, resisting = stages.force, stages.actuation, stages.friction
@@ -80,8 +94,12 @@ def state_derivative(
     for k in range(3):
         force[3 + k] -= disturbance[k]
     friction_torque(friction, velocities, stages.directions, resisting)
-    for i in range(n):
+    actuated = int(model.actuated_count)
+    for i in range(actuated):
         force[6 + i] = actuation[6 + i] - disturbance[3 + i] - resisting[i]
+    for i in range(actuated, n):
+        spring = model.stiffness[i] * (theta[i] - model.rest[i]) + model.damping[i] * velocities[i]
+        force[6 + i] = -spring - resisting[i]
     for k in range(n, int(friction.count)):  # the wheels
         force[6 + k] = actuation[6 + k] - resisting[k]
     out[0:3] = v0
@@ -98,8 +116,9 @@ def rk4_step(
 
     ``stages.actuation`` is held; ``stages.slope[0]`` is the derivative in ``x``.
     """
-    size, end = x.size, stages.end
-    slope, stage, disturbance = stages.slope, stages.stage, stages.disturbance
+    size, end = state_size(model), stages.end
+    slope, stage = stages.slope, stages.stage
+    disturbance = stages.disturbance[: 3 + int(model.actuated_count)]
     for k in range(1, 4):
         step = period if k == 3 else 0.5 * period
         if k != 2:  # the two stages in the middle are at one time

@@ -12,7 +12,7 @@ from pydantic import Field
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.errors import DivergedError, InputError
-from space_robot_msgs_py.samples import Command, RobotState, State
+from space_robot_msgs_py.samples import MOST_WHEELS, Command, RobotState, State
 
 from ..actuators.actuators import (
     Actuators,
@@ -29,7 +29,7 @@ from ..robot import Robot
 from ..sensors.noise import Draws
 from ..sensors.sensors import Sensors, SensorSettings, arrays_of_draws, sense
 from .faults import FaultSettings, PartFaults
-from .integrator import Stages, state_size
+from .integrator import MOST_NUMBERS, Stages, state_size
 from .stick_slip import integrate
 from .truth import write_truth
 from .wheel_mounting import mount_wheels
@@ -65,7 +65,7 @@ class PlantMemory(Record):
     stages: Stages = nested(Stages)
     substeps: float = shaped(lambda n: ())
     """Integration steps in a tick."""
-    x: Array = shaped(lambda n: (state_size(n),))
+    x: Array = shaped(lambda n: (MOST_NUMBERS,))
     """The state, see `Stages`."""
     rotation: Array = shaped(lambda n: (3, 3))
     """Scratch."""
@@ -108,7 +108,7 @@ class Plant:
         """The plant's `PlantMemory`, for compiled loops."""
         memory = self.memory
         assign(
-            memory, model=self.robot.model, environment=Environment.build(n, settings),
+            memory, model=self.robot.model, environment=Environment.build(self.robot, settings),
             actuators=Actuators.build(n, settings, period), substeps=settings.substeps,
         )  # fmt: skip
         self.command_delay_buffer = command_delay_buffer(
@@ -116,14 +116,16 @@ class Plant:
         )
         """Ring of the commands that are still on their way."""
         memory.x[3:7] = np.array(settings.initial_quaternion) / norm
-        memory.x[7 : 7 + n] = np.radians(settings.initial_joints_deg)
-        speeds = memory.x[13 + 2 * n :]
+        memory.x[7 : 7 + n] = robot.from_degrees(settings.initial_joints_deg)
+        memory.x[7 + n : 7 + robot.joint_count] = [spring.rest for spring in robot.springs]
+        speeds = memory.x[13 + 2 * robot.joint_count :][:MOST_WHEELS]
         mount_wheels(settings.wheels, memory.model, memory.environment.friction, speeds)
         self.truth = RobotState(0, self.block["truth"])
         self.state = RobotState(0, self.block["measured"])
         # at rest: what `write_truth` would say, without waiting for compiled code
         self.truth.quaternion[:] = memory.x[3:7]
         self.truth.joint_positions[:] = memory.x[7 : 7 + n]
+        self.truth.passive_positions[: len(robot.springs)] = memory.x[7 + n : 7 + robot.joint_count]
         self.truth.wheel_velocities[:] = speeds
         sensors = Sensors.build(n, settings, period, memory.truth)
         schedule = settings.schedule(self.names, period)
@@ -225,28 +227,30 @@ def advance(
         The fastest rate then, see `fastest_rate`.
     """
     truth, measured = memory.truth, memory.measured
+    joints, wheels = int(memory.model.joint_count), int(memory.model.wheel_count)
     n, actuation = truth.joint_positions.size, memory.stages.actuation
     actuate(memory.actuators, command_delay_buffer, torque, tick, period, truth, measured)
     substeps = int(memory.substeps)
     step = period / substeps
     actuation[:6] = memory.actuators.base_wrench
     actuation[6 : 6 + n] = truth.applied_torque[3:]
-    actuation[6 + n :] = truth.wheel_torques
+    for k in range(wheels):
+        actuation[6 + joints + k] = truth.wheel_torques[k]
     for k in range(substeps):
         integrate(
             memory.model, memory.environment, memory.x, tick * period + k * step, step,
             memory.stages,
         )  # fmt: skip
-    write_truth(memory.x, memory.rotation, truth)
-    fastest: float = fastest_rate(memory.x, n)
+    write_truth(memory.model, memory.x, memory.rotation, truth)
+    fastest: float = fastest_rate(memory.model, memory.x)
     return fastest
 
 
 @kernel
-def fastest_rate(x: Array, n: int) -> float:
+def fastest_rate(model: Model, x: Array) -> float:
     """Return the fastest velocity of base axes, joints and wheels, rad/s (NaN if any is)."""
     fastest = 0.0
-    for i in range(10 + n, x.size):
+    for i in range(10 + int(model.joint_count), state_size(model)):
         if not abs(x[i]) <= fastest:  # also true of NaN
             fastest = abs(x[i])
             if np.isnan(fastest):

@@ -19,12 +19,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 
 from ..dynamics.model import Model
 from ..environment.disturbance import disturbance_torque
 from ..environment.environment import Environment
-from .integrator import Stages, rk4_step, state_derivative
+from .integrator import Stages, first_velocity, rk4_step, state_derivative, state_size
 
 Array = NDArray[np.float64]
 
@@ -43,31 +43,37 @@ def integrate(
 ) -> None:
     """Advance ``x`` in place from ``time`` by ``period``, s; ``stages.actuation`` is held."""
     left = period
-    stages.held[:] = 0.0
+    stages.held[: int(environment.friction.count)] = 0.0
     for _ in range(MOST_CUTS):
         slide_or_stand(model, environment, x, time, stages)
         rk4_step(model, environment, x, time, left, stages)
-        joint = first_at_rest(environment, x, stages)
+        joint = first_at_rest(model, environment, x, stages)
         if joint == NONE:
-            x[:] = stages.end
+            _take(model, stages, x)
             return
-        velocity = x.size - stages.directions.size + joint
+        velocity = first_velocity(model) + joint
         if x[velocity] == 0.0:  # broke away and came back
             stages.held[joint] = 1.0
             continue
         length = left
         while joint != NONE:  # one that comes to rest still earlier is met on the way
-            velocity = x.size - stages.directions.size + joint
+            velocity = first_velocity(model) + joint
             length = cut(model, environment, x, time, length, velocity, stages)
             stages.end[velocity] = 0.0
-            joint = first_at_rest(environment, x, stages)
-        x[:] = stages.end
-        stages.held[:] = 0.0
+            joint = first_at_rest(model, environment, x, stages)
+        _take(model, stages, x)
+        stages.held[: int(environment.friction.count)] = 0.0
         time += length
         left -= length
     slide_or_stand(model, environment, x, time, stages)
     rk4_step(model, environment, x, time, left, stages)
-    x[:] = stages.end
+    _take(model, stages, x)
+
+
+@subroutine
+def _take(model: Model, stages: Stages, x: Array) -> None:
+    for i in range(state_size(model)):
+        x[i] = stages.end[i]
 
 
 @kernel
@@ -80,23 +86,24 @@ def slide_or_stand(
     """
     directions, data, coulomb = stages.directions, stages.data, environment.friction.coulomb
     n, derivative = int(environment.friction.count), stages.slope[0]
-    first, sticks = x.size - directions.size, environment.friction.set_valued
+    first, sticks = first_velocity(model), environment.friction.set_valued
+    disturbance = stages.disturbance[: 3 + int(model.actuated_count)]
     for i in range(n):
-        directions[i] = sticks * np.sign(x[first + i])
-        data.locked[1 + i] = sticks if x[first + i] == 0.0 and coulomb[i] > 0.0 else 0.0
-    disturbance_torque(environment.disturbance, time, stages.disturbance)
+        directions[i] = sticks * np.sign(x[first + i]) if coulomb[i] > 0.0 else 0.0
+        data.locked[i] = sticks if x[first + i] == 0.0 and coulomb[i] > 0.0 else 0.0
+    disturbance_torque(environment.disturbance, time, disturbance)
     for _ in range(MOST_PIVOTS):
-        state_derivative(model, environment, x, stages.disturbance, stages, derivative)
+        state_derivative(model, environment, x, disturbance, stages, derivative)
         changed = NONE
         for i in range(n):
             if x[first + i] != 0.0 or coulomb[i] * sticks == 0.0 or stages.held[i] != 0.0:
                 continue
-            if data.locked[1 + i] != 0.0:
-                if abs(data.holding[1 + i]) > coulomb[i]:
-                    data.locked[1 + i], directions[i] = 0.0, np.sign(data.holding[1 + i])
+            if data.locked[i] != 0.0:
+                if abs(data.holding[i]) > coulomb[i]:
+                    data.locked[i], directions[i] = 0.0, np.sign(data.holding[i])
                     changed = i
             elif derivative[first + i] * directions[i] < 0.0:
-                data.locked[1 + i], directions[i] = 1.0, 0.0
+                data.locked[i], directions[i] = 1.0, 0.0
                 changed = i
             if changed != NONE:
                 break
@@ -105,10 +112,10 @@ def slide_or_stand(
 
 
 @kernel
-def first_at_rest(environment: Environment, x: Array, stages: Stages) -> int:
+def first_at_rest(model: Model, environment: Environment, x: Array, stages: Stages) -> int:
     """Return the joint that came to rest first between ``x`` and ``stages.end``, or `NONE`."""
     directions, end = stages.directions, stages.end
-    first, earliest, found = x.size - directions.size, 2.0, NONE
+    first, earliest, found = first_velocity(model), 2.0, NONE
     for i in range(int(environment.friction.count)):
         before, after = x[first + i], end[first + i]
         if after * directions[i] < 0.0:

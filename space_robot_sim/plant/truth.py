@@ -9,25 +9,31 @@ from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.samples import State
 
 from ..dynamics.attitude import rotate_back, rotation_matrix
+from ..dynamics.model import Model
 
 Array = NDArray[np.float64]
 
 
 @kernel
-def write_truth(x: Array, rotation: Array, truth: State) -> None:
+def write_truth(model: Model, x: Array, rotation: Array, truth: State) -> None:
     """Write the plant's state into ``truth``; the torque in there is left alone.
 
     Args:
+        model: of the plant's robot.
         x: the state, see `space_robot_sim.plant.integrator.Stages`.
         rotation: (3, 3) scratch.
         truth: angular velocity on base axes.
     """
-    n = truth.joint_positions.size
+    n, actuated = int(model.joint_count), truth.joint_positions.size
     truth.base_position[:] = x[:3]
     truth.quaternion[:] = x[3:7]
-    truth.joint_positions[:] = x[7 : 7 + n]
+    truth.joint_positions[:] = x[7 : 7 + actuated]
     truth.base_velocity[:] = x[7 + n : 10 + n]
     rotation_matrix(truth.quaternion, rotation)
     rotate_back(rotation, x[10 + n : 13 + n], truth.omega_base)
-    truth.joint_velocities[:] = x[13 + n : 13 + 2 * n]
-    truth.wheel_velocities[:] = x[13 + 2 * n :]
+    truth.joint_velocities[:] = x[13 + n : 13 + n + actuated]
+    for k in range(n - actuated):
+        truth.passive_positions[k] = x[7 + actuated + k]
+        truth.passive_velocities[k] = x[13 + n + actuated + k]
+    for k in range(int(model.wheel_count)):
+        truth.wheel_velocities[k] = x[13 + 2 * n + k]

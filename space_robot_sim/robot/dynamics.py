@@ -45,16 +45,16 @@ def mass_matrix(robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: Array
     Args:
         robot: the robot's numbers.
         quaternion_wxyz: (4,) base attitude, unit.
-        joint_positions: (n,) rad.
+        joint_positions: (N,) of all joints, rad, or m of prismatic ones.
 
     Returns:
-        (n+6, n+6), symmetric positive definite; generalised velocity ``[v0, w0, thetadot]``,
+        (N+6, N+6), symmetric positive definite; generalised velocity ``[v0, w0, thetadot]``,
         base part on inertial axes.
 
     Raises:
         ValueError: an argument has the wrong shape, or the quaternion is not unit.
     """
-    n = robot.n
+    n = robot.joint_count
     out, data = np.empty((n + 6, n + 6)), Data.allocate(n)
     positions = _vector(joint_positions, n, "joint_positions")
     forward_kinematics(robot.model, _quaternion(quaternion_wxyz), positions, data)
@@ -74,17 +74,17 @@ def bias_force(
     Args:
         robot: the robot's numbers.
         quaternion_wxyz: (4,) base attitude, unit.
-        joint_positions: (n,) rad.
+        joint_positions: (N,) of all joints, rad, or m of prismatic ones.
         w0_inertial: (3,) base angular velocity on inertial axes, rad/s.
-        joint_velocities: (n,) rad/s.
+        joint_velocities: (N,) of all joints, rad/s or m/s.
 
     Returns:
-        (n+6,) force (N), moment about the base CoM (N m) on inertial axes, joint torques (N m).
+        (N+6,) force (N), moment about the base CoM (N m) on inertial axes, joint torques (N m).
 
     Raises:
         ValueError: an argument has the wrong shape, or the quaternion is not unit.
     """
-    n = robot.n
+    n = robot.joint_count
     out, data = np.empty(n + 6), Data.allocate(n)
     positions = _vector(joint_positions, n, "joint_positions")
     velocities = _vector(joint_velocities, n, "joint_velocities")
@@ -107,19 +107,19 @@ def forward_dynamics(
     Args:
         robot: the robot's numbers.
         quaternion_wxyz: (4,) base attitude, unit.
-        joint_positions: (n,) rad.
+        joint_positions: (N,) of all joints, rad, or m of prismatic ones.
         w0_inertial: (3,) base angular velocity on inertial axes, rad/s.
-        joint_velocities: (n,) rad/s.
-        force: (n+6,) F: force (N), moment about the base CoM (N m) on inertial axes, joint
+        joint_velocities: (N,) of all joints, rad/s or m/s.
+        force: (N+6,) F: force (N), moment about the base CoM (N m) on inertial axes, joint
             torques (N m).
 
     Returns:
-        (n+6,) m/s2 and rad/s2, base part on inertial axes.
+        (N+6,) m/s2 and rad/s2, base part on inertial axes.
 
     Raises:
         ValueError: an argument has the wrong shape, or the quaternion is not unit.
     """
-    n = robot.n
+    n = robot.joint_count
     out = np.empty(n + 6)
     aba(
         robot.model,

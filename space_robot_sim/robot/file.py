@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 from scipy.spatial.transform import Rotation
 from typing_extensions import Self
 
@@ -68,8 +68,8 @@ class BaseFile(StrictModel):
 class OriginFile(StrictModel):
     """A frame on its parent's axes: place in m, then turned about x, y, z of the parent."""
 
-    xyz: Vector = [0.0, 0.0, 0.0]
-    rpy_deg: Vector = [0.0, 0.0, 0.0]
+    xyz: Vector = Field([0.0, 0.0, 0.0])
+    rpy_deg: Vector = Field([0.0, 0.0, 0.0])
 
 
 class FrameFile(StrictModel):
@@ -144,7 +144,7 @@ class LinkFile(FrameFile):
     name: Annotated[str, Field(min_length=1)]
     parent: str = ""
     joint: Literal["revolute", "continuous", "prismatic", "fixed"] = "revolute"
-    axis: Vector = [0.0, 0.0, 1.0]
+    axis: Vector = Field([0.0, 0.0, 1.0])
     mass: Annotated[float, Field(ge=0.0)]
     inertia: Annotated[list[float], Field(min_length=6, max_length=6)]
     com: Vector
@@ -152,17 +152,31 @@ class LinkFile(FrameFile):
     friction: FrictionFile | None = None
     passive: PassiveFile | None = None
 
-    @model_validator(mode="after")
-    def _makes_sense(self) -> Self:
-        if self.joint == "fixed" and (self.passive or self.friction):
-            raise ValueError(f"link {self.name!r} is fixed: it has no friction and no spring")
-        if self.joint != "fixed" or self.mass > 0.0:
-            _physical_inertia(self.inertia)
-        if self.joint != "fixed" and self.mass == 0.0:
-            raise ValueError(f"link {self.name!r} moves: its mass must be greater than 0")
-        if not np.linalg.norm(self.axis) > 1e-9:
-            raise ValueError(f"the axis of link {self.name!r} must not be zero")
-        return self
+    @field_validator("axis", mode="after")
+    @classmethod
+    def _is_direction(cls, axis: list[float]) -> list[float]:
+        if not np.linalg.norm(axis) > 1e-9:
+            raise ValueError("the axis must not be zero")
+        return axis
+
+    @field_validator("mass", mode="after")
+    @classmethod
+    def _moves_mass(cls, mass: float, info: ValidationInfo) -> float:
+        if mass == 0.0 and info.data.get("joint") != "fixed":
+            raise ValueError("a link that moves must have a mass greater than 0")
+        return mass
+
+    @field_validator("inertia", mode="after")
+    @classmethod
+    def _is_physical(cls, inertia: list[float], info: ValidationInfo) -> list[float]:
+        return inertia if info.data.get("mass") == 0.0 else _physical_inertia(inertia)
+
+    @field_validator("friction", "passive", mode="after")
+    @classmethod
+    def _moves(cls, given: StrictModel | None, info: ValidationInfo) -> StrictModel | None:
+        if given and info.data.get("joint") == "fixed":
+            raise ValueError("a fixed link has no friction and no spring")
+        return given
 
 
 class ToolFile(FrameFile):
@@ -192,7 +206,7 @@ class RobotFile(StrictModel):
     base: BaseFile
     links: Annotated[list[LinkFile], Field(min_length=1), AfterValidator(_distinct_names)]
     tool: ToolFile | None = None
-    tools: list[ToolFile] = []
+    tools: list[ToolFile] = Field([])
 
     def bodies(self) -> list[Body]:
         """Return the tree that the file tells."""

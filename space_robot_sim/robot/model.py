@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from space_robot_msgs_py.compiled.records import assign
 
 from ..dynamics.model import Model
@@ -18,7 +16,7 @@ if TYPE_CHECKING:
 def model_of(robot: Robot) -> Model:
     """Fill a `Model`; see there for what stands where."""
     model, bodies, joints = Model.allocate(robot.n), robot.joint_count + 1, robot.joint_count
-    assign(model, joint_count=joints)
+    assign(model, joint_count=joints, actuated_count=robot.n)
     model.mass[:bodies] = robot.mass
     model.inertia[:bodies] = inertia_elements(robot.inertia)
     model.com[:bodies] = robot.com
@@ -27,6 +25,8 @@ def model_of(robot: Robot) -> Model:
     model.is_prismatic[:joints] = robot.is_prismatic
     model.parent[:joints] = robot.parent
     model.order[:joints] = robot.order
+    for j, spring in enumerate(robot.springs, robot.n):
+        model.stiffness[j], model.damping[j], model.rest[j] = spring
     visited = (0, *(joint + 1 for joint in robot.order))
     for before, joint in zip(visited, robot.order, strict=False):
         continues = robot.parent[joint] == before
@@ -34,5 +34,3 @@ def model_of(robot: Robot) -> Model:
         if not continues:
             model.branches[robot.parent[joint]] = 1.0
     return model
-
-

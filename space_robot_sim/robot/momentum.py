@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .base_axes import base_axes, cross, to_base, to_inertial
+from .frames import BodyFrame, body_frames
 from .robot import Robot
 
 Array = NDArray[np.float64]
@@ -26,9 +27,9 @@ class Motion(NamedTuple):
     omega_base: Array
     """(N, 3) rad/s, base frame."""
     joint_positions: Array
-    """(N, n) rad."""
+    """(T, N) of all joints, the passive ones behind; rad, or m of prismatic joints."""
     joint_velocities: Array
-    """(N, n) rad/s."""
+    """(T, N) rad/s or m/s."""
 
 
 class RobotMomentum(NamedTuple):
@@ -63,7 +64,7 @@ def robot_momentum(robot: Robot, motion: Motion) -> RobotMomentum:
     Raises:
         ValueError: an array has the wrong shape.
     """
-    rows, n = len(motion.quaternion), robot.n
+    rows, n = len(motion.quaternion), robot.joint_count
     wanted = ((rows, 4), (rows, 3), (rows, n), (rows, n))
     for name, array, shape in zip(motion._fields, motion, wanted, strict=True):
         if array.shape != shape:
@@ -89,29 +90,30 @@ def _sum(vectors: Iterable[Array]) -> Array:
 
 
 def _bodies(robot: Robot, motion: Motion) -> Iterator[_Body]:
-    """Walk the chain (modified Denavit-Hartenberg) from the base outwards; arrays are (., N)."""
-    model, theta, rate = robot.model, motion.joint_positions, motion.joint_velocities
-    x, y, z = base_axes(motion.quaternion)
-    omega = to_inertial(np.array((x, y, z)), motion.omega_base)
-    joint, velocity = np.zeros_like(x), np.zeros_like(x)
-    yield _body(robot, 0, (x, y, z), joint, velocity, omega)
-    for i in range(robot.n):
-        ca, sa, ct, st = model.cos_alpha[i], model.sin_alpha[i], np.cos(theta[i]), np.sin(theta[i])
-        y, z, first = ca * y + sa * z, ca * z - sa * y, model.a[i] * x
-        link = first + model.d[i] * z
-        velocity = velocity + cross(omega, link)
-        joint = joint + link
-        x, y = ct * x + st * y, ct * y - st * x
-        omega = omega + rate[i] * z
-        yield _body(robot, i + 1, (x, y, z), joint, velocity, omega)
+    """Walk from the base outwards; arrays are (., T)."""
+    axes = base_axes(motion.quaternion)
+    omega = {0: to_inertial(axes, motion.omega_base)}
+    frames: dict[int, BodyFrame] = {}
+    velocity = {0: np.zeros_like(omega[0])}
+    for frame in body_frames(robot, (axes[0], axes[1], axes[2]), motion.joint_positions):
+        body, joint = frame.body, frame.body - 1
+        if body:
+            parent, rate = int(robot.parent[joint]), motion.joint_velocities[joint]
+            link = frame.origin - frames[parent].origin
+            velocity[body] = velocity[parent] + cross(omega[parent], link)
+            omega[body] = omega[parent]
+            if robot.is_prismatic[joint]:
+                velocity[body] = velocity[body] + rate * frame.z
+            else:
+                omega[body] = omega[body] + rate * frame.z
+        frames[body] = frame
+        yield _body(robot, frame, velocity[body], omega[body])
 
 
-def _body(
-    robot: Robot, i: int, axes: tuple[Array, Array, Array], joint: Array, velocity: Array,
-    omega: Array,
-) -> _Body:  # fmt: skip
-    """Return body i, whose frame sits at ``joint`` and moves with ``velocity``."""
-    turn = np.array(axes)
-    arm = to_inertial(turn, np.broadcast_to(robot.com[i][:, np.newaxis], joint.shape))
-    spin = to_inertial(turn, robot.inertia[i] @ to_base(turn, omega))
-    return _Body(float(robot.mass[i]), joint + arm, velocity + cross(omega, arm), spin)
+def _body(robot: Robot, frame: BodyFrame, velocity: Array, omega: Array) -> _Body:
+    """Return the body of a frame that moves with ``velocity``."""
+    turn = np.array((frame.x, frame.y, frame.z))
+    arm = frame.on_outer_axes(robot.com[frame.body])
+    spin = to_inertial(turn, robot.inertia[frame.body] @ to_base(turn, omega))
+    mass = float(robot.mass[frame.body])
+    return _Body(mass, frame.origin + arm, velocity + cross(omega, arm), spin)

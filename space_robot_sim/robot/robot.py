@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from space_robot_msgs_py.config.validation import read_yaml, validate
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import MOST_PASSIVE
 from space_robot_msgs_py.topics import BASE_AXES
 
 from ..dynamics.model import MOST_JOINTS, Model
@@ -21,9 +22,6 @@ from .model import model_of
 from .tree import Body, Joint, JointFriction, JointLimits, Moved, Spring, Tool, Visual, flatten
 
 Array = NDArray[np.float64]
-
-MOST_PASSIVE = 24
-"""More passive joints than that no state has room for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,13 +113,16 @@ class Robot:
         """
         walked = flatten(bodies, where)
         listed = {body.joint.name: number for number, body in enumerate(bodies) if body.joint}
-        moved = sorted(walked[1:], key=lambda m: (_joint(m).spring is not None, listed[_joint(m).name]))
+        moved = sorted(
+            walked[1:], key=lambda m: (_joint(m).spring is not None, listed[_joint(m).name])
+        )
         joints = [_joint(m) for m in moved]
         actuated = tuple(joint for joint in joints if not joint.spring)
         springs = tuple(joint.spring for joint in joints if joint.spring)
         for number, most, what in (
-            (len(joints), MOST_JOINTS, "moving joints"), (len(springs), MOST_PASSIVE, "passive joints")
-        ):  # fmt: skip
+            (len(joints), MOST_JOINTS, "moving joints"),
+            (len(springs), MOST_PASSIVE, "passive joints"),
+        ):
             if number > most:
                 raise InputError(f"{where}: at most {most} {what} can be flown, here are {number}")
         if not actuated:

@@ -53,6 +53,9 @@ class Spring(NamedTuple):
     """rad or m."""
 
 
+NO_LIMITS, USUAL_FRICTION = JointLimits(), JointFriction()
+
+
 @dataclass(frozen=True)
 class Joint:
     """How a body is joined to its parent."""
@@ -66,8 +69,8 @@ class Joint:
     """(3,) m, from the parent's frame to the body's at zero, on the *body's* axes at zero."""
     axis: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     """(3,) unit vector on the body's axes: turned about, or moved along."""
-    limits: JointLimits = JointLimits()
-    friction: JointFriction = JointFriction()
+    limits: JointLimits = NO_LIMITS
+    friction: JointFriction = USUAL_FRICTION
     spring: Spring | None = None
     """Of a passive joint; None: the joint is actuated, or fixed."""
 

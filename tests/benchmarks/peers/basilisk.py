@@ -86,12 +86,12 @@ def _arm(start: Start, viscous: float) -> spinningBodyNDOFStateEffector:
     arm.ModelTag = "arm"
     for i in range(robot.n):
         link = spinningBodyNDOFStateEffector.SpinningBody()
-        twist = Rotation.from_euler("x", robot.alpha[i]).as_matrix()
+        twist = robot.rotation[i]
         link.setMass(robot.mass[i + 1])
         link.setISPntSc_S(robot.inertia[i + 1].tolist())
         link.setDCM_S0P(twist.T.tolist())
         link.setR_ScS_S(_column(robot.com[i + 1]))
-        link.setR_SP_P(_column(np.array([robot.a[i], 0.0, 0.0]) + twist[:, 2] * robot.d[i]))
+        link.setR_SP_P(_column(twist @ robot.offset[i]))
         link.setSHat_S([[0.0], [0.0], [1.0]])
         link.setThetaInit(start.theta[i])
         link.setThetaDotInit(start.rate[i])

@@ -35,7 +35,7 @@ def test_wheels_accelerate_as_the_dense_equations_say(n: int, wheels: int, seed:
     model, data, out = robot.model.copy(), Data.allocate(n), np.empty(6 + n + wheels)
     assign(model, wheel_count=wheels)
     model.wheel_axis[:wheels], model.wheel_inertia[:wheels] = axes, inertia
-    data.locked[1 + n : 1 + n + wheels] = stands
+    data.locked[n : n + wheels] = stands
     velocities = np.concatenate([state.rate, speeds])
     aba(model, state.quaternion, state.theta, state.w0, velocities, force, data, out)
 
@@ -55,5 +55,5 @@ def test_wheels_accelerate_as_the_dense_equations_say(n: int, wheels: int, seed:
     expected[free] = np.linalg.solve(mass[np.ix_(free, free)], (force - bias)[free])
     np.testing.assert_allclose(out, expected, rtol=0.0, atol=1e-11 * np.abs(expected).max())
     holding = (force - bias - mass @ expected)[last][stands]
-    found = data.holding[1 + n : 1 + n + wheels][stands]
+    found = data.holding[n : n + wheels][stands]
     assert found == pytest.approx(holding, rel=1e-9, abs=1e-9 * np.abs(expected).max())

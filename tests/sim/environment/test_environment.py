@@ -20,6 +20,7 @@ from space_robot_sim.environment.payload import PayloadSettings, with_payload
 from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
+FOUR = random_robot(np.random.default_rng(4), 4)
 
 
 def disturbance(n: int, scale: float, time: float) -> Array:
@@ -82,17 +83,17 @@ def test_without_a_scale_nothing_disturbs() -> None:
 @given(st.floats(-50.0, 50.0), st.integers(0, 3))
 def test_friction_opposes_the_motion(rate: float, joint: int) -> None:
     """(27): the torque it takes from the joint has the sign of the rate, so power is lost."""
-    torque = friction(Friction.build(4, FrictionSettings()), joint, rate)
+    torque = friction(Friction.build(FOUR, FrictionSettings()), joint, rate)
     expected = 0.02 * (rate > 0) - 0.02 * (rate < 0) + 0.2 * rate
     assert torque == pytest.approx(expected, rel=1e-14)
     assert torque * rate >= 0.0
-    assert friction(Friction.build(4, FrictionSettings()), joint, -rate) == -torque
+    assert friction(Friction.build(FOUR, FrictionSettings()), joint, -rate) == -torque
 
 
 @given(st.lists(st.floats(0.0, 9.0), min_size=8, max_size=8), st.sampled_from([-0.5, 0.0, 0.25]))
 def test_each_joint_has_its_own_friction(coefficients: list[float], rate: float) -> None:
     """As a stuck joint has."""
-    joints = Friction.build(4, FrictionSettings())
+    joints = Friction.build(FOUR, FrictionSettings())
     joints.coulomb[:4], joints.viscous[:4] = coefficients[:4], coefficients[4:]
     for joint in range(4):
         coulomb, viscous = coefficients[joint], coefficients[4 + joint]
@@ -102,9 +103,9 @@ def test_each_joint_has_its_own_friction(coefficients: list[float], rate: float)
 
 def test_friction_of_a_joint_that_breaks_away_opposes_what_comes() -> None:
     """Not yet turning, it has the whole Coulomb torque; one that stands has none of its own."""
-    joints, out = Friction.build(3, FrictionSettings(coulomb=5.0)), np.empty(3)
-    friction_torque(joints, np.zeros(3), np.array([0.0, 1.0, -1.0]), out)
-    np.testing.assert_array_equal(out, [0.0, 5.0, -5.0])
+    joints, out = Friction.build(FOUR, FrictionSettings(coulomb=5.0)), np.empty(4)
+    friction_torque(joints, np.zeros(4), np.array([0.0, 1.0, -1.0, 0.0]), out)
+    np.testing.assert_array_equal(out, [0.0, 5.0, -5.0, 0.0])
 
 
 def test_payload_replaces_mass_and_inertia_of_the_last_link(paper_robot: Robot) -> None:
@@ -116,7 +117,7 @@ def test_payload_replaces_mass_and_inertia_of_the_last_link(paper_robot: Robot) 
     np.testing.assert_array_equal(loaded.com, paper_robot.com)
     np.testing.assert_array_equal(loaded.mass[:-1], paper_robot.mass[:-1])
     np.testing.assert_array_equal(loaded.inertia[:-1], paper_robot.inertia[:-1])
-    assert loaded.model.mass[-1] == 10.0, "the compiled algorithms must see the payload"
+    assert loaded.model.mass[6] == 10.0, "the compiled algorithms must see the payload"
 
 
 def test_payload_sits_on_the_last_link_of_any_robot() -> None:

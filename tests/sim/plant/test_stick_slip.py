@@ -108,8 +108,8 @@ def test_joints_stand_or_break_away_as_coulombs_law_has_it(n: int, seed: int) ->
     torque = rng.normal(size=n + 3)
     stages = stand(plant, torque)
     data, directions = data_of(plant), stages.directions[:n]
-    locked = data.locked[1 : n + 1] != 0.0
-    friction = np.where(locked, data.holding[1 : n + 1], COULOMB * directions)
+    locked = data.locked[:n] != 0.0
+    friction = np.where(locked, data.holding[:n], COULOMB * directions)
     (expected,) = solutions(plant.robot, state, torque, COULOMB)
     np.testing.assert_allclose(friction, expected, rtol=0.0, atol=1e-9)
     accelerations = stages.slope[0, 13 + n : 13 + 2 * n]
@@ -229,5 +229,5 @@ def test_locked_joints_are_as_if_welded(seven_joint_robot: Robot) -> None:
     saddle[stands, n + 6 + np.arange(stands.size)] = 1.0
     solution = np.linalg.solve(saddle, np.concatenate([force, np.zeros(stands.size)]))
     np.testing.assert_allclose(stages.slope[0, 7 + n : 13 + 2 * n], solution[: n + 6], atol=1e-9)
-    holding = data_of(plant).holding[stands - 5]
+    holding = data_of(plant).holding[stands - 6]
     np.testing.assert_allclose(holding, solution[n + 6 :], atol=1e-8)

@@ -46,12 +46,15 @@ def test_paper_robot_holds_tables_2_and_3(paper_robot: Robot) -> None:
     assert (paper_robot.name, paper_robot.n) == ("paper", 6)
     assert paper_robot.axis_names == ("base_x", "base_y", "base_z", *paper_robot.joint_names)
     np.testing.assert_array_equal(paper_robot.mass, [750, 20, 35, 20, 10, 20, 5])
-    np.testing.assert_allclose(np.degrees(paper_robot.alpha), [0, 90, 180, 90, -90, 90])
-    np.testing.assert_array_equal(paper_robot.a, [0.5, 0, 2.7, 0, 0, 0])
-    np.testing.assert_array_equal(paper_robot.d, [1.05, 0, 0, 2.16, 0, 0.35])
+    twists = Rotation.from_matrix(paper_robot.rotation).as_euler("xyz", degrees=True)
+    np.testing.assert_allclose(np.abs(twists[:, 0]), [0, 90, 180, 90, 90, 90])
+    np.testing.assert_array_equal(paper_robot.rotation[4, 2], [0, -1, 0])
+    np.testing.assert_array_equal(paper_robot.offset[:, 0], [0.5, 0, 2.7, 0, 0, 0])
+    np.testing.assert_array_equal(paper_robot.offset[:, 2], [1.05, 0, 0, 2.16, 0, 0.35])
     np.testing.assert_array_equal(paper_robot.com[3], [0, -1.08, 0])
     np.testing.assert_array_equal(paper_robot.inertia[6], np.diag([0.8, 0.4, 0.6]))
-    assert paper_robot.tool == (0.0, 0.0, 0.25)
+    np.testing.assert_array_equal(paper_robot.tool.position, [0.0, 0.0, 0.25])
+    assert paper_robot.tool.body == 6
 
 
 def test_from_yaml_reads_every_number(tmp_path: Path, content: dict[str, Any]) -> None:
@@ -62,20 +65,23 @@ def test_from_yaml_reads_every_number(tmp_path: Path, content: dict[str, Any]) -
     assert robot.joint_names == ("joint1", "joint2", "joint3")
     np.testing.assert_array_equal(robot.mass, [base["mass"], *(k["mass"] for k in links)])
     np.testing.assert_array_equal(robot.com, [[0, 0, 0], *(k["com"] for k in links)])
-    np.testing.assert_allclose(robot.alpha, [np.deg2rad(k["alpha_deg"]) for k in links])
+    twists = Rotation.from_euler("x", [[k["alpha_deg"]] for k in links], degrees=True)
+    np.testing.assert_allclose(robot.rotation, twists.as_matrix(), rtol=0.0, atol=1e-15)
     for tensor, body in zip(robot.inertia, [base, *links], strict=True):
         xx, yy, zz, xy, xz, yz = body["inertia"]
         np.testing.assert_array_equal(tensor, [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    assert robot.tool == (np.pi, 0.0, 0.3)
+    np.testing.assert_array_equal(robot.tool.rotation, np.diag([1.0, -1.0, -1.0]))
+    np.testing.assert_array_equal(robot.tool.position, [0.0, 0.0, -0.3])
 
 
 def test_model_is_exact_at_right_angles(paper_robot: Robot) -> None:
     """No 6e-17 where the cosine of 90 degrees is meant; any other twist as cos and sin say."""
-    assert set(paper_robot.model.cos_alpha) <= {-1.0, 0.0, 1.0}
-    assert set(paper_robot.model.sin_alpha) <= {-1.0, 0.0, 1.0}
-    robot = Robot.from_dict(random_robot_file(np.random.default_rng(6), 4))
-    np.testing.assert_array_equal(robot.model.cos_alpha, np.cos(robot.alpha))
-    np.testing.assert_array_equal(robot.model.sin_alpha, np.sin(robot.alpha))
+    assert set(paper_robot.model.rotation[:6].ravel()) <= {-1.0, 0.0, 1.0}
+    content = random_robot_file(np.random.default_rng(6), 4)
+    twists = np.radians([link["alpha_deg"] for link in content["robot"]["links"]])
+    rotation = Robot.from_dict(content).model.rotation
+    np.testing.assert_array_equal(rotation[:4, 4], np.cos(twists))
+    np.testing.assert_array_equal(rotation[:4, 7], np.sin(twists))
 
 
 def test_with_last_link_changes_that_link_only(paper_robot: Robot) -> None:
@@ -143,7 +149,7 @@ FAULTS: dict[str, tuple[Edit, list[str]]] = {
     ),
     "unknown key": (
         in_link(0, "weight", 5.0),
-        ["robot.links.0.weight", "5.0", "unknown key", "choose one of a, alpha_deg, com, d"],
+        ["robot.links.0.weight", "5.0", "unknown key", "choose one of a, alpha_deg, axis, com, d"],
     ),
     "missing key": (without("robot", "links", 1, "mass"), ["robot.links.1.mass", "required"]),
     "no links": (

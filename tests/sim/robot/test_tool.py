@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles import pinocchio_model, rotation_of
 from random_robots import random_quaternion, random_robot
-from scipy.spatial.transform import Rotation
 
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.tool import tool_pose
@@ -22,9 +21,7 @@ def pinocchio_tool(robot: Robot, quaternion: np.ndarray, theta: np.ndarray) -> p
     pin.forwardKinematics(
         model, data, np.concatenate([np.zeros(3), np.roll(quaternion, -1), theta])
     )
-    alpha, a, d = robot.tool
-    twist = pin.SE3(Rotation.from_euler("x", alpha).as_matrix(), np.zeros(3))
-    return data.oMi[model.njoints - 1] * twist * pin.SE3(np.eye(3), np.array([a, 0.0, d]))
+    return data.oMi[model.njoints - 1] * pin.SE3(robot.tool.rotation, robot.tool.position)
 
 
 @given(st.integers(1, 9), st.integers(0, 2**32 - 1))

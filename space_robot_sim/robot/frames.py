@@ -1,0 +1,69 @@
+"""Frames of a robot's bodies, for every tick of a flight at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class BodyFrame(NamedTuple):
+    """A body's frame, tick by tick; vectors (3, T) on the axes of an outer frame."""
+
+    body: int
+    x: Array
+    y: Array
+    z: Array
+    """The axis of the joint that moves the body."""
+    origin: Array
+    """m, from the base's CoM."""
+
+    def on_outer_axes(self, vector: Array) -> Array:
+        """Turn a vector (3,) on the body's axes to the outer frame's, (3, T)."""
+        turned: Array = self.x * vector[0] + self.y * vector[1] + self.z * vector[2]
+        return turned
+
+
+def body_frames(
+    robot: Robot, base_axes: tuple[Array, Array, Array], joint_positions: Array
+) -> Iterator[BodyFrame]:
+    """Hand out the frame of the base, then of every body, a parent's before its children's.
+
+    Args:
+        robot: whose masses do not matter.
+        base_axes: x, y and z of the base, (3, T) each.
+        joint_positions: (N, T) of all joints, rad, or m of prismatic ones.
+    """
+    frames = {0: BodyFrame(0, *base_axes, np.zeros_like(base_axes[0]))}
+    yield frames[0]
+    for joint in robot.order:
+        _, x, y, z, origin = frames[int(robot.parent[joint])]
+        turn, offset, position = robot.rotation[joint], robot.offset[joint], joint_positions[joint]
+        x, y, z = (_combined((x, y, z), turn[:, k]) for k in range(3))
+        origin = origin + _combined((x, y, z), offset)
+        if robot.is_prismatic[joint]:
+            origin = origin + position * z
+        else:
+            ct, st = np.cos(position), np.sin(position)
+            x, y = ct * x + st * y, ct * y - st * x
+        frames[joint + 1] = BodyFrame(joint + 1, x, y, z, origin)
+        yield frames[joint + 1]
+
+
+def _combined(vectors: tuple[Array, Array, Array], factors: Array) -> Array:
+    """Return the sum of the vectors times the factors; most factors of most robots are zero."""
+    terms = [
+        factor * vector
+        for factor, vector in zip(factors, vectors, strict=True)
+        if factor != 0.0
+    ]  # fmt: skip
+    total = terms[0] if terms else np.zeros_like(vectors[0])
+    for term in terms[1:]:
+        total = total + term
+    return total
