@@ -153,7 +153,7 @@ def topic_page() -> str:
     """All topics of the graph."""
     rows = (
         (
-            f"`{topic.name}`", topic.type, str(topic.depth),
+            f"`{topic.full_name}`", topic.type, str(topic.depth),
             "transient local" if topic.transient_local else "volatile",
             _occasion(topic),
         )
@@ -162,7 +162,9 @@ def topic_page() -> str:
     return "\n\n".join([
         "# Topics", MADE,
         "All are reliable and keep the last messages. Fields, units, frames and rates are in"
-        " [bags](../manual/bags.md#topics). Every topic but `/diagnostics` is recorded.",
+        " [bags](../manual/bags.md#topics). Every topic but `/diagnostics` is recorded. These are"
+        " the names of nodes without a namespace; in one, as `/sat1`, all but `/diagnostics` begin"
+        " with it: `/sat1/joint_states`.",
         table(("topic", "type", "history", "durability", "a message"), rows),
     ]) + "\n"  # fmt: skip
 

@@ -76,6 +76,8 @@ class RecorderLoop:
         self.outputs: tuple[RawPublisher, ...] = ()
         group = PolledCallbackGroup()
         self._inputs = [RawSubscription(node, topic, group, QUEUE_DEPTH) for topic in topics.ALL]
+        self._ours = {entry.full_name: entry.topic.full_name for entry in self._inputs}
+        """Names in the root namespace by those that are heard."""
         self._pause = Wait(settings.drain_period, patience_s=PATIENCE_S)
         self._diagnostics = RawSubscription(node, topics.DIAGNOSTICS, group)
         self._told = False
@@ -188,7 +190,7 @@ class RecorderLoop:
                 for status in decode(taken.data, topics.DIAGNOSTICS.type).status:
                     for item in status.values:
                         if item.key.startswith(SENT):
-                            name = item.key.removeprefix(SENT)
+                            name = self._ours.get(item.key.removeprefix(SENT), "")
                             self._recorder.note_sent(name, taken.publisher, int(item.value))
 
     @property

@@ -1,9 +1,14 @@
-"""Names, types and quality of service of every topic of the graph."""
+"""Names, types and quality of service of every topic of the graph.
+
+Names are relative: rclpy puts them into the node's namespace and applies its remappings.
+"""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
+ROOT = "/"
+"""The namespace of nodes that are given none."""
 INERTIAL_FRAME = "inertial"
 BASE_FRAME = "base"
 BASE_AXES = ("base_x", "base_y", "base_z")
@@ -14,6 +19,7 @@ class Topic(NamedTuple):
     """One topic of the graph. What its messages say stands in the module of `wire` of its name."""
 
     name: str
+    """Relative, as nodes give it to rclpy."""
     type: str
     depth: int
     """History kept, in messages. Shallow queues lose data at 2 kHz (keep seconds of traffic)."""
@@ -28,34 +34,43 @@ class Topic(NamedTuple):
     is_optional: bool = False
     """Sent in some flights only, so that silence is no loss."""
 
+    @property
+    def full_name(self) -> str:
+        """Return its name in the root namespace: in words, counts and reports, wherever it is."""
+        return self.in_namespace(ROOT)
 
-JOINT_STATES = Topic("/joint_states", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
-BASE_STATE = Topic("/base/state", "sensor_msgs/msg/MultiDOFJointState", 10_000, per_tick=True)
+    def in_namespace(self, namespace: str) -> str:
+        """Return its full name in a namespace (``/``, ``/sat1``), without remappings."""
+        if self.name.startswith("/"):
+            return self.name
+        return f"/{self.name}" if namespace == ROOT else f"{namespace}/{self.name}"
+
+
+JOINT_STATES = Topic("joint_states", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
+BASE_STATE = Topic("base/state", "sensor_msgs/msg/MultiDOFJointState", 10_000, per_tick=True)
 # What the base's actuators tell of themselves; sent where there are any.
 WHEELS_STATE = Topic(
-    "/wheels/state", "sensor_msgs/msg/JointState", 10_000, per_tick=True, is_optional=True
+    "wheels/state", "sensor_msgs/msg/JointState", 10_000, per_tick=True, is_optional=True
 )
 THRUSTERS_STATE = Topic(
-    "/thrusters/state", "sensor_msgs/msg/JointState", 10_000, per_tick=True, is_optional=True
+    "thrusters/state", "sensor_msgs/msg/JointState", 10_000, per_tick=True, is_optional=True
 )
-COMMAND = Topic("/command", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
+COMMAND = Topic("command", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
 # Reference and clock are not transient local: a late joiner would be told the past, and that a
 # message was lost if one is pushed out meanwhile; at depth 1 a slow one would lose some. The
 # mission says again what is still needed when somebody joins, a plant that waits its time.
-REFERENCE_JOINTS = Topic("/reference/joints", "trajectory_msgs/msg/JointTrajectory", 200)
-REFERENCE_BASE = Topic("/reference/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 200)
-TELEMETRY = Topic("/controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, has_stamp=False)
+REFERENCE_JOINTS = Topic("reference/joints", "trajectory_msgs/msg/JointTrajectory", 200)
+REFERENCE_BASE = Topic("reference/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 200)
+TELEMETRY = Topic("controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, has_stamp=False)
 LAW = Topic(
-    "/controller/law", "rcl_interfaces/msg/ParameterEvent", 100,
+    "controller/law", "rcl_interfaces/msg/ParameterEvent", 100,
     transient_local=True, is_event=True,
 )  # fmt: skip
-CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock", 1_000)
+CLOCK = Topic("clock", "rosgraph_msgs/msg/Clock", 1_000)
 # The truth is sent where what the sensors tell may differ from it; no flight software listens.
-TRUTH_JOINTS = Topic(
-    "/truth/joints", "trajectory_msgs/msg/JointTrajectory", 1_000, is_optional=True
-)
+TRUTH_JOINTS = Topic("truth/joints", "trajectory_msgs/msg/JointTrajectory", 1_000, is_optional=True)
 TRUTH_BASE = Topic(
-    "/truth/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 1_000, is_optional=True
+    "truth/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 1_000, is_optional=True
 )
 
 ALL = (
@@ -66,5 +81,7 @@ ALL = (
 STATES = (JOINT_STATES, BASE_STATE, WHEELS_STATE, THRUSTERS_STATE)
 """The parts of a state."""
 TRUTH = (TRUTH_JOINTS, TRUTH_BASE)
-BY_NAME = {topic.name: topic for topic in ALL}
+BY_NAME = {topic.full_name: topic for topic in ALL}
+"""By their full names in the root namespace."""
+# One for all robots of a domain, as ROS has it: each status tells its node's name.
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100)

@@ -108,7 +108,7 @@ def entries_of(bag: Path) -> list[Entry]:
     """Messages as a recorder on another machine would have them: by its own clock."""
     clock = 1_795_220_105_128_297_452
     sent = messages_of(bag)
-    return [(t.name, t.type, clock + 31_000 * i, data) for i, (t, data) in enumerate(sent)]
+    return [(t.full_name, t.type, clock + 31_000 * i, data) for i, (t, data) in enumerate(sent)]
 
 
 def rosbags_bag(folder: Path, entries: Iterable[Entry], setup: Callable[[Writer], Any]) -> Path:

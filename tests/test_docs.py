@@ -119,5 +119,5 @@ def test_security_policy_has_one_publisher_a_topic_and_all_listeners() -> None:
         ]
 
     for topic in topics.ALL:
-        assert len(nodes("publish", topic.name)) == 1, topic.name
-        assert nodes("subscribe", topic.name) == list(LISTENERS[topic]), topic.name
+        assert len(nodes("publish", topic.full_name)) == 1, topic.full_name
+        assert nodes("subscribe", topic.full_name) == list(LISTENERS[topic]), topic.full_name

@@ -89,7 +89,7 @@ def test_a_message_is_one_file_in_wire_and_one_line_in_topics(
     newest = topics.Topic("/newest", "sensor_msgs/msg/Temperature", 100, per_tick=True)
     monkeypatch.setattr(topics, "NEWEST", newest, raising=False)
     monkeypatch.setattr(topics, "ALL", (*topics.ALL, newest))
-    monkeypatch.setitem(topics.BY_NAME, newest.name, newest)
+    monkeypatch.setitem(topics.BY_NAME, newest.full_name, newest)
     monkeypatch.setattr(room_of_messages, "__path__", [*room_of_messages.__path__, str(tmp_path)])
     (tmp_path / "newest.py").write_text(NEWEST)
     flight = Flight(FlightPlan(duration=0.01))
@@ -110,8 +110,8 @@ def test_a_message_is_one_file_in_wire_and_one_line_in_topics(
         *range(9),
         *range(10, 20),
     ]
-    assert read_accounts(tmp_path / "bag")[newest.name]["missing"] == 1
-    assert load_bag(tmp_path / "bag").lost == {t.name: int(t is newest) for t in topics.ALL}
+    assert read_accounts(tmp_path / "bag")[newest.full_name]["missing"] == 1
+    assert load_bag(tmp_path / "bag").lost == {t.full_name: int(t is newest) for t in topics.ALL}
 
 
 def test_a_command_is_one_file_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

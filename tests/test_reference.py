@@ -41,4 +41,4 @@ def test_every_law_and_every_topic_is_there() -> None:
     for name in laws():
         assert f"| `{name}." in PAGES["parameters.md"]
     for topic in topics.ALL:
-        assert f"| `{topic.name}` | {topic.type} |" in PAGES["topics.md"]
+        assert f"| `{topic.full_name}` | {topic.type} |" in PAGES["topics.md"]

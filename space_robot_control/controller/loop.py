@@ -109,7 +109,7 @@ class ControllerLoop:
     def stand_down(self) -> None:
         """Answer one more state, with no torque: the plant holds that."""
         answering, answered = self._answering, self._answering.answered
-        if answered >= 0 and self._node.count_publishers(topics.JOINT_STATES.name):
+        if answered >= 0 and self._node.count_publishers(self._states.inputs[0].full_name):
             until = time.monotonic() + STAND_DOWN_S
             tick = self._unanswered
             while tick <= answered and time.monotonic() < until:

@@ -129,7 +129,7 @@ def unflown(flight: Flight, start: int = 0, stop: int | None = None) -> FlightLo
     log = FlightLog.allocate(ticks, names.joints, flight.timebase, *counts, names.passive)
     log.first_tick = start
     log.flight = flight.description
-    log.lost = {topic.name: 0 for topic in topics.ALL}
+    log.lost = {topic.full_name: 0 for topic in topics.ALL}
     log.commanded_torque = np.empty_like(log.applied_torque)
     log.telemetry = np.empty((log.ticks, 4, log.axes))
     reference = flight.mission.chunk(start, log.ticks)

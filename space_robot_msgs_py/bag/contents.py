@@ -137,7 +137,7 @@ class Bag:
 
     def messages(self, *wanted: Topic) -> Iterator[tuple[str, bytes]]:
         """Yield topic name and bytes of the messages of some topics, each topic's in its order."""
-        names = {topic.name for topic in wanted}
+        names = {topic.full_name for topic in wanted}
         for batch in self.batches():
             if batch.topic in names:
                 yield from ((batch.topic, batch.message(i)) for i in range(len(batch)))

@@ -51,7 +51,7 @@ def unread_messages(recorded: Mapping[str, int], gone: Mapping[str, int]) -> lis
 
 def half_truth(counts: Mapping[str, int]) -> list[str]:
     """Tell if only one half of the true states is there, so that it is of no use."""
-    there = [topic.name for topic in TRUTH if counts.get(topic.name)]
+    there = [topic.full_name for topic in TRUTH if counts.get(topic.full_name)]
     if len(there) != 1:
         return []
     return [f"of the true states only {there[0]} is there: the measured ones are taken for them"]

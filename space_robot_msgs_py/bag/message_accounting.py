@@ -161,12 +161,12 @@ def topics_with_allowed_gaps(flight: Mapping[str, Any]) -> frozenset[str]:
         excused += (topics.COMMAND, topics.TELEMETRY)
     if flight.get("faults"):
         excused += topics.STATES
-    return frozenset(topic.name for topic in excused)
+    return frozenset(topic.full_name for topic in excused)
 
 
 def unanswered_ticks(accounting: Mapping[str, MessageAccounting], finished: bool = True) -> int:
     """Ticks without a command."""
-    command = accounting[topics.COMMAND.name]
+    command = accounting[topics.COMMAND.full_name]
     return command.missing(_last_tick(accounting) if finished else command.last)
 
 

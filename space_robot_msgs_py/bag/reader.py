@@ -76,7 +76,7 @@ def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
     for topic, batch in selection.batches():
         rows.take(topic, batch)
     for topic in REQUIRED:
-        if not rows.counts[topic.name]:
+        if not rows.counts[topic.full_name]:
             raise missing(topic, bag, selection)
     rows.tell_apart()
     log, excused = rows.log, topics_with_allowed_gaps(flight)
@@ -84,7 +84,7 @@ def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
     gone = _gone(selection, rows)
     accounts = noted_accounts(bag.custom_data())
     _count_lost(bag, selection, rows, gone, accounts)
-    if excused and not (bag.incomplete or any(log.lost[topic.name] for topic in REQUIRED)):
+    if excused and not (bag.incomplete or any(log.lost[topic.full_name] for topic in REQUIRED)):
         fill_gaps(log)
     whole = log.whole
     ticks = len(whole) - int(np.argmax(whole[::-1])) if whole.any() else 0
@@ -186,10 +186,10 @@ def timebase_of(
 def missing(topic: topics.Topic, bag: Bag, selection: Selection) -> InputError:
     """Tell why a bag without a topic's messages cannot be read."""
     selection.topics()  # a topic to remap that is not there comes first
-    if topic.name in selection.wrong:
-        return InputError(f"{topic.name} is {selection.wrong[topic.name]}")
+    if topic.full_name in selection.wrong:
+        return InputError(f"{topic.full_name} is {selection.wrong[topic.full_name]}")
     context = [*_not_finished(bag), *bag.damage, selection.listing_instead_of(topic)]
-    return InputError(f"no messages on {topic.name} ({'; '.join(context)})")
+    return InputError(f"no messages on {topic.full_name} ({'; '.join(context)})")
 
 
 def _not_finished(bag: Bag) -> list[str]:
@@ -211,9 +211,9 @@ def _count_lost(
     log = rows.log
     there = selection.topics()
     accounting = {
-        topic.name: rows.accounting.get(topic.name, MessageAccounting(topic))
+        topic.full_name: rows.accounting.get(topic.full_name, MessageAccounting(topic))
         for topic in topics.ALL
-        if topic.name in rows.accounting or (bag.finished and topic in there)
+        if topic.full_name in rows.accounting or (bag.finished and topic in there)
     }
     log.lost = lost_messages(accounting, topics_with_allowed_gaps(log.flight), bag.finished)
     for name in log.lost if bag.finished else ():
@@ -222,5 +222,5 @@ def _count_lost(
             log.lost[name] = account.missing + unread  # the bag is the one that was counted
         else:
             log.lost[name] = max(log.lost[name], unread)
-    if topics.COMMAND.name in accounting:
+    if topics.COMMAND.full_name in accounting:
         log.unanswered = unanswered_ticks(accounting, bag.finished)

@@ -66,9 +66,9 @@ class BagRecorder:
         self._chunk_bytes = min(CHUNK_BYTES, split_size or CHUNK_BYTES)
         self._most_bytes = min(MOST_CHUNKS * CHUNK_BYTES, split_size or MOST_CHUNKS * CHUNK_BYTES)
         self._timebase = timebase
-        self.accounting = {topic.name: MessageAccounting(topic) for topic in topics.ALL}
+        self.accounting = {topic.full_name: MessageAccounting(topic) for topic in topics.ALL}
         self.sources = {
-            topic.name: Sources(topic.name, publishers or Unknown()) for topic in topics.ALL
+            topic.full_name: Sources(topic.name, publishers or Unknown()) for topic in topics.ALL
         }
         self.failure = ""
         """The reason why nothing is written any more (empty: all is well)."""
@@ -93,7 +93,8 @@ class BagRecorder:
             publisher: by whom: a GID (empty: not known).
             sequence: its place among all of its publisher, from 1 on (0: not known).
         """
-        sources = self.sources[topic.name]
+        name = topic.full_name
+        sources = self.sources[name]
         is_unnamed = sequence > 0 and not publisher
         if is_unnamed and not sources.take_unnamed(sequence, sent_ns):
             return False
@@ -102,8 +103,8 @@ class BagRecorder:
                 return False
             if sources.begins_anew:
                 sources.begins_anew = False
-                self.accounting[topic.name] = MessageAccounting(topic)
-        counted = self.accounting[topic.name]
+                self.accounting[name] = MessageAccounting(topic)
+        counted = self.accounting[name]
         invalid = counted.invalid_stamps
         try:
             tick = message_tick(topic, data, self._timebase)
@@ -166,7 +167,7 @@ class BagRecorder:
             else:
                 self._kept = self.received
                 self.kept_tick = min(
-                    self.accounting[topic.name].last
+                    self.accounting[topic.full_name].last
                     for topic in (topics.JOINT_STATES, topics.BASE_STATE)
                 )
         self._flush_at, self._open_bytes = time.monotonic() + CHUNK_AGE_S, 0

@@ -92,7 +92,7 @@ def bag_information(
         "topics_with_message_count": [
             {
                 "topic_metadata": {
-                    "name": topic.name,
+                    "name": topic.full_name,
                     "type": topic.type,
                     "serialization_format": "cdr",
                     "offered_qos_profiles": qos_profiles(topic),

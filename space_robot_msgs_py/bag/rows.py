@@ -78,12 +78,14 @@ class Rows:
     def oddities(self, excused: bool) -> list[str]:
         """Messages that could not be used; invalid stamps are no news if ``excused``."""
         found = [
-            f"{reader.misfits} messages on {topic.name} do not fit ({reader.fault})"
+            f"{reader.misfits} messages on {topic.full_name} do not fit ({reader.fault})"
             for topic, reader in self._readers.items()
             if reader.misfits
         ]
         if faults := self._law_faults:
-            found.append(f"{len(faults)} messages on {topics.LAW.name} do not fit ({faults[0]})")
+            found.append(
+                f"{len(faults)} messages on {topics.LAW.full_name} do not fit ({faults[0]})"
+            )
         for name, counted in self.accounting.items():
             if counted.invalid_stamps and not excused:
                 found.append(
@@ -94,8 +96,8 @@ class Rows:
 
     def take(self, topic: topics.Topic, batch: Batch) -> None:
         """Count the messages of a topic and put what they say into their ticks' rows."""
-        counted = self.accounting.setdefault(topic.name, MessageAccounting(topic))
-        self.counts[topic.name] += len(batch)
+        counted = self.accounting.setdefault(topic.full_name, MessageAccounting(topic))
+        self.counts[topic.full_name] += len(batch)
         ticks, known = self._ticks(topic, batch)
         places = np.flatnonzero(known)
         counted.invalid_stamps += len(batch) - len(places)
@@ -134,7 +136,7 @@ class Rows:
 
     def tell_apart(self) -> None:
         """Make the true states those of the log, if both their halves came; call it at the end."""
-        if not all(self.counts[topic.name] for topic in topics.TRUTH):
+        if not all(self.counts[topic.full_name] for topic in topics.TRUTH):
             self._apart = None
         if self._apart is None:
             return
@@ -149,7 +151,7 @@ class Rows:
         log.laws = in_order(law for law in self._laws if law.tick < ticks)
         for column in self._columns():
             column.resize((ticks, *column.shape[1:]), refcheck=False)
-        if topics.COMMAND.name not in self.accounting:
+        if topics.COMMAND.full_name not in self.accounting:
             log.commanded_torque = None
         if log.measured is not None:
             log.believed_error = np.full((ticks, log.axes), np.nan)
@@ -157,7 +159,7 @@ class Rows:
                 there = (at >= 0) & (at < ticks)
                 log.believed_error[at[there]] = error[there]
         sent, answered = self._sent_ns[topics.BASE_STATE], self._sent_ns[topics.COMMAND]
-        if self._wall_clock and topics.COMMAND.name in self.accounting:
+        if self._wall_clock and topics.COMMAND.full_name in self.accounting:
             both = (answered != _NEVER) & (sent != _NEVER)
             log.latency_s = np.where(both, answered - sent, np.nan) * 1e-9
         return log

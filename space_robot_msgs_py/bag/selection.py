@@ -66,7 +66,9 @@ class Selection:
             return None
         named = ((self.ours(name), count) for name, count in counts.items())
         return {
-            topic.name: count for topic, count in named if topic and topic.name not in self.wrong
+            topic.full_name: count
+            for topic, count in named
+            if topic and topic.full_name not in self.wrong
         }
 
     def listing(self) -> str:
@@ -82,9 +84,9 @@ class Selection:
 
     def _fits(self, topic: graph.Topic, kind: str, encoding: str) -> bool:
         if encoding != "cdr":
-            self.wrong[topic.name] = f"encoded as {encoding!r}, 'cdr' is needed"
+            self.wrong[topic.full_name] = f"encoded as {encoding!r}, 'cdr' is needed"
         elif kind and not _is_type(kind, topic):
-            self.wrong[topic.name] = f"of type {kind}, {topic.type} is needed"
+            self.wrong[topic.full_name] = f"of type {kind}, {topic.type} is needed"
         else:
             return True
         return False

@@ -144,7 +144,7 @@ class BagWriter:
         channels = [
             Channel(
                 id=self._channels[topic.name],
-                topic=topic.name,
+                topic=topic.full_name,
                 message_encoding="cdr",
                 schema_id=numbers[topic.type],
                 metadata={

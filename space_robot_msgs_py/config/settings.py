@@ -51,7 +51,7 @@ class NodeSettings(StrictModel):
         names = [topic.name for topic in cls.sends]
         for entry in entries:
             _, colon, topic = entry.partition(":")
-            if colon and topic not in names:
+            if colon and topic.strip("/") not in names:
                 raise ValueError(f"{short(entry)}: choose a topic it sends, {', '.join(names)}")
         return entries
 

@@ -42,8 +42,9 @@ class Diagnostics:
         values = {**health.values, **self._rate(health, now)}
         self._last, self._last_s = health, now
         status = DiagnosticStatus(
-            level=bytes([health.level]), name=self._node.get_name(), message=health.mode,
-            hardware_id="space_robot",
+            level=bytes([health.level]),
+            name=self._node.get_fully_qualified_name().lstrip("/"),
+            message=health.mode, hardware_id="space_robot",
             values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()],
         )  # fmt: skip
         message = DiagnosticArray(status=[status])

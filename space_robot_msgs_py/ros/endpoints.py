@@ -15,6 +15,7 @@ from typing import Any
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from ..topics import Topic
 from ..wire.source_guard import SourceGuard
@@ -38,6 +39,11 @@ class PolledCallbackGroup(CallbackGroup):
 
     def ending_execution(self, entity: Any) -> None:
         """Do nothing: there is nothing to end."""
+
+
+def full_name_of(info: TopicEndpointInfo) -> str:
+    """The full name of an endpoint's node."""
+    return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
 
 
 def message_type(name: str) -> Any:
@@ -65,6 +71,8 @@ class RawPublisher:
         self._node = node
         self._publisher = node.create_publisher(message_type(topic.type), topic.name, qos(topic))
         self._publish = raw_publish(self._publisher)
+        self.full_name = str(self._publisher.topic_name)
+        """In the node's namespace, remapped as the user wants."""
         self.sent = 0
         """Messages sent."""
 
@@ -83,15 +91,21 @@ class RawPublisher:
 
         Args:
             names: ``NODE:TOPIC``, a node that must listen to that topic, or ``NODE``, one that must
-                listen to this one whatever it is.
+                listen to this one whatever it is. Nodes are of this one's namespace, unless they
+                are given with another.
         """
         awaited = [entry.partition(":") for entry in names if entry]
-        nodes = [node for node, _, topic in awaited if topic in ("", self.topic.name)]
+        nodes = [node for node, _, topic in awaited if topic.strip("/") in ("", self.topic.name)]
         infos = self._node.get_subscriptions_info_by_topic(self.topic.name)
-        missing = [name for name in nodes if name not in {info.node_name for info in infos}]
+        listening = {full_name_of(info) for info in infos}
+        missing = [name for name in nodes if self._full_node_name(name) not in listening]
         if not missing and self.listener_count < len(nodes):
             return nodes  # discovered, but not all matched with this publisher yet
         return missing
+
+    def _full_node_name(self, name: str) -> str:
+        namespace = self._node.get_namespace().rstrip("/")
+        return name if name.startswith("/") else f"{namespace}/{name}"
 
     def flush(self, timeout_s: float) -> None:
         """Wait until all listeners have acknowledged everything sent."""
@@ -120,6 +134,8 @@ class RawSubscription:
             message_type(topic.type), topic.name, lambda message: None, profile,
             raw=True, callback_group=group,
         )  # fmt: skip
+        self.full_name = str(self._subscription.topic_name)
+        """In the node's namespace, remapped as the user wants."""
         self.handle = self._subscription.handle
         self._type = self._subscription.msg_type
         self._take_serialized = serialized_take()
@@ -160,4 +176,4 @@ class FollowedSubscription(RawSubscription):
     def counts(self, word: str) -> dict[str, int]:
         """Count, for a node's health, the messages of others that were ``word``, if any."""
         count = self.source.others_messages
-        return {f"{word}: another publisher's on {self.topic.name}": count} if count else {}
+        return {f"{word}: another publisher's on {self.full_name}": count} if count else {}

@@ -14,6 +14,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from ..bag.sources import Claimed
 from ..errors import InputError
+from .endpoints import full_name_of
 from .locks import FileLock, HeldError, look, node_lock, topic_lock
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
@@ -106,7 +107,7 @@ def _gid(text: str) -> bytes:
 def foreign_publishers(
     node: Node, topic_names: Sequence[str], own: Sequence[str] = ()
 ) -> dict[str, list[str]]:
-    """Full names of nodes other than this one that publish these topics; none: no entry.
+    """Full names of nodes other than this one by full topic name; of a topic without: no entry.
 
     By name, as discovery sees it now: a killed node of this one's name is not foreign. ``own``:
     full names of further nodes that are none.
@@ -117,11 +118,11 @@ def foreign_publishers(
         infos = node.get_publishers_info_by_topic(topic)
         names = {_full_name(info) for info in infos} - known
         if names:
-            foreign[topic] = sorted(names)
+            foreign[node.resolve_topic_name(topic)] = sorted(names)
     return foreign
 
 
 def _full_name(info: TopicEndpointInfo) -> str:
     if info.node_name == UNNAMED:
         return "a DDS participant without a ROS node"
-    return f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+    return full_name_of(info)

@@ -80,7 +80,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         if self.loop is None:
             return Health("unconfigured")
         health = self.loop.health()
-        sent = {f"{SENT}{output.topic.name}": output.sent for output in self.loop.outputs}
+        sent = {f"{SENT}{output.full_name}": output.sent for output in self.loop.outputs}
         values = {**health.values, **sent, "service_calls": self.calls.count}
         if not self.is_active:
             return Health("inactive", values=values)
@@ -185,7 +185,11 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
 
     def _foreign_publishers(self) -> str:
         """Tell who else publishes this node's topics, in words; empty if nobody."""
-        crowded = [topic for topic in self._topics if self.count_publishers(topic) > 1]
+        crowded = [
+            topic
+            for topic in self._topics
+            if self.count_publishers(self.resolve_topic_name(topic)) > 1
+        ]
         foreign = foreign_publishers(self, crowded)
         return "; ".join(f"{t} is also published by {', '.join(n)}" for t, n in foreign.items())
 

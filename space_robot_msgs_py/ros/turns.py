@@ -181,7 +181,7 @@ class Seat:
         node, loop = self.node, self.node.loop
         assert loop is not None
         self._remind_at = self._remind_at or now + REMIND_S
-        missing = {out.topic.name: out.missing_listeners(loop.wait_for) for out in loop.outputs}
+        missing = {out.full_name: out.missing_listeners(loop.wait_for) for out in loop.outputs}
         if any(missing.values()):
             if now > self._remind_at:
                 self._remind_at = now + REMIND_S

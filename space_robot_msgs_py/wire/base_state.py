@@ -43,9 +43,9 @@ class BaseState(MessageDescription):
 
     def runs(self, message: Any) -> Iterable[Run]:
         """Linear velocity in the inertial frame, angular velocity and torque in the base's."""
-        name_order(message.joint_names, self.names, self.topic.name)
+        name_order(message.joint_names, self.names, self.topic.full_name)
         if not (len(message.transforms) == len(message.twist) == len(message.wrench) == 1):
-            raise MessageError(f"{self.topic.name}: one transform, twist, wrench expected")
+            raise MessageError(f"{self.topic.full_name}: one transform, twist, wrench expected")
         return (
             Run("transforms[0].translation", XYZ),
             Run("transforms[0].rotation", WXYZ),

@@ -10,7 +10,8 @@ from ..samples import LawInForce, Timebase
 from .cdr import MessageLayout
 from .definitions import decode
 
-NODE = topics.LAW.name.rpartition("/")[0] + "_node"
+NODE = "/controller_node"
+"""Full name of the node in the root namespace."""
 CONTROLLER = "controller"
 """The parameter that names the law."""
 STRING, DOUBLE_ARRAY = 4, 8
@@ -24,8 +25,9 @@ class LawCodec:
     every other. A change is rare, so each message is laid out anew.
     """
 
-    def __init__(self, timebase: Timebase) -> None:
-        self._timebase = timebase
+    def __init__(self, timebase: Timebase, node: str = NODE) -> None:
+        """``node``: full name of the one whose law it is."""
+        self._timebase, self._node = timebase, node
 
     def encode(self, law: LawInForce) -> bytes:
         """The bytes of /controller/law."""
@@ -39,7 +41,7 @@ class LawCodec:
         given = [{"name": name, "value": value} for name, value in values.items()]
         content = {
             "stamp": {"sec": sec, "nanosec": nanosec},
-            "node": NODE,
+            "node": self._node,
             "new_parameters" if law.is_first else "changed_parameters": given,
         }
         return MessageLayout(topics.LAW.type, content).data
@@ -55,12 +57,12 @@ class LawCodec:
         given = {p.name: p.value for p in (*message.new_parameters, *message.changed_parameters)}
         law = given.get(CONTROLLER)
         if law is None or law.type != STRING:
-            raise MessageError(f"{topics.LAW.name}: no parameter {CONTROLLER!r}")
+            raise MessageError(f"{topics.LAW.full_name}: no parameter {CONTROLLER!r}")
         name, gains = law.string_value, {}
         for key, value in given.items():
             if key.startswith(f"{name}."):
                 if value.type != DOUBLE_ARRAY:
-                    raise MessageError(f"{topics.LAW.name}: {key} is no list of numbers")
+                    raise MessageError(f"{topics.LAW.full_name}: {key} is no list of numbers")
                 gains[key.removeprefix(f"{name}.")] = tuple(value.double_array_value.tolist())
         is_first = any(p.name == CONTROLLER for p in message.new_parameters)
         return LawInForce(tick, name, gains, is_first)

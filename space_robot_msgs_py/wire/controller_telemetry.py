@@ -47,7 +47,7 @@ class Telemetry(MessageDescription):
     def runs(self, message: Any) -> Iterable[Run]:
         """The tick, then all else."""
         if not len(message.data):
-            raise MessageError(f"{self.topic.name}: no tick")
+            raise MessageError(f"{self.topic.full_name}: no tick")
         return (Run("data", range(len(message.data))),)
 
 
@@ -78,4 +78,4 @@ class TelemetryCodec:
         try:
             return int(message.data[0]), message.data[offset:].reshape(shape)
         except (IndexError, ValueError, OverflowError) as error:
-            raise MessageError(f"{topics.TELEMETRY.name}: {error}") from None
+            raise MessageError(f"{topics.TELEMETRY.full_name}: {error}") from None

@@ -50,11 +50,12 @@ class JointStates(MessageDescription):
 
     def runs(self, message: Any) -> Iterable[Run]:
         """Field by field in the order of our names, whatever theirs."""
-        order = name_order(message.name, self.names, self.topic.name)
+        order = name_order(message.name, self.names, self.topic.full_name)
         for field in self.fields:
             count = len(getattr(message, field))
             if count != len(order):
                 raise MessageError(
-                    f"{self.topic.name}: {count} values of {field} for {len(order)} names", "size"
+                    f"{self.topic.full_name}: {count} values of {field} for {len(order)} names",
+                    "size",
                 )
             yield Run(field, order[: count - self._passive] if field == "effort" else order)

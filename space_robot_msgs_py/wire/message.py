@@ -132,7 +132,7 @@ def description(topic: Topic) -> type[MessageDescription] | None:
 
     None of one whose messages are no columns of numbers.
     """
-    module = import_module(f"{__package__}.{topic.name.strip('/').replace('/', '_')}")
+    module = import_module(f"{__package__}.{topic.name.replace('/', '_')}")
     for known in vars(module).values():
         if isinstance(known, type) and getattr(known, "topic", None) is topic:
             return cast(type[MessageDescription], known)

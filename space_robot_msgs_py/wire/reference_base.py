@@ -32,7 +32,7 @@ class ReferenceBase(Trajectory):
         """Quaternion w x y z, angular velocity and acceleration in the base's frame."""
         if not len(point.transforms) == len(point.velocities) == len(point.accelerations) == 1:
             raise MessageError(
-                f"{self.topic.name}: a point lacks pose, velocity or acceleration", "size"
+                f"{self.topic.full_name}: a point lacks pose, velocity or acceleration", "size"
             )
         return (
             Run("transforms[0].rotation", WXYZ),

@@ -32,6 +32,6 @@ class ReferenceJoints(Trajectory):
         for field in FIELDS:
             if len(getattr(point, field)) != len(order):
                 raise MessageError(
-                    f"{self.topic.name}: a point lacks {field} of some joint", "size"
+                    f"{self.topic.full_name}: a point lacks {field} of some joint", "size"
                 )
             yield Run(field, order)

@@ -44,14 +44,14 @@ class Trajectory(MessageDescription):
 
     def runs(self, message: Any) -> Iterable[Run]:
         """Point by point."""
-        order = name_order(message.joint_names, self.names, self.topic.name)
+        order = name_order(message.joint_names, self.names, self.topic.full_name)
         if not message.points:
-            raise MessageError(f"{self.topic.name}: a trajectory without points")
+            raise MessageError(f"{self.topic.full_name}: a trajectory without points")
         for i, point in enumerate(message.points):
             after = point.time_from_start
             if after.sec * 1_000_000_000 + after.nanosec != self.timebase.stamp_ns(i):
                 raise MessageError(
-                    f"{self.topic.name}: point {i} is not {i} ticks after its message's stamp"
+                    f"{self.topic.full_name}: point {i} is not {i} ticks after its message's stamp"
                 )
             for path, places in self.point_runs(point, order):
                 yield Run(f"points[{i}].{path}", places)

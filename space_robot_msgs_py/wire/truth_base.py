@@ -36,7 +36,7 @@ class TruthBase(Trajectory):
     def point_runs(self, point: Any, order: Sequence[int]) -> Iterable[Run]:
         """Pose; velocity on inertial axes, angular velocity on base axes."""
         if not len(point.transforms) == len(point.velocities) == 1:
-            raise MessageError(f"{self.topic.name}: a point lacks pose or velocity", "size")
+            raise MessageError(f"{self.topic.full_name}: a point lacks pose or velocity", "size")
         return (
             Run("transforms[0].translation", XYZ),
             Run("transforms[0].rotation", WXYZ),

@@ -51,5 +51,7 @@ class TruthJoints(Trajectory):
         """Positions, velocities, effort, each in the order of our names."""
         for field in FIELDS:
             if len(getattr(point, field)) != len(order):
-                raise MessageError(f"{self.topic.name}: a point lacks {field} of some axis", "size")
+                raise MessageError(
+                    f"{self.topic.full_name}: a point lacks {field} of some axis", "size"
+                )
             yield Run(field, order[: len(order) - self._passive] if field == "effort" else order)

@@ -34,11 +34,11 @@ AXES = ["base_x", "base_y", "base_z", *JOINTS]
 
 
 def _publisher(node: Node, topic: topics.Topic) -> Any:
-    return node.create_publisher(message_type(topic.type), topic.name, qos(topic))
+    return node.create_publisher(message_type(topic.type), topic.full_name, qos(topic))
 
 
 def _subscribe(node: Node, topic: topics.Topic, callback: Any) -> None:
-    node.create_subscription(message_type(topic.type), topic.name, callback, qos(topic))
+    node.create_subscription(message_type(topic.type), topic.full_name, callback, qos(topic))
 
 
 def _joint_state(tick: int, names: list[str]) -> Any:
@@ -75,7 +75,7 @@ def _fly_plant(node: Node, ticks: int, file: Path) -> None:
             send()
 
     _subscribe(node, topics.COMMAND, on_command)
-    while base.get_subscription_count() < 1 or node.count_publishers(topics.COMMAND.name) < 1:
+    while base.get_subscription_count() < 1 or node.count_publishers(topics.COMMAND.full_name) < 1:
         time.sleep(0.02)
     time.sleep(0.5)  # matched both ways
     send()

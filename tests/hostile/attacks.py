@@ -25,13 +25,16 @@ def strangers() -> Iterator[tuple[str, Attack]]:
     for topic in topics.ALL:
         for kind in KINDS:
             for rate in (2.0, FLOOD_HZ):
-                yield f"{kind} on {topic.name} at {rate:g} Hz", _intrusion(topic.name, kind, rate)
+                yield (
+                    f"{kind} on {topic.full_name} at {rate:g} Hz",
+                    _intrusion(topic.full_name, kind, rate),
+                )
 
 
 def early_strangers() -> Iterator[tuple[str, Attack]]:
     """Somebody who publishes before the flight begins: it must not begin."""
     for topic in topics.ALL:
-        yield f"{topic.name} taken before", _early(topic.name)
+        yield f"{topic.full_name} taken before", _early(topic.full_name)
 
 
 def deaths() -> Iterator[tuple[str, Attack]]:

@@ -20,7 +20,7 @@ OVERRIDES = CONFIG / "qos/record_overrides.yaml"
 def test_overrides_for_ros2_bag_record_are_the_topics_own() -> None:
     """Every topic with its depth and durability, and no other."""
     expected = {
-        topic.name: {
+        topic.full_name: {
             "history": "keep_last",
             "depth": topic.depth,
             "reliability": "reliable",
@@ -47,7 +47,7 @@ def test_ros2_bag_reads_the_overrides_as_the_nodes_quality_of_service() -> None:
         assert read == of_the_nodes(topics.BY_NAME[name]), name
 
 
-@pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
+@pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.full_name)
 def test_what_a_topics_messages_say_stands_in_the_module_of_its_name(topic: topics.Topic) -> None:
     """Our own message fits its own description; a law's is no columns of numbers."""
     found = description(topic)
@@ -62,7 +62,7 @@ def test_what_a_topics_messages_say_stands_in_the_module_of_its_name(topic: topi
 def test_the_recorder_starts_without_the_compiler() -> None:
     """Half a second sooner; the descriptions of messages need it as little."""
     modules = ["space_robot_msgs_py.bag.recorder", "space_robot_msgs_py.bag.message_accounting"]
-    names = [topic.name.strip("/").replace("/", "_") for topic in topics.ALL]
+    names = [topic.name.replace("/", "_") for topic in topics.ALL]
     modules += [f"space_robot_msgs_py.wire.{name}" for name in [*names, "reference_codec"]]
     program = f"import sys, {', '.join(modules)}; sys.exit('numba' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0

@@ -100,7 +100,7 @@ def not_finite(bag: Path, flight: Flight) -> list[str]:
     told = (state.applied_torque, state.wheel_torques, state.thrusts)
     for name, data in open_bag(bag).messages(topics.COMMAND, *states.topics):
         torques: tuple[Array, ...] = told
-        if name == topics.COMMAND.name:
+        if name == topics.COMMAND.full_name:
             commands.decode(data, command)
             torques = (command.torque,)
         else:

@@ -90,7 +90,7 @@ class CommandList:
             message.header.frame_id, str(names), _text(message.position), _text(message.velocity)
         )
         try:
-            order = name_order(names, self._names, topics.COMMAND.name)
+            order = name_order(names, self._names, topics.COMMAND.full_name)
             self._torque[:] = efforts[order]
         except (MessageError, IndexError):
             self._torque[:] = np.nan

@@ -73,13 +73,13 @@ class Recording:
         self.states_count = counts[topics.JOINT_STATES]
         """Ticks, about."""
         self.has_commands = bool(counts[topics.COMMAND])
-        account = noted_accounts(self._bag.custom_data()).get(topics.COMMAND.name)
+        account = noted_accounts(self._bag.custom_data()).get(topics.COMMAND.full_name)
         self.lost_commands = account.missing if account else 0
         """Answers that the recorder knows to have missed: what was answered then is not known."""
         self.is_finished = self._bag.finished
         self.answers_are_complete = bool(
             flight
-        ) and topics.COMMAND.name not in topics_with_allowed_gaps(flight)
+        ) and topics.COMMAND.full_name not in topics_with_allowed_gaps(flight)
         """True if the controller has answered every state, so that no answer means a loss."""
 
     def commands(self, names: tuple[str, ...]) -> Commands:

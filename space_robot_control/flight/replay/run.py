@@ -70,7 +70,7 @@ class _Run:
     def _choose_parts(self) -> tuple[Topic, ...]:
         """The parts of a state that the controller needs."""
         parts = StateCodec(self._choice.names, self._recording.timebase).control_topics
-        if lacking := [topic.name for topic in parts if topic not in self._recording.parts]:
+        if lacking := [topic.full_name for topic in parts if topic not in self._recording.parts]:
             raise InputError(
                 f"{self._options.bag}: no messages on {', '.join(lacking)}, which a controller of "
                 "these actuators needs"

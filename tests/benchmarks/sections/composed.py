@@ -95,6 +95,6 @@ def _fly(plan: FlightPlan) -> Sent:
 def _sending_times(file: Path, topic: topics.Topic, flight: Flight) -> NDArray[np.int64]:
     times = np.full(flight.ticks, NEVER, np.int64)
     with file.open("rb") as stream:
-        for _, _, message in make_reader(stream).iter_messages(topics=[topic.name]):
+        for _, _, message in make_reader(stream).iter_messages(topics=[topic.full_name]):
             times[flight.timebase.tick(message.log_time)] = message.publish_time
     return times

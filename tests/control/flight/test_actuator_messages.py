@@ -45,8 +45,8 @@ def test_its_bag_and_its_messages_are_the_flight(actuators: str, law: str, tmp_p
     assert (back.damage, back.unanswered, set(back.lost.values())) == ((), 0, {0})
     assert_same(simulate(Flight(plan(actuators, law, faults=[NOTHING]))), log)
     sent = {name for name, _ in open_bag(tmp_path / "bag").messages(*topics.STATES)}
-    assert (topics.WHEELS_STATE.name in sent) is bool(names.wheels)
-    assert (topics.THRUSTERS_STATE.name in sent) is bool(names.thrusters)
+    assert (topics.WHEELS_STATE.full_name in sent) is bool(names.wheels)
+    assert (topics.THRUSTERS_STATE.full_name in sent) is bool(names.thrusters)
     assert log.wheel_velocities.shape == (200, len(names.wheels))
     assert log.actuator_commands.shape == (200, len(names.actuators))
     assert np.isfinite(log.actuator_commands).all()

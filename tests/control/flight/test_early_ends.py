@@ -141,7 +141,7 @@ def test_every_tick_is_in_the_bag(flown: tuple[str, list[FlightLog], Path]) -> N
         topics.CLOCK: -(-sent // 20), topics.TELEMETRY: -(-answered // 20),
         topics.LAW: 2 if "swap" in name else min(answered, 1),
     }  # fmt: skip
-    assert messages == {topic.name: count for topic, count in counts.items() if count}
+    assert messages == {topic.full_name: count for topic, count in counts.items() if count}
 
 
 def test_the_report_of_what_was_flown_is_that_of_its_bag(

@@ -120,8 +120,8 @@ def test_the_bag_has_every_message_once_and_in_order(tmp_path: Path) -> None:
     flown("repeat_state@0:0.5", "jitter_state@0:2", "repeat_command@0", bag=tmp_path / "bag")
     found: dict[str, list[bytes]] = {}
     for topic, message in messages_of(tmp_path / "bag"):
-        found.setdefault(topic.name, []).append(message)
+        found.setdefault(topic.full_name, []).append(message)
     for topic in (topics.JOINT_STATES, topics.BASE_STATE, topics.COMMAND):
-        assert len(set(found[topic.name])) == len(found[topic.name])
-    assert len(found[topics.JOINT_STATES.name]) in range(TICKS - 2, TICKS + 1)
-    assert len(found[topics.COMMAND.name]) < TICKS, "overtaken states are not answered"
+        assert len(set(found[topic.full_name])) == len(found[topic.full_name])
+    assert len(found[topics.JOINT_STATES.full_name]) in range(TICKS - 2, TICKS + 1)
+    assert len(found[topics.COMMAND.full_name]) < TICKS, "overtaken states are not answered"

@@ -82,7 +82,9 @@ def test_a_log_has_a_column_for_each_actuator(names: RobotNames, tmp_path: Path)
     read = recorded(log, tmp_path / "bag", names)
     assert_same(read, log)
     assert read.damage == ()
-    assert not any(read.lost[topic.name] for topic in (topics.WHEELS_STATE, topics.THRUSTERS_STATE))
+    assert not any(
+        read.lost[topic.full_name] for topic in (topics.WHEELS_STATE, topics.THRUSTERS_STATE)
+    )
     assert read.rows(10, 20).wheel_velocities.shape == (10, len(names.wheels))
 
 
@@ -110,7 +112,7 @@ def test_lost_states_of_wheels_are_counted_and_leave_gaps(tmp_path: Path) -> Non
         log, tmp_path / "bag",
         keep=lambda topic, tick: topic is not topics.WHEELS_STATE or tick not in (7, 8, 200),
     )  # fmt: skip
-    assert read.lost[topics.WHEELS_STATE.name] == 3
+    assert read.lost[topics.WHEELS_STATE.full_name] == 3
     gaps = np.flatnonzero(np.isnan(read.wheel_velocities).any(axis=1))
     assert gaps.tolist() == [7, 8, 200]
     np.testing.assert_array_equal(read.thrusts, log.thrusts)
@@ -124,7 +126,7 @@ def test_states_that_a_fault_kept_back_have_the_wheels_of_before(tmp_path: Path)
         faults=["drop_state@0"],
     )  # fmt: skip
     assert read.filled == 1
-    assert not any(read.lost[topic.name] for topic in topics.STATES)
+    assert not any(read.lost[topic.full_name] for topic in topics.STATES)
     for name in (*ACTUATOR_FIELDS, "quaternion"):
         column, true = getattr(read, name), getattr(log, name)
         np.testing.assert_array_equal(column[50], true[49], name)

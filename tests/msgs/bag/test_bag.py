@@ -64,7 +64,7 @@ def test_rosbags_reads_every_message_with_definitions_from_the_file(
     assert count == 400
 
 
-@pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
+@pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.full_name)
 def test_definition_parses_to_the_type_it_names(topic: topics.Topic) -> None:
     types = get_types_from_msg(definition(topic.type), topic.type)
     for name, fields in types.items():
@@ -118,7 +118,9 @@ def test_recorder_counts_what_is_missing_and_drops_what_is_repeated(tmp_path: Pa
 
 
 def test_nothing_flown_is_nothing_lost() -> None:
-    assert set(lost_messages({t.name: MessageAccounting(t) for t in topics.ALL}).values()) == {0}
+    assert set(lost_messages({t.full_name: MessageAccounting(t) for t in topics.ALL}).values()) == {
+        0
+    }
 
 
 def test_bag_is_never_overwritten(tmp_path: Path) -> None:

@@ -140,7 +140,9 @@ def test_a_trajectory_of_unequal_points_is_left_out_and_told(
     recorded: Recorded, entries: list[Entry], tmp_path: Path
 ) -> None:
     """One of its points has one position less than there are joints."""
-    at = next(i for i, (topic, *_) in enumerate(entries) if topic == topics.REFERENCE_JOINTS.name)
+    at = next(
+        i for i, (topic, *_) in enumerate(entries) if topic == topics.REFERENCE_JOINTS.full_name
+    )
     topic, kind, log_ns, data = entries[at]
     message = decode(data, kind)
     message.points[1].positions = message.points[1].positions[:-1]
@@ -182,7 +184,9 @@ def test_messages_of_the_sample_are_those_that_rosbags_reads() -> None:
     with Reader(SAMPLE) as reader:
         theirs = [(c.topic, bytes(raw)) for c, _, raw in reader.messages()]
     for topic in topics.ALL:
-        assert [d for n, d in ours if n == topic.name] == [d for n, d in theirs if n == topic.name]
+        assert [d for n, d in ours if n == topic.full_name] == [
+            d for n, d in theirs if n == topic.full_name
+        ]
     assert len(ours) == 1208
 
 
@@ -192,7 +196,7 @@ def completed_sample(recorded: Recorded) -> list[Entry]:
         found = [(c.topic, c.msgtype, stamp, bytes(raw)) for c, stamp, raw in reader.messages()]
     topic = topics.REFERENCE_BASE
     missing = [
-        (topic.name, topic.type, 0, d) for t, d in messages_of(recorded.folder) if t is topic
+        (topic.full_name, topic.type, 0, d) for t, d in messages_of(recorded.folder) if t is topic
     ]
     return found + missing
 
@@ -298,7 +302,7 @@ def test_period_of_a_bag_of_others_is_that_of_its_stamps(
     recorded: Recorded, tmp_path: Path
 ) -> None:
     states = (topics.JOINT_STATES, topics.BASE_STATE)
-    sent = [(t.name, t.type, 0, data) for t, data in messages_of(recorded.folder)]
+    sent = [(t.full_name, t.type, 0, data) for t, data in messages_of(recorded.folder)]
     every_other = [
         entry
         for entry in sent

@@ -44,7 +44,7 @@ def test_every_message_serialised_again_is_the_same_bytes(bag: Path) -> None:
             message = store.deserialize_cdr(raw, connection.msgtype)
             assert bytes(store.serialize_cdr(message, connection.msgtype)) == bytes(raw)
             seen.add(connection.topic)
-    sent = topics.BY_NAME.keys() - {topics.WHEELS_STATE.name, topics.THRUSTERS_STATE.name}
+    sent = topics.BY_NAME.keys() - {topics.WHEELS_STATE.full_name, topics.THRUSTERS_STATE.full_name}
     assert seen == sent
 
 

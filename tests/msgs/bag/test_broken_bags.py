@@ -78,7 +78,7 @@ def test_a_broken_chunk_is_left_out_and_the_others_read(
     assert_rows_are_the_originals(log, recorded.log)
     assert log.ticks == (300 if which == 3 else 400)
     for topic in (topics.JOINT_STATES, topics.BASE_STATE, topics.COMMAND):
-        assert log.lost[topic.name] == 100
+        assert log.lost[topic.full_name] == 100
     assert not log.unfinished
     told = " ".join(log.damage)
     assert f"bag_0.mcap: unreadable at byte {start} " in told
@@ -304,7 +304,7 @@ def _write(path: Path, entries: list[tuple[str, str, str, bytes]]) -> None:
 
 @pytest.mark.parametrize("topic", ["/joint_states", "/reference/base"])
 def test_another_type_on_our_topic_is_named(recorded: Recorded, tmp_path: Path, topic: str) -> None:
-    entries = [(t.name, t.type, "cdr", data) for t, data in messages_of(recorded.folder)]
+    entries = [(t.full_name, t.type, "cdr", data) for t, data in messages_of(recorded.folder)]
     wrong = [(n, "std_msgs/msg/String" if n == topic else k, e, d) for n, k, e, d in entries]
     _write(tmp_path / "x.mcap", wrong)
     line = _error(tmp_path / "x.mcap")
@@ -319,7 +319,7 @@ def test_another_type_on_our_topic_is_named(recorded: Recorded, tmp_path: Path, 
 def test_a_topic_not_needed_is_left_out_if_it_is_of_another_type(
     recorded: Recorded, tmp_path: Path
 ) -> None:
-    entries = [(t.name, t.type, "cdr", data) for t, data in messages_of(recorded.folder)]
+    entries = [(t.full_name, t.type, "cdr", data) for t, data in messages_of(recorded.folder)]
     changed = [
         (n, "geometry_msgs/msg/Twist" if n == "/command" else k, e, d) for n, k, e, d in entries
     ]
@@ -433,7 +433,7 @@ def test_a_topic_of_the_type_that_is_missing_is_named_first(
     recorded: Recorded, tmp_path: Path
 ) -> None:
     entries = [
-        (t.name.replace("/joint_states", "/zz/arm"), t.type, "cdr", data)
+        (t.full_name.replace("/joint_states", "/zz/arm"), t.type, "cdr", data)
         for t, data in messages_of(recorded.folder)
     ]
     _write(tmp_path / "x.mcap", entries)

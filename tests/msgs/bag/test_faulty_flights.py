@@ -110,11 +110,12 @@ def test_nothing_is_filled_where_the_recorder_lost_states(
             continue
         sent[topic] += 1
         if not (is_state and tick == 200):
-            recorder.record(topic, data, 0, topic.name.encode(), sent[topic])
+            recorder.record(topic, data, 0, topic.full_name.encode(), sent[topic])
     recorder.close()
     log = read_flight(tmp_path / "bag")
     assert log.lost == {
-        topic.name: int(topic in (topics.JOINT_STATES, topics.BASE_STATE)) for topic in topics.ALL
+        topic.full_name: int(topic in (topics.JOINT_STATES, topics.BASE_STATE))
+        for topic in topics.ALL
     }
     assert log.filled == 0
     assert np.flatnonzero(~log.whole).tolist() == sorted((*KEPT_BACK, 200))
@@ -168,6 +169,6 @@ def test_bad_stamps_between_good_ones_are_kept_at_the_time_of_the_last_good_one(
     recorder.close()
     (batch,) = McapStorage(tmp_path / "bag" / "bag_0.mcap").batches()
     assert list(zip(stamps_of(batch).tolist(), batch.log_ns.tolist(), strict=True)) == expected
-    counted = recorder.accounting[topics.CLOCK.name]
+    counted = recorder.accounting[topics.CLOCK.full_name]
     assert (counted.received, counted.invalid_stamps) == (20, len(expected) - 20)
-    assert recorder.lost[topics.CLOCK.name] == 0
+    assert recorder.lost[topics.CLOCK.full_name] == 0

@@ -42,7 +42,7 @@ def test_events_may_come_whenever_they_like() -> None:
     assert counted.missing(4 * LONGEST_JUMP) == 0
 
 
-@pytest.mark.parametrize("topic", [topics.JOINT_STATES, topics.COMMAND], ids=lambda t: t.name)
+@pytest.mark.parametrize("topic", [topics.JOINT_STATES, topics.COMMAND], ids=lambda t: t.full_name)
 @given(st.lists(st.integers(0, 60), max_size=80), st.integers(0, 5))
 def test_ticks_are_counted_as_a_set_has_them(
     topic: topics.Topic, ticks: list[int], more: int
@@ -88,7 +88,7 @@ def test_a_stream_said_again_from_its_start_is_whole(
     assert counted.missing(period * 100) == counted.gaps == 0
 
 
-@pytest.mark.parametrize("topic", [topics.JOINT_STATES, topics.CLOCK], ids=lambda t: t.name)
+@pytest.mark.parametrize("topic", [topics.JOINT_STATES, topics.CLOCK], ids=lambda t: t.full_name)
 @given(st.integers(1, 30), st.integers(0, 12), st.integers(0, 100), st.integers(2, 12))
 def test_what_a_pause_passed_over_is_no_gap(
     topic: topics.Topic, period: int, before: int, passed: int, after: int

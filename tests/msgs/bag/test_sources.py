@@ -22,7 +22,7 @@ from space_robot_msgs_py.samples import Command, Timebase
 from space_robot_msgs_py.wire.codecs import CommandCodec
 
 TIMEBASE = Timebase(500_000)
-TOPIC = topics.COMMAND.name
+TOPIC = topics.COMMAND.full_name
 OURS, AGAIN, FOREIGN, OTHER = (bytes([number] * 16) for number in range(1, 5))
 
 
@@ -218,7 +218,7 @@ def test_where_messages_tell_no_publisher_numbers_do(tmp_path: Path) -> None:
     assert kept == [True, False, False] * 100
     assert recorder.foreign == {TOPIC: 200}
     assert not recorder.is_behind
-    assert not any(recorder.lost[name] for name in (TOPIC, topics.LAW.name))
+    assert not any(recorder.lost[name] for name in (TOPIC, topics.LAW.full_name))
     recorder.close()
     counts = read_accounts(tmp_path / "bag")[TOPIC]
     assert (counts["received"], counts["foreign"], counts["invalid_stamps"]) == (100, 200, 0)

@@ -64,9 +64,9 @@ def test_a_bag_has_truth_and_measurement_as_flown(flown: tuple[FlightLog, Path])
     log, bag = flown
     recorded = read_flight(bag)
     assert_same(recorded, log)
-    assert recorded.lost == {topic.name: 0 for topic in topics.ALL}
+    assert recorded.lost == {topic.full_name: 0 for topic in topics.ALL}
     assert analyze(recorded) == analyze(log)
-    assert {read_accounts(bag)[topic.name]["received"] for topic in topics.TRUTH} == {
+    assert {read_accounts(bag)[topic.full_name]["received"] for topic in topics.TRUTH} == {
         TICKS // CHUNK_TICKS
     }
 
@@ -98,9 +98,9 @@ def test_sensors_that_tell_the_truth_need_no_second_word(tmp_path: Path) -> None
         assert one.measured is None
         assert one.believed_error is None
         assert one.as_measured() is one
-    assert recorded.lost == {topic.name: 0 for topic in topics.ALL}
+    assert recorded.lost == {topic.full_name: 0 for topic in topics.ALL}
     for topic in topics.TRUTH:
-        account = read_accounts(tmp_path / "bag")[topic.name]
+        account = read_accounts(tmp_path / "bag")[topic.full_name]
         assert (account["received"], account["missing"]) == (0, 0)
     assert not recorded.damage
     report = analyze(recorded)

@@ -64,7 +64,7 @@ class Player:
 
     def __init__(self, ground: Ground) -> None:
         self._outs = {topic: RawPublisher(ground.node, topic) for topic in topics.ALL}
-        self._claim = Claim(ground.node, [topic.name for topic in topics.ALL])
+        self._claim = Claim(ground.node, [topic.full_name for topic in topics.ALL])
 
     def is_heard(self) -> bool:
         """Whether the recorder is connected, beside all others that listen."""
@@ -117,9 +117,10 @@ def test_the_bag_is_the_flight_and_nothing_else(
     for name in COLUMNS:
         np.testing.assert_array_equal(getattr(log, name), getattr(original, name), name)
     for topic in (topics.JOINT_STATES, topics.COMMAND, topics.CLOCK):
-        count = counts[topic.name]["foreign"]
+        count = counts[topic.full_name]["foreign"]
         assert count > 0
         assert (
-            f"{count} messages on {topic.name} were left out: they are from /flood" in log.foreign
+            f"{count} messages on {topic.full_name} were left out: they are from /flood"
+            in log.foreign
         )
     assert "messages of /flood were left out" in output

@@ -296,5 +296,7 @@ def test_a_base_of_another_name_is_an_error_that_names_both(names: list[str]) ->
         (topics.REFERENCE_BASE, make_reference_codec().decode_base),
     ):
         data = STATE[1] if topic is topics.BASE_STATE else REFERENCE[1]
-        with pytest.raises(MessageError, match=rf"^{topic.name}: names .* expected \['base'\]"):
+        with pytest.raises(
+            MessageError, match=rf"^{topic.full_name}: names .* expected \['base'\]"
+        ):
             decode(renamed(names, topic, data))

@@ -48,7 +48,7 @@ def test_it_is_the_flight_of_four_processes_and_of_none(fly: Callable[..., Flown
     """With two swaps of laws; states and commands to the last byte, the report to the last bit."""
     composed, processes = fly(*SHORT, *SWAP, "--composed"), fly(*SHORT, *SWAP)
     for topic in STATES_AND_COMMANDS:
-        assert messages(composed.bag, topic) == messages(processes.bag, topic), topic.name
+        assert messages(composed.bag, topic) == messages(processes.bag, topic), topic.full_name
     swaps = ["0.1:ctc", "0.3:tde_smc"]
     log = simulate(Flight(FlightPlan(swaps=swaps, duration=0.5)))
     assert_same_columns(read_flight(composed.bag), log)
@@ -77,7 +77,7 @@ def test_faults_of_the_plant_are_brought_about_as_in_four_processes(
     )  # fmt: skip
     composed, processes = fly(*SHORT, *faults, "--composed"), fly(*SHORT, *faults)
     for topic in STATES_AND_COMMANDS:
-        assert messages(composed.bag, topic) == messages(processes.bag, topic), topic.name
+        assert messages(composed.bag, topic) == messages(processes.bag, topic), topic.full_name
 
 
 def test_by_the_wall_clock_every_tick_is_flown(fly: Callable[..., Flown]) -> None:

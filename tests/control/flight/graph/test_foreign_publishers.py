@@ -173,7 +173,7 @@ def test_late_listeners_are_told_what_is_needed_and_of_no_lost_message(
     for _ in range(3):
         joined_at = tick
         subscription = monitor.node.create_subscription(
-            message_type(topic.type), topic.name,
+            message_type(topic.type), topic.full_name,
             lambda message: heard.append(message.header.stamp), qos(topic),
             event_callbacks=SubscriptionEventCallbacks(message_lost=lost.append),
         )  # fmt: skip

@@ -70,7 +70,7 @@ def test_all_laws_are_swapped_at_the_same_ticks_in_both(
 
 def test_nothing_is_lost_and_every_tick_is_in_the_bag(fly: Callable[..., Flown]) -> None:
     flown = fly(*LONG)
-    assert flown.report["lost"] == {topic.name: 0 for topic in topics.ALL}
+    assert flown.report["lost"] == {topic.full_name: 0 for topic in topics.ALL}
     assert flown.report["ticks"] == 6000
     with Reader(flown.bag) as reader:
         counts = {c.topic: c.msgcount for c in reader.connections}

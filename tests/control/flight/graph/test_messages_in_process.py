@@ -45,14 +45,14 @@ OPTIONS: dict[str, dict[str, str]] = {
     "all that is new": {"sensors": "tactical", "navigation": "filtered"}
 }
 """Options of flights beside their faults."""
-AHEAD = {topics.REFERENCE_JOINTS.name, topics.REFERENCE_BASE.name}
+AHEAD = {topics.REFERENCE_JOINTS.full_name, topics.REFERENCE_BASE.full_name}
 """The mission of a graph sends its reference beyond the flight's end."""
 
 
 def messages_by_topic(bag: Path) -> dict[str, list[bytes]]:
     found = defaultdict(list)
     for topic, message in messages_of(bag):
-        found[topic.name].append(message)
+        found[topic.full_name].append(message)
     return found
 
 

@@ -32,7 +32,7 @@ def test_truth_measured_and_believed_are_those_of_one_process(
     flown = fly("--duration", "0.5", *given)
     log = simulate(Flight(FlightPlan(faults=faults, duration=0.5)))
     recorded = read_flight(flown.bag)
-    assert recorded.lost == {topic.name: 0 for topic in topics.ALL}
+    assert recorded.lost == {topic.full_name: 0 for topic in topics.ALL}
     assert recorded.measured is not None
     assert log.measured is not None
     for name, column in log.measured.columns.items():

@@ -64,7 +64,7 @@ def test_commands_that_the_recorder_missed_are_known(bag: Path, tmp_path: Path) 
     counts = dict.fromkeys(topics.BY_NAME, 0)
     for name, data in open_bag(bag).messages(*topics.ALL):
         counts[name] += 1
-        if name != topics.COMMAND.name or not 100 < counts[name] <= 130:
+        if name != topics.COMMAND.full_name or not 100 < counts[name] <= 130:
             recorder.record(topics.BY_NAME[name], data, 1, b"participant " + b"0001", counts[name])
     recorder.close()
     assert Recording(bag).lost_commands == 0
@@ -85,7 +85,9 @@ def test_references_begin_with_the_one_that_covers_the_start(
 def test_topics_of_other_names_are_remapped(bag: Path, tmp_path: Path) -> None:
     with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         connections: dict[str, Any] = {
-            topic.name: writer.add_connection(f"/arm{topic.name}", topic.type, typestore=jazzy())
+            topic.full_name: writer.add_connection(
+                f"/arm{topic.full_name}", topic.type, typestore=jazzy()
+            )
             for topic in topics.ALL
         }
         for number, (name, data) in enumerate(open_bag(bag).messages(*topics.ALL)):
