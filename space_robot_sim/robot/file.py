@@ -224,8 +224,8 @@ class RobotFile(StrictModel):
 
 def _tools_of(body: str, tools: list[ToolFile], last: str) -> tuple[Tool, ...]:
     return tuple(
-        Tool(tool.name, tool.rotation, tool.rotation @ tool.offset)
-        for tool in tools if (tool.link or last) == body
+        Tool(tool.name, tool.rotation, tool.rotation @ tool.offset, rank=rank)
+        for rank, tool in enumerate(tools) if (tool.link or last) == body
     )  # fmt: skip
 
 

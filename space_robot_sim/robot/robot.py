@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,9 @@ from ..dynamics.model import MOST_JOINTS, Model
 from .file import _Document, inertia_tensor
 from .model import model_of
 from .tree import Body, Joint, JointFriction, JointLimits, Moved, Spring, Tool, Visual, flatten
+
+if TYPE_CHECKING:
+    from .urdf import UrdfRobot
 
 Array = NDArray[np.float64]
 
@@ -63,6 +66,8 @@ class Robot:
     visuals: tuple[Visual, ...] = ()
     order: tuple[int, ...] = field(default=())
     """The joints as a walk down each branch meets them: a parent's before its children's."""
+    repairs: tuple[str, ...] = ()
+    """What was repaired in the file that it was read from, a line each."""
 
     @property
     def n(self) -> int:
@@ -96,13 +101,38 @@ class Robot:
         Raises:
             InputError: naming file, key, value given and values allowed.
         """
-        return cls.from_dict(read_yaml(Path(path)), where=str(path))
+        return cls.from_dict(read_yaml(Path(path)), str(path), Path(path).parent)
 
     @classmethod
-    def from_dict(cls, content: dict[str, Any], where: str = "robot") -> Robot:
-        """Build from the mapping a robot file holds (key ``robot`` at its top)."""
+    def from_dict(
+        cls, content: dict[str, Any], where: str = "robot", folder: Path | None = None
+    ) -> Robot:
+        """Build from the mapping a robot file holds (key ``robot`` at its top).
+
+        A URDF that it refers to is looked for in ``folder``, the working one if None.
+        """
+        from .urdf_file import is_urdf, read_urdf_content
+
+        if is_urdf(content):
+            return cls._of_urdf(read_urdf_content(content, folder or Path(), where), where)
         file = validate(_Document, content, where).robot
         return cls.of_tree(file.name, file.bodies(), where)
+
+    @classmethod
+    def from_urdf(cls, path: str | Path, base: str | None = None, repair: bool = False) -> Robot:
+        """Read and check a URDF or xacro file: see `space_robot_sim.robot.urdf.read_urdf`.
+
+        Raises:
+            InputError: in one line that names link or joint, line, value and the repair, if any.
+        """
+        from .urdf import read_urdf
+
+        return cls._of_urdf(read_urdf(path, base, repair), str(path))
+
+    @classmethod
+    def _of_urdf(cls, found: UrdfRobot, where: str) -> Robot:
+        robot = cls.of_tree(found.name, found.bodies, where)
+        return replace(robot, repairs=tuple(map(str, found.findings)))
 
     @classmethod
     def of_tree(cls, name: str, bodies: Sequence[Body], where: str = "robot") -> Robot:
@@ -237,9 +267,10 @@ def _locked(joint: Joint, position: float) -> Joint:
 
 def _numbered_tools(members: Sequence[Body]) -> tuple[Tool, ...]:
     """Return the tools of all bodies; a robot without any has one on its last body."""
-    found = tuple(
+    found = [
         replace(tool, body=number)
         for number, body in enumerate(members)
         for tool in body.tools
-    )  # fmt: skip
-    return found or (Tool("tool", np.eye(3), np.zeros(3), len(members) - 1),)
+    ]  # fmt: skip
+    found = found or [Tool("tool", np.eye(3), np.zeros(3), len(members) - 1)]
+    return tuple(sorted(found, key=lambda tool: tool.rank))

@@ -1,0 +1,190 @@
+"""From links and joints to the bodies of a robot, the physically impossible ones mended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.config.validation import short
+
+from ..tree import Body, Joint, JointKind, Tool
+from .fields import HERE, Frame
+from .findings import Report
+from .graph import Edge, Tree
+from .inertia import inertia_defect, nearest_inertia, solid_inertia
+from .links import Link
+
+Array = NDArray[np.float64]
+
+NOTHING = 1e-9
+"""kg: lighter bodies count as massless."""
+
+
+def mend_massless(links: Mapping[str, Link], tree: Tree, report: Report) -> None:
+    """Lock the joints of bodies without mass that may be locked: those of tips, and the root's.
+
+    Raises:
+        InputError: a body without mass carries others; how they move is not defined.
+    """
+    while True:
+        carriers = tree.carriers()
+        mass = dict.fromkeys(carriers.values(), 0.0)
+        for name, carrier in carriers.items():
+            mass[carrier] += links[name].mass
+        massless = [name for name in tree.order if mass.get(name, 1.0) < NOTHING]
+        if not massless:
+            return
+        carried: dict[str, list[str]] = {name: [] for name in mass}
+        for name in mass:
+            if name != tree.base:
+                carried[carriers[tree.edges[name].parent]].append(name)
+        tips = [name for name in massless if not carried[name] and name != tree.base]
+        if tips:
+            _lock_tip(links[tips[0]], tree, carriers, report)
+        elif tree.base in massless and len(carried[tree.base]) == 1:
+            _lock_root(links[tree.base], carried[tree.base][0], tree, report)
+        else:
+            link = links[massless[0]]
+            what = "a base that" if link.name == tree.base else "a link that moves and"
+            raise report.error(
+                link.mass_line, link.part, f"{what} carries others must have a mass",
+                f"{link.mass:g}",
+            )  # fmt: skip
+
+
+def _lock_tip(link: Link, tree: Tree, carriers: Mapping[str, str], report: Report) -> None:
+    edge = tree.edges[link.name]
+    report.repaired(
+        link.mass_line, link.part, "a link that moves must have a mass", f"{link.mass:g}",
+        f"{edge.joint.part} locked at 0, merged into link {short(carriers[edge.parent])}",
+    )  # fmt: skip
+    edge.joint = replace(edge.joint, kind="fixed")
+
+
+def _lock_root(root: Link, child: str, tree: Tree, report: Report) -> None:
+    """Lock the one joint of a root without mass: what it carries floats freely anyway."""
+    edge = tree.edges[child]
+    report.repaired(
+        root.mass_line, root.part, "the base must have a mass", f"{root.mass:g}",
+        f"{edge.joint.part} locked at 0, merged into link {short(child)}",
+    )  # fmt: skip
+    edge.joint = replace(edge.joint, kind="fixed")
+
+
+def check_kinds(tree: Tree, report: Report) -> None:
+    """Refuse the joints of more than one degree of freedom.
+
+    Raises:
+        InputError: there is one.
+    """
+    for edge in tree.edges.values():
+        if edge.joint.kind in ("floating", "planar"):
+            raise report.error(
+                edge.joint.line, edge.joint.part, "it moves in more than one way: use revolute, "
+                "continuous and prismatic joints, with links between them that have a mass",
+                edge.joint.kind,
+            )  # fmt: skip
+
+
+def mend_inertias(links: Mapping[str, Link], tree: Tree, report: Report) -> None:
+    """See that every link that has a mass can be made of matter.
+
+    A point's inertia, zero, will do for a link that is fixed to one with an inertia.
+    """
+    carriers = tree.carriers()
+    solid = set()
+    for name, link in links.items():
+        if link.mass >= NOTHING and inertia_defect(link.mass, link.inertia)[0] == "":
+            solid.add(carriers[name])
+    for name, link in links.items():
+        if link.mass < NOTHING or (carriers[name] in solid and not link.inertia.any()):
+            continue
+        defect, moments = inertia_defect(link.mass, link.inertia)
+        if not defect:
+            continue
+        nearest = nearest_inertia(link.inertia) if "zero" not in defect else None
+        repair = "raised to the nearest physical one"
+        if nearest is None or inertia_defect(link.mass, nearest)[0]:
+            nearest, what = solid_inertia(link.mass, link.visuals)
+            repair = f"that of {what}"
+        shown = ", ".join(f"{moment:.4g}" for moment in np.linalg.eigvalsh(nearest))
+        report.repaired(
+            link.mass_line, link.part, defect, moments, f"{repair}, principal moments {shown}"
+        )
+        link.inertia = nearest
+
+
+def make_bodies(links: Mapping[str, Link], tree: Tree, tools: Sequence[str]) -> list[Body]:
+    """Return a body for each link, the base first, the others in the order of their joints.
+
+    Args:
+        links: by their names.
+        tree: how they hang together.
+        tools: the links whose frames are the tools', the first one first.
+    """
+    # the axis of a reversed joint runs through the frame of what is now its parent: what is now its
+    # child gets its frame there; all other links keep theirs
+    frames = {
+        edge.joint.parent: edge.joint.frame for edge in tree.edges.values() if edge.is_reversed
+    }
+    ranks = {name: rank for rank, name in enumerate(tools)}
+    bodies = [_body(links[tree.base], HERE, None, "", ranks.get(tree.base))]
+    for name, edge in tree.edges.items():
+        joint = _joint(edge, frames.get(edge.parent, HERE))
+        frame = frames.get(name, HERE)
+        bodies.append(_body(links[name], frame, joint, edge.parent, ranks.get(name)))
+    return bodies
+
+
+def end_frames(links: Mapping[str, Link], tree: Tree) -> list[str]:
+    """Return the links whose frames are the tools', those behind the most joints first.
+
+    They are fixed links without mass that carry nothing, and the last moving link of a branch that
+    has none of them.
+    """
+    carriers, leaves = tree.carriers(), tree.leaves()
+    depth = {tree.base: 0}
+    for name in tree.order[1:]:
+        edge = tree.edges[name]
+        depth[name] = depth[edge.parent] + edge.moves
+    ends = [name for name in tree.edges if name in leaves and links[name].mass < NOTHING]
+    carried = {carriers[edge.parent] for edge in tree.edges.values() if edge.moves}
+    for name, edge in tree.edges.items():
+        if edge.moves and name not in carried and name not in {carriers[end] for end in ends}:
+            ends.append(name)
+    place = {name: number for number, name in enumerate(tree.edges)}
+    return sorted(ends, key=lambda name: (-depth[name], place[name]))
+
+
+def _joint(edge: Edge, parent: Frame) -> Joint:
+    """Return the joint between two bodies; ``parent``: the frame of the one nearer to the base."""
+    joint = edge.joint
+    rotation = parent.rotation.T
+    if edge.is_reversed:
+        offset, axis = -parent.position, -joint.axis
+    else:
+        rotation = rotation @ joint.frame.rotation
+        offset = joint.frame.rotation.T @ (joint.frame.position - parent.position)
+        axis = joint.axis
+    return Joint(
+        joint.name, cast(JointKind, joint.kind), rotation, offset, axis, joint.limits,
+        joint.friction,
+    )  # fmt: skip
+
+
+def _body(link: Link, frame: Frame, joint: Joint | None, parent: str, rank: int | None) -> Body:
+    """Return a link as a body whose frame is ``frame``, seen from the link's; a tool if ranked."""
+    turn, at = frame.rotation.T, frame.position
+    visuals = tuple(
+        replace(visual, rotation=turn @ visual.rotation, position=turn @ (visual.position - at))
+        for visual in link.visuals
+    )
+    tools = () if rank is None else (Tool(link.name, turn, -turn @ at, rank=rank),)
+    return Body(
+        link.name, link.mass, turn @ link.inertia @ turn.T, turn @ (link.com - at), parent, joint,
+        tools, visuals,
+    )  # fmt: skip

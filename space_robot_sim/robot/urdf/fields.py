@@ -1,0 +1,109 @@
+"""Numbers in the attributes of URDF elements, read strictly, and the frames they make."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .elements import Element
+from .findings import Report
+
+Array = NDArray[np.float64]
+
+LARGEST = 1e12
+"""Of any number in a file, kg, m, rad, ...: all that is computed of them stays finite."""
+_NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+_INFINITE = re.compile(r"([-+]?)inf(?:inity)?", re.IGNORECASE)
+
+
+class Frame(NamedTuple):
+    """A frame, seen from another."""
+
+    rotation: Array
+    """(3, 3) its axes, as columns, on the axes of the other."""
+    position: Array
+    """(3,) m, on the axes of the other."""
+
+
+HERE = Frame(np.eye(3), np.zeros(3))
+
+
+class Fields:
+    """Reads the attributes of the elements of one link or joint."""
+
+    def __init__(self, report: Report, part: str) -> None:
+        """Take where defects go, and which link or joint they are named after."""
+        self.report, self.part = report, part
+
+    def number(self, element: Element, name: str, default: float | None = None) -> float:
+        """Return a number; without a default the attribute must be there."""
+        text = element.attributes.get(name)
+        if text is None and default is not None:
+            return default
+        if text is None:
+            raise self.report.error(
+                element.line, self.part, f"<{element.tag}> needs the attribute {name!r}"
+            )
+        return self._number(element, name, text)
+
+    def limit(self, element: Element, name: str) -> float | None:
+        """Return a number that may be infinite; None if it is not there."""
+        text = element.attributes.get(name)
+        if text is None:
+            return None
+        infinite = _INFINITE.fullmatch(text.strip())
+        if infinite:
+            return -math.inf if infinite[1] == "-" else math.inf
+        return self._number(element, name, text)
+
+    def vector(
+        self, element: Element, name: str, default: tuple[float, ...] | None, count: int = 3
+    ) -> Array:
+        """Return so many numbers, separated by blanks."""
+        text = element.attributes.get(name)
+        if text is None and default is not None:
+            return np.array(default)
+        words = (text or "").split()
+        if len(words) != count:
+            raise self.report.error(
+                element.line, self.part, f"{element.tag}.{name} must be {count} numbers", text or ""
+            )
+        return np.array([self._number(element, name, word) for word in words])
+
+    def frame(self, origin: Element | None) -> Frame:
+        """Return the frame that an ``<origin>`` describes, on the axes of the one it stands in."""
+        if origin is None:
+            return HERE
+        self.report.check_content(origin, self.part, (), ("xyz", "rpy"))
+        zero = (0.0, 0.0, 0.0)
+        rotation = rotation_of_rpy(self.vector(origin, "rpy", zero))
+        return Frame(rotation, self.vector(origin, "xyz", zero))
+
+    def _number(self, element: Element, name: str, text: str) -> float:
+        value = float(text) if _NUMBER.fullmatch(text.strip()) else math.nan
+        if abs(value) <= LARGEST:
+            return value
+        why = "is no number" if math.isnan(value) else f"must be at most {LARGEST:g}"
+        raise self.report.error(element.line, self.part, f"{element.tag}.{name} {why}", text)
+
+
+def rotation_of_rpy(rpy: Array) -> Array:
+    """Return ``Rz(yaw) Ry(pitch) Rx(roll)``: roll, pitch, yaw (rad) about fixed axes x, y, z."""
+    (cr, cp, cy), (sr, sp, sy) = _exact(np.cos(rpy)), _exact(np.sin(rpy))
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def _exact(values: Array) -> Array:
+    """Rid sines and cosines of multiples of 90 degrees of the rounding error of pi."""
+    rounded = np.round(values)
+    return np.where(np.abs(values - rounded) < 1e-15, rounded, values)

@@ -1,0 +1,104 @@
+"""What is wrong with a robot's file: named with part, line and value, repaired where one may."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from space_robot_msgs_py.config.validation import short
+from space_robot_msgs_py.errors import InputError
+
+from .elements import Element
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A defect that can be repaired."""
+
+    part: str
+    """The link or joint that has it, such as ``link 'tip'``."""
+    line: int
+    """Where it stands in the file."""
+    defect: str
+    """In words, and what is allowed."""
+    value: str
+    """As given."""
+    repair: str
+    """The repair, as a participle: ``merged into link 'arm'``."""
+
+    def __str__(self) -> str:
+        """Return the finding and its repair in one line."""
+        return f"line {self.line}: {self._named()}: {self.repair}"
+
+    def _named(self) -> str:
+        return f"{self.part}: {self.defect}{f', got {self.value}' if self.value else ''}"
+
+
+class Report:
+    """Collects the defects of one file; those that nothing repairs end the reading at once."""
+
+    def __init__(self, where: str) -> None:
+        """Take the name of the file, for errors."""
+        self.where = where
+        self.findings: list[Finding] = []
+
+    def error(self, line: int, part: str, defect: str, value: str | None = None) -> InputError:
+        """Return the error, to be raised, for a defect that has no repair."""
+        given = "" if value is None else f", got {short(value)}"
+        return InputError(f"{self.where}: line {line}: {part}: {defect}{given}")
+
+    def repaired(self, line: int, part: str, defect: str, value: str, repair: str) -> None:
+        """Keep a defect that is repaired as ``repair`` says."""
+        self.findings.append(Finding(part, line, defect, value and short(value), repair))
+
+    def sorted(self) -> list[Finding]:
+        """Return the defects kept, by line."""
+        return sorted(self.findings, key=lambda finding: finding.line)
+
+    def refuse_defects(self) -> None:
+        """Raise an InputError that names the first defect in the file, if there is any."""
+        if not self.findings:
+            return
+        first = self.sorted()[0]
+        more = f" (and {len(self.findings) - 1} more)" if len(self.findings) > 1 else ""
+        raise InputError(
+            f"{self.where}: line {first.line}: {first._named()} "
+            f"(with --repair: {first.repair}){more}"
+        )
+
+    def check_content(
+        self, element: Element, part: str, children: Collection[str], attributes: Collection[str]
+    ) -> None:
+        """Keep as defects what an element should not hold: most often it is misspelt.
+
+        What has a prefix, such as ``drake:``, is an extension that is none of our business.
+        """
+        for name, value in element.attributes.items():
+            if name not in attributes and ":" not in name and name != "xmlns":
+                self.repaired(
+                    element.line, part, f"<{short_tag(element.tag)}> has an unknown attribute "
+                    f"{short(name)} (known: {', '.join(attributes) or 'none'})", value,
+                    "left out",
+                )  # fmt: skip
+        for child in element.children:
+            if child.tag not in children and ":" not in child.tag:
+                self.repaired(
+                    child.line, part, f"<{short_tag(element.tag)}> has an unknown element "
+                    f"<{short_tag(child.tag)}> (known: {', '.join(children) or 'none'})", "",
+                    "left out",
+                )  # fmt: skip
+
+    def only(self, element: Element, tag: str, part: str) -> Element | None:
+        """Return the child with a tag, None if there is none; a second one is a defect."""
+        found = list(element.all(tag))
+        for again in found[1:]:
+            self.repaired(
+                again.line, part, f"<{tag}> stands there twice", f"line {found[0].line} and here",
+                "the first one holds",
+            )  # fmt: skip
+        return found[0] if found else None
+
+
+def short_tag(tag: str) -> str:
+    """Show the name of an element in an error, in one short line."""
+    return short(tag)[1:-1]

@@ -1,0 +1,116 @@
+"""Links and joints as one tree, seen from the base."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from space_robot_msgs_py.config.validation import one_of, short
+
+from .findings import Report
+from .joints import UrdfJoint
+from .links import Link
+
+
+@dataclass
+class Edge:
+    """A joint, and which of its ends is nearer to the base."""
+
+    joint: UrdfJoint
+    parent: str
+    """The link nearer to the base."""
+    is_reversed: bool
+    """The file has it the other way round: here the joint's child carries its parent."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether the joint does anything but hold."""
+        return self.joint.kind != "fixed"
+
+
+@dataclass
+class Tree:
+    """All links, outwards from a base."""
+
+    base: str
+    order: list[str]
+    """Names of the links, each after the one that carries it."""
+    edges: dict[str, Edge]
+    """Of each link but the base, by its name, what joins it to the rest; as in the file."""
+
+    def carriers(self) -> dict[str, str]:
+        """Return for each link the one, itself perhaps, whose joint moves it; base if none."""
+        found = {self.base: self.base}
+        for name in self.order[1:]:
+            edge = self.edges[name]
+            found[name] = name if edge.moves else found[edge.parent]
+        return found
+
+    def leaves(self) -> set[str]:
+        """Return the links that carry no other one."""
+        return set(self.order) - {edge.parent for edge in self.edges.values()}
+
+
+def build_tree(
+    links: Mapping[str, Link], joints: Mapping[str, UrdfJoint], base: str | None, report: Report
+) -> Tree:
+    """Join the links to one tree and look at it from ``base``, or from its root.
+
+    A base other than the root turns the joints between them round: what was the child of such a
+    joint becomes its parent.
+
+    Raises:
+        InputError: the links are not one tree, or there is no such base.
+    """
+    root = _root(links, joints, report)
+    if base is not None:
+        one_of(base, links, "link", f" for the base of {report.where}")
+    neighbours: dict[str, list[tuple[str, Edge]]] = {name: [] for name in links}
+    for joint in joints.values():
+        neighbours[joint.parent].append((joint.child, Edge(joint, joint.parent, False)))
+        neighbours[joint.child].append((joint.parent, Edge(joint, joint.child, True)))
+    tree = Tree(base or root, [], {})
+    waiting = [tree.base]
+    while waiting:
+        name = waiting.pop()
+        tree.order.append(name)
+        for other, edge in reversed(neighbours[name]):
+            if name == tree.base or edge.joint is not tree.edges[name].joint:
+                tree.edges[other] = edge
+                waiting.append(other)
+    place = {name: number for number, name in enumerate(joints)}
+    tree.edges = dict(sorted(tree.edges.items(), key=lambda item: place[item[1].joint.name]))
+    return tree
+
+
+def _root(links: Mapping[str, Link], joints: Mapping[str, UrdfJoint], report: Report) -> str:
+    """Return the link that no other carries, having seen that all others hang on it."""
+    above: dict[str, UrdfJoint] = {}
+    for joint in joints.values():
+        if joint.child in above:
+            other = above[joint.child]
+            raise report.error(
+                joint.line, joint.part, f"its child {short(joint.child)} is the child of "
+                f"joint {short(other.name)} (line {other.line}) already: loops cannot be closed",
+            )  # fmt: skip
+        above[joint.child] = joint
+    roots = [link for link in links.values() if link.name not in above]
+    if len(roots) > 1:
+        raise report.error(
+            roots[1].line, roots[1].part, "only the root may be no joint's child, here are "
+            f"{len(roots)} such links", ", ".join(link.name for link in roots),
+        )  # fmt: skip
+    seen = {link.name for link in roots}
+    below: dict[str, list[str]] = {name: [] for name in links}
+    for joint in joints.values():
+        below[joint.parent].append(joint.child)
+    waiting = list(seen)
+    while waiting:
+        children = below[waiting.pop()]
+        seen.update(children)
+        waiting += children
+    for name in links:
+        if name not in seen:
+            joint = above[name]
+            raise report.error(joint.line, joint.part, "parents and children go round in a circle")
+    return roots[0].name

@@ -1,0 +1,93 @@
+"""Is an inertia one that matter can have? If not: the nearest that it can."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..tree import Visual
+
+Array = NDArray[np.float64]
+
+LEAST_GYRATION = 1e-6
+"""m: a body whose radius of gyration is less counts as a point."""
+ROUNDING = 1e-9
+"""By how much of it a principal moment may exceed the sum of the other two."""
+SLENDER = 1e-3
+"""The least of a repaired body's second moments, as a share of the largest: a rod of 1 m is
+then 4 cm thick."""
+SOLID = 1000.0
+"""kg/m3, the density of a body of which nothing but the mass is known."""
+
+
+def inertia_defect(mass: float, inertia: Array) -> tuple[str, str]:
+    """Return in words why no body of this mass has this inertia, and its principal moments.
+
+    Args:
+        mass: kg, above 0.
+        inertia: (3, 3) kg m2 about the CoM.
+
+    Returns:
+        The defect, empty if there is none, and the moments (kg m2) to be shown.
+    """
+    moments = np.linalg.eigvalsh(inertia)
+    given = ", ".join(f"{moment:.4g}" for moment in moments)
+    if np.max(np.abs(moments)) <= mass * LEAST_GYRATION**2:
+        return "the inertia is zero", given
+    if moments[0] <= ROUNDING * moments[2]:
+        return "the inertia is not positive definite (principal moments)", given
+    if moments[2] > (moments[0] + moments[1]) * (1.0 + ROUNDING):
+        return "the inertia breaks the triangle inequality (principal moments)", given
+    return "", given
+
+
+def nearest_inertia(inertia: Array) -> Array | None:
+    """Return the nearest inertia that a body of matter can have; None if there is nothing near.
+
+    A body's second moments ``S = integral r r^T dm = 1/2 tr(I) 1 - I`` are a matrix without
+    negative eigenvalues, and every such matrix belongs to a body (Wensing, Kim and Slotine 2018,
+    Linear matrix inequalities for physically consistent inertial parameter identification). The
+    nearest to a matrix that has some is the one with those raised to 0 (Higham 1988), here to a
+    little above.
+    """
+    moments, axes = np.linalg.eigh(inertia)
+    second = 0.5 * np.sum(moments) - moments
+    largest = float(np.max(second))
+    if largest <= 0.0:
+        return None
+    second = np.maximum(second, SLENDER * largest)
+    nearest: Array = axes @ np.diag(np.sum(second) - second) @ axes.T
+    return 0.5 * (nearest + nearest.T)
+
+
+def solid_inertia(mass: float, visuals: tuple[Visual, ...]) -> tuple[Array, str]:
+    """Return the inertia of a homogeneous body that looks like the first shape, and its name.
+
+    Without a shape it is a sphere as dense as water.
+
+    Args:
+        mass: kg.
+        visuals: what the body looks like; meshes do not count.
+    """
+    for visual in visuals:
+        if visual.shape != "mesh":
+            turn = visual.rotation
+            inertia: Array = turn @ np.diag(_solid(mass, visual.shape, visual.size)) @ turn.T
+            return inertia, f"the solid {visual.shape} that it looks like"
+    radius = (3.0 * mass / (4.0 * math.pi * SOLID)) ** (1.0 / 3.0)
+    ball = _solid(mass, "sphere", (radius,))
+    return np.diag(ball), f"a solid sphere of {radius:.3g} m (density of water)"
+
+
+def _solid(mass: float, shape: str, size: tuple[float, ...]) -> list[float]:
+    """Return the principal moments of a homogeneous solid, kg m2, on its axes."""
+    if shape == "sphere":
+        return [0.4 * mass * size[0] ** 2] * 3
+    if shape == "cylinder":
+        radius, length = size
+        across = mass * (3.0 * radius**2 + length**2) / 12.0
+        return [across, across, 0.5 * mass * radius**2]
+    x, y, z = (mass * edge**2 / 12.0 for edge in size)
+    return [y + z, x + z, x + y]

@@ -1,0 +1,191 @@
+"""The joints of a URDF: how they turn or slide, how far, against which friction."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.config.validation import short
+
+from ..tree import JointFriction, JointLimits
+from .elements import Element
+from .fields import Fields, Frame
+from .findings import Report
+from .links import Link, read_name
+
+Array = NDArray[np.float64]
+
+KINDS = {
+    "revolute": "revolute",
+    "continuous": "revolute",
+    "prismatic": "prismatic",
+    "fixed": "fixed",
+    "floating": "floating",
+    "planar": "planar",
+}
+"""The types of URDF, and which of them become one another's."""
+ELEMENTS = ("origin", "parent", "child", "axis", "limit", "dynamics", "mimic")
+EXTENSIONS = ("calibration", "safety_controller", "hardwareInterface")
+LIMITS = ("lower", "upper", "effort", "velocity", "acceleration", "deceleration", "jerk")
+NEARLY_ONE = 1e-3
+"""How much the norm of an axis may differ from 1: numbers of four digits do."""
+
+
+@dataclass
+class UrdfJoint:
+    """A joint as its file tells it."""
+
+    name: str
+    line: int
+    kind: str
+    """A value of `KINDS`."""
+    parent: str
+    child: str
+    frame: Frame
+    """The child's frame at joint position zero, on the parent's axes."""
+    axis: Array
+    """(3,) unit vector on the child's axes."""
+    limits: JointLimits
+    friction: JointFriction
+
+    @property
+    def part(self) -> str:
+        """The joint as errors name it."""
+        return f"joint {short(self.name)}"
+
+
+def read_joints(robot: Element, links: Mapping[str, Link], report: Report) -> dict[str, UrdfJoint]:
+    """Return all joints by their names, in the order of the file."""
+    found: dict[str, UrdfJoint] = {}
+    for element in robot.all("joint"):
+        name = read_name(element, report)
+        part = f"joint {short(name)}"
+        if name in found:
+            raise report.error(
+                element.line, part, f"the name is taken by the joint in line {found[name].line}"
+            )
+        found[name] = _joint(element, name, links, Fields(report, part))
+    return found
+
+
+def _joint(element: Element, name: str, links: Mapping[str, Link], fields: Fields) -> UrdfJoint:
+    report, part = fields.report, fields.part
+    report.check_content(element, part, ELEMENTS + EXTENSIONS, ("name", "type"))
+    written = element.attributes.get("type", "")
+    if written not in KINDS:
+        raise report.error(element.line, part, f"type must be one of {', '.join(KINDS)}", written)
+    parent, child = (_end(element, tag, links, fields) for tag in ("parent", "child"))
+    if parent == child:
+        raise report.error(element.line, part, "parent and child must be two links", parent)
+    joint = UrdfJoint(
+        name, element.line, KINDS[written], parent, child,
+        fields.frame(report.only(element, "origin", part)), np.array([1.0, 0.0, 0.0]),
+        JointLimits(), JointFriction(),
+    )  # fmt: skip
+    if joint.kind in ("revolute", "prismatic"):
+        joint.axis = _axis(report.only(element, "axis", part), fields)
+        limit = report.only(element, "limit", part)
+        joint.limits = _limits(element, limit, written == "continuous", fields)
+        joint.friction = _friction(report.only(element, "dynamics", part), fields)
+        mimic = report.only(element, "mimic", part)
+        if mimic is not None:
+            report.repaired(
+                mimic.line, part, "<mimic>: joints cannot be coupled",
+                mimic.attributes.get("joint", ""), "freed: it moves on its own",
+            )  # fmt: skip
+    return joint
+
+
+def _end(element: Element, tag: str, links: Mapping[str, Link], fields: Fields) -> str:
+    """Return the name of the link at one end of a joint."""
+    end = fields.report.only(element, tag, fields.part)
+    name = end.attributes.get("link", "") if end is not None else ""
+    if end is None or not name:
+        raise fields.report.error(element.line, fields.part, f'<{tag} link="..."/> is missing')
+    if name not in links:
+        raise fields.report.error(end.line, fields.part, f"the {tag} is no link of the file", name)
+    return name
+
+
+def _axis(element: Element | None, fields: Fields) -> Array:
+    if element is None:
+        return np.array([1.0, 0.0, 0.0])  # as URDF says
+    fields.report.check_content(element, fields.part, (), ("xyz",))
+    axis = fields.vector(element, "xyz", None)
+    norm = float(np.linalg.norm(axis))
+    given = element.attributes.get("xyz", "")
+    if norm < NEARLY_ONE:
+        raise fields.report.error(element.line, fields.part, "the axis has no direction", given)
+    if abs(norm - 1.0) > NEARLY_ONE:
+        fields.report.repaired(
+            element.line, fields.part, "the axis must have length 1", given, "normalised"
+        )
+    return axis / norm
+
+
+def _limits(
+    joint: Element, element: Element | None, continuous: bool, fields: Fields
+) -> JointLimits:
+    report, part = fields.report, fields.part
+    if element is None:
+        if not continuous:
+            kind = joint.attributes["type"]
+            report.repaired(joint.line, part, f"a {kind} joint needs a <limit>", "", "no limits")
+        return JointLimits()
+    report.check_content(element, part, (), LIMITS)
+    lower, upper = (-math.inf, math.inf) if continuous else _range(element, fields)
+    return JointLimits(lower, upper, _most(element, "velocity", fields),
+                       _most(element, "effort", fields))  # fmt: skip
+
+
+def _range(element: Element, fields: Fields) -> tuple[float, float]:
+    """Return the least and largest position; one that is not given is 0, as URDF says."""
+    lower, upper = (fields.limit(element, name) or 0.0 for name in ("lower", "upper"))
+    given = f"{lower:g} to {upper:g}"
+    if lower > upper:
+        fields.report.repaired(
+            element.line, fields.part, "the limits lower and upper are upside down", given,
+            "exchanged",
+        )  # fmt: skip
+        return upper, lower
+    if lower == upper:
+        fields.report.repaired(
+            element.line, fields.part, "the limits lower and upper leave no room to move", given,
+            "no limits of position",
+        )  # fmt: skip
+        return -math.inf, math.inf
+    return lower, upper
+
+
+def _most(element: Element, name: str, fields: Fields) -> float:
+    """Return the largest velocity or effort."""
+    given = fields.limit(element, name)
+    if given is not None and given > 0.0:
+        return given
+    repair = "made positive" if given else f"no limit of {name}"
+    fields.report.repaired(
+        element.line, fields.part, f"limit.{name} must be given and above 0",
+        element.attributes.get(name, ""), repair,
+    )  # fmt: skip
+    return abs(given) if given else math.inf
+
+
+def _friction(element: Element | None, fields: Fields) -> JointFriction:
+    """Return what the file says of friction; 0 for the part that ``<dynamics>`` does not name."""
+    if element is None:
+        return JointFriction()
+    fields.report.check_content(element, fields.part, (), ("damping", "friction"))
+    found = {}
+    for name in ("friction", "damping"):
+        value = fields.number(element, name, 0.0)
+        if value < 0.0:
+            fields.report.repaired(
+                element.line, fields.part, f"dynamics.{name} must be at least 0",
+                element.attributes[name], "read as 0",
+            )  # fmt: skip
+        found[name] = max(value, 0.0)
+    return JointFriction(coulomb=found["friction"], viscous=found["damping"])

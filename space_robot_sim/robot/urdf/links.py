@@ -1,0 +1,113 @@
+"""The links of a URDF: masses, inertias, shapes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.config.validation import short
+
+from ..tree import Visual
+from .elements import Element
+from .fields import Fields
+from .findings import Report
+from .visuals import Colours, read_visuals
+
+Array = NDArray[np.float64]
+
+ELEMENTS = ("inertial", "visual", "collision")
+EXTENSIONS = ("contact", "gravity", "self_collision_checking", "sensor", "verbose")
+MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+
+
+@dataclass
+class Link:
+    """A link as its file tells it; vectors on its own axes."""
+
+    name: str
+    line: int
+    mass_line: int
+    """Where its mass stands, or the link if it has none."""
+    mass: float
+    """kg, 0 if there is none."""
+    inertia: Array
+    """(3, 3) kg m2 about the CoM."""
+    com: Array
+    """(3,) m."""
+    visuals: tuple[Visual, ...]
+
+    @property
+    def part(self) -> str:
+        """The link as errors name it."""
+        return f"link {short(self.name)}"
+
+
+def read_links(robot: Element, colours: Colours, folder: Path, report: Report) -> dict[str, Link]:
+    """Return all links by their names, in the order of the file."""
+    found: dict[str, Link] = {}
+    for element in robot.all("link"):
+        name = read_name(element, report)
+        if name in found:
+            raise report.error(
+                element.line, f"link {short(name)}",
+                f"the name is taken by the link in line {found[name].line}",
+            )  # fmt: skip
+        found[name] = _link(element, name, colours, folder, report)
+    if not found:
+        raise report.error(robot.line, "robot", "there is no <link>")
+    return found
+
+
+def read_name(element: Element, report: Report) -> str:
+    """Return the name of a link or joint, which must have one that can be shown."""
+    name = element.attributes.get("name", "")
+    if not name.strip() or not name.isprintable():
+        raise report.error(element.line, element.tag, "a printable name is needed", name)
+    return name
+
+
+def _link(element: Element, name: str, colours: Colours, folder: Path, report: Report) -> Link:
+    link = Link(
+        name, element.line, element.line, 0.0, np.zeros((3, 3)), np.zeros(3),
+        read_visuals(element, f"link {short(name)}", colours, folder, report),
+    )  # fmt: skip
+    report.check_content(element, link.part, ELEMENTS + EXTENSIONS, ("name", "type"))
+    inertial = report.only(element, "inertial", link.part)
+    if inertial is not None:
+        _read_inertial(inertial, link, Fields(report, link.part))
+    return link
+
+
+def _read_inertial(inertial: Element, link: Link, fields: Fields) -> None:
+    report, part = fields.report, link.part
+    report.check_content(inertial, part, ("origin", "mass", "inertia"), ())
+    frame = fields.frame(report.only(inertial, "origin", part))
+    link.com, link.mass_line = frame.position, inertial.line
+    mass = report.only(inertial, "mass", part)
+    if mass is not None:
+        report.check_content(mass, part, (), ("value",))
+        link.mass, link.mass_line = fields.number(mass, "value"), mass.line
+    if link.mass < 0.0:
+        raise report.error(link.mass_line, part, "mass must be at least 0 kg", f"{link.mass:g}")
+    inertia = report.only(inertial, "inertia", part)
+    if inertia is None:
+        return
+    report.check_content(inertia, part, (), MOMENTS)
+    # urdfdom refuses files in which one is missing; a product that is not there may well mean 0
+    for product in MOMENTS[3:]:
+        if product not in inertia.attributes:
+            report.repaired(inertia.line, part, f"<inertia> needs {product!r}", "", "read as 0")
+    values = [fields.number(inertia, moment) for moment in MOMENTS[:3]]
+    values += [fields.number(inertia, product, 0.0) for product in MOMENTS[3:]]
+    xx, yy, zz, xy, xz, yz = values
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    link.inertia = frame.rotation @ tensor @ frame.rotation.T
+    if link.mass == 0.0 and link.inertia.any():
+        report.repaired(
+            inertia.line, part, "inertia without mass", f"{np.trace(link.inertia):g} kg m2 (trace)",
+            "the inertia is left out",
+        )  # fmt: skip
+        link.inertia = np.zeros((3, 3))

@@ -1,0 +1,108 @@
+"""The shapes that show a link."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from space_robot_msgs_py.config.validation import short
+from space_robot_msgs_py.errors import InputError
+
+from ..tree import Visual
+from .elements import Element
+from .fields import Fields, Frame
+from .findings import Report, short_tag
+
+Colour = tuple[float, float, float, float]
+Colours = dict[str, Colour]
+
+
+def read_colours(robot: Element, report: Report) -> Colours:
+    """Return the colours of all materials that have a name, wherever in the file they stand."""
+    in_visuals = [
+        material
+        for link in robot.all("link")
+        for visual in link.all("visual")
+        for material in visual.all("material")
+    ]
+    found: Colours = {}
+    for material in [*in_visuals, *robot.all("material")]:
+        name = material.attributes.get("name", "")
+        try:
+            colour = _colour(material, {}, Fields(report, f"material {short(name)}"))
+        except InputError as error:
+            _left_out(material, f"material {short(name)}", error, "the colour", report)
+        else:
+            if name and colour:
+                found[name] = colour
+    return found
+
+
+def read_visuals(
+    link: Element, part: str, colours: Colours, folder: Path, report: Report
+) -> tuple[Visual, ...]:
+    """Return the shapes of a link; one that makes no sense is a defect and left out."""
+    found = []
+    for element in link.all("visual"):
+        fields = Fields(Report(report.where), part)
+        try:
+            found.append(_visual(element, fields, colours, folder))
+        except InputError as error:
+            _left_out(element, part, error, "the shape", report)
+        report.findings += fields.report.findings
+    return tuple(found)
+
+
+def _visual(element: Element, fields: Fields, colours: Colours, folder: Path) -> Visual:
+    report, part = fields.report, fields.part
+    report.check_content(element, part, ("origin", "geometry", "material", "meta"), ("name",))
+    frame = fields.frame(report.only(element, "origin", part))
+    geometry = report.only(element, "geometry", part)
+    if geometry is None or len(geometry.children) != 1:
+        raise report.error(element.line, part, "<visual> needs one <geometry> of one shape")
+    colour = None
+    for material in element.all("material"):
+        colour = _colour(material, colours, fields)
+    return _shape(geometry.children[0], frame, colour, fields, folder)
+
+
+def _shape(
+    shape: Element, frame: Frame, colour: Colour | None, fields: Fields, folder: Path
+) -> Visual:
+    if shape.tag == "mesh":
+        scale = tuple(map(float, fields.vector(shape, "scale", (1.0, 1.0, 1.0))))
+        name = shape.attributes.get("filename", "")
+        if not name or not name.isprintable():
+            raise fields.report.error(shape.line, fields.part, "a mesh needs a filename", name)
+        # a path is that from the URDF's folder; package://, file:// and the like stay as they are
+        mesh = name if "://" in name else str(folder / name)
+        return Visual("mesh", scale, frame.rotation, frame.position, mesh, colour)
+    if shape.tag == "box":
+        size = tuple(map(float, fields.vector(shape, "size", None)))
+    elif shape.tag == "cylinder":
+        size = (fields.number(shape, "radius"), fields.number(shape, "length"))
+    elif shape.tag == "sphere":
+        size = (fields.number(shape, "radius"),)
+    else:
+        raise fields.report.error(
+            shape.line, fields.part, "a shape must be box, cylinder, sphere or mesh",
+            short_tag(shape.tag),
+        )  # fmt: skip
+    if min(size) <= 0.0:
+        raise fields.report.error(
+            shape.line, fields.part, f"<{shape.tag}> must have sizes above 0",
+            " ".join(f"{edge:g}" for edge in size),
+        )  # fmt: skip
+    return Visual(shape.tag, size, frame.rotation, frame.position, "", colour)  # type: ignore[arg-type]
+
+
+def _colour(material: Element, colours: Colours, fields: Fields) -> Colour | None:
+    """Return a material's own colour, else that of its name; None if nobody knows one."""
+    for element in material.all("color"):
+        red, green, blue, alpha = fields.vector(element, "rgba", None, count=4)
+        return float(red), float(green), float(blue), float(alpha)
+    return colours.get(material.attributes.get("name", ""))
+
+
+def _left_out(element: Element, part: str, error: InputError, what: str, report: Report) -> None:
+    words = str(error).split(f"{part}: ", 1)[-1]
+    report.repaired(element.line, part, f"<{element.tag}>: {words}", "", f"{what} is left out")

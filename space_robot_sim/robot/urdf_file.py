@@ -1,0 +1,97 @@
+"""A robot's YAML that refers to a URDF, and adds what URDF cannot say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, model_validator
+from typing_extensions import Self
+
+from space_robot_msgs_py.config.validation import StrictModel, validate
+
+from .file import PassiveFile
+from .tree import Spring
+from .urdf.read import UrdfRobot, parse_urdf, read_urdf, with_springs
+
+KEYS = ("urdf", "urdf_text")
+"""Either of them in ``robot`` says that the robot is a URDF's."""
+
+
+class UrdfFile(StrictModel):
+    """``robot`` of a YAML that refers to a URDF."""
+
+    name: str = ""
+    """The robot's; that in the URDF if empty."""
+    urdf: str = ""
+    """Path of the URDF or xacro file, from the folder of the YAML."""
+    urdf_text: str = ""
+    """The URDF itself, in the place of a path."""
+    base: Annotated[str, Field(min_length=1)] | None = None
+    """The link that is the satellite; the root if it is left out."""
+    repair: bool = False
+    """Whether defects are repaired."""
+    passive: Annotated[dict[str, PassiveFile], Field(default_factory=dict)]
+    """Joints without a motor and the springs that hold them, by the joints' names."""
+    tools: list[str] | None = None
+    """Links whose frames are tools, the first one first; the ends of the branches if left out."""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if bool(self.urdf) == bool(self.urdf_text):
+            raise ValueError("either urdf or urdf_text must tell the robot")
+        return self
+
+    def read(self, folder: Path, where: str) -> UrdfRobot:
+        """Read the URDF, which is in ``folder`` or below, and add springs and name."""
+        if self.urdf:
+            found = read_urdf(folder / self.urdf, self.base, self.repair, self.tools)
+        else:
+            path = folder / f"{self.name or 'robot'}.urdf"
+            found = parse_urdf(self.urdf_text, path, self.base, self.repair, self.tools)
+        is_prismatic = {
+            body.joint.name: body.joint.kind == "prismatic" for body in found.bodies if body.joint
+        }
+        springs = {
+            name: Spring(
+                given.stiffness, given.damping,
+                given.rest_deg if is_prismatic.get(name) else float(np.radians(given.rest_deg)),
+            )
+            for name, given in self.passive.items()
+        }  # fmt: skip
+        found = with_springs(found, springs, where)
+        return replace(found, name=self.name or found.name)
+
+
+class _Document(StrictModel):
+    robot: UrdfFile
+
+
+def is_urdf(content: dict[str, Any]) -> bool:
+    """Return whether what a robot's YAML holds refers to a URDF."""
+    robot = content.get("robot")
+    return isinstance(robot, dict) and any(key in robot for key in KEYS)
+
+
+def read_urdf_content(content: dict[str, Any], folder: Path, where: str) -> UrdfRobot:
+    """Read the URDF that a robot's YAML refers to.
+
+    Args:
+        content: what the YAML holds; see `is_urdf`.
+        folder: the YAML's.
+        where: the YAML's name, for errors.
+
+    Raises:
+        InputError: the YAML or the URDF is wrong.
+    """
+    return validate(_Document, content, where).robot.read(folder, where)
+
+
+def complete_content(content: dict[str, Any], folder: Path, where: str) -> dict[str, Any]:
+    """Return the content of a YAML with the URDF's text in the place of its path."""
+    file = validate(_Document, content, where).robot
+    found = file.read(folder, where)
+    robot = {key: value for key, value in content["robot"].items() if key != "urdf"}
+    return {"robot": {"name": found.name, **robot, "urdf_text": found.text}}
