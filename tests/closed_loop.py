@@ -61,7 +61,7 @@ class Loop:
         mission = MissionSettings(waypoint_times=[0.0, 15.0, 30.0], waypoints_deg=flat)
         self.plant = Plant(robot, PlantSettings(**plant), PERIOD)
         self.controller = Controller(robot, law, PERIOD, navigation=navigation)
-        self.mission = Mission(robot.n, mission, PERIOD)
+        self.mission = Mission(robot, mission, PERIOD)
         self.references = ReferenceBuffer(robot.n)
         self.own_output_as_applied = False
         self.flipped = False

@@ -59,10 +59,10 @@ def robot_of(log: FlightLog) -> Robot:
         robot = find_robot(str(name))
     else:
         raise NotDescribedError("the bag does not say which robot was flown")
-    if robot.joint_names != log.joint_names:
+    if (robot.joint_names, robot.passive_names) != (log.joint_names, log.passive_names):
         raise NotDescribedError(
-            f"robot {robot.name!r} has the joints {', '.join(robot.joint_names)}, "
-            f"the bag {', '.join(log.joint_names)}"
+            f"robot {robot.name!r} has the joints {', '.join(robot.all_joint_names)}, "
+            f"the bag {', '.join((*log.joint_names, *log.passive_names))}"
         )
     return robot
 

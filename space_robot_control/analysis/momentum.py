@@ -64,7 +64,7 @@ class MomentumSeries:
         axes, skipped = axes_of(rows), rows.ticks - log.ticks
         motion = Motion(
             rows.quaternion / np.linalg.norm(rows.quaternion, axis=1, keepdims=True),
-            rows.omega_base, rows.joint_positions, rows.joint_velocities,
+            rows.omega_base, rows.all_positions, rows.all_velocities,
         )  # fmt: skip
         found = robot_momentum(self._robot, motion)
         wheels = self.flown.wheels

@@ -68,11 +68,14 @@ class Pointing(Metric):
 def pointing_error(log: FlightLog, robot: Robot, start: Array | None = None) -> PointingError:
     """Compute the error of the tool's pose at every tick of a flight of ``robot``.
 
+    Joints without motors are desired to be at rest where their springs hold them.
     ``start``: (1, 3) m, where the base was when the flight began (None: at the first tick here).
     """
     start = log.base_position[:1] if start is None else start
-    actual, place = tool_pose(robot, _unit(log.quaternion), log.joint_positions)
-    desired, wanted = tool_pose(robot, _unit(log.reference_base[:, :4]), log.reference_joints[:, 0])
+    actual, place = tool_pose(robot, _unit(log.quaternion), log.all_positions)
+    rest = np.broadcast_to([spring.rest for spring in robot.springs], log.passive_positions.shape)
+    joints = np.hstack([log.reference_joints[:, 0], rest])
+    desired, wanted = tool_pose(robot, _unit(log.reference_base[:, :4]), joints)
     return PointingError(
         boresight=angle_between(actual[:, :, 2], desired[:, :, 2]),
         rotation=rotation_angle(actual, desired),

@@ -140,11 +140,16 @@ class Ripple(Metric):
 
 
 def desired_torque(log: FlightLog, robot: Robot) -> Array:
-    """(N, n+3) N m, what inverse dynamics asks of ``robot`` along the reference of each tick."""
+    """(N, n+3) N m, what inverse dynamics asks of ``robot`` along the reference of each tick.
+
+    Prismatic joints have N; joints without motors are locked.
+    """
     references = log.references(log.first_tick, log.first_tick + log.ticks)
     quaternion = references["quaternion"]
     quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
-    return (inverse_dynamics if controls_base(log) else free_inverse_dynamics)(robot, references)
+    return (inverse_dynamics if controls_base(log) else free_inverse_dynamics)(
+        robot.nominal, references
+    )
 
 
 def ripple_spectrum(log: FlightLog, robot: Robot) -> RippleSpectrum:

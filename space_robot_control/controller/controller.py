@@ -53,7 +53,7 @@ class Controller:
         """Build it for a robot and a law.
 
         Args:
-            robot: the nominal one.
+            robot: as the controller knows it; the laws have its `Robot.nominal`.
             law: in force at the beginning.
             period: s.
             acceleration_filter_hz: corner of the low-pass of the time-delay pair (0: none).
@@ -71,7 +71,7 @@ class Controller:
         self.block = ControllerMemory.block(robot.n)
         """The controller's `ControllerMemory`, for compiled loops."""
         memory: ControllerMemory = self.block[0]
-        assign(memory, model=robot.model, last_jacobian_inverse=2.0 * np.eye(3))
+        assign(memory, model=robot.nominal.model, last_jacobian_inverse=2.0 * np.eye(3))
         assign(memory, controls_base=actuators.controls_base)
         assign(memory, transfer_ticks=max(1, round(TRANSFER_S / period)))
         assign(memory.pair, smoothing=low_pass_weight(acceleration_filter_hz, period))

@@ -37,7 +37,7 @@ def bag_bytes(flight: Flight) -> float:
 def room_remark(flight: Flight, bag: Path) -> str:
     """Return a line that says that ``bag`` will not have room; empty if it will."""
     free = shutil.disk_usage(next(p for p in bag.absolute().parents if p.exists())).free
-    if flight.ticks * largest_tick(flight.robot.n) <= free:
+    if flight.ticks * largest_tick(flight.robot.joint_count) <= free:
         return ""
     try:
         size = bag_bytes(flight)

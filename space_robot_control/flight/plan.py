@@ -165,7 +165,7 @@ class Flight:
         self.law = next(iter(laws.values()))
         """In force at the start."""
         self.plant = Plant(self.robot, settings.plant, self.period)
-        self.mission = Mission(self.robot.n, settings.mission, self.period)
+        self.mission = Mission(self.robot, settings.mission, self.period)
         self.believed_actuators = believed_actuators(
             settings.controller.actuators, self._robots.controller
         )
@@ -274,6 +274,14 @@ class Flight:
         return {"base_actuators": flown, **other}
 
     @property
+    def _prismatic_joints(self) -> dict[str, Any]:
+        """The joints whose numbers are m and N; none is told of, where there is none."""
+        robot = self.robot
+        kinds = zip(robot.all_joint_names, robot.is_prismatic, strict=True)
+        found = [name for name, is_prismatic in kinds if is_prismatic]
+        return {"prismatic_joints": found} if found else {}
+
+    @property
     def description(self) -> dict[str, Any]:
         """The flight as a bag tells it; enough to fly it again.
 
@@ -302,6 +310,7 @@ class Flight:
             **({"restart_controller": True} if self.plan.restart_controller else {}),
             "parameters": self.parameters,
             "gains_used": self.gains_used,
+            **self._prismatic_joints,
             **self._robots.description,
             "versions": versions(),
             "commit": commit(),

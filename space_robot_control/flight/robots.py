@@ -26,11 +26,11 @@ class Robots:
         )
         self._names = settings.plant.robot, settings.controller.robot
         for node, robot in (("controller", self.controller), ("mission", mission)):
-            if robot.joint_names != self.plant.joint_names:
+            if _names(robot) != _names(self.plant):
                 raise InputError(
                     f"the robots of plant and {node} must have the same joints, got "
-                    f"{self.plant.name!r} with {', '.join(self.plant.joint_names)} and "
-                    f"{robot.name!r} with {', '.join(robot.joint_names)}"
+                    f"{self.plant.name!r} with {', '.join(self.plant.all_joint_names)} and "
+                    f"{robot.name!r} with {', '.join(robot.all_joint_names)}"
                 )
 
     def _read(self, name: str) -> Robot:
@@ -44,3 +44,7 @@ class Robots:
         plant, controller = (self._contents[name] for name in self._names)
         own = {"controller_robot": self.controller.name, "controller_robot_file": controller}
         return {"robot_file": plant, **({} if controller == plant else own)}
+
+
+def _names(robot: Robot) -> tuple[tuple[str, ...], ...]:
+    return robot.joint_names, robot.passive_names

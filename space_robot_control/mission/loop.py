@@ -43,7 +43,7 @@ class MissionLoop:
         """Read the robot and the mission."""
         self._node, self._settings = node, settings
         robot = find_robot(settings.robot)
-        self._mission = Mission(robot.n, settings, settings.period)
+        self._mission = Mission(robot, settings, settings.period)
         self._codec = ReferenceCodec(robot.joint_names, settings.timebase)
         self._joints = RawPublisher(node, topics.REFERENCE_JOINTS)
         self._base = RawPublisher(node, topics.REFERENCE_BASE)

@@ -11,6 +11,7 @@ from pydantic import Field
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ReferenceChunk
+from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -22,7 +23,9 @@ class MissionSettings(StrictModel):
         [0.0], description="time of each waypoint, s, rising from 0", min_length=1
     )
     waypoints_deg: list[float] = Field(
-        [0.0], description="joint angles of all waypoints one after the other, degrees"
+        [0.0],
+        description="positions of the joints with motors in all waypoints one after the other, "
+        "degrees (of prismatic joints m)",
     )
     base_quaternion: Annotated[list[float], Field(min_length=4, max_length=4)] = Field(
         [1.0, 0.0, 0.0, 0.0], description="base attitude to hold: w, x, y, z"
@@ -36,13 +39,13 @@ class Mission:
     waypoint and after the last the arm is held there.
     """
 
-    def __init__(self, n: int, settings: MissionSettings, period: float) -> None:
-        """A mission for ``n`` joints.
+    def __init__(self, robot: Robot, settings: MissionSettings, period: float) -> None:
+        """A mission for the joints with motors of ``robot``.
 
         Raises:
             InputError: the waypoints do not fit the times or the joints.
         """
-        times = np.array(settings.waypoint_times)
+        n, times = robot.n, np.array(settings.waypoint_times)
         if len(settings.waypoints_deg) != n * len(times):
             raise InputError(
                 f"waypoints_deg has {len(settings.waypoints_deg)} values; "
@@ -54,7 +57,7 @@ class Mission:
         if not 1e-3 <= norm <= 1e3:
             raise InputError(f"base_quaternion must have a norm near 1, got {norm:g}")
         self._times = times
-        self._waypoints = np.radians(settings.waypoints_deg).reshape(len(times), n)
+        self._waypoints = robot.from_degrees(np.reshape(settings.waypoints_deg, (len(times), n)))
         self._quaternion = np.array(settings.base_quaternion) / norm
         self._period = period
 

@@ -62,7 +62,8 @@ def demand(robot: Robot, mission: MissionSettings, cases: Sequence[EnvironmentSe
 def _smooth_force(
     robot: Robot, settings: MissionSettings, case: EnvironmentSettings | None = None
 ) -> Array:
-    """Return F_S (K, m) every `SAMPLING` s, without Coulomb friction."""
+    """Return F_S (K, m) every `SAMPLING` s, without Coulomb friction; passive joints locked."""
+    robot = robot.nominal
     chunk = sampled_reference(robot, settings)
     count = len(chunk.joints)
     quaternion, still = chunk.base[0, :4], np.zeros(3)

@@ -41,7 +41,7 @@ def sampled_reference(
     Raises:
         InputError: the waypoints do not fit the times or the joints.
     """
-    mission = Mission(robot.n, settings, step)
+    mission = Mission(robot, settings, step)
     return mission.chunk(0, int(np.ceil(mission.duration / step - 1e-9)) + 1)
 
 
@@ -53,7 +53,7 @@ def inertia_along(
     If nothing turns the base: H_f (K, n, n).
 
     Args:
-        robot: with its payload, if it carries one.
+        robot: with its payload, if it carries one; joints without motors are locked.
         settings: of the mission; its last waypoint is looked at too.
         step: s.
         controls_base: whether anything turns the base.
@@ -62,7 +62,7 @@ def inertia_along(
         InputError: the waypoints do not fit the times or the joints.
     """
     chunk = sampled_reference(robot, settings, step)
-    inertia = semi_floating_inertia(robot, chunk.joints[:, 0])
+    inertia = semi_floating_inertia(robot.nominal, chunk.joints[:, 0])
     return inertia_in_rho(chunk.base[0, :4], inertia) if controls_base else free_inertia(inertia)
 
 

@@ -76,7 +76,7 @@ def listen(
     kind = find_law("tde_stc")  # whichever: its command goes nowhere
     law = kind({name: np.ones(robot.n + 3) for name in kind.gain_descriptions()}, period)
     controller = Controller(robot, law, period, navigation=navigation)
-    memory, held = controller.block[0], Mission(robot.n, mission, period).chunk(0, 1).references()
+    memory, held = controller.block[0], Mission(robot, mission, period).chunk(0, 1).references()
     first, last = round(SETTLING / period), round((SETTLING + LISTENING) / period)
     rates, errors = np.empty((2, last - first, robot.n + 3))
     for tick in range(last):

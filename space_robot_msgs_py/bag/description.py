@@ -68,6 +68,7 @@ class _Description(_Names):
     robot_file: dict[Text, JsonValue] = Field(default_factory=dict)
     base_actuators: dict[Text, JsonValue] = Field(default_factory=dict)
     controller_base_actuators: dict[Text, JsonValue] = Field(default_factory=dict)
+    prismatic_joints: list[Text] = Field(default_factory=list)
     controller_robot: Text = ""
     controller_robot_file: dict[Text, JsonValue] = Field(default_factory=dict)
 

@@ -198,7 +198,7 @@ class FlightLog:
     @property
     def whole(self) -> NDArray[np.bool_]:
         """(N,) whether state and reference of a row are there and finite."""
-        return self.finite(STATE_FIELDS) & self.finite(REFERENCE)
+        return self.finite(TOLD) & self.finite(REFERENCE)
 
     def finite(self, columns: Iterable[str]) -> NDArray[np.bool_]:
         """(N,) whether a row has no NaN in some of the columns."""
@@ -212,6 +212,16 @@ class FlightLog:
             return self.rows(0, 0)
         longest = int(np.argmax(stops - starts))
         return self.rows(int(starts[longest]), int(stops[longest]))
+
+    @property
+    def all_positions(self) -> Array:
+        """(N, n+p) rad or m, of all joints; those without motors are behind."""
+        return _beside(self.joint_positions, self.passive_positions)
+
+    @property
+    def all_velocities(self) -> Array:
+        """(N, n+p) rad/s or m/s, of all joints; those without motors are behind."""
+        return _beside(self.joint_velocities, self.passive_velocities)
 
     @property
     def axes(self) -> int:
@@ -280,6 +290,10 @@ def finite_rows(columns: Iterable[Array]) -> NDArray[np.bool_]:
     each = (np.isfinite(column.reshape(len(column), -1)).all(axis=1) for column in columns)
     found: NDArray[np.bool_] = np.logical_and.reduce(list(each))
     return found
+
+
+def _beside(joints: Array, passive: Array) -> Array:
+    return np.hstack([joints, passive]) if passive.shape[1] else joints
 
 
 def _put(

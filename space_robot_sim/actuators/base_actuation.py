@@ -57,7 +57,7 @@ class BaseActuatorSettings(StrictModel):
 
     def robot_names(self, robot: Robot) -> RobotNames:
         """Return the names of all that is told of ``robot`` and asked of it."""
-        return RobotNames.of(robot.joint_names, self.names, self.wheel_count)
+        return RobotNames.of(robot.joint_names, self.names, self.wheel_count, robot.passive_names)
 
     def check(self, robot: Robot, file: str) -> None:
         """See that the numbers fit one another and a robot.
@@ -87,7 +87,7 @@ class BaseActuatorSettings(StrictModel):
         self.wheels.check(robot.inertia[0])
         self.thrusters.check()
         _check_torques(self)
-        for name in set(self.names) & set(robot.joint_names):
+        for name in set(self.names) & set(robot.all_joint_names):
             raise InputError(f"{name!r} is a joint of robot {robot.name!r}, too: rename the joint")
 
 

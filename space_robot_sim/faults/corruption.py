@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from space_robot_msgs_py.samples import Command, RobotState
+from space_robot_msgs_py.samples import PASSIVE_FIELDS, Command, RobotState
 
 from .grammar import PROBABILITY, Kind
 from .schedule import Schedule
@@ -36,7 +36,9 @@ class Corruption:
         NAN_STATE, INF_STATE, SCALED_QUATERNION, STAMP_BACK, STAMP_JUMP, NAN_COMMAND, INF_COMMAND,
     )  # fmt: skip
 
-    def __init__(self, schedule: Schedule) -> None:
+    def __init__(self, schedule: Schedule, passive: int = 0) -> None:
+        """``passive``: the robot has so many joints without motors."""
+        self._passive = passive
         self._states = [
             (fault, value) for kind, value in ((NAN_STATE, np.nan), (INF_STATE, np.inf))
             for fault in schedule.of(kind)
@@ -57,6 +59,7 @@ class Corruption:
         for fault, value in self._states:
             if fault.happens_at(tick):
                 arrays = [getattr(state, name) for name in MEASURED]
+                arrays += [getattr(state, name)[: self._passive] for name in PASSIVE_FIELDS]
                 place = fault.choose(tick, sum(array.size for array in arrays))
                 for array in arrays:
                     if 0 <= place < array.size:

@@ -16,12 +16,19 @@ Array = NDArray[np.float64]
 NO_WHEELS = WheelSettings()
 
 
-def generalised_velocity(state: RobotState) -> Array:
-    """Return ``[v0, w0, thetadot]`` (n+6,) m/s and rad/s, base part on inertial axes."""
+def all_positions(robot: Robot, state: RobotState) -> Array:
+    """Return the positions (N,) of all joints, those without motors behind; rad or m."""
+    passive = state.passive_positions[: len(robot.passive_names)]
+    return np.concatenate([state.joint_positions, passive])
+
+
+def generalised_velocity(robot: Robot, state: RobotState) -> Array:
+    """Return ``[v0, w0, thetadot]`` (N+6,) m/s and rad/s, base part on inertial axes."""
     rotation = np.empty((3, 3))
     rotation_matrix(state.quaternion, rotation)
+    passive = state.passive_velocities[: len(robot.passive_names)]
     return np.concatenate(
-        [state.base_velocity, rotation @ state.omega_base, state.joint_velocities]
+        [state.base_velocity, rotation @ state.omega_base, state.joint_velocities, passive]
     )
 
 
@@ -29,8 +36,8 @@ def momentum(
     robot: Robot, state: RobotState, wheels: WheelSettings = NO_WHEELS
 ) -> tuple[Array, Array]:
     """Return linear (N s) and angular momentum (N m s) about the inertial origin, inertial axes."""
-    inertia = mass_matrix(robot, state.quaternion, state.joint_positions)
-    base = inertia[:6] @ generalised_velocity(state)
+    inertia = mass_matrix(robot, state.quaternion, all_positions(robot, state))
+    base = inertia[:6] @ generalised_velocity(robot, state)
     angular = base[3:] + np.cross(state.base_position, base[:3])
     rotation = np.empty((3, 3))
     rotation_matrix(state.quaternion, rotation)
@@ -39,8 +46,8 @@ def momentum(
 
 def kinetic_energy(robot: Robot, state: RobotState, wheels: WheelSettings = NO_WHEELS) -> float:
     """Return the kinetic energy T of (4) and of the wheels' spin, J."""
-    velocity = generalised_velocity(state)
-    inertia = mass_matrix(robot, state.quaternion, state.joint_positions)
+    velocity = generalised_velocity(robot, state)
+    inertia = mass_matrix(robot, state.quaternion, all_positions(robot, state))
     of_base, of_wheels = wheels.unit_axes @ state.omega_base, state.wheel_velocities[: wheels.count]
     spin = _spin_momenta(wheels, state) @ (of_base + 0.5 * of_wheels)
     return float(0.5 * velocity @ inertia @ velocity + spin)

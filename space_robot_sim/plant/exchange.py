@@ -92,5 +92,5 @@ def exchange_of(
     """Return the exchange of a robot's flight: a faulty one if any of its messages are to fail."""
     if not settings.has_message_faults:
         return Exchange(codec, guard)
-    faults = MessageFaults(settings.schedule(names, period), len(names.joints))
+    faults = MessageFaults(settings.schedule(names, period), len(names.joints), len(names.passive))
     return FaultyExchange(codec, guard, faults)

@@ -115,9 +115,12 @@ class MessageFaults:
     `commands` on the way back.
     """
 
-    def __init__(self, schedule: Schedule, n: int) -> None:
-        """Prepare those that ``schedule`` has, for a robot of ``n`` joints."""
-        self.corruption = Corruption(schedule)
+    def __init__(self, schedule: Schedule, n: int, passive: int = 0) -> None:
+        """Prepare those that ``schedule`` has.
+
+        The robot has ``n`` joints with motors, ``passive`` without.
+        """
+        self.corruption = Corruption(schedule, passive)
         self.states: Link[Any] = Link(schedule, STATE_LINK)
         """All messages of a tick's state are one item."""
         self.commands: Link[Any] = Link(schedule, COMMAND_LINK)

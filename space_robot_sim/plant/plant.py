@@ -45,7 +45,8 @@ class PlantSettings(ActuatorSettings, EnvironmentSettings, SensorSettings, Fault
     """Settings of the plant's world, beside the robot's own file."""
 
     initial_joints_deg: list[float] = Field(
-        [0.0], description="joint angles at tick 0, degrees, one a joint"
+        [0.0],
+        description="positions at tick 0 of the joints with motors, degrees (of prismatic ones m)",
     )
     initial_quaternion: Annotated[list[float], Field(min_length=4, max_length=4)] = Field(
         [1.0, 0.0, 0.0, 0.0], description="base attitude at tick 0: w, x, y, z"

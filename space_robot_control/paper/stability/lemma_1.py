@@ -63,12 +63,15 @@ class Contraction:
 
 
 def inertia_along(robot: Robot, log: FlightLog, ticks: NDArray[np.intp]) -> Array:
-    """(K, m, m) H_S of ``robot`` in the configurations flown at ``ticks`` (K,)."""
-    model = RhoSpaceModel.allocate(robot.n)
+    """(K, m, m) H_S of ``robot`` in the configurations flown at ``ticks`` (K,).
+
+    Passive joints are locked.
+    """
+    nominal, model = robot.nominal.model, RhoSpaceModel.allocate(robot.n)
     inertia = np.empty((len(ticks), log.axes, log.axes))
     for k, tick in enumerate(ticks):
         rho_space_into(
-            robot.model, log.quaternion[tick], log.joint_positions[tick], log.omega_base[tick],
+            nominal, log.quaternion[tick], log.joint_positions[tick], log.omega_base[tick],
             log.joint_velocities[tick], model,
         )  # fmt: skip
         inertia[k] = model.inertia

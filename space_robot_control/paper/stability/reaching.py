@@ -49,7 +49,7 @@ def off_mission_plan(flight: Flight, initial_error: float) -> FlightPlan:
     eta = np.copysign(np.sqrt(1.0 - eps @ eps), start.base[0, 0])
     plant: dict[str, Any] = {
         "initial_quaternion": [float(eta), *eps.tolist()],
-        "initial_joints_deg": np.degrees(start.joints[0, 0] - initial_error).tolist(),
+        "initial_joints_deg": flight.robot.to_degrees(start.joints[0, 0] - initial_error).tolist(),
     }
     return flight.plan.with_parameters("plant", plant)
 

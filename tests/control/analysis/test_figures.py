@@ -22,6 +22,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 from PIL import Image
+from random_robots import random_robot
 from scipy import signal
 
 from space_robot_control.analysis import excerpt, tracking_error
@@ -59,7 +60,7 @@ def flown(
     angles = random.uniform(-90.0, 90.0, (len(times), n))
     settings = MissionSettings(waypoint_times=list(times), waypoints_deg=angles.ravel().tolist())
     ticks = round((times[-1] if duration is None else duration) / PERIOD)
-    chunk = Mission(n, settings, PERIOD).chunk(0, ticks)
+    chunk = Mission(random_robot(np.random.default_rng(n), n), settings, PERIOD).chunk(0, ticks)
     joints = names or tuple(f"joint{i + 1}" for i in range(n))
     log = FlightLog.allocate(ticks, joints, Timebase(500_000))
     log.reference_joints[:], log.reference_base[:] = chunk.joints, chunk.base

@@ -332,7 +332,7 @@ def test_all_that_is_made_of_a_plan_agrees(parameters: Parameters) -> None:
     )  # fmt: skip
     assert loop.block.tobytes() == flight.controller.block.tobytes()
     assert law.gains_block.tobytes() == flight.controller.law.gains_block.tobytes()
-    reference = Mission(6, mission, mission.period).chunk(0, 100)
+    reference = Mission(robot, mission, mission.period).chunk(0, 100)
     np.testing.assert_array_equal(reference.joints, flight.mission.chunk(0, 100).joints)
 
 

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
+from random_robots import random_robot
 
 from space_robot_control.mission.mission import Mission, MissionSettings
 from space_robot_msgs_py.errors import InputError
@@ -18,6 +19,7 @@ from space_robot_msgs_py.errors import InputError
 Array = NDArray[np.float64]
 
 PERIOD = 5e-4
+ROBOTS = {n: random_robot(np.random.default_rng(n), n) for n in range(1, 10)}
 PAPER_TIMES = [0.0, 15.0, 30.0]
 PAPER_DEG = np.array(
     [[0, 120, 220, 0, -10, 0], [15, 110, 185, 45, 10, -25], [30, 100, 150, 90, 30, -50]], float
@@ -28,7 +30,7 @@ def mission_of(times: Any, degrees: Any, period: float = PERIOD, **more: Any) ->
     degrees = np.asarray(degrees, dtype=float)
     flat = degrees.ravel().tolist()
     options = MissionSettings(waypoint_times=list(times), waypoints_deg=flat, **more)
-    return Mission(degrees.shape[-1], options, period)
+    return Mission(ROBOTS[degrees.shape[-1]], options, period)
 
 
 @pytest.fixture(scope="module")
