@@ -78,7 +78,9 @@ setup(
             "scipy-stubs",
             "types-PyYAML",
             "types-psutil",
+            "xacro",
         ],
+        "xacro": ["xacro"],  # robots in files that end in .xacro
     },
     entry_points={"console_scripts": ["space-robot = space_robot_control.cli.main:main"]},
     data_files=[

@@ -11,6 +11,7 @@ from ..tree import Visual
 from .elements import Element
 from .fields import Fields, Frame
 from .findings import Report, short_tag
+from .meshes import mesh_path
 
 Colour = tuple[float, float, float, float]
 Colours = dict[str, Colour]
@@ -73,8 +74,7 @@ def _shape(
         name = shape.attributes.get("filename", "")
         if not name or not name.isprintable():
             raise fields.report.error(shape.line, fields.part, "a mesh needs a filename", name)
-        # a path is that from the URDF's folder; package://, file:// and the like stay as they are
-        mesh = name if "://" in name else str(folder / name)
+        mesh = mesh_path(name, folder)
         return Visual("mesh", scale, frame.rotation, frame.position, mesh, colour)
     if shape.tag == "box":
         size = tuple(map(float, fields.vector(shape, "size", None)))

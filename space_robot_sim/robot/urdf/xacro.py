@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 import io
 from pathlib import Path
 
@@ -19,10 +18,10 @@ def expand_xacro(path: Path) -> str:
     """
     check_file(path)
     try:
-        xacro = importlib.import_module("xacro")
+        import xacro
     except ImportError:
         raise InputError(
-            f"{path}: xacro is not installed: `pip install xacro` or `apt install "
+            f"{path}: xacro is not installed: `pip install 'space_robot[xacro]'` or `apt install "
             "ros-jazzy-xacro`, or expand the file elsewhere to a .urdf"
         ) from None
     said = io.StringIO()  # warnings, and where it was when it failed
