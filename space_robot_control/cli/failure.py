@@ -2,32 +2,34 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from space_robot_msgs_py.errors import DivergedError, FlightError, InputError
+from space_robot_msgs_py.errors import FlightError, InputError
 
 if TYPE_CHECKING:
     from ..flight.plan import Flight
 
 FLOWN = ("controller", "case", "gains", "robot", "mission", "sensors", "period", "swaps", "faults")
-_DIVERGED = re.compile(r"diverged at tick (\d+)")
 
 
 def failed_report(
     flight: Flight, bag: Path | None, error: FlightError, figures: dict[str, Any]
 ) -> dict[str, Any]:
     """Report what was to be flown, the ``figures`` of what was, and why it is no more."""
-    planned = flight.description
+    from ..flight.ending import DIVERGED, Ending
+
+    planned, ending = flight.description, Ending.early(error, flight.period)
+    diverged = {"tick": ending.tick, "time_s": ending.ended_at_s}
     report = {key: planned[key] for key in FLOWN if key in planned}
     return {
         **report,
         **figures,
         "planned_ticks": flight.ticks,
         "bag": str(bag) if bag and bag.exists() else None,
-        "diverged": _divergence(error, flight.period),
+        "diverged": diverged if ending.outcome == DIVERGED else None,
         "error": str(error),
+        **ending.as_record(),
     }
 
 
@@ -41,10 +43,3 @@ def report_of(bag: Path) -> dict[str, Any]:
         return analyze(read_flight(bag, trust=True))
     except InputError:
         return {}
-
-
-def _divergence(error: FlightError, period: float) -> dict[str, Any] | None:
-    """Return tick and time; of a graph's flight they are in the words of the node that saw it."""
-    found = _DIVERGED.search(str(error))
-    tick = error.tick if isinstance(error, DivergedError) else int(found[1]) if found else None
-    return None if tick is None else {"tick": tick, "time_s": round(tick * period, 9)}

@@ -48,6 +48,7 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
 
     from ..analysis import analyze
     from ..flight.bag_path import check_bag_path, default_bag
+    from ..flight.ending import Ending
     from ..flight.graph.orchestrator import fly as fly_graph
     from ..flight.terminal import echo_json
     from .failure import failed_report, report_of
@@ -62,6 +63,8 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
         if as_json:
             echo_json(failed_report(flight, bag, error, report_of(bag)))
         raise
-    show_report(report, as_json)
+    ending = Ending.complete(flight.ticks, flight.period)
     if failures := report["graph"]["failures"]:
-        raise FlightError("; ".join(failures))
+        ending = Ending.early(FlightError("; ".join(failures)), flight.period)
+    show_report({**report, **ending.as_record()}, as_json)
+    ending.check()

@@ -32,6 +32,7 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
     from ..flight.bag_path import check_bag_path
     from ..flight.compilation import compile_kernels
     from ..flight.disk_space import room_remark
+    from ..flight.ending import Ending
     from ..flight.progress import flight_progress
     from ..flight.simulate import fly_blocks
     from .failure import failed_report
@@ -61,7 +62,9 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
             except FlightError as error:
                 failure = error
     report = analysis.report() if analysis.ticks else {}
-    if failure and as_json:
+    if not failure:
+        report |= Ending.complete(flight.ticks, period).as_record()
+    elif as_json:
         report = failed_report(flight, bag, failure, report)
     if report:
         show_report(report, as_json)

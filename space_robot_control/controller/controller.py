@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +38,20 @@ Array = NDArray[np.float64]
 
 TRANSFER_S = 0.02
 """Time in which a law that takes over passes from the force it found to its own, s."""
+
+
+class ControllerSnapshot(NamedTuple):
+    """A controller between two ticks, see `Controller.save`."""
+
+    block: Block
+    """Of a `ControllerMemory`."""
+    law: str
+    """Name of the law in force."""
+    saved_law: dict[str, Any]
+    """See `ControlLaw.save`."""
+    tick: int
+    torque: Array
+    """Of the last command."""
 
 
 class Controller:
@@ -85,7 +101,8 @@ class Controller:
         self._address = allocated.ctypes.data
         self._actuators: Array = allocated["command"][0, : len(actuators.names)]
         """What is asked of each of them."""
-        self._command = Command(-1, np.zeros(len(self.names.commanded)))
+        self.last_command = Command(-1, np.zeros(len(self.names.commanded)))
+        """That of the last tick, overwritten by the next."""
         self.valves = slice(robot.n + 3 + actuators.wheel_count, None)
         """The part of a command that opens thrusters."""
         self.signals = Signals.view(self.block["signals"])
@@ -108,6 +125,21 @@ class Controller:
         self.signals.n_hat[:] = 0.0
         assign(self._memory, transfer_left=-1.0)
 
+    def save(self) -> ControllerSnapshot:
+        """Copy what the controller and its law know and remember."""
+        command = self.last_command
+        return ControllerSnapshot(
+            self.block.copy(), self._law.name, self._law.save(), command.tick, command.torque.copy()
+        )
+
+    def restore(self, snapshot: ControllerSnapshot, laws: Mapping[str, ControlLaw]) -> None:
+        """Be again what was saved; ``laws`` by name hold the one that was in force."""
+        self.block[:] = snapshot.block
+        self._law = laws[snapshot.law]
+        self._law.restore(snapshot.saved_law)
+        self.last_command.tick = snapshot.tick
+        self.last_command.torque[:] = snapshot.torque
+
     def update(self, state: RobotState, reference: Block) -> Command:
         """The torque that answers a measured state.
 
@@ -123,17 +155,32 @@ class Controller:
                 unit; nothing was remembered of it.
             SingularAttitudeError: the base has turned by 180 degrees.
         """
-        law, command = self._law, self._command
+        law, command = self._law, self.last_command
         status = compute_signals(
             self.block, state.tick, state.block, reference, law.h_bar, law.uses_model, self.period
         )
         if status != USABLE:
             raise unusable(status, state.tick, state.quaternion)
         apply_transfer(self.block, state.tick, law.force(self.signals), command.torque)
+        return self._share_out(state.tick)
+
+    def share_out(self, state: RobotState, torque: Array) -> Command:
+        """The command for a torque (m,), N m, that no law asked for; see `update`."""
+        allocation = self._memory.allocation
+        assign(
+            allocation, reported_speeds=state.wheel_velocities,
+            reported_torques=state.wheel_torques, demand=torque[:3],
+        )  # fmt: skip
+        self.last_command.torque[: len(torque)] = torque
+        return self._share_out(state.tick)
+
+    def _share_out(self, tick: int) -> Command:
+        """Ask the base's actuators, if it has any, for the torque demanded of the base."""
+        command = self.last_command
         if self._actuators.size:
-            self.allocate.call(self._address, state.tick)
+            self.allocate.call(self._address, tick)
             command.torque[-self._actuators.size :] = self._actuators
-        command.tick = state.tick
+        command.tick = tick
         return command
 
     @cached_property

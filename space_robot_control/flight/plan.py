@@ -22,6 +22,7 @@ from ..controller.controller import Controller
 from ..controller.gains import build_laws
 from ..controller.navigation.settings import Mode
 from ..controller.swaps import parse_swaps
+from ..laws import ControlLaw
 from ..mission.mission import Mission
 from .faults import KINDS, PROCESS_KINDS
 from .node_settings import FlightSettings
@@ -171,12 +172,16 @@ class Flight:
         )
         """The base's actuators as the controller knows them."""
         self._check_actuators()
-        self.controller = Controller(
-            self._robots.controller, self.law, self.period,
-            settings.controller.acceleration_filter_hz, settings.controller.filter_settings,
-            self.believed_actuators, settings.controller.allocation,
-        )  # fmt: skip
+        self.controller = self.build_controller(self.law)
         self.ticks = self._ticks()
+
+    def build_controller(self, law: ControlLaw) -> Controller:
+        """Build a controller that remembers nothing, with ``law`` in force."""
+        settings = self.controller_settings
+        return Controller(
+            self._robots.controller, law, self.period, settings.acceleration_filter_hz,
+            settings.filter_settings, self.believed_actuators, settings.allocation,
+        )  # fmt: skip
 
     def _ticks(self) -> int:
         duration = self.mission.duration if self.plan.duration is None else self.plan.duration

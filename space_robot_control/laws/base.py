@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -50,6 +51,10 @@ class LawMemory(Record):
     force: Array = per_axis("generalised force F_S", "N m")
 
 
+_BLOCKS, _VIEWS = ("gains_block", "memory_block"), ("gains", "memory", "h_bar")
+"""Attributes of a law: its memory, and those that look into it."""
+
+
 class ControlLaw(ABC):
     """One control law on m = n+3 axes at a fixed period.
 
@@ -69,14 +74,38 @@ class ControlLaw(ABC):
         self.period = period
         self.gains_block = self.gains_type.block(n)
         self.memory_block = self.memory_type.block(n)
+        self._look_into_blocks()
+        self.gain_values = gains
+        self.reset()
+
+    def _look_into_blocks(self) -> None:
         self.gains: Any = self.gains_type.view(self.gains_block)
         """The gains as attributes."""
         self.memory: Any = self.memory_type.view(self.memory_block)
         """s and u of the last tick, and what the law remembers, as attributes."""
         self.h_bar: Array = getattr(self.gains, "h_bar", np.zeros(0))
         """(m,) h_bar of the time-delay estimate; empty if the law has none."""
-        self.gain_values = gains
-        self.reset()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Copy and pickle a law without its views of its own memory."""
+        return {name: value for name, value in vars(self).items() if name not in _VIEWS}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Look into the memory that came."""
+        vars(self).update(state)
+        self._look_into_blocks()
+
+    def save(self) -> dict[str, Any]:
+        """Copy gains, memory and all other attributes, for `restore`."""
+        return copy.deepcopy(self.__getstate__())
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Be again what was saved."""
+        for name, value in copy.deepcopy(dict(saved)).items():
+            if name in _BLOCKS:
+                getattr(self, name)[:] = value
+            else:
+                setattr(self, name, value)
 
     @classmethod
     def gain_descriptions(cls) -> dict[str, str]:

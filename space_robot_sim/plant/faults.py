@@ -6,6 +6,7 @@ way between plant and controller.
 
 from __future__ import annotations
 
+import copy
 import math
 from typing import Annotated, Any
 
@@ -90,6 +91,14 @@ class PartFaults:
         acting = schedule.of(*PART_KINDS.values())
         self._turns = sorted({tick for fault in acting for tick in (fault.first, fault.stop)})
         """Ticks at which something begins or ends."""
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> PartFaults:
+        """Without any fault there is nothing to copy."""
+        copied = PartFaults.__new__(PartFaults)
+        memo[id(self)] = copied
+        held = vars(self)
+        copied.__dict__.update(copy.deepcopy(held, memo) if self._turns else held)
+        return copied
 
     def are_in(self, group: str) -> bool:
         """Return whether any part of a group ("sensors", ...) fails at some time."""

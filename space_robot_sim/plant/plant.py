@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +75,19 @@ class PlantMemory(Record):
     """The true state at the current tick, and the torque given over the interval before it."""
     measured: State = nested(State)
     """The state as the sensors report it at the current tick."""
+
+
+class PlantSnapshot(NamedTuple):
+    """A plant at a tick, see `Plant.save`."""
+
+    tick: int
+    block: Block
+    """Of a `PlantMemory`."""
+    command_delay_buffer: Array
+    next_change: float
+    drawn: tuple[int, int]
+    """See `Draws`."""
+    part_faults: PartFaults
 
 
 class Plant:
@@ -189,6 +203,21 @@ class Plant:
             self.state.block[:] = self.truth.block
         else:
             measure(self.block, tick, self.period)
+
+    def save(self) -> PlantSnapshot:
+        """Copy all that the rest of the flight depends on, but the commands to come."""
+        return PlantSnapshot(
+            self.tick, self.block.copy(), self.command_delay_buffer.copy(), self.next_change,
+            self._draws.drawn, copy.deepcopy(self._part_faults),
+        )  # fmt: skip
+
+    def restore(self, snapshot: PlantSnapshot) -> None:
+        """Go back, or on, to the tick of a snapshot of this flight: from there the bits repeat."""
+        self.block[:] = snapshot.block
+        self.command_delay_buffer[:] = snapshot.command_delay_buffer
+        self.state.tick = self.truth.tick = snapshot.tick
+        self.next_change, self._draws.drawn = snapshot.next_change, snapshot.drawn
+        self._part_faults = copy.deepcopy(snapshot.part_faults)
 
     def diverged(self, fastest: float) -> DivergedError:
         """Return the error for a fastest rate after a step of ``fastest``, rad/s."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -46,7 +47,11 @@ class SensorFault:
 
 
 def _by_kind(changes: Mapping[Kind, Change]) -> Change:
-    return lambda values, fault: changes[fault.kind](values, fault)
+    return partial(_change, changes)
+
+
+def _change(changes: Mapping[Kind, Change], values: Array, fault: ScheduledFault) -> None:
+    changes[fault.kind](values, fault)
 
 
 def add_noise(sigma: Array, fault: ScheduledFault) -> None:

@@ -24,17 +24,18 @@ class Draws:
 
     def __init__(self, seed: int, arrays: Mapping[str, Array]) -> None:
         """``arrays``: to be filled, by the sensor's name."""
-        self._keys = [((seed, zlib.crc32(name.encode())), a) for name, a in arrays.items()]
-        self._block = -1
+        self._arrays = [(zlib.crc32(name.encode()), array) for name, array in arrays.items()]
+        self.drawn = seed, -1
+        """The seed, and the block of ticks that is in the arrays."""
 
     def refill(self, tick: int) -> int:
         """See that the row of ``tick`` is drawn; return the first tick that needs other rows."""
-        block = tick // BLOCK_TICKS
-        if block != self._block:
-            for key, array in self._keys:
-                rng = np.random.default_rng((*key, block))
+        block, (seed, drawn) = tick // BLOCK_TICKS, self.drawn
+        if block != drawn:
+            for key, array in self._arrays:
+                rng = np.random.default_rng((seed, key, block))
                 array[:] = rng.standard_normal(array.shape)
-            self._block = block
+            self.drawn = seed, block
         return (block + 1) * BLOCK_TICKS
 
 
