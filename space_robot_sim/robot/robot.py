@@ -19,6 +19,7 @@ from space_robot_msgs_py.topics import BASE_AXES
 from ..dynamics.model import MOST_JOINTS, Model
 from .file import _Document, inertia_tensor
 from .model import model_of
+from .numbers import Document, are_numbers, numbers_of
 from .tree import Body, Joint, JointFriction, JointLimits, Moved, Spring, Tool, Visual, flatten
 
 if TYPE_CHECKING:
@@ -107,7 +108,7 @@ class Robot:
     def from_dict(
         cls, content: dict[str, Any], where: str = "robot", folder: Path | None = None
     ) -> Robot:
-        """Build from the mapping a robot file holds (key ``robot`` at its top).
+        """Build from the mapping a robot file holds (key ``robot`` at its top), or `content`.
 
         A URDF that it refers to is looked for in ``folder``, the working one if None.
         """
@@ -115,6 +116,10 @@ class Robot:
 
         if is_urdf(content):
             return cls._of_urdf(read_urdf_content(content, folder or Path(), where), where)
+        if are_numbers(content):
+            numbers = validate(Document, content, where).robot
+            built = cls.of_tree(numbers.name, [b.body for b in numbers.bodies], where)
+            return built._walked(numbers.order, where)
         file = validate(_Document, content, where).robot
         return cls.of_tree(file.name, file.bodies(), where)
 
@@ -206,6 +211,22 @@ class Robot:
                 body = replace(body, parent=self.body_names[self.parent[j]], joint=joint)
             found.append(body)
         return found
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """All numbers but the visuals, as lists and texts; `from_dict` builds the same of them."""
+        return numbers_of(self.name, self.bodies(), self.order)
+
+    def _walked(self, order: Sequence[int], where: str) -> Robot:
+        """Return the robot with another `order`, in which sums over branches are taken."""
+        seen = {-1}
+        for j in order:
+            if j in seen or not 0 <= j < self.joint_count or self.parent[j] - 1 not in seen:
+                raise InputError(f"{where}: order: each joint once, a parent's before its own")
+            seen.add(j)
+        if len(order) != self.joint_count:
+            raise InputError(f"{where}: order: {self.joint_count} joints were expected")
+        return replace(self, order=tuple(order))
 
     @cached_property
     def nominal(self) -> Robot:

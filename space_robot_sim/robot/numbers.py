@@ -1,0 +1,126 @@
+"""A robot's own numbers as a mapping, of which the same robot is built to the bit.
+
+So bags keep a robot that no file tells. Who writes a robot by hand has a file's form, see
+`space_robot_sim.robot.file`. Numbers that are infinite or NaN are null; visuals are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from space_robot_msgs_py.config.validation import StrictModel
+
+from .tree import Body, Joint, JointFriction, JointLimits, Spring, Tool
+
+Array = NDArray[np.float64]
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
+
+
+class ToolNumbers(StrictModel):
+    """See `Tool`."""
+
+    name: str
+    rotation: Matrix
+    position: Vector
+
+
+class JointNumbers(StrictModel):
+    """See `Joint`; its axis is z."""
+
+    name: str
+    kind: Literal["revolute", "prismatic"]
+    rotation: Matrix
+    offset: Vector
+    limits: Annotated[list[float | None], Field(min_length=4, max_length=4)]
+    friction: Annotated[list[float | None], Field(min_length=2, max_length=2)]
+    spring: Annotated[list[float], Field(min_length=3, max_length=3)] | None
+
+
+class BodyNumbers(StrictModel):
+    """See `Body`."""
+
+    name: str
+    mass: float
+    inertia: Matrix
+    com: Vector
+    parent: str
+    joint: JointNumbers | None
+    tools: list[ToolNumbers]
+
+    @classmethod
+    def of(cls, body: Body) -> BodyNumbers:
+        """Take those of a body."""
+        joint = body.joint and {
+            "name": body.joint.name,
+            "kind": body.joint.kind,
+            "rotation": body.joint.rotation.tolist(),
+            "offset": body.joint.offset.tolist(),
+            "limits": _known(body.joint.limits),
+            "friction": _known(body.joint.friction),
+            "spring": body.joint.spring and list(body.joint.spring),
+        }
+        tools = [
+            {"name": t.name, "rotation": t.rotation.tolist(), "position": t.position.tolist()}
+            for t in body.tools
+        ]
+        return cls.model_validate({
+            "name": body.name, "mass": body.mass, "inertia": body.inertia.tolist(),
+            "com": body.com.tolist(), "parent": body.parent, "joint": joint, "tools": tools,
+        })  # fmt: skip
+
+    @property
+    def body(self) -> Body:
+        """The body that they are of."""
+        joint, given = None, self.joint
+        if given:
+            joint = Joint(
+                given.name, given.kind, np.array(given.rotation), np.array(given.offset),
+                limits=JointLimits(*_or(given.limits, JointLimits())),
+                friction=JointFriction(*_or(given.friction, JointFriction())),
+                spring=Spring(*given.spring) if given.spring else None,
+            )  # fmt: skip
+        tools = (Tool(t.name, np.array(t.rotation), np.array(t.position)) for t in self.tools)
+        return Body(
+            self.name, self.mass, np.array(self.inertia), np.array(self.com), self.parent, joint,
+            tuple(tools),
+        )  # fmt: skip
+
+
+class RobotNumbers(StrictModel):
+    """A robot's bodies by number, and the order of a walk over its joints."""
+
+    name: Annotated[str, Field(min_length=1)]
+    bodies: Annotated[list[BodyNumbers], Field(min_length=2)]
+    order: list[int]
+
+
+class Document(StrictModel):
+    """The whole mapping."""
+
+    robot: RobotNumbers
+
+
+def are_numbers(content: dict[str, Any]) -> bool:
+    """Tell whether a robot's mapping holds its own numbers; else it has a file's form."""
+    robot = content.get("robot")
+    return isinstance(robot, dict) and "bodies" in robot
+
+
+def numbers_of(name: str, bodies: Sequence[Body], order: Sequence[int]) -> dict[str, Any]:
+    """Return the mapping of a robot's own numbers."""
+    found = [BodyNumbers.of(body) for body in bodies]
+    return Document(robot=RobotNumbers(name=name, bodies=found, order=list(order))).model_dump()
+
+
+def _known(row: Sequence[float]) -> list[float | None]:
+    return [value if np.isfinite(value) else None for value in row]
+
+
+def _or(row: list[float | None], default: Sequence[float]) -> list[float]:
+    return [other if value is None else value for value, other in zip(row, default, strict=True)]
