@@ -40,7 +40,7 @@ def tuned_set(
     """
     plans = [validate(FlightPlan, {**options, "case": case}, "options") for case in cases]
     settings = [FlightSettings.resolve(plan.options(), plan.parameters) for plan in plans]
-    nominal, reference = Robots(settings[0]).plant, settings[0].mission
+    nominal, reference = Robots(settings[0], plans[0].robot).plant, settings[0].mission
     eta = reference.base_quaternion[0] / float(np.linalg.norm(reference.base_quaternion))
     if abs(eta) <= SINGULAR_ETA:
         raise InputError("base_quaternion: turned by 180 degrees, where the laws are singular")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -151,12 +152,13 @@ def _numbers(value: Any) -> Array | None:
 
 
 def build_law(
-    name: str, settings: ControllerNodeSettings, axes: int, given: Mapping[str, Any] | None = None
-) -> ControlLaw:
+    name: str | type[ControlLaw], settings: ControllerNodeSettings, axes: int,
+    given: Mapping[str, Any] | None = None,
+) -> ControlLaw:  # fmt: skip
     """A law by name (or ``module:Class``) with the gains that the settings choose.
 
     Args:
-        name: of the law.
+        name: of the law, or its class.
         settings: they choose its gains.
         axes: m = n+3.
         given: gains that come over those.
@@ -164,40 +166,81 @@ def build_law(
     Raises:
         InputError: unknown law, gain set without it, or gains that do not fit.
     """
-    law = find_law(name)
-    files = gain_files(settings.robot, settings.gains)
-    if law.name not in files:
+    law = find_law(name) if isinstance(name, str) else name
+    may_lack = settings.gains == DEFAULT and (bool(given) or not law.gain_descriptions())
+    files = _gain_files(settings, may_lack)
+    if law.name in files:
+        gains = read_gains(files[law.name], law, axes)
+    elif may_lack:
+        gains = {}
+    else:
         raise InputError(
             f"gains {settings.gains!r} have no file for controller {law.name!r}, "
             f"only for {', '.join(sorted(files))}"
         )
-    gains = read_gains(files[law.name], law, axes)
     if given:
         gains = check_gains({**gains, **given}, law, axes, PARAMETERS)
     return law(gains, settings.period)
 
 
 def build_laws(
-    settings: ControllerNodeSettings, axes: int, given: Mapping[str, Tree] | None = None
-) -> dict[str, ControlLaw]:
+    settings: ControllerNodeSettings, axes: int, given: Mapping[str, Tree] | None = None,
+    own: str | type[ControlLaw] | ControlLaw = "",
+) -> dict[str, ControlLaw]:  # fmt: skip
     """The laws a controller can fly, by name: the one in force first, then those of the gain set.
 
     Args:
         settings: they choose the law in force and the gains.
         axes: m = n+3.
         given: gains by law that come over those of the files.
+        own: the law in force as a class or an object, which brings its gains; it is copied.
 
     Raises:
         InputError: a law that is not there, or gains that do not fit.
     """
     given = given or {}
-    first = find_law(settings.controller).name
-    wanted = {first: settings.controller}
-    for name in available_laws(settings):
+    first = own if not isinstance(own, str) else find_law(settings.controller)
+    wanted: dict[str, str | type[ControlLaw] | ControlLaw] = {first.name: first}
+    for name in available_laws(settings, first.name in given or isinstance(first, ControlLaw)):
         wanted.setdefault(name, name)
     for name in given:
         one_of(name, wanted, "law", f" in {PARAMETERS} (gains are <law>.<gain>)")
-    return {law: build_law(name, settings, axes, given.get(law)) for law, name in wanted.items()}
+    return {
+        name: _copy_of(law, settings, axes, given.get(name))
+        if isinstance(law, ControlLaw)
+        else build_law(law, settings, axes, given.get(name))
+        for name, law in wanted.items()
+    }
+
+
+def _copy_of(
+    law: ControlLaw, settings: ControllerNodeSettings, axes: int, given: Mapping[str, Any] | None
+) -> ControlLaw:
+    """A law of its own memory, with the gains of ``law`` and those ``given`` over them.
+
+    Raises:
+        InputError: it is for another robot or another period.
+    """
+    if len(law.memory.s) != axes or law.period != settings.period:
+        raise InputError(
+            f"controller {law.name!r} is for {len(law.memory.s)} axes and ticks of "
+            f"{law.period:g} s, the flight has {axes} and {settings.period:g} s"
+        )
+    copied = copy.deepcopy(law)
+    if given:
+        values = {**law.gain_values, **given}
+        copied.gain_values = check_gains(values, type(law), axes, PARAMETERS)
+    return copied
+
+
+def _gain_files(settings: ControllerNodeSettings, may_lack: bool) -> dict[str, Path]:
+    """The files of the chosen gains; none where there ``may_lack`` any."""
+    try:
+        return gain_files(settings.robot, settings.gains)
+    except InputError:
+        if not may_lack:
+            raise
+        return {}
 
 
 def split_gains(parameters: Mapping[str, Any]) -> tuple[Tree, dict[str, Tree]]:
@@ -211,6 +254,7 @@ def split_gains(parameters: Mapping[str, Any]) -> tuple[Tree, dict[str, Tree]]:
     return own, gains
 
 
-def available_laws(settings: ControllerNodeSettings) -> list[str]:
-    """Names of the laws of this project that the chosen gains cover."""
-    return sorted(set(gain_files(settings.robot, settings.gains)) & set(laws()))
+def available_laws(settings: ControllerNodeSettings, may_lack: bool = False) -> list[str]:
+    """Names of the laws of this project that the chosen gains cover; there ``may_lack`` any."""
+    files = _gain_files(settings, may_lack and settings.gains == DEFAULT)
+    return sorted(set(files) & set(laws()))

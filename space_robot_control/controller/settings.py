@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.config.files import named_file
+from space_robot_msgs_py.config.files import named_layers
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_sim.robot.find import robot_files
@@ -117,6 +117,6 @@ class ControllerNodeSettings(NodeSettings):
         """Add what the files of the actuators and of the gain set say to the controller itself."""
         return [
             *super().layers(selected),
-            named_file("actuators", selected["actuators"]),
+            *named_layers("actuators", selected["actuators"]),
             *set_file(selected["robot"], selected["gains"]),
         ]

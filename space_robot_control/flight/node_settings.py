@@ -6,15 +6,16 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
-from space_robot_msgs_py.config.files import config_directory, named_file, node_parameters
+from space_robot_msgs_py.config.files import GIVEN, config_directory, named_layers, node_parameters
 from space_robot_msgs_py.config.settings import NodeSettings
 from space_robot_msgs_py.config.trees import Tree, flatten, merge, nest
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.settings import PlantNodeSettings
-from space_robot_sim.robot.find import mission_file
+from space_robot_sim.robot.find import mission_layers
 
 from ..controller.gains import gains_as_path, split_gains
+from ..controller.navigation.believed_sensors import believed_numbers
 from ..controller.settings import ControllerNodeSettings, set_file
 from ..laws import ControlLaw
 from ..mission.settings import MissionNodeSettings
@@ -69,27 +70,31 @@ class FlightSettings(NamedTuple):
         plant = PlantNodeSettings.resolve(given["plant"])
         mission = MissionNodeSettings.resolve(given["mission"])
         for node in (plant, mission):  # a file that is not shipped: a bag tells all of it
-            file = mission_file(node.robot, node.mission)
-            if config_directory() not in file.parents:
-                told = dict(flatten(node_parameters(file, node.node)))
-                given[node.node] = {**told, **given[node.node]}
+            for file in mission_layers(node.robot, node.mission):
+                if config_directory() not in file.parents:
+                    told = dict(flatten(node_parameters(file, node.node)))
+                    given[node.node] = {**told, **given[node.node]}
         given["controller"].setdefault("actuators", plant.actuators)
         if plant.realtime:  # by the wall clock there is no time to wait
             given["controller"] = {"reference_timeout": 0.0, **given["controller"]}
         own, gains = split_gains(given["controller"])
         controller = ControllerNodeSettings.resolve(own)
         path = gains_as_path(controller.gains, controller.robot)
-        of_flight = named_file("actuators", controller.actuators)
-        for file in (
-            of_flight,
-            *set_file(controller.robot, path),
-        ):  # as if given: a bag tells of it
+        of_flight = named_layers("actuators", controller.actuators)
+        # as if given: a bag tells of it
+        for file in (*of_flight, *set_file(controller.robot, path)):
             of_the_set = dict(flatten(node_parameters(file, "controller")))
             given["controller"] = {**of_the_set, **given["controller"]}
             own = merge(nest(of_the_set), own)
             controller = ControllerNodeSettings.resolve(own)
         if controller.navigation == "filtered" and "navigation_sensors" not in own:
-            own["navigation_sensors"] = given["controller"]["navigation_sensors"] = plant.sensors
+            if plant.sensors == GIVEN:
+                believed = {"navigation_filter": believed_numbers(plant, plant.period)}
+                given["controller"] = {**dict(flatten(believed)), **given["controller"]}
+                own = merge(believed, own)
+            else:
+                own["navigation_sensors"] = plant.sensors
+                given["controller"]["navigation_sensors"] = plant.sensors
             controller = ControllerNodeSettings.resolve(own)
         settings = cls(
             plant,

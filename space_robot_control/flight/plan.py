@@ -1,131 +1,34 @@
-"""The options of a flight, and the flight that they make, checked before anything starts."""
+"""The flight that options make, checked before anything starts."""
 
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import ByteSize, Field
-
-from space_robot_msgs_py.bag.mcap_file import Compression
-from space_robot_msgs_py.config.validation import StrictModel, one_of
+from space_robot_msgs_py.config.files import GIVEN
+from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
-from space_robot_sim.faults.grammar import Kinds, parse_faults
+from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import MOST_TICKS
-from space_robot_sim.robot.find import robot_as_path, robot_files
+from space_robot_sim.robot.find import robot_files
 
 from ..controller.allocation.believed_actuators import believed_actuators
 from ..controller.controller import Controller
 from ..controller.gains import build_laws
-from ..controller.navigation.settings import Mode
+from ..controller.no_law import NoLaw
 from ..controller.swaps import parse_swaps
 from ..laws import ControlLaw
 from ..mission.mission import Mission
 from .faults import KINDS, PROCESS_KINDS
 from .node_settings import FlightSettings
+from .options import NO_FRICTION, FlightPlan
 from .robots import Robots
 from .software import commit, versions
 
-NO_FRICTION = {"friction.coulomb": 0.0, "friction.viscous": 0.0}
-
-
-class FlightPlan(StrictModel):
-    """The options of ``fly`` and ``simulate``."""
-
-    controller: str = "tde_stc"
-    case: str = "1"
-    gains: str = "default"
-    sensors: str = "ideal"
-    actuators: str = "ideal"
-    """Of the base."""
-    robot: str = "paper"
-    mission: str = ""
-    duration: Annotated[float | None, Field(gt=0.0, le=1e6)] = None
-    period: float | None = None
-    """Length of a tick of every node, s (None: that of the files)."""
-    substeps: int | None = None
-    """Integration steps of the plant in a tick (None: that of the files)."""
-    navigation: Mode | None = None
-    """What the laws see (None: what the files say)."""
-    command_latency_ticks: int = 0
-    friction: bool = True
-    realtime: bool = False
-    fifo_priority: int = 0
-    faults: list[str] = Field(default_factory=list)
-    """The faults, each as ``KIND@T[-END][:ARGUMENT]``, see `space_robot_control.flight.faults`."""
-    events: list[str] = Field(default_factory=list)
-    """What is captured and released, see `space_robot_sim.environment.events`; none: what the
-    mission says."""
-    seed: Annotated[int, Field(ge=0)] = 0
-    """Seed of the random numbers of faults and sensors."""
-    swaps: list[str] = Field(default_factory=list)
-    """Laws to swap to in flight, each as ``T:LAW``."""
-    restart_controller: bool = False
-    """Start a controller again that died or hangs."""
-    composed: bool = False
-    """Put all nodes into one process, stepped in turn."""
-    domain: Annotated[int | None, Field(ge=0, le=232)] = None
-    """ROS domain to fly in (None: ROS_DOMAIN_ID, or a free one)."""
-    compression: Compression | None = None
-    """Compression of the bag (None: the recorder's own)."""
-    split_size: ByteSize | None = None
-    """Bytes after which the bag goes on in another file (None: the recorder's own)."""
-    parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
-    """Further parameters by node, dotted names."""
-
-    def faults_of(self, kinds: Kinds) -> list[str]:
-        """Return the texts of the faults that are of some ``kinds``.
-
-        Raises:
-            InputError: a fault that cannot be.
-        """
-        return [str(f) for f in parse_faults(self.faults, KINDS) if f.kind.name in kinds]
-
-    def options(self) -> dict[str, dict[str, Any]]:
-        """Return what the options, without ``parameters``, say to each node, by dotted name."""
-        robot = robot_as_path(self.robot)
-        period = {} if self.period is None else {"period": self.period}
-        return {
-            "plant": {
-                **period,
-                **({} if self.substeps is None else {"substeps": self.substeps}),
-                "robot": robot,
-                "mission": self.mission,
-                "case": self.case,
-                "sensors": self.sensors,
-                "actuators": self.actuators,
-                "realtime": self.realtime,
-                "command_latency_ticks": self.command_latency_ticks,
-                "fifo_priority": self.fifo_priority,
-                "faults": self.faults_of(PLANT_KINDS),
-                "fault_seed": self.seed,
-                **({"events": self.events} if self.events else {}),
-                **({} if self.friction else NO_FRICTION),
-            },
-            "controller": {
-                **period,
-                "robot": robot,
-                "controller": self.controller,
-                "gains": self.gains,
-                "fifo_priority": self.fifo_priority,
-                "swaps": self.swaps,
-                **({} if self.navigation is None else {"navigation": self.navigation}),
-            },
-            "mission": {**period, "robot": robot, "mission": self.mission},
-            "recorder": {
-                **period,
-                **({} if self.compression is None else {"compression": self.compression}),
-                **({} if self.split_size is None else {"split_size": int(self.split_size)}),
-            },
-        }
-
-    def with_parameters(self, node: str, values: dict[str, Any]) -> FlightPlan:
-        """Return the same plan with further parameters of a node, by dotted name."""
-        parameters = {**self.parameters, node: {**self.parameters.get(node, {}), **values}}
-        return self.model_copy(update={"parameters": parameters})
+__all__ = ["NO_FRICTION", "Flight", "FlightPlan"]
 
 
 class Flight:
@@ -146,12 +49,14 @@ class Flight:
         self.recorder_settings = settings.recorder
         self.period = settings.plant.period
         self.timebase = settings.plant.timebase
-        self._robots = Robots(settings)
+        self._robots = Robots(settings, plan.robot)
         self.robot = self._robots.plant
         mission = settings.mission
         self._mission_name = mission.mission or robot_files(mission.robot).name
         axes = self.robot.n + 3
-        laws = build_laws(settings.controller, axes, settings.gains)
+        laws: dict[str, ControlLaw] = {NoLaw.name: NoLaw(axes, self.period)}
+        if plan.controller is not None:
+            laws = build_laws(settings.controller, axes, settings.gains, plan.controller)
         self.swaps = [
             (tick, laws[one_of(name, laws, "controller", " of swaps")])
             for tick, name in parse_swaps(settings.controller.swaps, self.period)
@@ -167,13 +72,21 @@ class Flight:
         """In force at the start."""
         self.plant = Plant(self.robot, settings.plant, self.period)
         self.mission = Mission(self.robot, settings.mission, self.period)
-        self.believed_actuators = believed_actuators(
-            settings.controller.actuators, self._robots.controller
-        )
+        self.believed_actuators = self._believed_actuators()
         """The base's actuators as the controller knows them."""
         self._check_actuators()
         self.controller = self.build_controller(self.law)
         self.ticks = self._ticks()
+
+    def _believed_actuators(self) -> BaseActuatorSettings:
+        name, robot = self.controller_settings.actuators, self._robots.controller
+        if name != GIVEN:
+            return believed_actuators(name, robot)
+        given = self.plan.actuators if isinstance(self.plan.actuators, dict) else {}
+        own = {key: given[key] for key in BaseActuatorSettings.model_fields if key in given}
+        found = validate(BaseActuatorSettings, own, "actuators")
+        found.check(robot, GIVEN)
+        return found
 
     def build_controller(self, law: ControlLaw) -> Controller:
         """Build a controller that remembers nothing, with ``law`` in force."""

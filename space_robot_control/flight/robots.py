@@ -9,6 +9,7 @@ from space_robot_sim.robot import Robot
 from space_robot_sim.robot.find import robot_content
 
 from .node_settings import FlightSettings
+from .objects import robot_setting
 
 
 class Robots:
@@ -18,7 +19,9 @@ class Robots:
         InputError: a robot that is not there, or has other joints than the plant's.
     """
 
-    def __init__(self, settings: FlightSettings) -> None:
+    def __init__(self, settings: FlightSettings, given: str | Robot) -> None:
+        """``given``: by the flight's options."""
+        self._given = {} if isinstance(given, str) else {robot_setting(given): given}
         self._contents: dict[str, dict[str, Any]] = {}
         self.plant, self.controller, mission = (
             self._read(node.robot)
@@ -34,6 +37,9 @@ class Robots:
                 )
 
     def _read(self, name: str) -> Robot:
+        if name in self._given:
+            self._contents[name] = self._given[name].content
+            return self._given[name]
         if name not in self._contents:
             self._contents[name] = robot_content(name)
         return Robot.from_dict(self._contents[name], where=f"robot {name}")

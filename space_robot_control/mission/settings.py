@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from space_robot_msgs_py.config.settings import NodeSettings
-from space_robot_sim.robot.find import mission_file
+from space_robot_sim.robot.find import mission_layers
 
 from .mission import MissionSettings
 
@@ -33,4 +33,4 @@ class MissionNodeSettings(MissionSettings, NodeSettings):
     @classmethod
     def layers(cls, selected: Mapping[str, str]) -> list[Path]:
         """The mission's own file over the graph's."""
-        return [*super().layers(selected), mission_file(selected["robot"], selected["mission"])]
+        return [*super().layers(selected), *mission_layers(selected["robot"], selected["mission"])]

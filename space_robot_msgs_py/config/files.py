@@ -13,6 +13,9 @@ from .yaml_text import check_file
 GRAPH_FILE = "space_robot.yaml"
 """The file of the graph's defaults in the config folder."""
 
+GIVEN = "given"
+"""In the place of a file's name: there is no file, all numbers are given beside it."""
+
 
 @cache
 def config_directory() -> Path:
@@ -46,6 +49,15 @@ def named_file(kind: str, name: str) -> Path:
             "or a path to a .yaml file"
         )
     return folder / f"{name}.yaml"
+
+
+def named_layers(kind: str, name: str) -> list[Path]:
+    """Return the `named_file`; none for what is `GIVEN`.
+
+    Raises:
+        InputError: there is no such file; names the ones there are.
+    """
+    return [] if name == GIVEN else [named_file(kind, name)]
 
 
 def node_parameters(path: Path, node: str) -> Tree:

@@ -9,10 +9,10 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.config.files import named_file
+from space_robot_msgs_py.config.files import named_layers
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 
-from ..robot.find import mission_file
+from ..robot.find import mission_layers
 from .plant import PlantSettings
 
 MOST_TICKS = 10**10
@@ -63,8 +63,8 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         """Add mission (where the arm starts), case (what disturbs it), sensors and actuators."""
         return [
             *super().layers(selected),
-            mission_file(selected["robot"], selected["mission"]),
-            named_file("cases", selected["case"]),
-            named_file("sensors", selected["sensors"]),
-            named_file("actuators", selected["actuators"]),
+            *mission_layers(selected["robot"], selected["mission"]),
+            *named_layers("cases", selected["case"]),
+            *named_layers("sensors", selected["sensors"]),
+            *named_layers("actuators", selected["actuators"]),
         ]

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from space_robot_msgs_py.config.files import config_directory, named_file
+from space_robot_msgs_py.config.files import GIVEN, config_directory, named_file
 from space_robot_msgs_py.config.validation import read_yaml, short
 from space_robot_msgs_py.config.yaml_text import check_file, is_folder
 from space_robot_msgs_py.errors import InputError
@@ -55,6 +55,8 @@ def robot_files(robot: str) -> RobotFiles:
     Raises:
         InputError: there is no such robot; names those there are.
     """
+    if robot == GIVEN:
+        return RobotFiles(GIVEN, Path(GIVEN), None, None)
     path = Path(robot)
     if robot.endswith((*YAML, *URDF)):
         check_file(path)
@@ -110,6 +112,15 @@ def mission_file(robot: str, mission: str = "") -> Path:
             "makes it one, with gains; or name a mission"
         )
     return found.mission
+
+
+def mission_layers(robot: str, mission: str) -> list[Path]:
+    """Return the `mission_file`; none of a mission that is `GIVEN`.
+
+    Raises:
+        InputError: see `mission_file`.
+    """
+    return [] if mission == GIVEN else [mission_file(robot, mission)]
 
 
 def robot_as_path(robot: str) -> str:
