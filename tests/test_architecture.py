@@ -18,7 +18,7 @@ ROOMS = {
     ),
     "space_robot_control": (
         "laws", "controller", "controller_node", "mission", "mission_node", "tuning", "flight",
-        "analysis", "campaign", "paper", "view", "cli",
+        "analysis", "scenario", "campaign", "paper", "view", "cli",
     ),
 }  # fmt: skip
 """Of each package, from the ground up: a room imports only from rooms that stand before it."""

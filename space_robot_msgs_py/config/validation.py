@@ -60,10 +60,11 @@ def validate(schema: type[Schema], content: Any, where: str) -> Schema:
     try:
         return schema.model_validate(content)
     except ValidationError as error:
-        raise InputError(_one_line(error, schema, where)) from None
+        raise InputError(one_line(error, schema, where)) from None
 
 
-def _one_line(error: ValidationError, schema: type[BaseModel], where: str) -> str:
+def one_line(error: ValidationError, schema: type[BaseModel], where: str) -> str:
+    """Tell the first fault of ``content`` of a ``schema``: key, what was given, what is allowed."""
     # a misspelt key shows as one missing and one unknown: the unknown one is the cause
     faults = sorted(
         error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden"

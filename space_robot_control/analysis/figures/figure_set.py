@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -35,6 +36,13 @@ class SavedFigure(NamedTuple):
     def data_uri(self) -> str:
         """Return the SVG as a data URI, for a page that refers to nothing outside itself."""
         return "data:image/svg+xml;base64," + base64.b64encode(self.svg.read_bytes()).decode()
+
+
+class Drawing(NamedTuple):
+    """A figure that can be drawn."""
+
+    caption: str
+    draw: Callable[[], Figure]
 
 
 class FigureFolder(NamedTuple):
@@ -91,36 +99,46 @@ class FigureSet:
             InputError: a figure cannot be written there.
         """
         return [
-            SavedFigure(caption, save_figure(figure, folder / stem)[-1])
-            for stem, caption, figure in self._figures()
-            if figure.axes
+            SavedFigure(drawing.caption, save_figure(figure, folder / stem)[-1])
+            for stem, drawing in self.drawings().items()
+            if (figure := drawing.draw()).axes
         ]
 
-    def _figures(self) -> Iterator[tuple[str, str, Figure]]:
-        """Draw the figures one after the other; with name of the file and caption."""
+    def drawings(self) -> dict[str, Drawing]:
+        """Return the figures that there are, by name of the file; none is drawn yet."""
         flights = self._flights
         torques = {n: s.base_torque for n, s in flights.items() if s.base_torque is not None}
+        found: dict[str, Drawing] = {}
         several = len(self._missions) > 1
         for number, (name, figure) in enumerate(self._missions.values(), start=1):
             suffix, of = (f"_{number}", f" of {name}") if several else ("", "")
-            yield f"desired_joints{suffix}", f"Desired joint angles{of} (Fig. 5)", figure
+            caption = f"Desired joint angles{of} (Fig. 5)"
+            found[f"desired_joints{suffix}"] = Drawing(caption, partial(_drawn, figure))
         if len(flights) == 1 and self._first is not None:
             caption = "Errors and torques of base and joints (Figs. 6 to 9)"
-            yield "control_results", caption, self._first
+            found["control_results"] = Drawing(caption, partial(_drawn, self._first))
         else:
             caption = "Errors and torques, norms over each group of axes (Figs. 6 to 9)"
-            yield "control_results", caption, errors_and_torques(flights)
+            found["control_results"] = Drawing(caption, partial(errors_and_torques, flights))
         if torques:
-            yield "junctions", "Base torque x where two motions meet", junctions(torques)
-            yield "chatter", "A stretch of base torque, and its spectrum", chatter(torques)
-        yield "ripple", "Spectrum of the torques' ripple", ripple(flights)
+            caption = "Base torque x where two motions meet"
+            found["junctions"] = Drawing(caption, partial(junctions, torques))
+            caption = "A stretch of base torque, and its spectrum"
+            found["chatter"] = Drawing(caption, partial(chatter, torques))
+        found["ripple"] = Drawing("Spectrum of the torques' ripple", partial(ripple, flights))
         for number, (name, figures) in enumerate(self._hardware.items(), start=1):
             suffix, of = (f"_{number}", f" of {name}") if len(flights) > 1 else ("", "")
             for stem, (caption, figure) in figures.items():
-                yield f"{stem}{suffix}", f"{caption}{of}", figure
+                found[f"{stem}{suffix}"] = Drawing(f"{caption}{of}", partial(_drawn, figure))
         caption = "The end effector's pointing error in the inertial frame"
-        yield "pointing", caption, pointing(flights)
-        yield "latency", "Time from a state's sending to its command's", latency_histogram(flights)
+        found["pointing"] = Drawing(caption, partial(pointing, flights))
+        caption = "Time from a state's sending to its command's"
+        found["latency"] = Drawing(caption, partial(latency_histogram, flights))
+        return found
+
+
+def _drawn(figure: Figure) -> Figure:
+    return figure
 
 
 def _of_hardware(log: FlightLog) -> Iterator[tuple[str, tuple[str, Figure]]]:
