@@ -48,5 +48,6 @@ class Flown:
 
     @property
     def bag_report(self) -> dict[str, Any]:
-        """What the report says of the bag: without what happened in the graph."""
-        return {key: value for key, value in self.report.items() if key != "graph"}
+        """What the report says of the bag: without what happened in the graph, and its end."""
+        other = {"graph", "outcome", "reason", "ended_at_s"}
+        return {key: value for key, value in self.report.items() if key not in other}
