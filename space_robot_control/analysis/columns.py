@@ -62,27 +62,33 @@ def _ticks(log: FlightLog) -> NDArray[np.int64]:
 
 def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
     """Yield names and values (N, K) of columns that belong together."""
-    joints, axes = log.joint_names, [*_each("base", XYZ), *log.joint_names]
+    joints, lengths = log.joint_names, log.prismatic
+    torques = [*["n_m"] * 3, *("n" if slides else "n_m" for slides in lengths[: len(joints)])]
+    axes = [*_each("base", XYZ), *joints]
     error, q_d, joints_d = tracking_error(log), log.reference_base, log.reference_joints
     yield ["time_s"], (_ticks(log) * log.timebase.period_ns / 1e9)[:, np.newaxis]
     yield _each("base_position", XYZ, "m"), log.base_position
     yield _each("q", WXYZ), log.quaternion
     yield _each("base_velocity", XYZ, "m_s"), log.base_velocity
     yield _each("omega_base", XYZ, "rad_s"), log.omega_base
-    yield [f"{joint}_position_rad" for joint in joints], log.joint_positions
-    yield [f"{joint}_velocity_rad_s" for joint in joints], log.joint_velocities
-    yield _each("applied_torque", axes, "n_m"), log.applied_torque
+    for names, slides, positions, velocities in (
+        (joints, lengths, log.joint_positions, log.joint_velocities),
+        (log.passive_names, lengths[len(joints) :], log.passive_positions, log.passive_velocities),
+    ):
+        yield _of_joints("{}_position", names, slides), positions
+        yield _of_joints("{}_velocity", names, slides, "_s"), velocities
+    yield _with_units("applied_torque", axes, torques), log.applied_torque
     if (told := log.measured) is not None:
         yield _each("measured_q", WXYZ), told.quaternion
         yield _each("measured_omega_base", XYZ, "rad_s"), told.omega_base
-        yield _each("measured_position", joints, "rad"), told.joint_positions
-        yield _each("measured_velocity", joints, "rad_s"), told.joint_velocities
-        yield _each("reported_torque", axes, "n_m"), told.applied_torque
+        yield _of_joints("measured_position_{}", joints, lengths), told.joint_positions
+        yield _of_joints("measured_velocity_{}", joints, lengths, "_s"), told.joint_velocities
+        yield _with_units("reported_torque", axes, torques), told.applied_torque
     if log.believed_error is not None:
         yield _each("believed_error_q", XYZ), log.believed_error[:, :3]
-        yield _each("believed_error", joints, "rad"), log.believed_error[:, 3:]
+        yield _of_joints("believed_error_{}", joints, lengths), log.believed_error[:, 3:]
     if log.commanded_torque is not None:
-        yield _each("commanded_torque", axes, "n_m"), log.commanded_torque
+        yield _with_units("commanded_torque", axes, torques), log.commanded_torque
     wheels, thrusters = log.wheel_velocities.shape[1], log.thrusts.shape[1]
     yield _numbered("wheel_velocity", wheels, "rad_s"), log.wheel_velocities
     yield _numbered("wheel_torque", wheels, "n_m"), log.wheel_torques
@@ -98,11 +104,25 @@ def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
     yield _each("reference_q", WXYZ), q_d[:, :4]
     yield _each("reference_omega_base", XYZ, "rad_s"), q_d[:, 4:7]
     yield _each("reference_omega_base_rate", XYZ, "rad_s2"), q_d[:, 7:]
-    for k, number in enumerate(("position_rad", "velocity_rad_s", "acceleration_rad_s2")):
-        yield [f"reference_{joint}_{number}" for joint in joints], joints_d[:, k]
+    for k, (number, per) in enumerate(
+        (("position", ""), ("velocity", "_s"), ("acceleration", "_s2"))
+    ):
+        yield _of_joints(f"reference_{{}}_{number}", joints, lengths, per), joints_d[:, k]
     if controls_base(log):
         yield _each("error_q", XYZ), error[:, :3]
-    yield _each("error", joints, "rad"), error[:, 3:]
+    yield _of_joints("error_{}", joints, lengths), error[:, 3:]
+
+
+def _of_joints(
+    what: str, joints: Sequence[str], slides: Sequence[bool], per: str = ""
+) -> list[str]:
+    """Return a name a joint, with its unit: rad, or m of one that slides, ``per`` a time."""
+    units = ("m" if is_prismatic else "rad" for is_prismatic in slides)
+    return [f"{what.format(joint)}_{unit}{per}" for joint, unit in zip(joints, units, strict=False)]
+
+
+def _with_units(what: str, axes: Sequence[str], units: Sequence[str]) -> list[str]:
+    return [f"{what}_{axis}_{unit}" for axis, unit in zip(axes, units, strict=True)]
 
 
 def _numbered(what: str, count: int, unit: str) -> list[str]:

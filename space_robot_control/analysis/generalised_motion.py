@@ -67,7 +67,7 @@ def applied_force(log: FlightLog) -> Array:
 def neglected_force(log: FlightLog, h_bar: Array) -> Array:
     """Compute ``N = F_S - h_bar rhodd`` (33), (N-1, m), over the interval of each tick.
 
-    N m on the joints; on the base the generalised force that belongs to eps, twice the torque
-    where the attitude is small.
+    N m on the joints, of prismatic ones N; on the base the generalised force that belongs to eps,
+    twice the torque where the attitude is small.
     """
     return applied_force(log) - h_bar * mean_acceleration(log)

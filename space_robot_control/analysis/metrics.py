@@ -6,7 +6,7 @@ RMS values instead. Both are given, named ``eq64`` and ``mean_axis``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import reduce
 from typing import Any
 
@@ -20,32 +20,63 @@ from .spectrum import PowerAbove
 
 Array = NDArray[np.float64]
 Table = dict[str, dict[str, float]]
+AxisIndex = slice | list[int]
+"""Some of the n+3 axes, as an index."""
+UNITS = {
+    "attitude": "-", "joints_prismatic": "m", "joints": "rad", "base_torque": "N m",
+    "torque": "N m", "force": "N",
+}  # fmt: skip
+"""By the beginning of a column's name; the first that fits holds."""
 
 
-def axis_groups(n: int, controls_base: bool = True) -> dict[str, slice]:
+def axis_groups(
+    n: int, controls_base: bool = True, prismatic: Sequence[bool] = ()
+) -> dict[str, AxisIndex]:
     """Divide the n+3 axes into base, inner (1 to 3) and outer joints, by their keys' suffix.
 
-    The base is no group of a flight in which nothing turns it.
+    Joints are divided by their kind instead if some are ``prismatic`` (of n joints at least, or
+    empty: none is), for no number may be of rad and of m. The base is no group of a flight in which
+    nothing turns it.
     """
-    groups = {"base": slice(0, 3)} if controls_base else {}
+    groups: dict[str, AxisIndex] = {"base": slice(0, 3)} if controls_base else {}
+    if any(prismatic[:n]):
+        for key, is_prismatic in (("revolute", False), ("prismatic", True)):
+            found = [3 + joint for joint in range(n) if prismatic[joint] == is_prismatic]
+            groups |= {key: found} if found else {}
+        return groups
     groups[f"1_{min(n, 3)}"] = slice(3, 3 + min(n, 3))
     if n > 3:
         groups[f"4_{n}"] = slice(6, 3 + n)
     return groups
 
 
-def error_columns(axes: int, controls_base: bool = True) -> dict[str, slice]:
+def error_columns(
+    axes: int, controls_base: bool = True, prismatic: Sequence[bool] = ()
+) -> dict[str, AxisIndex]:
     """Return which of the m = n+3 axes each error column of Table V is of."""
-    return _columns(axis_groups(axes - 3, controls_base), "attitude", "joints")
+    groups = axis_groups(axes - 3, controls_base, prismatic)
+    return {"attitude" if k == "base" else f"joints_{k}": found for k, found in groups.items()}
 
 
-def torque_columns(axes: int, controls_base: bool = True) -> dict[str, slice]:
+def torque_columns(
+    axes: int, controls_base: bool = True, prismatic: Sequence[bool] = ()
+) -> dict[str, AxisIndex]:
     """Return which of the m = n+3 axes each torque column of Table V is of."""
-    return _columns(axis_groups(axes - 3, controls_base), "base_torque", "torque")
+    groups = axis_groups(axes - 3, controls_base, prismatic)
+    names = {"base": "base_torque", "prismatic": "force_prismatic"}
+    return {names.get(k, f"torque_{k}"): found for k, found in groups.items()}
+
+
+def unit_of(column: str) -> str:
+    """Return the unit of a column of `error_columns` or `torque_columns`."""
+    return next(unit for prefix, unit in UNITS.items() if column.startswith(prefix))
 
 
 def tracking_error(log: FlightLog) -> Array:
-    """Compute ``e = rho_d - rho`` (N, n+3): eps, then joints, rad; of +-Q_d the one on Q's side."""
+    """Compute ``e = rho_d - rho`` (N, n+3): eps, then joints, rad or m.
+
+    Of +-Q_d it is that of the one on Q's side.
+    """
     error = np.empty((log.ticks, log.axes))
     desired = log.reference_base[:, :4]
     side = np.where(_sum_of_columns(log.quaternion * desired) < 0.0, -1.0, 1.0)
@@ -118,7 +149,7 @@ class TotalVariation:
         self._last = values[-1:].copy()
         self._rows += len(values)
 
-    def per_second(self, axes: slice, period: float) -> float:
+    def per_second(self, axes: AxisIndex, period: float) -> float:
         """Mean over some axes, per second of rows that are ``period`` s apart."""
         if self._rows < 2:
             return 0.0
@@ -128,9 +159,11 @@ class TotalVariation:
 class Rms(Metric):
     """The RMS of errors and torques, by definition and column of Table V."""
 
-    def __init__(self, axes: int, controls_base: bool = True) -> None:
+    def __init__(
+        self, axes: int, controls_base: bool = True, prismatic: Sequence[bool] = ()
+    ) -> None:
         self._error, self._torque = AxisRms(axes), AxisRms(axes)
-        self._controls_base = controls_base
+        self._kinds = controls_base, prismatic
 
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
@@ -141,17 +174,19 @@ class Rms(Metric):
         """By definition and column."""
         error, torque = self._error.value, self._torque.value
         return {
-            "mean_axis": _by_column(error, torque, np.mean, self._controls_base),
-            "eq64": _by_column(error, torque, eq64, self._controls_base),
+            "mean_axis": _by_column(error, torque, np.mean, *self._kinds),
+            "eq64": _by_column(error, torque, eq64, *self._kinds),
         }
 
 
 class Maxima(Metric):
     """Largest |error| and |torque| on any axis, by column of Table V."""
 
-    def __init__(self, axes: int, controls_base: bool = True) -> None:
+    def __init__(
+        self, axes: int, controls_base: bool = True, prismatic: Sequence[bool] = ()
+    ) -> None:
         self._error, self._torque = AxisMaximum(axes), AxisMaximum(axes)
-        self._controls_base = controls_base
+        self._kinds = controls_base, prismatic
 
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
@@ -160,14 +195,16 @@ class Maxima(Metric):
 
     def result(self) -> dict[str, float]:
         """By column, in its unit."""
-        return _by_column(self._error.value, self._torque.value, np.max, self._controls_base)
+        return _by_column(self._error.value, self._torque.value, np.max, *self._kinds)
 
 
 class Chatter(Metric):
     """Measures how rough the applied torques are, by measure and column of Table V."""
 
-    def __init__(self, axes: int, period: float, controls_base: bool = True) -> None:
-        self._period, self._columns = period, torque_columns(axes, controls_base)
+    def __init__(
+        self, axes: int, period: float, controls_base: bool = True, prismatic: Sequence[bool] = ()
+    ) -> None:
+        self._period, self._columns = period, torque_columns(axes, controls_base, prismatic)
         self._variation, self._power = TotalVariation(axes), PowerAbove(axes, period)
 
     def add(self, log: FlightLog, error: Array) -> None:
@@ -197,22 +234,21 @@ def of_log(metric: Metric, log: FlightLog) -> Any:
 
 
 def _by_column(
-    error: Array, torque: Array, figure: Callable[[Array], Any], controls_base: bool
+    error: Array,
+    torque: Array,
+    figure: Callable[[Array], Any],
+    controls_base: bool,
+    prismatic: Sequence[bool],
 ) -> dict[str, float]:
     """Sum up the numbers of the axes, (m,) each, in every column of Table V."""
     return {
         name: float(figure(values[axes]))
         for values, columns in (
-            (error, error_columns(len(error), controls_base)),
-            (torque, torque_columns(len(torque), controls_base)),
+            (error, error_columns(len(error), controls_base, prismatic)),
+            (torque, torque_columns(len(torque), controls_base, prismatic)),
         )
         for name, axes in columns.items()
     }
-
-
-def _columns(groups: dict[str, slice], base: str, prefix: str) -> dict[str, slice]:
-    """Return the axes of each column, ``base`` or the suffix of the group after ``prefix``."""
-    return {base if key == "base" else f"{prefix}_{key}": axes for key, axes in groups.items()}
 
 
 def _sum_of_columns(values: Array) -> Array:

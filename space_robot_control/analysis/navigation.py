@@ -28,7 +28,7 @@ class NavigationError(Metric):
 
     def __init__(self, log: FlightLog) -> None:
         """``log``: the first rows."""
-        self._columns = error_columns(log.axes, controls_base(log))
+        self._columns = error_columns(log.axes, controls_base(log), log.prismatic)
         self._rms, self._maximum = AxisRms(log.axes), AxisMaximum(log.axes)
 
     def add(self, log: FlightLog, error: Array) -> None:
@@ -52,7 +52,9 @@ class NavigationError(Metric):
 
 
 def navigation_error(log: FlightLog, error: Array) -> Array:
-    """(K, n+3) true coordinates less those believed at the ticks with telemetry; eps, then rad.
+    """(K, n+3) true coordinates less those believed at the ticks with telemetry.
+
+    They are eps, then rad or m.
 
     Args:
         log: with `FlightLog.believed_error`.

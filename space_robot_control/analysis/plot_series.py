@@ -14,7 +14,7 @@ from space_robot_msgs_py.errors import InputError
 
 from .attitude_drift import controls_base
 from .described import robot_of
-from .metrics import error_columns, torque_columns, tracking_error
+from .metrics import AxisIndex, error_columns, torque_columns, tracking_error
 from .pointing import PointingError, pointing_error
 from .ripple import RippleSpectrum, ripple_spectrum
 from .waypoints import junction_ticks
@@ -65,9 +65,9 @@ class PlotSeries(NamedTuple):
     time: Array
     """(N,) s."""
     errors: dict[str, Array]
-    """(N,) norm of the error of each column of Table V: eps, rad."""
+    """(N,) norm of the error of each column of Table V, in its unit."""
     torques: dict[str, Array]
-    """(N,) norm of the torque of each column of Table V, N m."""
+    """(N,) norm of the torque of each column of Table V, in its unit."""
     base_torque: BaseTorque | None
     """None where nothing turned the base."""
     pointing: PointingError | None
@@ -91,8 +91,8 @@ class PlotSeries(NamedTuple):
             latency = 1e3 * known if len(known) else None
         return cls(
             tick_times(log),
-            _norms(error, error_columns(axes, of_base)),
-            _norms(log.applied_torque, torque_columns(axes, of_base)),
+            _norms(error, error_columns(axes, of_base, log.prismatic)),
+            _norms(log.applied_torque, torque_columns(axes, of_base, log.prismatic)),
             BaseTorque.of(log) if of_base else None,
             pointing,
             latency,
@@ -100,5 +100,5 @@ class PlotSeries(NamedTuple):
         )
 
 
-def _norms(values: Array, columns: dict[str, slice]) -> dict[str, Array]:
+def _norms(values: Array, columns: dict[str, AxisIndex]) -> dict[str, Array]:
     return {name: np.linalg.norm(values[:, axes], axis=1) for name, axes in columns.items()}

@@ -167,11 +167,13 @@ def _sizing(log: FlightLog, other: ActuatorSet | None) -> Sizing:
 
 
 _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
-    "rms": lambda log: Rms(log.axes, controls_base(log)),
-    "maxima": lambda log: Maxima(log.axes, controls_base(log)),
+    "rms": lambda log: Rms(log.axes, controls_base(log), log.prismatic),
+    "maxima": lambda log: Maxima(log.axes, controls_base(log), log.prismatic),
     "attitude_drift": AttitudeDrift,
     "navigation_error": NavigationError,
-    "chatter": lambda log: Chatter(log.axes, log.timebase.period, controls_base(log)),
+    "chatter": lambda log: Chatter(
+        log.axes, log.timebase.period, controls_base(log), log.prismatic
+    ),
     "ripple": lambda log: Ripple(log, robot_of(log)),
     "settling": Settling,
     "saturation": lambda log: Saturation(torque_limits(log)),

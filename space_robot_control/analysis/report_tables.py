@@ -8,12 +8,11 @@ from itertools import groupby
 from typing import Any, NamedTuple
 
 from .described import IDEAL
+from .metrics import unit_of
 from .pointing import ARCSEC
 from .settling import BAND
 from .tables import NONE, Column, Group, Table
 from .words import Report, flown, law_of, notes, remarks, seen_through
-
-UNITS = {"attitude": "-", "joints": "rad", "base_torque": "N m", "torque": "N m"}
 
 DEFINITIONS = {
     "RMS, mean of axes": "mean over a column's axes of each axis' root mean square: what Table V "
@@ -31,7 +30,7 @@ DEFINITIONS = {
     "ripple's peak": "frequency at which the ripple's spectrum is highest, and the root mean "
     "square of what is within 0.5 Hz of it",
     "settled after": "time from the last waypoint after which the error stays to the end within "
-    f"{BAND:g} (rad on joints; on the attitude's quaternion, where it is 4.1 arcsec)",
+    f"{BAND:g} (rad or m on joints; on the attitude's quaternion, where it is 4.1 arcsec)",
     "saturation": "ticks at which a torque was at the actuator's limit; of each wheel those at its "
     "largest torque and at its largest momentum",
     "latency": "from a state's sending to its command's, by the wall clock; in brackets in ticks",
@@ -88,7 +87,7 @@ def rms_table(report: Report) -> Table:
     rough = *report["chatter"].values(), (report["ripple"] or {}).get("rms", {})
     rows: list[list[Any]] = []
     for key, value in report["rms"]["mean_axis"].items():
-        spec = ".4f" if "torque" in key else ".3e"
+        spec = ".4f" if unit_of(key).startswith("N") else ".3e"
         rms = f"{value:{spec}}", beside[key] and f"{beside[key]:{spec}}"
         rows.append([key, unit_of(key), *rms, *(measure.get(key, "") for measure in rough)])
     return Table(title, columns, [Group(rows)], remarks(report))
@@ -126,11 +125,6 @@ def _groups(shown: Sequence[Line]) -> list[Group]:
     ]
 
 
-def unit_of(column: str) -> str:
-    """Return the unit of a column of Table V."""
-    return next(unit for prefix, unit in UNITS.items() if column.startswith(prefix))
-
-
 def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
     """List all metrics of the reports, a line each.
 
@@ -143,10 +137,10 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
     if not brief:
         found += each("RMS, mean of axes", ("rms", "mean_axis"), unit_of)
         found += each("RMS, eq. (64)", ("rms", "eq64"), unit_of)
-        found += each("variation per s", ("chatter", "total_variation_per_s"), "N m/s")
+        found += each("variation per s", ("chatter", "total_variation_per_s"), _per_second)
         found += each("power > 100 Hz", ("chatter", "power_above_100_hz"))
-        found += each("ripple", ("ripple", "rms"), "N m")
-    found += each("ripple's peak", ("ripple", "peak"), text=_peak)
+        found += each("ripple", ("ripple", "rms"), unit_of)
+    found += each("ripple's peak", ("ripple", "peak"), text_of=_peak_of)
     found += each("attitude drift", ("attitude_drift",), "deg", label=_end_or_max)
     found += each("navigation error", ("navigation_error", "rms"), unit_of)
     found += each("maximum", ("maxima",), unit_of)
@@ -159,7 +153,7 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
     found.append(one("commands", "not as commanded", "", _differing))
     for kind in ("rms", "max"):
         label = partial(_axes, kind=kind)
-        found += each("estimate error", ("estimate_error", kind), "N m", label=label)
+        found += each("estimate error", ("estimate_error", kind), _group_unit, label=label)
     for group, key in (("pointing", "boresight_rad"), ("rotation", "rotation_rad")):
         found += each(group, ("pointing", key), text=_angle, label=_upper)
     for group, key in (("tool position", "tool_position_m"), ("base's drift", "base_drift_m")):
@@ -204,15 +198,20 @@ def _each_key(
     unit: str | Callable[[str], str] = "",
     text: Callable[[Any], str] = _number,
     label: Callable[[str], str] = str,
+    text_of: Callable[[str], Callable[[Any], str]] | None = None,
 ) -> list[Line]:
-    """Make a line for every key below ``path`` in any of the reports."""
+    """Make a line for every key below ``path`` in any of the reports.
+
+    ``text`` writes a value, or the one that ``text_of`` has for its key.
+    """
     below = [_at(report, path) for report in reports]
     return [
         Line(
             group, label(key), unit if isinstance(unit, str) else unit(key),
-            [text(values[key]) if key in values else NONE for values in below],
+            [write(values[key]) if key in values else NONE for values in below],
         )
         for key in dict.fromkeys(key for values in below for key in values)
+        for write in [text_of(key) if text_of else text]
     ]  # fmt: skip
 
 
@@ -235,8 +234,21 @@ def _angle(value: float) -> str:
     return f"{value:.3g} rad\n{readable}"
 
 
-def _peak(value: dict[str, float] | None) -> str:
-    return f"{value['frequency_hz']:.4g} Hz\n{value['rms']:.2e} N m" if value else NONE
+def _peak_of(column: str) -> Callable[[dict[str, float] | None], str]:
+    return partial(_peak, unit=unit_of(column))
+
+
+def _peak(value: dict[str, float] | None, unit: str) -> str:
+    return f"{value['frequency_hz']:.4g} Hz\n{value['rms']:.2e} {unit}" if value else NONE
+
+
+def _per_second(column: str) -> str:
+    return f"{unit_of(column)}/s"
+
+
+def _group_unit(group: str) -> str:
+    """Return the unit of the force of a group of axes."""
+    return "N" if group == "prismatic" else "N m"
 
 
 def _drift(value: float | None) -> str:

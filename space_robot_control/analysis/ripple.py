@@ -23,7 +23,7 @@ from space_robot_sim.robot import Robot
 from space_robot_sim.robot.dynamics import free_inverse_dynamics, inverse_dynamics
 
 from .attitude_drift import controls_base
-from .metrics import torque_columns
+from .metrics import AxisIndex, torque_columns
 from .spectrum import PowerSpectrum
 
 Array = NDArray[np.float64]
@@ -56,20 +56,20 @@ class RippleSpectrum(NamedTuple):
     frequency: Array
     """(F,) Hz, above `SLOWEST`."""
     mean_square: Array
-    """(F, n+3) N2 m2 of each axis."""
+    """(F, n+3) N2 m2 of each axis, N2 of prismatic joints."""
 
-    def group(self, axes: slice) -> Array:
-        """(F,) N2 m2, mean over some axes."""
+    def group(self, axes: AxisIndex) -> Array:
+        """(F,) N2 m2 or N2, mean over some axes."""
         mean: Array = np.mean(self.mean_square[:, axes], axis=1)
         return mean
 
     def rms(self, above: float = SLOWEST) -> Array:
-        """(n+3,) N m, of each axis' ripple ``above`` a frequency, Hz."""
+        """(n+3,) N m or N, of each axis' ripple ``above`` a frequency, Hz."""
         fast = self.frequency >= above * (1.0 - 1e-9)
         rms: Array = np.sqrt(np.sum(self.mean_square[fast], axis=0))
         return rms
 
-    def peak(self, axes: slice) -> Peak | None:
+    def peak(self, axes: AxisIndex) -> Peak | None:
         """Find the peak of the mean over some axes; None: it falls or rises all the way."""
         power = self.group(axes)
         inner = power[1:-1]
@@ -95,7 +95,7 @@ class Ripple(Metric):
         if 0.5 / self._period <= SLOWEST:
             raise InputError(f"ticks less than {0.5 / SLOWEST:g} s apart are needed")
         self._names = (*BASE_AXES, *log.joint_names)
-        self._columns = torque_columns(log.axes, controls_base(log))
+        self._columns = torque_columns(log.axes, controls_base(log), log.prismatic)
         self._spectrum = PowerSpectrum(log.axes, self._period, round(SEGMENT_S / self._period))
         self._rows = 0
 
@@ -117,7 +117,7 @@ class Ripple(Metric):
         return RippleSpectrum(frequency[fast], mean_square[fast])
 
     def result(self) -> dict[str, Any]:
-        """Return the RMS by torque column and by axis, N m, and the peak of each column.
+        """Return the RMS by torque column and by axis, N m or N, and the peak of each column.
 
         ``fast`` is the RMS of what is above `FAST`.
         """

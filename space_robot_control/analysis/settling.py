@@ -18,7 +18,7 @@ from .waypoints import Waypoints
 Array = NDArray[np.float64]
 
 BAND = 1e-5
-"""Largest |error| that counts as settled: rad on a joint; on eps, which is 4.1 arcsec."""
+"""Largest |error| that counts as settled: rad or m on a joint; on eps, which is 4.1 arcsec."""
 SHORTEST_WATCH = 0.1
 """s of flight after a waypoint without which nothing can be said of settling there."""
 
@@ -34,7 +34,7 @@ class Settling(Metric):
         """``log``: the first rows; ``band``: unit of the error, for the largest of the axes."""
         self._first_tick, self._period, self._band = log.first_tick, log.timebase.period, band
         self._waypoints = Waypoints()
-        self._columns = error_columns(log.axes, controls_base(log))
+        self._columns = error_columns(log.axes, controls_base(log), log.prismatic)
         self._outside = dict.fromkeys(self._columns, -1)
         """Last row outside the band, by column."""
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from .options import OPTIONS, flight_options, plan_flight, remarks_on_gains
+from .options import OPTIONS, flight_options, plan_flight, remarks_on
 
 
 @click.command()
@@ -58,7 +58,7 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     bag = bag or default_bag(flight)
     check_bag_path(bag)
     try:
-        report = fly_graph(flight, bag, analyze, remarks_on_gains(flight))
+        report = fly_graph(flight, bag, analyze, remarks_on(flight))
     except FlightError as error:
         if as_json:
             echo_json(failed_report(flight, bag, error, report_of(bag)))

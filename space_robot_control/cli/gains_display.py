@@ -58,7 +58,7 @@ def _noise_gains(found: Checked) -> Table:
     columns = [
         Column("", is_label=True), *(Column(check.law, spec=".3g") for check in found.checks)
     ]  # fmt: skip
-    names = found.flight.robot.axis_names
+    names = _axes(found, "N s/m")
     rows = [
         [name, *(float(check.noise_gain[axis]) for check in found.checks)]
         for axis, name in enumerate(names)
@@ -67,11 +67,21 @@ def _noise_gains(found: Checked) -> Table:
     return Table.of(title, columns, rows)
 
 
+def _axes(found: Checked, of_prismatic: str) -> list[str]:
+    """Name the axes, those of prismatic joints with the unit of their own."""
+    robot = found.flight.robot
+    slides = (False, False, False, *robot.is_prismatic[: robot.n])
+    return [
+        f"{name} ({of_prismatic})" if is_prismatic else name
+        for name, is_prismatic in zip(robot.axis_names, slides, strict=True)
+    ]
+
+
 def _ripple(found: Checked) -> Table:
     columns = [Column("", is_label=True), *(Column(law, spec=".3g") for law in found.ripple)]
     rows = [
         [name, *(None if x is None else float(x[axis]) for x in found.ripple.values())]
-        for axis, name in enumerate(found.flight.robot.axis_names)
+        for axis, name in enumerate(_axes(found, "N"))
     ]
     sensors = found.flight.plant_settings.sensors
     table = Table.of(f"Torque ripple with sensors {sensors}, held still, N m RMS", columns, rows)

@@ -262,18 +262,19 @@ def plan_flight(**options: Any) -> Flight:
     return Flight(validate(FlightPlan, options, "options"))
 
 
-def remarks_on_gains(flight: Flight) -> list[str]:
-    """Return what there is to say of gains that leave the time-delay estimate too little margin."""
+def remarks_on(flight: Flight) -> list[str]:
+    """Return what there is to say of gains with too little margin and of joints asked too much."""
     from ..tuning.gain_check import pair_corner
-    from ..tuning.warning import margin_remarks
+    from ..tuning.warning import limit_remarks, margin_remarks
 
     flown = [flight.law, *(law for _, law in flight.swaps)]
     corner = pair_corner(flight.controller_settings)
     names = flight.plant.names
-    return margin_remarks(
+    on_gains = margin_remarks(
         flown, flight.plant.robot, flight.mission_settings, corner, flight.controls_base,
         on_thrusters=bool(names.thrusters and not names.wheels),
     )  # fmt: skip
+    return on_gains + limit_remarks(flight.plant.robot, flight.mission_settings)
 
 
 OUTPUT = file_option("--output", help="File to write the JSON to as well.")

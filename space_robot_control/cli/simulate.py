@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from .options import OPTIONS, flight_options, plan_flight, remarks_on_gains
+from .options import OPTIONS, flight_options, plan_flight, remarks_on
 
 
 @click.command()
@@ -44,7 +44,7 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
         check_bag_path(bag)
         if remark := room_remark(flight, bag):
             click.echo(remark, err=True)
-    for remark in remarks_on_gains(flight):
+    for remark in remarks_on(flight):
         click.echo(remark, err=True)
     compile_kernels(bool(flight.plant.names.actuators))
     period, analysis, began = flight.period, Analysis(), time.monotonic()

@@ -13,6 +13,8 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ReferenceChunk
 from space_robot_sim.robot import Robot
 
+from .limits import check_positions
+
 Array = NDArray[np.float64]
 
 
@@ -43,7 +45,8 @@ class Mission:
         """A mission for the joints with motors of ``robot``.
 
         Raises:
-            InputError: the waypoints do not fit the times or the joints.
+            InputError: the waypoints do not fit the times or the joints, or are beyond the limits
+                of these.
         """
         n, times = robot.n, np.array(settings.waypoint_times)
         if len(settings.waypoints_deg) != n * len(times):
@@ -58,8 +61,19 @@ class Mission:
             raise InputError(f"base_quaternion must have a norm near 1, got {norm:g}")
         self._times = times
         self._waypoints = robot.from_degrees(np.reshape(settings.waypoints_deg, (len(times), n)))
+        check_positions(robot, self._waypoints)
         self._quaternion = np.array(settings.base_quaternion) / norm
         self._period = period
+
+    @property
+    def times(self) -> Array:
+        """(K,) s, of the waypoints."""
+        return self._times
+
+    @property
+    def waypoints(self) -> Array:
+        """(K, n) rad, or m of prismatic joints."""
+        return self._waypoints
 
     @property
     def duration(self) -> float:

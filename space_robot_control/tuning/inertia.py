@@ -50,10 +50,11 @@ def inertia_along(
 ) -> Array:
     """Return H_S (K, m, m) of ``robot`` along a mission's reference, every ``step`` s.
 
-    If nothing turns the base: H_f (K, n, n).
+    If nothing turns the base: H_f (K, n, n). Of a robot with passive joints every configuration is
+    there twice: with them locked at rest, as slow motion has them, and loose, as a tick has them.
 
     Args:
-        robot: with its payload, if it carries one; joints without motors are locked.
+        robot: with its payload, if it carries one.
         settings: of the mission; its last waypoint is looked at too.
         step: s.
         controls_base: whether anything turns the base.
@@ -63,6 +64,8 @@ def inertia_along(
     """
     chunk = sampled_reference(robot, settings, step)
     inertia = semi_floating_inertia(robot.nominal, chunk.joints[:, 0])
+    if robot.springs:
+        inertia = np.concatenate([inertia, loose_inertia(robot, chunk.joints[:, 0])])
     return inertia_in_rho(chunk.base[0, :4], inertia) if controls_base else free_inertia(inertia)
 
 
@@ -70,6 +73,20 @@ def free_inertia(inertia: Array) -> Array:
     """Return H_f (K, n, n) of H_r, or of H_S, (K, m, m)."""
     share = np.linalg.solve(inertia[:, :3, :3], inertia[:, :3, 3:])
     left: Array = inertia[:, 3:, 3:] - inertia[:, 3:, :3] @ share
+    return left
+
+
+def loose_inertia(robot: Robot, joint_positions: Array) -> Array:
+    """Return ``H_aa - H_ap H_pp^-1 H_pa`` (K, m, m) of H_r, p its passive joints, at rest.
+
+    The actuated axes a meet it in motion that is faster than the springs, which then do not count.
+    ``joint_positions`` (K, n) are those of the actuated joints, rad or m.
+    """
+    count, m = len(joint_positions), robot.n + 3
+    rest = np.broadcast_to([spring.rest for spring in robot.springs], (count, len(robot.springs)))
+    whole = semi_floating_inertia(robot, np.hstack([joint_positions, rest]))
+    share = np.linalg.solve(whole[:, m:, m:], whole[:, m:, :m])
+    left: Array = whole[:, :m, :m] - whole[:, :m, m:] @ share
     return left
 
 
@@ -88,9 +105,9 @@ def inertia_in_rho(quaternion: Array, inertia: Array) -> Array:
 
 
 def semi_floating_inertia(robot: Robot, joint_positions: Array) -> Array:
-    """Return H_r (K, m, m) about the base's axes for ``joint_positions`` (K, n), rad or m.
+    """Return H_r (K, N+3, N+3) about the base's axes for all ``joint_positions`` (K, N).
 
-    The robot has no passive joints.
+    They are in rad, or in m of prismatic joints; passive joints are behind.
     """
     count, n = joint_positions.shape
     angular = np.zeros((n + 1, count, 3, n + 3))

@@ -1,18 +1,23 @@
-"""A remark, before a flight, on gains that leave the time-delay estimate too little margin."""
+"""Remarks, before a flight, on gains with too little margin, and on joints asked too much."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+
+import numpy as np
 
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.robot import Robot
 
 from ..controller.navigation.low_pass import low_pass_weight
 from ..laws import ControlLaw
-from ..mission.mission import MissionSettings
-from .inertia import inertia_along
+from ..mission.limits import too_fast, too_strong
+from ..mission.mission import Mission, MissionSettings
+from .inertia import inertia_along, sampled_reference, semi_floating_inertia
 from .spectrum import LEAST_MARGIN, spectrum
 
+A_LEG = 10
+"""Configurations of each leg at least."""
 COARSE = 0.5
 """s between two configurations: nobody is to wait for a remark."""
 
@@ -60,3 +65,32 @@ def margin_remarks(
             continue
         remarks.append(f"warning: {name}: {why}; see space-robot gains check")
     return remarks
+
+
+def limit_remarks(robot: Robot, mission: MissionSettings) -> list[str]:
+    """Return a line for each joint that the mission asks more of than its limits allow.
+
+    The force is that of acceleration alone, the attitude held and the passive joints locked:
+    friction, velocities and errors come on top.
+    """
+    try:
+        planned = Mission(robot, mission, COARSE)
+    except InputError:  # it is the flight that has to complain
+        return []
+    remarks = [
+        f"warning: mission: {b.joint} is to move at {b.asked:.3g} {b.unit}, its limit is "
+        f"{b.limit:.3g} {b.unit}"
+        for b in too_fast(robot, planned.times, planned.waypoints)
+    ]
+    has_limits = np.isfinite([limits.effort for limits in robot.limits]).any()
+    if not has_limits or len(planned.times) < 2:
+        return remarks
+    legs = np.diff(planned.times)
+    joints = sampled_reference(robot, mission, min(COARSE, *(legs / A_LEG))).joints
+    inertia = semi_floating_inertia(robot.nominal, joints[:, 0])[:, 3:, 3:]
+    force = np.einsum("kij,kj->ki", inertia, joints[:, 2])
+    return remarks + [
+        f"warning: mission: {b.joint} needs {b.asked:.3g} {b.unit} and more, its limit is "
+        f"{b.limit:.3g} {b.unit}"
+        for b in too_strong(robot, force)
+    ]

@@ -224,6 +224,12 @@ class FlightLog:
         return _beside(self.joint_velocities, self.passive_velocities)
 
     @property
+    def prismatic(self) -> tuple[bool, ...]:
+        """Of the n joints with motors and then of the p without: True for those that slide."""
+        told = self.flight.get("prismatic_joints", ())
+        return tuple(name in told for name in (*self.joint_names, *self.passive_names))
+
+    @property
     def axes(self) -> int:
         """Controlled coordinates, n+3."""
         return int(self.applied_torque.shape[1])

@@ -142,7 +142,7 @@ class Plant:
         self.truth.joint_positions[:] = memory.x[7 : 7 + n]
         self.truth.passive_positions[: len(robot.springs)] = memory.x[7 + n : 7 + robot.joint_count]
         self.truth.wheel_velocities[:] = speeds
-        sensors = Sensors.build(n, settings, period, memory.truth)
+        sensors = Sensors.build(n, settings, period, memory.truth, robot.is_prismatic[:n])
         schedule = settings.schedule(self.names, period)
         check_faults(schedule, settings)
         self._part_faults = PartFaults(schedule)

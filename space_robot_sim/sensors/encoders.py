@@ -1,8 +1,11 @@
-"""An encoder on each joint: its angle in whole steps, its rate measured or differenced."""
+"""An encoder on each joint: its angle in whole steps, its rate measured or differenced.
+
+The angle of a prismatic joint is its position; m stands in the place of rad there.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -41,15 +44,16 @@ class EncoderSettings(StrictModel):
     """The encoders of all joints; by default without error."""
 
     bits: Annotated[int, Field(ge=0, le=32)] = Field(
-        0, description="steps of a turn are two to this power (0: angles without steps)"
+        0,
+        description="steps of a turn, or of a metre, are two to this power (0: no steps)",
     )
-    noise: Sigma = Field(0.0, description="white noise of each angle, rad")
+    noise: Sigma = Field(0.0, description="white noise of each angle, rad or m")
     difference_ticks: Annotated[int, Field(ge=0, le=MOST_DIFFERENCED)] = Field(
         0, description="joint rates are differences of angles over so many ticks (0: measured)"
     )
-    velocity_noise: Sigma = Field(0.0, description="white noise of each joint rate, rad/s")
+    velocity_noise: Sigma = Field(0.0, description="white noise of each joint rate, rad/s or m/s")
     velocity_step: Sigma = Field(
-        0.0, description="distance of two values of a joint rate, rad/s (0: none)"
+        0.0, description="distance of two values of a joint rate, rad/s or m/s (0: none)"
     )
 
 
@@ -78,15 +82,23 @@ class Encoders(Record):
     """The last angles told, by tick modulo `MOST_DIFFERENCED`, rad."""
 
     @classmethod
-    def build(cls, n: int, settings: EncoderSettings, period: float, truth: State) -> Encoders:
-        """Read the settings; before tick 0 the robot was at rest at ``truth``."""
+    def build(
+        cls, n: int, settings: EncoderSettings, period: float, truth: State,
+        is_prismatic: Sequence[bool] | NDArray[np.bool_] = (),
+    ) -> Encoders:  # fmt: skip
+        """Read the settings; before tick 0 the robot was at rest at ``truth``.
+
+        ``is_prismatic`` (n,): which joints slide (empty: none).
+        """
         encoders = cls.allocate(n)
-        step = 2.0 * np.pi / 2.0**settings.bits if settings.bits else 0.0
+        whole = np.full(n, 2.0 * np.pi)
+        whole[: len(is_prismatic)][np.asarray(is_prismatic, np.bool_)] = 1.0
+        step = whole / 2.0**settings.bits if settings.bits else np.zeros(n)
         at_rest = truth.joint_positions
         assign(
             encoders, sigma=settings.noise, step=step, difference_ticks=settings.difference_ticks,
             velocity_sigma=settings.velocity_noise, velocity_step=settings.velocity_step,
-            told=step * np.floor(at_rest / step + 0.5) if step else at_rest,
+            told=step * np.floor(at_rest / step + 0.5) if settings.bits else at_rest,
         )  # fmt: skip
         return encoders
 

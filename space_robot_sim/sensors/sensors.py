@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,8 +39,13 @@ class Sensors(Record):
     """1 if they tell the truth."""
 
     @classmethod
-    def build(cls, n: int, settings: SensorSettings, period: float, truth: State) -> Sensors:
+    def build(
+        cls, n: int, settings: SensorSettings, period: float, truth: State,
+        is_prismatic: Sequence[bool] | NDArray[np.bool_] = (),
+    ) -> Sensors:  # fmt: skip
         """Read the numbers of the settings for a robot of ``n`` joints, at rest at ``truth``.
+
+        ``is_prismatic`` (n,): which joints slide (empty: none).
 
         Raises:
             InputError: they do not fit one another or the period.
@@ -49,7 +56,7 @@ class Sensors(Record):
                 sensors,
                 star_tracker=StarTracker.build(n, settings.star_tracker, period, truth),
                 gyro=Gyro.build(n, settings.gyro, period, truth),
-                encoders=Encoders.build(n, settings.encoders, period, truth),
+                encoders=Encoders.build(n, settings.encoders, period, truth, is_prismatic),
                 are_ideal=all(getattr(settings, name) == default for name, default in IDEAL),
             )
         except InputError as error:

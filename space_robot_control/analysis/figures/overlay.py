@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from ..metrics import unit_of
 from ..plot_series import PlotSeries
 from ..pointing import ARCSEC
 from .style import Look, house_style, legend_above, page, plot_lines
@@ -38,10 +39,14 @@ def errors_and_torques(flights: Mapping[str, PlotSeries]) -> Figure:
     """
     errors = _panels(
         flights, lambda series: series.errors,
-        lambda key: f"|{words(key)} error|{'' if key == 'attitude' else ' (rad)'}", True,
+        lambda key: f"|{words(key)} error|{'' if key == 'attitude' else f' ({unit_of(key)})'}",
+        True,
     )  # fmt: skip
     torques = _panels(
-        flights, lambda series: series.torques, lambda key: f"|{words(key)}| (N m)", False
+        flights,
+        lambda series: series.torques,
+        lambda key: f"|{words(key)}| ({unit_of(key)})",
+        False,
     )
     return _draw([errors, torques], list(flights))
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..metrics import torque_columns
+from ..metrics import torque_columns, unit_of
 from ..plot_series import PlotSeries
 from .overlay import words
 from .style import Look, house_style, legend_above, page, scattered
@@ -45,7 +45,8 @@ def ripple(flights: Mapping[str, PlotSeries]) -> Figure:
                 linestyle=look.dashes, marker=look.marker, linewidth=0.7,
                 markevery=_marks(frequency, names.index(name), len(names)),
             )  # fmt: skip
-        panel.set(xscale="log", yscale="log", ylabel=f"PSD of {words(key)} ((N m)²/Hz)")
+        squared = "N²" if unit_of(key) == "N" else "(N m)²"
+        panel.set(xscale="log", yscale="log", ylabel=f"PSD of {words(key)} ({squared}/Hz)")
     panels[-1].set_xlabel("frequency (Hz)")
     panels[-1].xaxis.set_major_formatter("{x:g}")
     figure.align_ylabels()

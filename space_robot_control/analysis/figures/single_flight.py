@@ -21,19 +21,37 @@ Array = NDArray[np.float64]
 BASE_AXES = ("base x", "base y", "base z")
 JUNCTION_HALF_WIDTH = 0.15
 """s on either side of a junction: long enough for the ripple to rise and die down."""
+MOST_LETTERS = 16
+"""Of names of joints in a label."""
 MOST_JUNCTIONS = 3
 """Junctions enlarged, from the first on: more would not fit beside one another."""
 
 
 @house_style()
 def desired_joints(log: FlightLog) -> Figure:
-    """Draw Fig. 5: the desired joint angles over time, each marked at the waypoints."""
-    figure = page(80.0)
-    axes = figure.add_subplot()
-    time, waypoints = tick_times(log), waypoint_ticks(log)
-    plot_lines(axes, time, np.degrees(log.reference_joints[:, 0]), marks=waypoints, dashed=True)
-    mark_moments(axes, time[waypoints])
-    axes.set(xlabel="time (s)", ylabel="desired joint angle (deg)")
+    """Draw Fig. 5: the desired joint angles over time, each marked at the waypoints.
+
+    The positions of prismatic joints have a panel of their own.
+    """
+    slides = np.array(log.prismatic[: len(log.joint_names)])
+    desired, time, waypoints = log.reference_joints[:, 0], tick_times(log), waypoint_ticks(log)
+    panels = [
+        (np.flatnonzero(kind), values, label)
+        for kind, values, label in (
+            (~slides, np.degrees(desired), "desired joint angle (deg)"),
+            (slides, desired, "desired joint position (m)"),
+        )
+        if kind.any()
+    ]
+    figure = page(80.0 if len(panels) == 1 else 120.0)
+    below = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, (joints, values, label) in zip(below, panels, strict=True):
+        plot_lines(
+            axes, time, values[:, joints], looks=joints.tolist(), marks=waypoints, dashed=True
+        )
+        mark_moments(axes, time[waypoints])
+        axes.set_ylabel(label)
+    below[-1].set_xlabel("time (s)")
     legend_above(figure, log.joint_names, dashed=True)
     return figure
 
@@ -59,7 +77,7 @@ def control_results(log: FlightLog, title: str) -> Figure:
     cells = figure.add_gridspec(rows, 2)
     for column, (part, names, error_label, torque_label) in enumerate((
         (slice(0, 3), BASE_AXES, of_base, "base torque (N m)"),
-        (slice(3, None), log.joint_names, "joint error (rad)", "joint torque (N m)"),
+        (slice(3, None), log.joint_names, *_joint_labels(log)),
     )):  # fmt: skip
         errors = figure.add_subplot(cells[0, column])
         torques = figure.add_subplot(cells[1, column], sharex=errors)
@@ -76,6 +94,18 @@ def control_results(log: FlightLog, title: str) -> Figure:
             enlarged.set_ylabel(torque_label)
         figure.align_ylabels([errors, torques])
     return figure
+
+
+def _joint_labels(log: FlightLog) -> tuple[str, str]:
+    """Return the labels of the joints' errors and torques, with the units that there are."""
+    slides = log.prismatic[: len(log.joint_names)]
+    if all(slides):
+        return "joint error (m)", "joint force (N)"
+    if not any(slides):
+        return "joint error (rad)", "joint torque (N m)"
+    sliding = ", ".join(n for n, is_so in zip(log.joint_names, slides, strict=True) if is_so)
+    few = sliding if len(sliding) <= MOST_LETTERS else "prismatic"
+    return f"joint error (rad; {few}: m)", f"joint torque (N m; {few}: N)"
 
 
 def _enlarge(

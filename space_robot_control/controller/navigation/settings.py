@@ -49,11 +49,11 @@ class NavigationFilterSettings(StrictModel):
         100.0, description="corner of each of two low-passes of the base's rate, Hz (0: none)"
     )
     joint_angle_noise: Sigma = Field(
-        AS_THE_SENSORS, description="noise of a joint's angle, rad (-1: the sensors')"
+        AS_THE_SENSORS, description="noise of a joint's angle, rad or m (-1: the sensors')"
     )
     joint_rate_noise: Sigma = Field(
         AS_THE_SENSORS,
-        description="noise of a joint's rate, rad/s (0: it is not used; -1: the sensors')",
+        description="noise of a joint's rate, rad/s or m/s (0: it is not used; -1: the sensors')",
     )
     joint_bandwidth_hz: Corner = Field(
         150.0, description="bandwidth of the filter of joint angles and rates, Hz (0: none)"

@@ -74,6 +74,8 @@ class _Follower:
         self, graph: Graph, flight: Flight, parameters: dict[str, dict[str, Any]],
         monitor: Monitor, stopped: list[int],
     ) -> None:  # fmt: skip
+        slides = flight.robot.is_prismatic[: flight.robot.n]
+        self._unit = "m" if slides.all() else "rad or m" if slides.any() else "rad"
         self.total_s = flight.ticks * flight.period
         self._last_clock_s = self.total_s - flight.plant_settings.clock_decimation * flight.period
         self._graph, self._monitor, self._stopped = graph, monitor, stopped
@@ -156,7 +158,8 @@ class _Follower:
         if monitor.simulated_s > self._last_s or (not self._begun_at and monitor.has_begun):
             self._begun_at = self._begun_at or now
             self._last_s, self._moved_at = monitor.simulated_s, now
-            show(self._last_s, _remark(monitor.errors, self._last_s, now - self._begun_at))
+            wall_s = now - self._begun_at
+            show(self._last_s, _remark(monitor.errors, self._last_s, wall_s, self._unit))
         elif now - self._moved_at > STALL_TIMEOUT_S:
             output = "\n".join(f"{n}:\n{p.output_tail()}" for n, p in self._graph.nodes.items())
             why = "".join(f"{node}: {mode}\n" for node, mode in monitor.complaints.items())
@@ -165,12 +168,14 @@ class _Follower:
             )
 
 
-def _remark(errors: tuple[float, float] | None, simulated_s: float, wall_s: float) -> str:
+def _remark(
+    errors: tuple[float, float] | None, simulated_s: float, wall_s: float, unit: str
+) -> str:
     speed = f"{simulated_s / wall_s:.1f}x real time, " if wall_s > 0.5 else ""
     if errors is None:
         return speed
     of_base = f"attitude {errors[0]:.1e}, " if errors[0] else ""  # the law of a free base sees none
-    return f"{speed}errors: {of_base}joints {errors[1]:.1e} rad"
+    return f"{speed}errors: {of_base}joints {errors[1]:.1e} {unit}"
 
 
 def _restart_command(parameters: Mapping[str, Any], absent: Collection[str]) -> list[str]:

@@ -11,7 +11,8 @@ import pytest
 from random_logs import random_log
 
 from space_robot_control.analysis import analyze
-from space_robot_control.analysis.report_tables import DEFINITIONS, Line, lines, unit_of
+from space_robot_control.analysis.metrics import unit_of
+from space_robot_control.analysis.report_tables import DEFINITIONS, Line, lines
 from space_robot_control.analysis.tables import NONE
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate

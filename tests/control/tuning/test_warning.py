@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from space_robot_control.cli.options import remarks_on_gains
+from space_robot_control.cli.options import remarks_on
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.tuning.gain_check import pair_corner
@@ -40,9 +40,9 @@ def test_table_iv_is_enough_for_joints_whose_base_is_free() -> None:
 
 def test_thrusters_are_told_which_gains_are_for_them() -> None:
     for actuators, is_said in (("thrusters", True), ("wheels_and_thrusters", False)):
-        (line,) = remarks_on_gains(Flight(FlightPlan(actuators=actuators)))
+        (line,) = remarks_on(Flight(FlightPlan(actuators=actuators)))
         assert ("thrusters' pulses" in line) is is_said
-    assert remarks_on_gains(Flight(FlightPlan(actuators="thrusters", gains="robust"))) == []
+    assert remarks_on(Flight(FlightPlan(actuators="thrusters", gains="robust"))) == []
 
 
 def test_laws_with_a_model_have_no_margin_to_lack() -> None:
