@@ -42,7 +42,7 @@ class Robots:
             return self._given[name]
         if name not in self._contents:
             self._contents[name] = robot_content(name)
-        return Robot.from_dict(self._contents[name], where=f"robot {name}")
+        return Robot.from_dict(self._contents[name], where=name)
 
     @property
     def description(self) -> dict[str, Any]:

@@ -19,13 +19,13 @@ from pathlib import Path
 from typing import Any
 
 from space_robot_msgs_py.config.files import GIVEN, config_directory, named_file
-from space_robot_msgs_py.config.validation import read_yaml, short
+from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.config.yaml_text import check_file, is_folder
 from space_robot_msgs_py.errors import InputError
 
 from .robot import Robot
+from .source import URDF, YAML, read_robot_file
 
-YAML, URDF = (".yaml", ".yml"), (".urdf", ".xacro")
 OWN = "robot"
 """Name, less its ending, of the robot's file in a folder of its own."""
 OWN_MISSION, OWN_GAINS = "mission.yaml", "gains"
@@ -82,10 +82,7 @@ def find_robot(robot: str, base: str | None = None, repair: bool = False) -> Rob
     Raises:
         InputError: there is no such robot, or its file is wrong.
     """
-    file = robot_files(robot).file
-    if file.suffix in URDF:
-        raise InputError(f"{file}: URDF is not read yet")
-    return Robot.from_yaml(file)
+    return read_robot_file(robot_files(robot).file, base, repair).robot
 
 
 def robot_content(robot: str) -> dict[str, Any]:
@@ -94,7 +91,7 @@ def robot_content(robot: str) -> dict[str, Any]:
     Raises:
         InputError: see `find_robot`.
     """
-    return read_yaml(robot_files(robot).file)
+    return read_robot_file(robot_files(robot).file).content
 
 
 def mission_file(robot: str, mission: str = "") -> Path:
@@ -107,6 +104,7 @@ def mission_file(robot: str, mission: str = "") -> Path:
         return named_file("missions", mission)
     found = robot_files(robot)
     if found.mission is None:
+        find_robot(robot)  # what is wrong with that comes first
         raise InputError(
             f"robot {short(robot)} has no mission of its own: `space-robot new {found.file}` "
             "makes it one, with gains; or name a mission"

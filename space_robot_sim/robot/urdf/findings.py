@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
@@ -29,6 +30,11 @@ class Finding:
     def __str__(self) -> str:
         """Return the finding and its repair in one line."""
         return f"line {self.line}: {self._named()}: {self.repair}"
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """The same as a mapping."""
+        return asdict(self)
 
     def _named(self) -> str:
         return f"{self.part}: {self.defect}{f', got {self.value}' if self.value else ''}"

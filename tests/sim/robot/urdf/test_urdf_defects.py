@@ -2,201 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
-from paths import DATA, DOCS
+from paths import DOCS
+from urdf_defects import DEFECTS, GOOD, LIMIT, with_defect
 
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.urdf import read_urdf
 
-GOOD = (DATA / "arm.urdf").read_text()
 MANUAL = DOCS / "manual" / "urdf.md"
-HULL = re.search(r"    <inertial>.*?</inertial>\n", GOOD, re.DOTALL)[0]  # type: ignore[index]
-UPPER = GOOD[GOOD.index('<link name="upper">') :].split("</inertial>")[0].split(">", 1)[1]
-FORE = '<mass value="10"/>'
-FLAT = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="0.2"/>'
-LIMIT = '<limit lower="-1" upper="2" velocity="0.1" effort="50"/>'
-STRAY = '<link name="stray"><inertial><mass value="1"/></inertial></link>\n</robot>'
-
-
-class Defect(NamedTuple):
-    """What is written in the place of something else, and what is said about it."""
-
-    old: str
-    new: str
-    part: str
-    line: int
-    text: str
-    repair: str = ""
-    """Empty: it has none."""
-
-
-DEFECTS = {
-    # what is no URDF at all
-    "empty file": Defect(GOOD, " \n", "", 0, "the file is empty"),
-    "not XML": Defect("</inertial>", "", "", 15, "not XML (mismatched tag)"),
-    "document type": Defect("<robot", "<!DOCTYPE x>\n<robot", "", 2, "<!DOCTYPE>"),
-    "nested too deep": Defect(GOOD, "<a>" * 200 + "</a>" * 200, "", 1, "nested deeper"),
-    "another root": Defect(GOOD, "<sdf><robot/></sdf>", "<sdf>", 1, "the root must be <robot>"),
-    "xacro element": Defect("</robot>", "<xacro:x/></robot>", "<xacro:x>", 57, "xacro must be"),
-    "robot without name": Defect(
-        '<robot name="arm">', "<robot>", "robot", 2, "needs a printable name", "named 'given'"
-    ),
-    "no link": Defect(GOOD, '<robot name="a"/>', "robot", 1, "there is no <link>"),
-    "no joint": Defect(
-        GOOD, f'<robot name="a"><link name="b">{HULL}</link></robot>', "", 0, "no joint moves"
-    ),
-    # names, and what hangs on what
-    "link without name": Defect('<link name="upper">', "<link>", "link", 16, "a printable name"),
-    "unprintable name": Defect('<link name="upper">', '<link name="&#10;">', "link", 16, "name"),
-    "joint without name": Defect('name="slide" ', "", "joint", 45, "a printable name"),
-    "two links of a name": Defect(
-        'link name="fore"', 'link name="upper"', "link 'upper'", 24, "taken by the link in line 16"
-    ),
-    "two joints of a name": Defect(
-        'joint name="slide"', 'joint name="wrist"', "joint 'wrist'", 52, "the joint in line 45"
-    ),
-    "name of a base axis": Defect(
-        'joint name="slide"', 'joint name="base_x"', "joint 'base_x'", 45, "name of a base axis"
-    ),
-    "no parent": Defect('<parent link="upper"/>', "", "joint 'slide'", 45, "<parent link="),
-    "no child": Defect('<child link="fore"/>', "<child/>", "joint 'slide'", 45, "<child link="),
-    "unknown parent": Defect(
-        '<parent link="upper"/>', '<parent link="x"/>', "joint 'slide'", 47, "is no link"
-    ),
-    "unknown child": Defect(
-        '<child link="fore"/>', '<child link="x"/>', "joint 'slide'", 48, "is no link"
-    ),
-    "parent is child": Defect(
-        '<child link="fore"/>', '<child link="upper"/>', "joint 'slide'", 45, "must be two links"
-    ),
-    "two parents": Defect(
-        '<child link="hand"/>', '<child link="upper"/>', "joint 'wrist'", 52,
-        "already: loops cannot be closed",
-    ),
-    "two roots": Defect(
-        "</robot>", STRAY, "link 'stray'", 57, "only the root may be no joint's child"
-    ),
-    "circle": Defect(
-        '<parent link="hull"/>', '<parent link="hand"/>', "joint 'shoulder'", 37, "in a circle"
-    ),
-    # joints
-    "no type": Defect(' type="prismatic"', "", "joint 'slide'", 45, "type must be one of"),
-    "unknown type": Defect('"prismatic"', '"screw"', "joint 'slide'", 45, "type must be one of"),
-    "planar joint": Defect(
-        '"prismatic"', '"planar"', "joint 'slide'", 45, "it moves in more than one way"
-    ),
-    "floating joint": Defect(
-        '"prismatic"', '"floating"', "joint 'slide'", 45, "it moves in more than one way"
-    ),
-    "mimic": Defect(
-        LIMIT, f'{LIMIT}<mimic joint="slide"/>', "joint 'shoulder'", 42, "cannot be coupled",
-        "freed",
-    ),
-    "zero axis": Defect('"0 1 0"', '"0 0 0"', "joint 'shoulder'", 41, "the axis has no direction"),
-    "axis of NaN": Defect('"0 1 0"', '"0 nan 0"', "joint 'shoulder'", 41, "is no number"),
-    "axis of two numbers": Defect('"0 1 0"', '"0 1"', "joint 'shoulder'", 41, "must be 3 numbers"),
-    "long axis": Defect(
-        '"0 1 0"', '"0 1 1"', "joint 'shoulder'", 41, "must have length 1", "normalised"
-    ),
-    "no limit": Defect(LIMIT, "", "joint 'shoulder'", 37, "needs a <limit>", "no limits"),
-    "limits upside down": Defect(
-        '"-1" upper="2"', '"2" upper="-1"', "joint 'shoulder'", 42, "upside down", "exchanged"
-    ),
-    "limits without room": Defect(
-        'lower="-1" upper="2" ', "", "joint 'shoulder'", 42, "no room", "no limits of position"
-    ),
-    "no effort": Defect(
-        ' effort="50"', "", "joint 'shoulder'", 42, "limit.effort must be", "no limit of effort"
-    ),
-    "negative velocity": Defect(
-        '"0.1" e', '"-0.1" e', "joint 'shoulder'", 42, "limit.velocity must be", "made positive"
-    ),
-    "negative damping": Defect(
-        '"0.4"', '"-0.4"', "joint 'shoulder'", 43, "dynamics.damping must be", "read as 0"
-    ),
-    "negative friction": Defect(
-        '"0.3"', '"-0.3"', "joint 'shoulder'", 43, "dynamics.friction must be", "read as 0"
-    ),
-    # numbers and what is misspelt
-    "text for a number": Defect(
-        '"0 0 0.8"', '"0 0 0,8"', "joint 'slide'", 46, "origin.xyz is no number, got '0,8'"
-    ),
-    "too large": Defect('"300"', '"1e13"', "link 'hull'", 7, "must be at most 1e+12"),
-    "infinite": Defect('"300"', '"1e400"', "link 'hull'", 7, "must be at most 1e+12"),
-    "no mass value": Defect(FORE, "<mass/>", "link 'fore'", 26, "needs the attribute 'value'"),
-    "no moment": Defect(
-        ' iyy="50"', "", "link 'hull'", 8, "<inertia> needs the attribute 'iyy'"
-    ),
-    "no product": Defect(' iyz="0" izz="60"', ' izz="60"', "link 'hull'", 8, "needs 'iyz'", "read"),
-    "misspelt element": Defect(
-        '<dynamics damping="0.4" friction="0.3"/>', "<dynamcis/>", "joint 'shoulder'", 43,
-        "unknown element <dynamcis>", "left out",
-    ),
-    "misspelt attribute": Defect(
-        'damping="0.4"', 'damp="0.4"', "joint 'shoulder'", 43, "unknown attribute 'damp'",
-        "left out",
-    ),
-    "given twice": Defect(
-        LIMIT, LIMIT * 2, "joint 'shoulder'", 42, "<limit> stands there twice", "the first one"
-    ),
-    # masses and inertias
-    "negative mass": Defect('"300"', '"-300"', "link 'hull'", 7, "mass must be at least 0"),
-    "root without inertia": Defect(
-        HULL, "", "link 'hull'", 4, "the base must have a mass",
-        "joint 'shoulder' locked at 0, merged into link 'upper'",
-    ),
-    "massless tip": Defect(
-        FORE, '<mass value="0"/>', "link 'fore'", 26, "a link that moves must have a mass",
-        "joint 'slide' locked at 0, merged into link 'upper'",
-    ),
-    "massless between": Defect(
-        UPPER, "<inertial>", "link 'upper'", 16, "a link that moves and carries others must"
-    ),
-    "inertia without mass": Defect(
-        "</link>\n  <joint", f"<inertial>{FLAT}</inertial></link>\n  <joint", "link 'hand'", 36,
-        "inertia without mass", "the inertia is left out",
-    ),
-    "zero inertia": Defect(
-        FLAT, "", "link 'fore'", 26, "the inertia is zero", "that of a solid sphere of 0.134 m"
-    ),
-    "zero inertia, a shape": Defect(
-        '<inertia ixx="2" ixy="0.1" ixz="0" iyy="2" iyz="0" izz="0.5"/>', "", "link 'upper'", 19,
-        "the inertia is zero", "that of the solid cylinder that it looks like",
-    ),
-    "not positive definite": Defect(
-        'iyy="50"', 'iyy="-5"', "link 'hull'", 7, "not positive definite", "raised to the nearest"
-    ),
-    "triangle inequality": Defect(
-        'izz="60"', 'izz="95"', "link 'hull'", 7, "breaks the triangle inequality",
-        "raised to the nearest physical one, principal moments 42.55, 52.55, 95",
-    ),
-    # shapes
-    "shape without size": Defect(
-        '<sphere radius="0.1"/>', "<sphere/>", "link 'hand'", 32, "needs the attribute 'radius'",
-        "the shape is left out",
-    ),
-    "negative shape": Defect(
-        '"1 1 2"', '"1 1 -2"', "link 'hull'", 10, "must have sizes above 0", "the shape is left out"
-    ),
-    "unknown shape": Defect(
-        '<box size="1 1 2"/>', "<cone/>", "link 'hull'", 10, "must be box, cylinder", "the shape"
-    ),
-    "no geometry": Defect(
-        '<geometry><box size="1 1 2"/></geometry>', "", "link 'hull'", 10, "one <geometry>", "the"
-    ),
-    "mesh without file": Defect(
-        'filename="package://arm/fore.stl" ', "", "link 'fore'", 29, "a mesh needs a filename",
-        "the shape is left out",
-    ),
-    "colour": Defect(
-        '"0.2 0.2 0.2 1"', '"grey"', "material 'grey'", 3, "must be 4 numbers", "the colour"
-    ),
-}  # fmt: skip
 
 
 @pytest.fixture
@@ -207,8 +23,7 @@ def given(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("name", DEFECTS)
 def test_a_defect_is_named_in_one_line(name: str, given: Path) -> None:
     defect = DEFECTS[name]
-    assert GOOD.count(defect.old) or not defect.line
-    given.write_text(GOOD.replace(defect.old, defect.new, 1))
+    given.write_text(with_defect(name))
     with pytest.raises(InputError) as raised:
         Robot.from_urdf(given)
     said = str(raised.value)
@@ -223,7 +38,7 @@ def test_a_defect_is_named_in_one_line(name: str, given: Path) -> None:
 @pytest.mark.parametrize("name", [name for name in DEFECTS if DEFECTS[name].repair])
 def test_a_repair_is_told_and_leaves_a_robot(name: str, given: Path) -> None:
     defect = DEFECTS[name]
-    given.write_text(GOOD.replace(defect.old, defect.new, 1))
+    given.write_text(with_defect(name))
     found = read_urdf(given, repair=True)
     first = found.findings[0]
     assert (first.part, first.line) == (defect.part, defect.line)
@@ -238,7 +53,7 @@ def test_a_repair_is_told_and_leaves_a_robot(name: str, given: Path) -> None:
 
 @pytest.mark.parametrize("name", [name for name in DEFECTS if not DEFECTS[name].repair])
 def test_what_has_no_repair_stays_an_error(name: str, given: Path) -> None:
-    given.write_text(GOOD.replace(DEFECTS[name].old, DEFECTS[name].new, 1))
+    given.write_text(with_defect(name))
     with pytest.raises(InputError) as plain:
         read_urdf(given)
     with pytest.raises(InputError) as repaired:

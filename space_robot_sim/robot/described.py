@@ -1,0 +1,80 @@
+"""A robot told to its user: bodies, joints, tools and shapes, ready for JSON and tables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .robot import Robot
+
+Array = NDArray[np.float64]
+
+
+def describe(robot: Robot) -> dict[str, Any]:
+    """Return what a robot consists of, SI units; angles in rad, numbers unknown are infinite.
+
+    Vectors are on the axes of the body's own frame, whose z is the axis of its joint.
+    """
+    return {
+        "name": robot.name,
+        "mass": float(np.sum(robot.mass)),
+        "joint_names": list(robot.joint_names),
+        "passive_names": list(robot.passive_names),
+        "bodies": [_body(robot, number) for number in range(robot.joint_count + 1)],
+        "joints": [_joint(robot, number) for number in range(robot.joint_count)],
+        "tools": [
+            {"name": t.name, "body": robot.body_names[t.body], "position": _numbers(t.position)}
+            for t in robot.tools
+        ],
+        "shapes": [
+            {
+                "body": robot.body_names[seen.body],
+                "shape": seen.shape,
+                "size": list(seen.size),
+                **({"mesh": seen.mesh, "found": _is_file(seen.mesh)} if seen.mesh else {}),
+            }
+            for seen in robot.visuals
+        ],
+        "repairs": list(robot.repairs),
+    }
+
+
+def _body(robot: Robot, number: int) -> dict[str, Any]:
+    return {
+        "name": robot.body_names[number],
+        "joint": robot.all_joint_names[number - 1] if number else None,
+        "mass": float(robot.mass[number]),
+        "com": _numbers(robot.com[number]),
+        "inertia": [_numbers(row) for row in robot.inertia[number]],
+        "principal_moments": _numbers(np.linalg.eigvalsh(robot.inertia[number])),
+    }
+
+
+def _joint(robot: Robot, number: int) -> dict[str, Any]:
+    is_actuated = number < robot.n
+    friction = robot.friction[number]
+    told: dict[str, Any] = {
+        "name": robot.all_joint_names[number],
+        "kind": "prismatic" if robot.is_prismatic[number] else "revolute",
+        "is_actuated": is_actuated,
+        "parent": robot.body_names[robot.parent[number]],
+        "child": robot.body_names[number + 1],
+        "friction": None if np.isnan(friction.coulomb) else friction._asdict(),
+    }
+    if is_actuated:
+        return {**told, "limits": robot.limits[number]._asdict()}
+    return {**told, "spring": robot.springs[number - robot.n]._asdict()}
+
+
+def _numbers(values: Array) -> list[float]:
+    return [float(value) + 0.0 for value in values]  # without negative zeros
+
+
+def _is_file(name: str) -> bool:
+    try:
+        return Path(name).is_file()
+    except (OSError, ValueError):
+        return False

@@ -1,0 +1,99 @@
+"""A robot as the mapping of a YAML file that has all of its numbers, whatever it was read from."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from .file import BASE, inertia_elements
+from .robot import Robot
+
+Array = NDArray[np.float64]
+
+
+def document_of(robot: Robot) -> dict[str, Any]:
+    """Return what `Robot.from_dict` builds the same robot of, but for its visuals.
+
+    Joints keep their numbers. Frames are told in degrees, so that a number may differ in its last
+    digits from the robot's.
+    """
+    links = [_link(robot, joint) for joint in range(robot.joint_count)]
+    carriers = (BASE, *robot.all_joint_names)
+    return {
+        "robot": {
+            "name": robot.name,
+            "base": {"mass": float(robot.mass[0]), "inertia": _inertia(robot, 0)},
+            "links": links,
+            "tools": [
+                {
+                    "name": tool.name,
+                    "link": carriers[tool.body],
+                    "origin": _origin(tool.rotation, tool.position),
+                }
+                for tool in robot.tools
+            ],
+        }
+    }
+
+
+def _link(robot: Robot, joint: int) -> dict[str, Any]:
+    body, rotation = joint + 1, robot.rotation[joint]
+    is_prismatic = bool(robot.is_prismatic[joint])
+    link: dict[str, Any] = {
+        "name": robot.all_joint_names[joint],
+        "parent": (BASE, *robot.all_joint_names)[robot.parent[joint]],
+        "joint": "prismatic" if is_prismatic else "revolute",
+        "origin": _origin(rotation, rotation @ robot.offset[joint]),
+        "mass": float(robot.mass[body]),
+        "inertia": _inertia(robot, body),
+        "com": _numbers(robot.com[body]),
+    }
+    friction = robot.friction[joint]
+    if np.isfinite(friction.coulomb):
+        link["friction"] = {"coulomb": friction.coulomb, "viscous": friction.viscous}
+    if joint < robot.n:
+        if limits := _limits(robot, joint):
+            link["limits"] = limits
+        return link
+    spring = robot.springs[joint - robot.n]
+    rest = spring.rest if is_prismatic else float(np.degrees(spring.rest))
+    link["passive"] = {
+        "stiffness": spring.stiffness, "damping": spring.damping, "rest_deg": rest
+    }  # fmt: skip
+    return link
+
+
+def _limits(robot: Robot, joint: int) -> dict[str, Any]:
+    given, is_prismatic = robot.limits[joint], robot.is_prismatic[joint]
+
+    def number(value: float) -> float:
+        return float(value if is_prismatic else np.degrees(value))
+
+    limits: dict[str, Any] = {}
+    if np.isfinite((given.lower, given.upper)).all():
+        limits["position_deg"] = [number(given.lower), number(given.upper)]
+    if np.isfinite(given.velocity):
+        limits["velocity_deg"] = number(given.velocity)
+    if np.isfinite(given.effort):
+        limits["effort"] = float(given.effort)
+    return limits
+
+
+def _origin(rotation: Array, position: Array) -> dict[str, Any]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of two angles about one axis one is zero: as good as any
+        rpy = Rotation.from_matrix(rotation).as_euler("xyz", degrees=True)
+    return {"xyz": _numbers(position), "rpy_deg": _numbers(rpy)}
+
+
+def _inertia(robot: Robot, body: int) -> list[float]:
+    return _numbers(inertia_elements(robot.inertia[body]))
+
+
+def _numbers(values: Array) -> list[float]:
+    """Return floats without negative zeros."""
+    return [float(value) + 0.0 for value in values]

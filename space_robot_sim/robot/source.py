@@ -1,0 +1,81 @@
+"""A robot's file, YAML or URDF, as the numbers that are flown and written down."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from space_robot_msgs_py.config.validation import read_yaml
+from space_robot_msgs_py.config.yaml_text import read_file
+from space_robot_msgs_py.errors import InputError
+
+from .document import document_of
+from .robot import Robot
+from .tree import Visual
+from .urdf import read_urdf
+from .urdf_file import is_urdf
+
+YAML, URDF = (".yaml", ".yml"), (".urdf", ".xacro")
+
+
+@dataclass(frozen=True)
+class RobotSource:
+    """What a robot's file says."""
+
+    where: str
+    """The file, for errors."""
+    content: dict[str, Any]
+    """Complete in itself, for `Robot.from_dict`."""
+    text: str
+    """The same as the text of a YAML file; that of a YAML file is that file's."""
+    visuals: tuple[Visual, ...] = ()
+    """Of a URDF; YAML has none."""
+    findings: tuple[str, ...] = ()
+    """Defects of a URDF that were repaired."""
+
+    @property
+    def robot(self) -> Robot:
+        """The robot, built of `content` whatever the file: a bag that tells that tells this one."""
+        robot = Robot.from_dict(self.content, where=self.where)
+        return replace(robot, visuals=self.visuals, repairs=self.findings)
+
+
+def read_robot_file(file: Path, base: str | None = None, repair: bool = False) -> RobotSource:
+    """Read a robot's file.
+
+    Args:
+        file: YAML or URDF.
+        base: the link that is the satellite, of a URDF (None: its root).
+        repair: whether a URDF's defects are repaired.
+
+    Raises:
+        InputError: the file is wrong, or what was asked is for a URDF.
+    """
+    if file.suffix in URDF:
+        return _of_urdf(file, base, repair)
+    if base or repair:
+        raise InputError(f"{file}: no URDF, so there is no base to choose and nothing to repair")
+    content = read_yaml(file)
+    if not is_urdf(content):
+        return RobotSource(str(file), content, read_file(file))
+    robot = Robot.from_yaml(file)
+    return _of_robot(robot, file, f"From {file.name} and the URDF that it names.")
+
+
+def _of_urdf(file: Path, base: str | None, repair: bool) -> RobotSource:
+    found = read_urdf(file, base, repair)
+    robot = Robot.of_tree(found.name, found.bodies, where=str(file))
+    robot = replace(robot, repairs=tuple(map(str, found.findings)))
+    return _of_robot(robot, file, f"From {file.name}{f', base {base}' if base else ''}.")
+
+
+def _of_robot(robot: Robot, file: Path, head: str) -> RobotSource:
+    content = document_of(robot)
+    comments = [head, *(f"Repaired: {text}" for text in robot.repairs)]
+    text = "".join(f"# {line}\n" for line in comments) + yaml.safe_dump(
+        content, sort_keys=False, default_flow_style=None, width=10_000, allow_unicode=True
+    )
+    return RobotSource(str(file), content, text, robot.visuals, robot.repairs)
