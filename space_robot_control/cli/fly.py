@@ -51,7 +51,7 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     from ..flight.ending import Ending
     from ..flight.graph.orchestrator import fly as fly_graph
     from ..flight.terminal import echo_json
-    from .failure import failed_report, report_of
+    from ..scenario.report import flight_report
     from .report_display import show_report
 
     flight = plan_flight(**options)
@@ -61,10 +61,24 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
         report = fly_graph(flight, bag, analyze, remarks_on(flight))
     except FlightError as error:
         if as_json:
-            echo_json(failed_report(flight, bag, error, report_of(bag)))
+            ending = Ending.early(error, flight.period)
+            echo_json(flight_report(flight, ending, _metrics_of(bag), bag))
         raise
     ending = Ending.complete(flight.ticks, flight.period)
     if failures := report["graph"]["failures"]:
         ending = Ending.early(FlightError("; ".join(failures)), flight.period)
     show_report({**report, **ending.as_record()}, as_json)
     ending.check()
+
+
+def _metrics_of(bag: Path) -> dict[str, Any]:
+    """Return the metrics of a flight that ended early; none if its bag has not one whole tick."""
+    from space_robot_msgs_py.bag.reader import read_flight
+    from space_robot_msgs_py.errors import InputError
+
+    from ..analysis import analyze
+
+    try:
+        return analyze(read_flight(bag, trust=True))
+    except InputError:
+        return {}

@@ -24,18 +24,10 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
       space-robot simulate --sensors fine --seed 3
       space-robot simulate --fault torque_scale@2:base=0.99 --fault noise_gyro@0:1e-6
     """
-    from contextlib import closing
-
-    from space_robot_msgs_py.errors import FlightError
-
-    from ..analysis import Analysis
     from ..flight.bag_path import check_bag_path
-    from ..flight.compilation import compile_kernels
     from ..flight.disk_space import room_remark
-    from ..flight.ending import Ending
     from ..flight.progress import flight_progress
-    from ..flight.simulate import fly_blocks
-    from .failure import failed_report
+    from ..scenario.in_process import fly_in_process
     from .report_display import show_report
 
     flight = plan_flight(**options)
@@ -46,27 +38,13 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
             click.echo(remark, err=True)
     for remark in remarks_on(flight):
         click.echo(remark, err=True)
-    compile_kernels(bool(flight.plant.names.actuators))
-    period, analysis, began = flight.period, Analysis(), time.monotonic()
-    with flight_progress(flight.ticks * period, flight.controller.law.name) as show:
+    began = time.monotonic()
+    with flight_progress(flight.ticks * flight.period, flight.law.name) as show:
 
-        def progress(tick: int) -> None:
-            rate = tick * period / (time.monotonic() - began)
-            show(tick * period, f"{rate:.0f} times real time")
+        def progress(simulated_s: float) -> None:
+            show(simulated_s, f"{simulated_s / (time.monotonic() - began):.0f} times real time")
 
-        failure = None
-        with closing(fly_blocks(flight, bag, progress)) as blocks:
-            try:
-                for block in blocks:
-                    analysis.add(block)
-            except FlightError as error:
-                failure = error
-    report = analysis.report() if analysis.ticks else {}
-    if not failure:
-        report |= Ending.complete(flight.ticks, period).as_record()
-    elif as_json:
-        report = failed_report(flight, bag, failure, report)
-    if report:
-        show_report(report, as_json)
-    if failure:
-        raise failure
+        flown = fly_in_process(flight, bag, progress, keep_log=False)
+    if as_json or flown.metrics:
+        show_report(flown.report(), as_json)
+    flown.check()

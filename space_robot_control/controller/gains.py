@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.config.files import node_parameters
+from space_robot_msgs_py.config.files import GIVEN, node_parameters
 from space_robot_msgs_py.config.trees import Tree, nest
 from space_robot_msgs_py.config.validation import one_of, read_yaml, short
 from space_robot_msgs_py.config.yaml_text import check_file, is_folder
@@ -44,6 +44,8 @@ def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
     if "/" in gain_set:
         return _gains_folder(path)
     found = robot_files(robot)
+    if robot == GIVEN:
+        raise InputError("a robot that no file tells has no gains of its own: give some")
     if (folder := found.gains) is None:
         raise InputError(
             f"robot {short(robot)} has no gains of its own: `space-robot new {found.file}` makes "
@@ -180,7 +182,7 @@ def build_law(
         )
     if given:
         gains = check_gains({**gains, **given}, law, axes, PARAMETERS)
-    return law(gains, settings.period)
+    return law(gains, settings.period) if gains else law(gains, settings.period, axes)
 
 
 def build_laws(
@@ -201,7 +203,8 @@ def build_laws(
     given = given or {}
     first = own if not isinstance(own, str) else find_law(settings.controller)
     wanted: dict[str, str | type[ControlLaw] | ControlLaw] = {first.name: first}
-    for name in available_laws(settings, first.name in given or isinstance(first, ControlLaw)):
+    brings_gains = isinstance(first, ControlLaw) or not first.gain_descriptions()
+    for name in available_laws(settings, brings_gains or first.name in given):
         wanted.setdefault(name, name)
     for name in given:
         one_of(name, wanted, "law", f" in {PARAMETERS} (gains are <law>.<gain>)")

@@ -23,6 +23,7 @@ from space_robot_sim.robot import Robot
 from space_robot_sim.robot.find import robot_as_path, robot_names
 from space_robot_sim.sensors.sensors import SensorSettings
 
+from ..controller.plain_laws import law_of
 from ..laws import ControlLaw, find_law, laws
 from ..mission.mission import MissionSettings
 
@@ -69,12 +70,14 @@ def _robot(value: Any) -> str | Robot:
     return value if isinstance(value, Robot) else _name(value, "a Robot")
 
 
-def _law(value: Any) -> str | type[ControlLaw] | ControlLaw | None:
+def _law(value: Any) -> Any:
     if value is None or isinstance(value, ControlLaw):
         return value
     if isclass(value) and issubclass(value, ControlLaw) and not isabstract(value):
         return value
-    return _name(value, "a ControlLaw (class or object)")
+    if callable(value) and not isclass(value):
+        return value
+    return _name(value, "a ControlLaw (class or object), or a function")
 
 
 def _gains(value: Any) -> str | Tree:
@@ -110,6 +113,12 @@ def robot_setting(robot: str | Robot) -> str:
     if isinstance(robot, str):
         return robot_as_path(robot)
     return robot.name if robot.name in robot_names() else GIVEN
+
+
+def law_given(law: Any) -> str | type[ControlLaw] | ControlLaw | None:
+    """Return a law as it was given, a function as the law that it is."""
+    is_function = callable(law) and not isclass(law) and not isinstance(law, ControlLaw)
+    return law_of(law) if is_function else law
 
 
 def law_setting(law: str | type[ControlLaw] | ControlLaw | None) -> str:

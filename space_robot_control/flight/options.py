@@ -22,6 +22,7 @@ from .objects import (
     RobotGiven,
     Sensors,
     gains_of,
+    law_given,
     law_setting,
     mission_of,
     numbers_of,
@@ -35,7 +36,8 @@ class FlightPlan(StrictModel):
     """The options of ``fly`` and ``simulate``."""
 
     controller: LawGiven = "tde_stc"
-    """Its name or module:Class; a `ControlLaw` class or object; None: none, on the bench."""
+    """Its name or module:Class; a `ControlLaw` class or object; a function, see
+    `space_robot_control.controller.plain_laws`; None: none, on the bench."""
     case: Case = "1"
     gains: Gains = "default"
     """Name or path of the set; or numbers by gain (or by law, then gain), over the default set."""
@@ -93,7 +95,8 @@ class FlightPlan(StrictModel):
         (case, world), (sensors, errors), (actuators, hardware) = (
             numbers_of(value) for value in (self.case, self.sensors, self.actuators)
         )
-        gains, values = gains_of(self.gains, self.controller)
+        law = law_given(self.controller)
+        gains, values = gains_of(self.gains, law)
         period = {} if self.period is None else {"period": self.period}
         return {
             "plant": {
@@ -119,7 +122,7 @@ class FlightPlan(StrictModel):
             "controller": {
                 **period,
                 "robot": robot,
-                "controller": law_setting(self.controller),
+                "controller": law_setting(law),
                 "gains": gains,
                 **values,
                 "fifo_priority": self.fifo_priority,

@@ -18,12 +18,13 @@ from space_robot_sim.robot.find import robot_files
 from ..controller.allocation.believed_actuators import believed_actuators
 from ..controller.controller import Controller
 from ..controller.gains import build_laws
-from ..controller.no_law import NoLaw
+from ..controller.plain_laws import NoLaw
 from ..controller.swaps import parse_swaps
 from ..laws import ControlLaw
 from ..mission.mission import Mission
 from .faults import KINDS, PROCESS_KINDS
 from .node_settings import FlightSettings
+from .objects import law_given
 from .options import NO_FRICTION, FlightPlan
 from .robots import Robots
 from .software import commit, versions
@@ -54,9 +55,10 @@ class Flight:
         mission = settings.mission
         self._mission_name = mission.mission or robot_files(mission.robot).name
         axes = self.robot.n + 3
-        laws: dict[str, ControlLaw] = {NoLaw.name: NoLaw(axes, self.period)}
+        laws: dict[str, ControlLaw] = {NoLaw.name: NoLaw({}, self.period, axes)}
         if plan.controller is not None:
-            laws = build_laws(settings.controller, axes, settings.gains, plan.controller)
+            own = law_given(plan.controller)
+            laws = build_laws(settings.controller, axes, settings.gains, own or "")
         self.swaps = [
             (tick, laws[one_of(name, laws, "controller", " of swaps")])
             for tick, name in parse_swaps(settings.controller.swaps, self.period)

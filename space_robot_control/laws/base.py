@@ -68,9 +68,15 @@ class ControlLaw(ABC):
     memory_type: ClassVar[type[LawMemory]] = LawMemory
     uses_model: ClassVar[bool] = False
 
-    def __init__(self, gains: Mapping[str, Array], period: float) -> None:
-        """``gains``: an (m,) array for each of ``gains_type``; ``period`` in s."""
-        n = len(next(iter(gains.values()))) - 3
+    def __init__(self, gains: Mapping[str, Array], period: float, axes: int | None = None) -> None:
+        """Begin with a memory of zeros.
+
+        Args:
+            gains: an (m,) array for each of ``gains_type``.
+            period: s.
+            axes: m, of a law without gains.
+        """
+        n = (axes or len(next(iter(gains.values())))) - 3
         self.period = period
         self.gains_block = self.gains_type.block(n)
         self.memory_block = self.memory_type.block(n)

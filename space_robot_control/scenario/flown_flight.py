@@ -20,14 +20,39 @@ from ..analysis.figures.style import save_figure
 from ..analysis.report_tables import rms_table
 from ..analysis.words import flown
 from ..flight.ending import COMPLETE, Ending
+from ..flight.plan import Flight
+from .report import flight_report
 
 
 class FlownFlight:
     """What came of a `Scenario.fly`, to its end or not."""
 
-    def __init__(self, log: FlightLog, ending: Ending, bag: Path | None = None) -> None:
-        """Take what was flown, how that ended, and where it was recorded."""
-        self.log, self.ending, self.bag = log, ending, bag
+    def __init__(
+        self, flight: Flight, ending: Ending, bag: Path | None, log: FlightLog | None,
+        metrics: dict[str, Any] | None = None,
+    ) -> None:  # fmt: skip
+        """Take what was to be flown, how that ended, where it was recorded, and what was flown.
+
+        Args:
+            flight: that was flown.
+            ending: of it.
+            bag: None: it was not recorded.
+            log: None: it was not kept.
+            metrics: of the report, without the short names; None: those of the log.
+        """
+        self.flight, self.ending, self.bag = flight, ending, bag
+        self._log, self._metrics = log, metrics
+
+    @property
+    def log(self) -> FlightLog:
+        """What was flown, a row a tick.
+
+        Raises:
+            InputError: it was not kept.
+        """
+        if self._log is None:
+            raise InputError("no log was kept (keep_log=False): record the flight and read its bag")
+        return self._log
 
     @property
     def outcome(self) -> str:
@@ -70,17 +95,21 @@ class FlownFlight:
         ``metrics["attitude"]`` is ``metrics["rms"]["mean_axis"]["attitude"]``. Empty if the flight
         has not one whole tick.
         """
-        try:
-            report = analyze(self.log)
-        except InputError:
-            return {}
-        return {**report["rms"]["mean_axis"], **report}
+        report = self._report
+        return {**report["rms"]["mean_axis"], **report} if report else {}
 
     def report(self) -> dict[str, Any]:
         """Return what ``space-robot simulate --json`` prints: metrics, outcome, reason, end."""
-        columns = self.metrics.get("rms", {}).get("mean_axis", ())
-        metrics = {name: value for name, value in self.metrics.items() if name not in columns}
-        return metrics | self.ending.as_record()
+        return flight_report(self.flight, self.ending, self._report, self.bag)
+
+    @cached_property
+    def _report(self) -> dict[str, Any]:
+        if self._metrics is not None:
+            return self._metrics
+        try:
+            return analyze(self.log)
+        except InputError:
+            return {}
 
     @property
     def plots(self) -> list[str]:
@@ -105,10 +134,9 @@ class FlownFlight:
         return figure
 
     def __repr__(self) -> str:
-        end = "" if self.is_complete else f" at {self.ended_at_s:g} s: {self.reason}"
-        return (
-            f"<FlownFlight: {flown(self.log.flight)}, {self.log.ticks} ticks, {self.outcome}{end}>"
-        )
+        end = "" if self.is_complete else f": {self.reason}"
+        what = flown(self.flight.description)
+        return f"<FlownFlight: {what}, {self.ended_at_s:g} s, {self.outcome}{end}>"
 
     def _repr_html_(self) -> str:
         """Show outcome and RMS in a notebook."""

@@ -10,16 +10,14 @@ from pydantic import ValidationError
 from typing_extensions import Self
 
 from space_robot_msgs_py.config.validation import one_line, one_of, short
-from space_robot_msgs_py.errors import FlightError, InputError
+from space_robot_msgs_py.errors import InputError
 
-from ..flight.bag_path import check_bag_path
 from ..flight.bench import Bench
 from ..flight.compilation import compile_kernels
-from ..flight.ending import Ending
 from ..flight.options import FlightPlan
 from ..flight.plan import Flight
-from ..flight.simulate import simulate
 from .flown_flight import FlownFlight
+from .in_process import fly_in_process
 
 OF_THE_GRAPH = ("realtime", "fifo_priority", "restart_controller", "composed", "domain")
 """Options of `FlightPlan` that only a graph of nodes has: `space-robot fly`."""
@@ -86,7 +84,10 @@ class Scenario(FlightPlan):
         return flight
 
     def fly(
-        self, bag: str | Path | None = None, progress: Callable[[float], object] | None = None
+        self,
+        bag: str | Path | None = None,
+        progress: Callable[[float], object] | None = None,
+        keep_log: bool = True,
     ) -> FlownFlight:
         """Fly it in this process; the bits are those of ``simulate``, and of ``fly`` in lockstep.
 
@@ -96,28 +97,14 @@ class Scenario(FlightPlan):
         Args:
             bag: folder to record to, which must not be there yet.
             progress: called now and then with the simulated seconds flown.
+            keep_log: False for flights longer than memory: the metrics alone are kept.
 
         Raises:
             InputError: see `check`; or the bag cannot be made, or memory is too small for a log.
         """
         if self.controller is None:
             raise InputError("controller is None, so there is nothing to fly: use bench()")
-        flight, folder = self.check(), None if bag is None else Path(bag)
-        if folder:
-            check_bag_path(folder)
-        compile_kernels(bool(flight.plant.names.actuators))
-
-        def show(tick: int) -> None:
-            if progress:
-                progress(tick * flight.period)
-
-        try:
-            log, ending = simulate(flight, folder, show), None
-        except FlightError as error:
-            if error.log is None:
-                raise
-            log, ending = error.log, Ending.early(error, flight.period)
-        return FlownFlight(log, ending or Ending.complete(flight.ticks, flight.period), folder)
+        return fly_in_process(self.check(), None if bag is None else Path(bag), progress, keep_log)
 
     def bench(self) -> Bench:
         """Return a bench that stands at the flight's first tick.

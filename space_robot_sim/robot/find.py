@@ -103,6 +103,8 @@ def mission_file(robot: str, mission: str = "") -> Path:
     if mission:
         return named_file("missions", mission)
     found = robot_files(robot)
+    if robot == GIVEN:
+        raise InputError("a robot that no file tells has no mission of its own: give one")
     if found.mission is None:
         find_robot(robot)  # what is wrong with that comes first
         raise InputError(

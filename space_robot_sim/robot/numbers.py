@@ -28,6 +28,7 @@ class ToolNumbers(StrictModel):
     name: str
     rotation: Matrix
     position: Vector
+    rank: int
 
 
 class JointNumbers(StrictModel):
@@ -66,9 +67,12 @@ class BodyNumbers(StrictModel):
             "spring": body.joint.spring and list(body.joint.spring),
         }
         tools = [
-            {"name": t.name, "rotation": t.rotation.tolist(), "position": t.position.tolist()}
+            {
+                "name": t.name, "rotation": t.rotation.tolist(), "position": t.position.tolist(),
+                "rank": t.rank,
+            }
             for t in body.tools
-        ]
+        ]  # fmt: skip
         return cls.model_validate({
             "name": body.name, "mass": body.mass, "inertia": body.inertia.tolist(),
             "com": body.com.tolist(), "parent": body.parent, "joint": joint, "tools": tools,
@@ -85,7 +89,10 @@ class BodyNumbers(StrictModel):
                 friction=JointFriction(*_or(given.friction, JointFriction())),
                 spring=Spring(*given.spring) if given.spring else None,
             )  # fmt: skip
-        tools = (Tool(t.name, np.array(t.rotation), np.array(t.position)) for t in self.tools)
+        tools = (
+            Tool(t.name, np.array(t.rotation), np.array(t.position), rank=t.rank)
+            for t in self.tools
+        )
         return Body(
             self.name, self.mass, np.array(self.inertia), np.array(self.com), self.parent, joint,
             tuple(tools),

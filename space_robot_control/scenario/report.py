@@ -1,0 +1,37 @@
+"""The report of a flight: its metrics and how it ended, ready for JSON."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ..flight.ending import DIVERGED, Ending
+from ..flight.plan import Flight
+
+FLOWN = (
+    "controller", "case", "gains", "robot", "mission", "sensors", "period", "swaps", "faults",
+    "events",
+)  # fmt: skip
+
+
+def flight_report(
+    flight: Flight, ending: Ending, metrics: dict[str, Any], bag: Path | None
+) -> dict[str, Any]:
+    """Report the ``metrics`` of what was flown, ``outcome``, ``reason`` and ``ended_at_s``.
+
+    If the flight ended before its time: also what was to be flown, as far as ``metrics`` do not
+    say it, ``planned_ticks``, ``bag`` (None: there is none), ``error`` and, if it ``diverged``, at
+    which tick and time.
+    """
+    if ending.error is None:
+        return metrics | ending.as_record()
+    planned, diverged = flight.description, {"tick": ending.tick, "time_s": ending.ended_at_s}
+    return {
+        **{key: planned[key] for key in FLOWN if key in planned},
+        **metrics,
+        "planned_ticks": flight.ticks,
+        "bag": str(bag) if bag and bag.exists() else None,
+        "diverged": diverged if ending.outcome == DIVERGED else None,
+        "error": ending.reason,
+        **ending.as_record(),
+    }
