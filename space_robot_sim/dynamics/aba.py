@@ -36,7 +36,6 @@ from .algebra import (
     vector,
 )
 from .branches import hand_in, keep_motion, kept_motion, taken_in
-from .kinematics import forward_kinematics, spatial_velocities
 from .model import Data, Model
 from .wheels import take_wheels, turn_wheels
 
@@ -45,24 +44,22 @@ Array = NDArray[np.float64]
 
 @kernel
 def aba(
-    model: Model, quaternion: Array, joint_positions: Array, omega_inertial: Array,
-    joint_velocities: Array, force: Array, data: Data, out: Array,
+    model: Model, omega_inertial: Array, joint_velocities: Array, force: Array, data: Data,
+    out: Array,
 ) -> None:  # fmt: skip
     """Write the acceleration ``[v0dot, w0dot, thetadd]`` (N+6,) into ``out``.
 
-    ``force`` (N+6,) is ``[f0, tau0, tau]``, the base's part on inertial axes, N and N m. Joints
-    that are locked in ``data`` do not accelerate, and ``data.holding`` tells what that takes.
-    Of a base with wheels they stand behind the joints, in velocities, force and ``out``.
+    It comes after `forward_kinematics` and `spatial_velocities`. ``force`` (N+6,) is
+    ``[f0, tau0, tau]``, the base's part on inertial axes, N and N m. Joints that are locked in
+    ``data`` do not accelerate, and ``data.holding`` tells what that takes. Of a base with wheels
+    they stand behind the joints, in velocities, force and ``out``.
     """
-    forward_kinematics(model, quaternion, joint_positions, data)
-    spatial_velocities(model, omega_inertial, joint_velocities, data)
     # inwards: the articulated-body inertia and bias force of each link, free about its joint
     inertia = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     coupling = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     mass = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     bias_moment, bias_force = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for k in range(int(model.joint_count) - 1, -1, -1):
-        j = int(model.order[k])
+    for j in range(int(model.joint_count) - 1, -1, -1):
         i = j + 1
         if model.branches[i] != 0.0:
             inertia, coupling, mass, bias_moment, bias_force = taken_in(
@@ -130,8 +127,7 @@ def aba(
     turn_wheels(model, angular, force, data, out)
     if model.branches[0] != 0.0:
         keep_motion(angular, linear, data.outwards[0])
-    for k in range(int(model.joint_count)):
-        j = int(model.order[k])
+    for j in range(int(model.joint_count)):
         i = j + 1
         if model.continues[j] == 0.0:
             angular, linear = kept_motion(data.outwards[int(model.parent[j])])

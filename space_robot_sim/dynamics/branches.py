@@ -1,6 +1,6 @@
 """What a body that branches begin at keeps for them: a recursion has one branch in registers.
 
-Bodies are visited down each branch in turn (`Model.order`). Along it the parent is the body visited
+Bodies are visited down each branch in turn (see `Model`). Along it the parent is the body visited
 before, and its numbers are at hand; where a branch begins they are read from memory. On the way
 inwards a branch's end result is added to its parent's memory, which the parent takes, and clears.
 """

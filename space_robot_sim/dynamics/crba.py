@@ -43,8 +43,7 @@ def crba(model: Model, data: Data, out: Array) -> None:
     for r in range(out.shape[0]):
         for c in range(out.shape[1]):
             out[r, c] = 0.0
-    for k in range(int(model.joint_count) - 1, -1, -1):
-        j = int(model.order[k])
+    for j in range(int(model.joint_count) - 1, -1, -1):
         if model.branches[j + 1] != 0.0:
             mass, moment, inertia = _taken_in(data.inwards[j + 1], mass, moment, inertia)
         mass += model.mass[j + 1]

@@ -57,8 +57,7 @@ def inverse_dynamics(
     if model.branches[0] != 0.0:
         keep_motion(angular, linear, data.outwards[0])
     count = int(model.joint_count)
-    for k in range(count):
-        j = int(model.order[k])
+    for j in range(count):
         if model.continues[j] == 0.0:
             angular, linear = kept_motion(data.outwards[int(model.parent[j])])
         coriolis, motion = data.coriolis[j + 1], data.motion[j + 1]
@@ -69,13 +68,11 @@ def inverse_dynamics(
         if model.branches[j + 1] != 0.0:
             keep_motion(angular, linear, data.outwards[j + 1])
     mass, force = model.mass[0], vector(data.bias[0], 3)
-    for k in range(count):
-        i = int(model.order[k]) + 1
+    for i in range(1, count + 1):
         mass, force = mass + model.mass[i], add(force, vector(data.bias[i], 3))
     drift = scale(force, -1.0 / mass)  # v0dot
     moment = force = (0.0, 0.0, 0.0)
-    for k in range(count - 1, -1, -1):
-        j = int(model.order[k])
+    for j in range(count - 1, -1, -1):
         if model.branches[j + 1] != 0.0:
             moment, force = taken_in_wrench(data.inwards[j + 1], moment, force)
         moment, force = _moved_along(model, j + 1, drift, moment, force, data)

@@ -44,11 +44,11 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
         r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2]
     )  # fmt: skip
     joint = (0.0, 0.0, 0.0)
-    _place(model, 0, axes, joint, data)
-    if model.branches[0] != 0.0:
-        keep_frame(axes, joint, data.frame[0])
-    for k in range(int(model.joint_count)):
-        j = int(model.order[k])
+    keep_frame(axes, joint, data.frame[0])
+    # three loops: one that calls and one that is long would keep no numbers in registers
+    for j in range(int(model.joint_count)):
+        data.turn[j, 0], data.turn[j, 1] = np.cos(joint_positions[j]), np.sin(joint_positions[j])
+    for j in range(int(model.joint_count)):
         if model.continues[j] == 0.0:
             axes, joint = kept_frame(data.frame[int(model.parent[j])])
         x = (axes[0], axes[3], axes[6])
@@ -62,7 +62,7 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
         )
         joint = add(joint, _combined(x, y, z, offset[0], offset[1], offset[2]))
         if model.is_prismatic[j] == 0.0:
-            ct, st = np.cos(joint_positions[j]), np.sin(joint_positions[j])
+            ct, st = data.turn[j, 0], data.turn[j, 1]
             x, y = add(scale(x, ct), scale(y, st)), subtract(scale(y, ct), scale(x, st))
             store(z, motion, 0)
             store(cross(joint, z), motion, 3)
@@ -71,9 +71,8 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
             store((0.0, 0.0, 0.0), motion, 0)
             store(z, motion, 3)
         axes = (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])
-        _place(model, j + 1, axes, joint, data)
-        if model.branches[j + 1] != 0.0:
-            keep_frame(axes, joint, data.frame[j + 1])
+        keep_frame(axes, joint, data.frame[j + 1])
+    _place(model, data)
 
 
 @subroutine
@@ -82,22 +81,23 @@ def _combined(x: Vector, y: Vector, z: Vector, a: float, b: float, c: float) -> 
     return add(add(scale(x, a), scale(y, b)), scale(z, c))
 
 
-@kernel
-def _place(model: Model, i: int, axes: Matrix, joint: Vector, data: Data) -> None:
-    """Write first moment and inertia of body i about the origin, from its axes and its joint."""
-    mass = model.mass[i]
-    com = add(joint, transform(axes, vector(model.com[i], 0)))
-    moment = scale(com, mass)
-    store(moment, data.first_moment[i], 0)
-    xx, yy, zz, xy, xz, yz = rotated_inertia(axes, symmetric(model.inertia[i]))
-    square = dot(moment, com)
-    row = data.inertia[i]  # the parallel-axis theorem
-    row[0] = xx + square - moment[0] * com[0]
-    row[1] = yy + square - moment[1] * com[1]
-    row[2] = zz + square - moment[2] * com[2]
-    row[3] = xy - moment[0] * com[1]
-    row[4] = xz - moment[0] * com[2]
-    row[5] = yz - moment[1] * com[2]
+@subroutine
+def _place(model: Model, data: Data) -> None:
+    """Write first moment and inertia of every body about the origin, from its frame."""
+    for i in range(int(model.joint_count) + 1):
+        axes, joint = kept_frame(data.frame[i])
+        com = add(joint, transform(axes, vector(model.com[i], 0)))
+        moment = scale(com, model.mass[i])
+        store(moment, data.first_moment[i], 0)
+        xx, yy, zz, xy, xz, yz = rotated_inertia(axes, symmetric(model.inertia[i]))
+        square = dot(moment, com)
+        row = data.inertia[i]  # the parallel-axis theorem
+        row[0] = xx + square - moment[0] * com[0]
+        row[1] = yy + square - moment[1] * com[1]
+        row[2] = zz + square - moment[2] * com[2]
+        row[3] = xy - moment[0] * com[1]
+        row[4] = xz - moment[0] * com[2]
+        row[5] = yz - moment[1] * com[2]
 
 
 @kernel
@@ -127,8 +127,7 @@ def spatial_velocities(
     _momentum_rate(model, 0, w, v, data)
     if model.branches[0] != 0.0:
         keep_motion(w, v, data.outwards[0])
-    for k in range(int(model.joint_count)):
-        j = int(model.order[k])
+    for j in range(int(model.joint_count)):
         if model.continues[j] == 0.0:
             w, v = kept_motion(data.outwards[int(model.parent[j])])
         motion, coriolis = data.motion[j + 1], data.coriolis[j + 1]

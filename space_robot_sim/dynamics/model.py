@@ -24,8 +24,10 @@ robot of another size needs no other code: see `Model.joint_count`."""
 class Model(Record):
     """The robot's constants as the compiled algorithms read them, SI units.
 
-    Of every array only as much is used as the robot has joints. Row j of those over joints is of
-    joint j, row j + 1 of those over bodies of the body that it moves.
+    Joints, and the bodies that they move, are in the order in which they are visited: down each
+    branch in turn. For a robot without passive joints that is the order of all joint arrays; with
+    them it is told by ``row``. Joint j moves body j + 1. Of every array only as much is used as the
+    robot has joints.
     """
 
     joint_count: float = shaped(lambda n: ())
@@ -46,8 +48,8 @@ class Model(Record):
     """1 for a joint that slides along its axis, 0 for one that turns about it."""
     parent: Array = shaped(lambda n: (MOST_JOINTS,))
     """Number of the body that each joint moves against."""
-    order: Array = shaped(lambda n: (MOST_JOINTS,))
-    """The joints in the order in which they are visited: down each branch."""
+    row: Array = shaped(lambda n: (MOST_JOINTS,))
+    """Where each joint of the robot's arrays, the actuated ones first, stands in the model's."""
     continues: Array = shaped(lambda n: (MOST_JOINTS,))
     """1 for a joint whose parent is the body visited before it; 0: a branch begins."""
     branches: Array = shaped(lambda n: (MOST_JOINTS + 1,))
@@ -89,10 +91,12 @@ class Data(Record):
     """``U_i / D_i`` of the articulated-body recursion."""
     u_over_d: Array = shaped(lambda n: (MOST_JOINTS + 1,))
     """``u_i / D_i`` of the articulated-body recursion."""
+    turn: Array = shaped(lambda n: (MOST_JOINTS, 2))
+    """Cosine and sine of each joint's position; of no meaning for one that slides."""
     frame: Array = shaped(lambda n: (MOST_JOINTS + 1, 12))
-    """Of bodies that branches begin at: axes (row by row) and origin, m."""
+    """Of each body: axes (row by row) and origin, m."""
     outwards: Array = shaped(lambda n: (MOST_JOINTS + 1, 6))
-    """Of the same: velocity or acceleration, handed on to the branches."""
+    """Of bodies that branches begin at: velocity or acceleration, handed on to the branches."""
     inwards: Array = shaped(lambda n: (MOST_JOINTS + 1, 27))
     """Of the same: what the branches hand in: an articulated inertia (J, G, M) and bias force, or
     what else adds up."""

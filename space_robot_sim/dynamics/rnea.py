@@ -26,8 +26,7 @@ def rnea_bias(model: Model, data: Data, out: Array) -> None:
     linear = (0.0, 0.0, 0.0)
     if model.branches[0] != 0.0:
         keep_motion(angular, linear, data.outwards[0])
-    for k in range(int(model.joint_count)):
-        j = int(model.order[k])
+    for j in range(int(model.joint_count)):
         i = j + 1
         if model.continues[j] == 0.0:
             angular, linear = kept_motion(data.outwards[int(model.parent[j])])
@@ -38,8 +37,7 @@ def rnea_bias(model: Model, data: Data, out: Array) -> None:
             keep_motion(angular, linear, data.outwards[i])
     moment = (0.0, 0.0, 0.0)
     force = (0.0, 0.0, 0.0)
-    for k in range(int(model.joint_count) - 1, -1, -1):
-        j = int(model.order[k])
+    for j in range(int(model.joint_count) - 1, -1, -1):
         i = j + 1
         if model.branches[i] != 0.0:
             moment, force = taken_in_wrench(data.inwards[i], moment, force)

@@ -46,6 +46,8 @@ class Friction(Record):
 
     count: float = shaped(lambda n: ())
     """Joints and wheels that there are; the rest of the arrays is unused."""
+    row: Array = shaped(lambda n: (MOST_JOINTS,))
+    """Where each joint stands in the others, which are in the order of `Model`."""
     coulomb: Array = shaped(lambda n: (MOST_JOINTS + MOST_WHEELS,))
     """f_C, N m."""
     viscous: Array = shaped(lambda n: (MOST_JOINTS + MOST_WHEELS,))
@@ -58,10 +60,11 @@ class Friction(Record):
         """Give each joint its own friction, or the settings', which passive joints do not have."""
         friction = cls.allocate(robot.n)
         assign(friction, count=robot.joint_count, set_valued=settings.set_valued)
-        for j, own in enumerate(robot.friction):
-            usual = (settings.coulomb, settings.viscous) if j < robot.n else (0.0, 0.0)
-            coulomb, viscous = np.where(np.isnan(own), usual, own)
-            friction.coulomb[j], friction.viscous[j] = coulomb, viscous
+        for row, joint in enumerate(robot.order):
+            own = robot.friction[joint]
+            usual = (settings.coulomb, settings.viscous) if joint < robot.n else (0.0, 0.0)
+            friction.row[joint] = row
+            friction.coulomb[row], friction.viscous[row] = np.where(np.isnan(own), usual, own)
         return friction
 
     @staticmethod
@@ -103,10 +106,11 @@ class StuckJoint:
 
     def apply(self, tick: int, part: Friction) -> None:
         """Make the joints stick as they should from ``tick`` to the next."""
-        self._change.apply(tick, part.coulomb, _stick)
+        rows = part.row
 
+        def stick(coulomb: Array, fault: ScheduledFault) -> None:
+            for axis in fault.axes:
+                row = int(rows[axis - len(BASE_AXES)])
+                coulomb[row] = max(coulomb[row], fault.value)
 
-def _stick(coulomb: Array, fault: ScheduledFault) -> None:
-    for axis in fault.axes:
-        joint = axis - len(BASE_AXES)
-        coulomb[joint] = max(coulomb[joint], fault.value)
+        self._change.apply(tick, part.coulomb, stick)

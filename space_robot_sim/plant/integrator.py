@@ -10,7 +10,8 @@ from space_robot_msgs_py.compiled.records import Record, nested, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS
 
 from ..dynamics.aba import aba
-from ..dynamics.attitude import quaternion_rate, rotate, rotation_matrix
+from ..dynamics.attitude import quaternion_rate, rotate
+from ..dynamics.kinematics import forward_kinematics, spatial_velocities
 from ..dynamics.model import MOST_JOINTS, Data, Model
 from ..environment.disturbance import disturbance_torque
 from ..environment.environment import Environment
@@ -29,8 +30,8 @@ class Stages(Record):
     """Scratch of the integrator.
 
     A state ``x`` is ``[r0 (3), quaternion (4), theta (N), v0 (3), w0 (3), thetadot (N), Omega]``,
-    velocities on inertial axes; ``Omega`` are those of the wheels against the base. Joints are the
-    actuated ones, then the passive ones; what is behind the last wheel is unused.
+    velocities on inertial axes; ``Omega`` are those of the wheels against the base. Joints are in
+    the order of `Model`; what is behind the last wheel is unused.
     """
 
     stage: Array = shaped(lambda n: (MOST_NUMBERS,))
@@ -41,7 +42,7 @@ class Stages(Record):
     """State at the end of a step."""
     actuation: Array = shaped(lambda n: (6 + MOST_MOVING,))
     """What the actuators give over the step: force (N) and torque (N m) on the base's axes, which
-    turn with it, torques on the N joints, torques of the wheels' motors, N m."""
+    turn with it, torques on the joints, actuated ones first, then those of wheels' motors, N m."""
     force: Array = shaped(lambda n: (6 + MOST_MOVING,))
     """Generalised force, base part on inertial axes."""
     disturbance: Array = shaped(lambda n: (3 + MOST_JOINTS,))
@@ -84,28 +85,32 @@ def state_derivative(
             scratch.
         out: as ``x``.
     """
-    n, friction = int(model.joint_count), environment.friction
+    n, friction, data = int(model.joint_count), environment.friction, stages.data
     quaternion, theta = x[3:7], x[7 : 7 + n]
     v0, w0, velocities = x[7 + n : 10 + n], x[10 + n : 13 + n], x[13 + n :]
     force, actuation, resisting = stages.force, stages.actuation, stages.friction
-    rotation_matrix(quaternion, stages.data.rotation)
-    rotate(stages.data.rotation, actuation[:3], force[:3])
-    rotate(stages.data.rotation, actuation[3:6], force[3:6])
+    forward_kinematics(model, quaternion, theta, data)
+    spatial_velocities(model, w0, velocities, data)
+    rotate(data.rotation, actuation[:3], force[:3])
+    rotate(data.rotation, actuation[3:6], force[3:6])
     for k in range(3):
         force[3 + k] -= disturbance[k]
     friction_torque(friction, velocities, stages.directions, resisting)
-    actuated = int(model.actuated_count)
-    for i in range(actuated):
-        force[6 + i] = actuation[6 + i] - disturbance[3 + i] - resisting[i]
-    for i in range(actuated, n):
-        spring = model.stiffness[i] * (theta[i] - model.rest[i]) + model.damping[i] * velocities[i]
-        force[6 + i] = -spring - resisting[i]
+    for i in range(n):
+        j = int(model.row[i])
+        if i < model.actuated_count:
+            force[6 + j] = actuation[6 + i] - disturbance[3 + i] - resisting[j]
+        else:
+            spring = model.stiffness[j] * (theta[j] - model.rest[j])
+            force[6 + j] = -spring - model.damping[j] * velocities[j] - resisting[j]
     for k in range(n, int(friction.count)):  # the wheels
         force[6 + k] = actuation[6 + k] - resisting[k]
-    out[0:3] = v0
+    for k in range(3):
+        out[k] = v0[k]
     quaternion_rate(quaternion, w0, out[3:7])
-    out[7 : 7 + n] = velocities[:n]
-    aba(model, quaternion, theta, w0, velocities, force, stages.data, out[7 + n :])
+    for i in range(n):
+        out[7 + i] = velocities[i]
+    aba(model, w0, velocities, force, data, out[7 + n :])
 
 
 @kernel

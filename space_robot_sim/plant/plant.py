@@ -131,16 +131,18 @@ class Plant:
         )
         """Ring of the commands that are still on their way."""
         memory.x[3:7] = np.array(settings.initial_quaternion) / norm
-        memory.x[7 : 7 + n] = robot.from_degrees(settings.initial_joints_deg)
-        memory.x[7 + n : 7 + robot.joint_count] = [spring.rest for spring in robot.springs]
+        positions = np.concatenate(
+            (robot.from_degrees(settings.initial_joints_deg), [s.rest for s in robot.springs])
+        )
+        memory.x[7 : 7 + robot.joint_count] = positions[list(robot.order)]
         speeds = memory.x[13 + 2 * robot.joint_count :][:MOST_WHEELS]
         mount_wheels(settings.wheels, memory.model, memory.environment.friction, speeds)
         self.truth = RobotState(0, self.block["truth"])
         self.state = RobotState(0, self.block["measured"])
         # at rest: what `write_truth` would say, without waiting for compiled code
         self.truth.quaternion[:] = memory.x[3:7]
-        self.truth.joint_positions[:] = memory.x[7 : 7 + n]
-        self.truth.passive_positions[: len(robot.springs)] = memory.x[7 + n : 7 + robot.joint_count]
+        self.truth.joint_positions[:] = positions[:n]
+        self.truth.passive_positions[: len(robot.springs)] = positions[n:]
         self.truth.wheel_velocities[:] = speeds
         sensors = Sensors.build(n, settings, period, memory.truth, robot.is_prismatic[:n])
         schedule = settings.schedule(self.names, period)

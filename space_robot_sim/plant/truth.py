@@ -27,13 +27,15 @@ def write_truth(model: Model, x: Array, rotation: Array, truth: State) -> None:
     n, actuated = int(model.joint_count), truth.joint_positions.size
     truth.base_position[:] = x[:3]
     truth.quaternion[:] = x[3:7]
-    truth.joint_positions[:] = x[7 : 7 + actuated]
     truth.base_velocity[:] = x[7 + n : 10 + n]
     rotation_matrix(truth.quaternion, rotation)
     rotate_back(rotation, x[10 + n : 13 + n], truth.omega_base)
-    truth.joint_velocities[:] = x[13 + n : 13 + n + actuated]
-    for k in range(n - actuated):
-        truth.passive_positions[k] = x[7 + actuated + k]
-        truth.passive_velocities[k] = x[13 + n + actuated + k]
+    positions, velocities = x[7 : 7 + n], x[13 + n : 13 + 2 * n]
+    for i in range(actuated):
+        j = int(model.row[i])
+        truth.joint_positions[i], truth.joint_velocities[i] = positions[j], velocities[j]
+    for i in range(actuated, n):
+        j, k = int(model.row[i]), i - actuated
+        truth.passive_positions[k], truth.passive_velocities[k] = positions[j], velocities[j]
     for k in range(int(model.wheel_count)):
         truth.wheel_velocities[k] = x[13 + 2 * n + k]

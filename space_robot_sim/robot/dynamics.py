@@ -39,6 +39,12 @@ def _quaternion(value: ArrayLike) -> Array:
     return array / norm
 
 
+def generalised_rows(robot: Robot) -> list[int]:
+    """Return where each of ``[v0, w0, joints]`` stands for the algorithms, see `Model.row`."""
+    row = robot.model.row
+    return [*range(6), *(6 + int(row[joint]) for joint in range(robot.joint_count))]
+
+
 def mass_matrix(robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: ArrayLike) -> Array:
     """Return the inertia matrix H of (7)-(10).
 
@@ -54,12 +60,12 @@ def mass_matrix(robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: Array
     Raises:
         ValueError: an argument has the wrong shape, or the quaternion is not unit.
     """
-    n = robot.joint_count
+    n, order, rows = robot.joint_count, list(robot.order), generalised_rows(robot)
     out, data = np.empty((n + 6, n + 6)), Data.allocate(n)
-    positions = _vector(joint_positions, n, "joint_positions")
+    positions = _vector(joint_positions, n, "joint_positions")[order]
     forward_kinematics(robot.model, _quaternion(quaternion_wxyz), positions, data)
     crba(robot.model, data, out)
-    return out
+    return out[np.ix_(rows, rows)]
 
 
 def bias_force(
@@ -84,14 +90,14 @@ def bias_force(
     Raises:
         ValueError: an argument has the wrong shape, or the quaternion is not unit.
     """
-    n = robot.joint_count
+    n, order, rows = robot.joint_count, list(robot.order), generalised_rows(robot)
     out, data = np.empty(n + 6), Data.allocate(n)
-    positions = _vector(joint_positions, n, "joint_positions")
-    velocities = _vector(joint_velocities, n, "joint_velocities")
+    positions = _vector(joint_positions, n, "joint_positions")[order]
+    velocities = _vector(joint_velocities, n, "joint_velocities")[order]
     forward_kinematics(robot.model, _quaternion(quaternion_wxyz), positions, data)
     spatial_velocities(robot.model, _vector(w0_inertial, 3, "w0_inertial"), velocities, data)
     rnea_bias(robot.model, data, out)
-    return out
+    return out[rows]
 
 
 def forward_dynamics(
@@ -119,19 +125,16 @@ def forward_dynamics(
     Raises:
         ValueError: an argument has the wrong shape, or the quaternion is not unit.
     """
-    n = robot.joint_count
-    out = np.empty(n + 6)
-    aba(
-        robot.model,
-        _quaternion(quaternion_wxyz),
-        _vector(joint_positions, n, "joint_positions"),
-        _vector(w0_inertial, 3, "w0_inertial"),
-        _vector(joint_velocities, n, "joint_velocities"),
-        _vector(force, n + 6, "force"),
-        Data.allocate(n),
-        out,
-    )
-    return out
+    n, order, rows = robot.joint_count, list(robot.order), generalised_rows(robot)
+    out, data = np.empty(n + 6), Data.allocate(n)
+    positions = _vector(joint_positions, n, "joint_positions")[order]
+    velocities = _vector(joint_velocities, n, "joint_velocities")[order]
+    omega = _vector(w0_inertial, 3, "w0_inertial")
+    forces = _vector(force, n + 6, "force")[[*range(6), *(6 + joint for joint in order)]]
+    forward_kinematics(robot.model, _quaternion(quaternion_wxyz), positions, data)
+    spatial_velocities(robot.model, omega, velocities, data)
+    aba(robot.model, omega, velocities, forces, data, out)
+    return out[rows]
 
 
 def inverse_dynamics(robot: Robot, references: Block) -> Array:

@@ -100,11 +100,10 @@ class BodyNumbers(StrictModel):
 
 
 class RobotNumbers(StrictModel):
-    """A robot's bodies by number, and the order of a walk over its joints."""
+    """A robot's bodies, as a walk down each branch meets them."""
 
     name: Annotated[str, Field(min_length=1)]
     bodies: Annotated[list[BodyNumbers], Field(min_length=2)]
-    order: list[int]
 
 
 class Document(StrictModel):
@@ -119,10 +118,10 @@ def are_numbers(content: dict[str, Any]) -> bool:
     return isinstance(robot, dict) and "bodies" in robot
 
 
-def numbers_of(name: str, bodies: Sequence[Body], order: Sequence[int]) -> dict[str, Any]:
+def numbers_of(name: str, bodies: Sequence[Body]) -> dict[str, Any]:
     """Return the mapping of a robot's own numbers."""
     found = [BodyNumbers.of(body) for body in bodies]
-    return Document(robot=RobotNumbers(name=name, bodies=found, order=list(order))).model_dump()
+    return Document(robot=RobotNumbers(name=name, bodies=found)).model_dump()
 
 
 def _known(row: Sequence[float]) -> list[float | None]:

@@ -10,6 +10,7 @@ from space_robot_control.laws.compiled import LawCode
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_sim.dynamics.aba import aba
+from space_robot_sim.dynamics.kinematics import forward_kinematics, spatial_velocities
 from space_robot_sim.plant.integrator import state_derivative
 from space_robot_sim.plant.plant import advance
 
@@ -32,12 +33,11 @@ def forward_dynamics_calls(block: Block, force: Array, calls: int) -> None:
     """``qdd = H^-1 (F - c)`` in the state of a `Plant`; ``force`` (n+6+MOST_WHEELS,)."""
     memory = block[0]
     x, stages, n = memory.x, memory.stages, memory.measured.joint_positions.size
-    out = stages.slope[0, 7 + n :]
+    data, out = stages.data, stages.slope[0, 7 + n :]
     for _ in range(calls):
-        aba(
-            memory.model, x[3:7], x[7 : 7 + n], x[10 + n : 13 + n], x[13 + n :], force,
-            stages.data, out,
-        )  # fmt: skip
+        forward_kinematics(memory.model, x[3:7], x[7 : 7 + n], data)
+        spatial_velocities(memory.model, x[10 + n : 13 + n], x[13 + n :], data)
+        aba(memory.model, x[10 + n : 13 + n], x[13 + n :], force, data, out)
         force[0] = 1e-12 * out[0]  # the next call waits for this one
 
 

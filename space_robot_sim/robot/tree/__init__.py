@@ -1,7 +1,8 @@
 """A robot as a tree of bodies: as its file tells it, and flattened for the algorithms."""
 
+from .arrays import TreeArrays
 from .bodies import Body, Joint, JointFriction, JointKind, JointLimits, Spring, Tool, Visual
-from .flatten import Moved, axes_with_z, flatten
+from .flatten import axes_with_z, flatten
 
 __all__ = [
     "Body",
@@ -9,9 +10,9 @@ __all__ = [
     "JointFriction",
     "JointKind",
     "JointLimits",
-    "Moved",
     "Spring",
     "Tool",
+    "TreeArrays",
     "Visual",
     "axes_with_z",
     "flatten",

@@ -24,6 +24,7 @@ from space_robot_sim.dynamics.branches import (
     kept_motion,
     taken_in,
 )
+from space_robot_sim.dynamics.kinematics import forward_kinematics, spatial_velocities
 from space_robot_sim.dynamics.model import Data
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.tree import Body
@@ -126,7 +127,10 @@ def test_nothing_is_left_behind(shape: str) -> None:
 
     def acceleration(motion: tuple[Array, ...]) -> Array:
         out = np.empty(n + 6)
-        aba(robot.model, *motion, data, out)
+        quaternion, positions, omega, velocities, force = motion
+        forward_kinematics(robot.model, quaternion, positions, data)
+        spatial_velocities(robot.model, omega, velocities, data)
+        aba(robot.model, omega, velocities, force, data, out)
         return out
 
     def random_motion() -> tuple[Array, ...]:

@@ -12,6 +12,7 @@ from random_robots import State, random_quaternion, random_robot
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.samples import MOST_WHEELS
 from space_robot_sim.dynamics.aba import aba
+from space_robot_sim.dynamics.kinematics import forward_kinematics, spatial_velocities
 from space_robot_sim.dynamics.model import Data
 
 
@@ -37,7 +38,9 @@ def test_wheels_accelerate_as_the_dense_equations_say(n: int, wheels: int, seed:
     model.wheel_axis[:wheels], model.wheel_inertia[:wheels] = axes, inertia
     data.locked[n : n + wheels] = stands
     velocities = np.concatenate([state.rate, speeds])
-    aba(model, state.quaternion, state.theta, state.w0, velocities, force, data, out)
+    forward_kinematics(model, state.quaternion, state.theta, data)
+    spatial_velocities(model, state.w0, velocities, data)
+    aba(model, state.w0, velocities, force, data, out)
 
     turned = rotation_of(state.quaternion).apply(axes).T
     base, last = slice(3, 6), slice(6 + n, None)

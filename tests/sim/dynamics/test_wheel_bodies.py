@@ -18,6 +18,7 @@ from wheel_oracles import (
 
 from space_robot_msgs_py.samples import MOST_WHEELS
 from space_robot_sim.dynamics.aba import aba
+from space_robot_sim.dynamics.kinematics import forward_kinematics, spatial_velocities
 from space_robot_sim.dynamics.model import Data
 from space_robot_sim.robot import Robot
 
@@ -28,7 +29,9 @@ def accelerations(robot: Robot, rotors: list[Rotor], state: State, force: Array)
     """``[v0dot, w0dot, thetadd, Omegadot]`` by the plant's algorithm; ``state`` has all speeds."""
     model, data, out = robot.model.copy(), Data.allocate(robot.n), np.empty(force.size)
     mount(model, rotors)
-    aba(model, state.quaternion, state.theta[: robot.n], state.w0, state.rate, force, data, out)
+    forward_kinematics(model, state.quaternion, state.theta[: robot.n], data)
+    spatial_velocities(model, state.w0, state.rate, data)
+    aba(model, state.w0, state.rate, force, data, out)
     return out
 
 

@@ -69,10 +69,10 @@ def test_tools_and_shapes_of_merged_links(arm: Robot) -> None:
 def test_another_base_turns_the_joints_round(arm: Robot) -> None:
     """The dynamics are compared in test_urdf_dynamics."""
     turned = Robot.from_urdf(ARM, base="hand")  # merged into fore
-    assert turned.joint_names == arm.joint_names
-    assert turned.mass.tolist() == [10.0, 300.0, 20.0]
-    assert turned.parent.tolist() == [2, 0]
-    assert turned.limits == arm.limits
+    assert turned.joint_names == arm.joint_names[::-1]
+    assert turned.mass.tolist() == [10.0, 20.0, 300.0]
+    assert turned.parent.tolist() == [0, 1]
+    assert turned.limits == arm.limits[::-1]
     assert [tool.name for tool in turned.tools] == ["hull"]
     with pytest.raises(InputError, match=r"unknown link 'x' .*: choose one of hull, upper, fore"):
         Robot.from_urdf(ARM, base="x")
