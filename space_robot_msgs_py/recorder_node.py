@@ -69,13 +69,14 @@ class RecorderLoop:
         except json.JSONDecodeError as error:
             raise InputError(f"recorder parameters: flight: not JSON ({error})") from None
         path = Path(settings.bag or time.strftime("bag_%Y%m%d-%H%M%S"))
+        group, namespace = PolledCallbackGroup(), node.get_namespace()
+        self._inputs = [RawSubscription(node, topic, group, QUEUE_DEPTH) for topic in topics.ALL]
         self._recorder = BagRecorder(
             path, {"period": settings.period, **flight}, settings.timebase,
             settings.compression, settings.split_size, GraphPublishers(node),
+            {entry.topic.name: entry.full_name for entry in self._inputs}, namespace,
         )  # fmt: skip
         self.outputs: tuple[RawPublisher, ...] = ()
-        group = PolledCallbackGroup()
-        self._inputs = [RawSubscription(node, topic, group, QUEUE_DEPTH) for topic in topics.ALL]
         self._ours = {entry.full_name: entry.topic.full_name for entry in self._inputs}
         """Names in the root namespace by those that are heard."""
         self._pause = Wait(settings.drain_period, patience_s=PATIENCE_S)
@@ -85,7 +86,8 @@ class RecorderLoop:
         """When recording was taken up again, by the senders' clock; 0: it never paused."""
         self._until_ns: int | None = None
         """When this recorder was told to stop; None while it records."""
-        node.log(f"recording to {path}")
+        of_whom = "" if namespace == topics.ROOT else f" the topics in {namespace}"
+        node.log(f"recording{of_whom} to {path}")
         if serialized_take() is take_by_rclpy:
             node.log("this rclpy does not tell publishers: they are told apart by their numbers")
 

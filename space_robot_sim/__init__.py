@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 __all__ = ["Robot", "bias_force", "forward_dynamics", "load_bag", "mass_matrix"]
 
 
-def load_bag(path: str | Path, remap: Mapping[str, str] | None = None) -> FlightLog:
+def load_bag(
+    path: str | Path, remap: Mapping[str, str] | None = None, namespace: str | None = None
+) -> FlightLog:
     """Read a recorded flight as NumPy arrays, one row a tick.
 
     Some of its fields, for N ticks and n joints:
@@ -39,10 +41,11 @@ def load_bag(path: str | Path, remap: Mapping[str, str] | None = None) -> Flight
     Args:
         path: the bag's folder, or a single .mcap or .db3 file.
         remap: our topic by the bag's, as in ``{"/arm/joint_states": "/joint_states"}``.
+        namespace: of the robot to be read, as ``/sat1``; None: of the only one in the bag.
 
     Raises:
         InputError: no bag is there, or no flight in it; one line says why.
     """
     from space_robot_msgs_py.bag.reader import read_flight
 
-    return read_flight(Path(path), remap)
+    return read_flight(Path(path), remap, namespace=namespace)

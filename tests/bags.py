@@ -50,6 +50,16 @@ class Recorded:
         return folder
 
 
+def assert_same_flight(log: FlightLog, original: FlightLog) -> None:
+    assert log.damage == ()
+    assert log.unfinished == ""
+    assert log.joint_names == original.joint_names
+    assert log.timebase == original.timebase
+    assert not any(log.lost.values())
+    for name in COLUMNS:
+        np.testing.assert_array_equal(getattr(log, name), getattr(original, name), name)
+
+
 def mcap_file(bag: Path) -> Path:
     return next(bag.glob("*.mcap"))
 

@@ -86,7 +86,7 @@ def test_a_message_is_one_file_in_wire_and_one_line_in_topics(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is laid out, recorded, counted, and missed, as all others are."""
-    newest = topics.Topic("/newest", "sensor_msgs/msg/Temperature", 100, per_tick=True)
+    newest = topics.Topic("newest", "sensor_msgs/msg/Temperature", 100, per_tick=True)
     monkeypatch.setattr(topics, "NEWEST", newest, raising=False)
     monkeypatch.setattr(topics, "ALL", (*topics.ALL, newest))
     monkeypatch.setitem(topics.BY_NAME, newest.full_name, newest)

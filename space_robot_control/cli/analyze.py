@@ -12,7 +12,7 @@ import click
 
 from space_robot_msgs_py.config.text import printable
 
-from .options import REMAP, TRUST, file_option, folder_option
+from .options import NAMESPACE, REMAP, TRUST, file_option, folder_option
 
 if TYPE_CHECKING:
     from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 @click.option("--from", "from_s", type=float, metavar="T", help="Begin at T simulated seconds.")
 @click.option("--to", "to_s", type=float, metavar="T", help="End before T simulated seconds.")
 @REMAP
+@NAMESPACE
 @TRUST
 @click.option(
     "--json", "as_json", is_flag=True, help="Print the report as JSON: a list of several."
@@ -58,6 +59,7 @@ def analyze(
     from_s: float | None,
     to_s: float | None,
     remap: dict[str, str],
+    namespace: str | None,
     trust: bool,
     as_json: bool,
 ) -> None:
@@ -76,6 +78,7 @@ def analyze(
       space-robot analyze flights/one --actuators wheels
       space-robot analyze flights/one --parquet one.parquet
       space-robot analyze theirs --remap /arm/joint_states:=/joint_states
+      space-robot analyze both --namespace /sat1
     """  # fmt: skip
     from space_robot_msgs_py.bag.reader import read_flight
 
@@ -104,7 +107,7 @@ def analyze(
     reports: dict[str, dict[str, Any]] = {}
     descriptions: dict[str, dict[str, Any]] = {}
     for name, bag in zip(names, bags, strict=True):
-        log = excerpt(read_flight(bag, remap, trust), from_s, to_s)
+        log = excerpt(read_flight(bag, remap, trust, namespace), from_s, to_s)
         reports[name], descriptions[name] = analyze(log, _set(log, actuators)), log.flight
         for write, paths in exports:
             write(log, paths[name])

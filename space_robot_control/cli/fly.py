@@ -26,6 +26,12 @@ from .options import OPTIONS, flight_options, plan_flight, remarks_on
 )
 @click.option("--restart-controller", is_flag=True, help="Start a dead or hung controller again.")
 @click.option("--domain", type=int, help="ROS domain [default: ROS_DOMAIN_ID, or a free one].")
+@click.option(
+    "--namespace",
+    default="",
+    metavar="NS",
+    help="ROS namespace of the nodes and their topics, as /sat1: one for each robot of a domain.",
+)
 def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     """Fly a mission on a ROS 2 graph, record it, and print the RMS table.
 
@@ -40,6 +46,7 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
       space-robot fly --case 4-2 --bag flights/heavy --json
       space-robot fly --command-latency-ticks 2
       space-robot fly --composed --realtime
+      space-robot fly --domain 7 --namespace /sat1
       space-robot fly --swap 5:tde_smc --swap 10:tde_stc
       space-robot fly --fault kill_controller@3 --restart-controller
       space-robot fly --fault drop_state@2-4:0.1 --fault noise_gyro@0:1e-5 --seed 7

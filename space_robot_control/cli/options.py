@@ -149,6 +149,11 @@ REMAP = click.option(
     help="Take their topic for ours, as /arm/states:=/joint_states; may be repeated.",
 )  # fmt: skip
 
+NAMESPACE = click.option(
+    "--namespace", metavar="NS",
+    help="Of the robot, as /sat1, where a bag has several [default: the only one].",
+)  # fmt: skip
+
 TRUST = click.option(
     "--trust", is_flag=True,
     help="Import the module:Class and read the files that the bag names: runs the bag's code.",

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from .options import OPTIONS, REMAP, TRUST, file_option
+from .options import NAMESPACE, OPTIONS, REMAP, TRUST, file_option
 
 
 @click.command()
@@ -34,6 +34,7 @@ from .options import OPTIONS, REMAP, TRUST, file_option
 @file_option("--csv", "table", help="File for both torques of every tick.")
 @file_option("--plot", help="Picture of both torques by axis, as PNG and SVG.")
 @REMAP
+@NAMESPACE
 @TRUST
 @click.option(
     "--domain",

@@ -10,7 +10,7 @@ from space_robot_msgs_py.bag.law_history import LawChange
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec
-from space_robot_msgs_py.wire.controller_law import LawCodec
+from space_robot_msgs_py.wire.controller_law import NODE, LawCodec
 from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
 from space_robot_msgs_py.wire.stamp_guard import StampGuard
 
@@ -37,11 +37,11 @@ class Answering:
 
     def __init__(
         self, controller: Controller, laws: LawChoice, references: ReferenceBuffer,
-        settings: ControllerNodeSettings,
+        settings: ControllerNodeSettings, node: str = NODE,
     ) -> None:  # fmt: skip
         """Answer with ``controller`` under the laws chosen, as the node's settings say.
 
-        ``references`` are told what is now.
+        ``references`` are told what is now; ``node`` is the node's full name.
         """
         self._controller, self._laws, self._references = controller, laws, references
         names = controller.names
@@ -49,7 +49,7 @@ class Answering:
         self.stamps = StampGuard(settings.longest_jump)
         self._commands = CommandCodec(names.commanded, settings.timebase)
         self._telemetry = TelemetryCodec(names.axes)
-        self._law = LawCodec(settings.timebase)
+        self._law = LawCodec(settings.timebase, node)
         self._telemetry_decimation = settings.telemetry_decimation
         self.answered = -1
         """The tick answered last; -1: none."""

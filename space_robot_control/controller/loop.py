@@ -52,8 +52,9 @@ class ControllerLoop:
         self._states = StateInput(node, self._controller.names, timebase)
         self._references = ReferenceInput(node, robot, timebase, settings.reference_timeout)
         self._answering = Answering(
-            self._controller, self._laws.choice, self._references.buffer, settings
-        )
+            self._controller, self._laws.choice, self._references.buffer, settings,
+            node.get_fully_qualified_name(),
+        )  # fmt: skip
         self._command_out = RawPublisher(node, topics.COMMAND)
         self._out = {
             topics.COMMAND: self._command_out,

@@ -13,10 +13,14 @@ from .plan import Flight
 
 
 def default_bag(flight: Flight) -> Path:
-    """Return ``flights/<controller>_case<case>_<time>`` below the current folder."""
+    """Return ``flights/<controller>_case<case>_<time>`` below the current folder.
+
+    In a namespace its name comes first: two robots may start in the same second.
+    """
     stamp = datetime.now(timezone.utc).strftime("%Y%m%d-%H%M%S")
     case = Path(flight.plant_settings.case).stem
-    return Path("flights") / f"{flight.law.name}_case{case}_{stamp}"
+    where = flight.plan.namespace.lstrip("/").replace("/", "_")
+    return Path("flights") / "_".join(filter(None, (where, flight.law.name, f"case{case}", stamp)))
 
 
 def check_bag_path(path: Path) -> None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import ByteSize, Field
+from pydantic import AfterValidator, ByteSize, Field
 
 from space_robot_msgs_py.bag.mcap_file import Compression
+from space_robot_msgs_py.config.namespace import full_namespace
 from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.topics import ROOT
 from space_robot_sim.faults.grammar import Kinds, parse_faults
 from space_robot_sim.plant.faults import PLANT_KINDS
 
@@ -73,6 +75,8 @@ class FlightPlan(StrictModel):
     """Put all nodes into one process, stepped in turn."""
     domain: Annotated[int | None, Field(ge=0, le=232)] = None
     """ROS domain to fly in (None: ROS_DOMAIN_ID, or a free one)."""
+    namespace: Annotated[str, AfterValidator(full_namespace)] = ROOT
+    """ROS namespace of the nodes and their topics."""
     compression: Compression | None = None
     """Compression of the bag (None: the recorder's own)."""
     split_size: ByteSize | None = None

@@ -19,7 +19,14 @@ from ..flight.plan import Flight
 from .flown_flight import FlownFlight
 from .in_process import fly_in_process
 
-OF_THE_GRAPH = ("realtime", "fifo_priority", "restart_controller", "composed", "domain")
+OF_THE_GRAPH = (
+    "realtime",
+    "fifo_priority",
+    "restart_controller",
+    "composed",
+    "domain",
+    "namespace",
+)
 """Options of `FlightPlan` that only a graph of nodes has: `space-robot fly`."""
 
 

@@ -130,6 +130,8 @@ class FlightLog:
     """Ticks without a command of their own (by the wall clock, or where something failed)."""
     filled: int = 0
     """Ticks without a usable state, which have the one before."""
+    namespace: str = "/"
+    """Of the robot's topics in the bag; what is said of topics names them as in the root one."""
     unfinished: str = ""
     """The end of a bag that nobody finished, as far as it is known; empty for a whole one."""
     damage: tuple[str, ...] = ()

@@ -29,20 +29,19 @@ from .message_accounting import (
     topics_with_allowed_gaps,
     unanswered_ticks,
 )
+from .robots import REQUIRED
 from .rows import Rows, stamps_of
 from .selection import Selection
 
-REQUIRED = (
-    topics.JOINT_STATES, topics.BASE_STATE, topics.REFERENCE_JOINTS, topics.REFERENCE_BASE,
-)  # fmt: skip
 DEFAULT_PERIOD = 0.0005
 """The period of a bag that does not tell it, s."""
 _STAMPS_LOOKED_AT = 200
 
 
 def read_flight(
-    path: Path, remap: Mapping[str, str] | None = None, trust: bool = False
-) -> FlightLog:
+    path: Path, remap: Mapping[str, str] | None = None, trust: bool = False,
+    namespace: str | None = None,
+) -> FlightLog:  # fmt: skip
     """Read a flight; what is broken is left out and told (`FlightLog.damage`).
 
     Ticks between the first and the last that have no whole state and reference are NaN. Of a bag
@@ -53,13 +52,14 @@ def read_flight(
         remap: our topic by the bag's, as in ``{"/arm/joint_states": "/joint_states"}``.
         trust: whether files and modules that its description names may be opened by those who
             ask for more than the bag holds (`FlightLog.trusted`); here none is opened.
+        namespace: of the robot to be read, as ``/sat1``; None: of the only one in the bag.
 
     Raises:
         InputError: no bag is there, it cannot be read, a needed topic is missing, empty, or of
-            another type, or not one tick is whole. One line.
+            another type, it has several robots, or not one tick is whole. One line.
     """
     try:
-        log = _read(open_bag(Path(path)), remap or {})
+        log = _read(open_bag(Path(path)), remap or {}, namespace)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
     except InputError as error:
@@ -69,8 +69,8 @@ def read_flight(
     return log
 
 
-def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
-    selection = Selection(bag, remap)
+def _read(bag: Bag, remap: Mapping[str, str], namespace: str | None) -> FlightLog:
+    selection = Selection(bag, remap, namespace)
     flight, damage = _description(bag)
     rows = _empty_rows(bag, selection, flight, damage)
     for topic, batch in selection.batches():
@@ -80,7 +80,7 @@ def _read(bag: Bag, remap: Mapping[str, str]) -> FlightLog:
             raise missing(topic, bag, selection)
     rows.tell_apart()
     log, excused = rows.log, topics_with_allowed_gaps(flight)
-    log.flight = flight
+    log.flight, log.namespace = flight, selection.namespace
     gone = _gone(selection, rows)
     accounts = noted_accounts(bag.custom_data())
     _count_lost(bag, selection, rows, gone, accounts)

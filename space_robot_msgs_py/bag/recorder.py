@@ -19,6 +19,7 @@ from .message_accounting import (
     message_tick,
     topics_with_allowed_gaps,
 )
+from .remappings import remappings_note
 from .sources import PARTICIPANT_BYTES, Publishers, Sources, Unknown
 from .writer import BagWriter
 
@@ -50,19 +51,27 @@ class BagRecorder:
         compression: Compression = "lz4",
         split_size: int = 0,
         publishers: Publishers | None = None,
+        names: Mapping[str, str] | None = None,
+        namespace: str = topics.ROOT,
     ) -> None:
         """Open the bag; ``flight`` says what was flown and is stored with it.
 
         A file of the bag that has ``split_size`` bytes is followed by another (0: never).
         ``publishers`` tells the graph's own from foreign ones; None: all are the graph's.
+        ``names``: full name of each topic, by its own; None: that in the ``namespace``.
 
         Raises:
             InputError: the bag exists already, or cannot be written.
         """
         self._excused = topics_with_allowed_gaps(flight)
+        names = names or {topic.name: topic.in_namespace(namespace) for topic in topics.ALL}
+        self._written = {t.name: t._replace(name=names[t.name]) for t in topics.ALL}
+        """The topics under the names that they have in the bag."""
         self._writer = BagWriter(
-            path, topics.ALL, {FLIGHT_KEY: json.dumps(dict(flight))}, compression, split_size
-        )
+            path, self._written.values(),
+            {FLIGHT_KEY: json.dumps(dict(flight)), **remappings_note(names, namespace)},
+            compression, split_size,
+        )  # fmt: skip
         self._chunk_bytes = min(CHUNK_BYTES, split_size or CHUNK_BYTES)
         self._most_bytes = min(MOST_CHUNKS * CHUNK_BYTES, split_size or MOST_CHUNKS * CHUNK_BYTES)
         self._timebase = timebase
@@ -117,7 +126,9 @@ class BagRecorder:
         if not is_new or self.failure:
             return True
         log_ns = self._timebase.stamp_ns(max(0, min(tick, counted.last)))
-        self._open_bytes = self._writer.write(topic, log_ns, sent_ns or log_ns, tick, data)
+        self._open_bytes = self._writer.write(
+            self._written[topic.name], log_ns, sent_ns or log_ns, tick, data
+        )
         if self._open_bytes > self._most_bytes:  # nobody has found the time to flush
             self.flush()
         return True

@@ -1,4 +1,4 @@
-"""The messages of a bag that are ours: by topic, remapped or not, of the right type."""
+"""The messages of a bag that are ours: by topic, in a namespace or remapped, of the right type."""
 
 from __future__ import annotations
 
@@ -10,16 +10,25 @@ from ..errors import InputError
 from .batch import Batch
 from .contents import Bag
 from .findings import some_of
+from .recorder import FLIGHT_KEY
+from .remappings import noted_remappings
+from .robots import find_namespace, is_type
 
 
 class Selection:
     """The messages of our topics in a bag."""
 
-    def __init__(self, bag: Bag, remap: Mapping[str, str]) -> None:
-        """``remap``: our topic by theirs; it then stands for ours, even if the bag has ours too.
+    def __init__(self, bag: Bag, remap: Mapping[str, str], namespace: str | None = None) -> None:
+        """Take the topics of one robot.
+
+        Args:
+            bag: a bag.
+            remap: our topic by theirs; it then stands for ours, even if the bag has ours too.
+            namespace: the robot's; None: that of the only one in the bag.
 
         Raises:
-            InputError: a topic is to become one that is not ours, or two are to become the same.
+            InputError: a topic is to become one that is not ours, or two are to become the same;
+                there are several robots, or none in the namespace.
         """
         self._bag, self._remap = bag, dict(remap)
         self.wrong: dict[str, str] = {}
@@ -28,6 +37,17 @@ class Selection:
             one_of(ours, graph.BY_NAME, "topic", f" to take {theirs} for")
             if list(self._remap.values()).count(ours) > 1:
                 raise InputError(f"more than one topic is to be taken for {ours}")
+        noted = noted_remappings(bag.custom_data())
+        taken = {n: ours for n, ours in noted.items() if ours not in self._remap.values()}
+        taken |= self._remap
+        is_ours = FLIGHT_KEY in bag.custom_data()
+        self.namespace = find_namespace(bag, namespace, taken.values(), is_ours)
+        """The robot's."""
+        self._names = {topic.in_namespace(self.namespace): topic for topic in graph.ALL}
+        for name, topic in list(self._names.items()):
+            if topic.full_name in taken.values():
+                del self._names[name]
+        self._names |= {theirs: graph.BY_NAME[ours] for theirs, ours in taken.items()}
 
     def batches(self) -> Iterator[tuple[graph.Topic, Batch]]:
         """All messages of our topics, as they were written."""
@@ -38,9 +58,7 @@ class Selection:
 
     def ours(self, name: str) -> graph.Topic | None:
         """Our topic that a topic of the bag is taken for."""
-        if name not in self._remap and name in self._remap.values():
-            return None
-        return graph.BY_NAME.get(self._remap.get(name, name))
+        return self._names.get(name)
 
     def topics(self) -> list[graph.Topic]:
         """Our topics that the bag has with the right type, messages or none.
@@ -79,18 +97,14 @@ class Selection:
         """The topics with messages in words, those first that may be the one that is looked for."""
         kinds, counts = self._bag.topics(), self._bag.counts()
         names = [name for name in sorted(kinds) if counts.get(name)]
-        names.sort(key=lambda name: not _is_type(kinds[name], topic))
+        names.sort(key=lambda name: not is_type(kinds[name], topic))
         return f"it has {some_of(names)}" if names else "no topic of it has any"
 
     def _fits(self, topic: graph.Topic, kind: str, encoding: str) -> bool:
         if encoding != "cdr":
             self.wrong[topic.full_name] = f"encoded as {encoding!r}, 'cdr' is needed"
-        elif kind and not _is_type(kind, topic):
+        elif kind and not is_type(kind, topic):
             self.wrong[topic.full_name] = f"of type {kind}, {topic.type} is needed"
         else:
             return True
         return False
-
-
-def _is_type(kind: str, topic: graph.Topic) -> bool:
-    return kind.replace("/msg/", "/") == topic.type.replace("/msg/", "/")

@@ -61,7 +61,10 @@ def named_layers(kind: str, name: str) -> list[Path]:
 
 
 def node_parameters(path: Path, node: str) -> Tree:
-    """Read what a ROS parameter file says to a node (keys ``/**``, then its ROS name), as a tree.
+    """Read what a ROS parameter file says to a node, as a tree.
+
+    Below the keys ``/**`` and its ROS name, which may have ``/**/`` before it: ROS itself takes
+    that for a node of any namespace, and the name alone for one in the root one.
 
     Raises:
         InputError: the file cannot be read or is not a ROS parameter file.
@@ -75,6 +78,6 @@ def node_parameters(path: Path, node: str) -> Tree:
         given = content["ros__parameters"] or {}
         if not isinstance(given, dict):
             raise InputError(f"{path}: {name}: parameters were expected, got {short(given)}")
-        if str(name).strip("/") in ("**", f"{node}_node"):
+        if str(name).strip("/").removeprefix("**/") in ("**", f"{node}_node"):
             merged = merge(merged, nest(given))
     return merged

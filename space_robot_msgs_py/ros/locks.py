@@ -10,11 +10,12 @@ import fcntl
 import os
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import InputError
+from ..topics import ROOT
 from .lifeline import starter
 
 TRIES, PAUSE_S = 5, 0.01
@@ -51,9 +52,9 @@ def node_lock(domain: int, node: str) -> Path:
     return _path(f"{domain}@{node.replace('/', '.')}")
 
 
-def domain_lock(domain: int) -> Path:
-    """The file that is locked by the command that has started a graph there."""
-    return _path(f"{domain}")
+def domain_lock(domain: int, namespace: str = ROOT) -> Path:
+    """The file that is locked by the command that has started a graph in a namespace there."""
+    return _path(f"{domain}" if namespace == ROOT else f"{domain}+{namespace.replace('/', '.')}")
 
 
 def _path(name: str) -> Path:
@@ -89,10 +90,22 @@ class FileLock:
         os.close(self._descriptor)
 
 
-def nodes_in(domain: int) -> list[Holder]:
-    """The nodes of this project in a domain."""
+def commands_in(domain: int) -> list[Holder]:
+    """The commands that have started a graph in a domain, in whatever namespace."""
+    lone, others = domain_lock(domain), domain_lock(domain, "/*")
+    return _holders([lone, *lone.parent.glob(others.name)])
+
+
+def nodes_in(domain: int, namespace: str = ROOT) -> list[Holder]:
+    """The nodes of this project in a namespace of a domain, those further down left out."""
+    wanted = node_lock(domain, f"{namespace.rstrip('/')}/*")
+    found = wanted.parent.glob(wanted.name)
+    return _holders([path for path in found if path.name.count(".") == wanted.name.count(".")])
+
+
+def _holders(paths: Iterable[Path]) -> list[Holder]:
     found = []
-    for path in sorted(node_lock(domain, "").parent.glob(node_lock(domain, "*").name)):
+    for path in sorted(paths):
         try:
             descriptor = _open(path)
         except InputError:

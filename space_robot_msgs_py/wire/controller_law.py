@@ -10,7 +10,7 @@ from ..samples import LawInForce, Timebase
 from .cdr import MessageLayout
 from .definitions import decode
 
-NODE = "/controller_node"
+NODE = topics.LAW.full_name.rpartition("/")[0] + "_node"
 """Full name of the node in the root namespace."""
 CONTROLLER = "controller"
 """The parameter that names the law."""

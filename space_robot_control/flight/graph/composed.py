@@ -5,7 +5,9 @@ They are the nodes of the other flights: only their process is one, so a tick wa
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, NoReturn
 
 from space_robot_msgs_py.ros.run_module import module_command
@@ -16,14 +18,21 @@ NAME = "composed"
 """The process' name among those of a graph."""
 
 
-def composed_command(parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """The command line of the process, with the parameters of each node."""
-    arguments = [
-        argument
-        for node, values in parameters.items()
-        for argument in ros_arguments(values, f"{node}_node")
-    ]
-    return [*module_command(__name__), *arguments]
+def composed_command(
+    parameters: Mapping[str, Mapping[str, Any]], namespace: str, folder: Path
+) -> list[str]:
+    """The command line of the process, with the parameters of each node.
+
+    They are written to a file in ``folder``: on a command line, ROS takes a parameter for a node
+    that is named for one in the root namespace.
+    """
+    content = {
+        f"/**/{node}_node": {"ros__parameters": values} for node, values in parameters.items()
+    }
+    file = folder / "parameters.yaml"
+    file.write_text(json.dumps(content), encoding="utf-8")  # JSON is YAML, which ROS reads
+    arguments = ros_arguments({}, namespace) or ["--ros-args"]
+    return [*module_command(__name__), *arguments, "--params-file", str(file)]
 
 
 def main() -> NoReturn:

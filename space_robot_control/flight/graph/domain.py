@@ -1,4 +1,7 @@
-"""A ROS domain of its own for every run: two runs in one domain would hear each other."""
+"""A ROS domain of its own for every run, or a namespace in one that the user names.
+
+Two runs in one namespace would hear each other; in two they do not.
+"""
 
 from __future__ import annotations
 
@@ -11,80 +14,92 @@ from pathlib import Path
 
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.ros.lifeline import PATIENCE_S
-from space_robot_msgs_py.ros.locks import FileLock, HeldError, Holder, domain_lock, nodes_in
+from space_robot_msgs_py.ros.locks import (
+    FileLock,
+    HeldError,
+    Holder,
+    commands_in,
+    domain_lock,
+    nodes_in,
+)
+from space_robot_msgs_py.topics import ROOT
 
 DOMAINS = range(1, 102)
 """Domains whose ports stay below Linux' ephemeral range."""
 LOOK_S = 0.05
 
-_held: set[int] = set()
-"""Domains that this process has already."""
+_held: set[tuple[int, str]] = set()
+"""Domains and namespaces that this process has already."""
 
 
 @contextmanager
-def ros_domain(given: int | None = None) -> Iterator[int]:
+def ros_domain(given: int | None = None, namespace: str = ROOT) -> Iterator[int]:
     """``given``, or the user's ROS_DOMAIN_ID, or a free one; held until the context ends.
 
+    Others may have another ``namespace`` of a domain that the user names.
+
     Raises:
-        InputError: that domain has nodes of this project, or a command that has started some.
+        InputError: that namespace of the domain has nodes of this project, or a command that has
+            started some.
         FlightError: none is free.
     """
     of_user = os.environ.get("ROS_DOMAIN_ID", "")
     if given is None and of_user.isdecimal():
         given = int(of_user)
-    domain, lock = _free_domain() if given is None else (given, _take(given))
-    _held.add(domain)
+    domain, lock = _free_domain(namespace) if given is None else (given, _take(given, namespace))
+    _held.add((domain, namespace))
     try:
         yield domain
     finally:
         if lock:
-            _held.remove(domain)
+            _held.remove((domain, namespace))
             lock.release()
 
 
-def _free_domain() -> tuple[int, FileLock]:
+def _free_domain(namespace: str) -> tuple[int, FileLock]:
     start = os.getpid() % len(DOMAINS)
     for domain in [*DOMAINS[start:], *DOMAINS[:start]]:
         try:
-            lock = FileLock(domain_lock(domain), "space-robot")
+            lock = FileLock(domain_lock(domain, namespace), "space-robot")
         except InputError:
             continue
-        if not _in_use(domain):
+        if len(commands_in(domain)) == 1 and not _in_use(domain):
             return domain, lock
         lock.release()
     raise FlightError("no free ROS domain between 1 and 101: set ROS_DOMAIN_ID")
 
 
-def _take(domain: int) -> FileLock | None:
+def _take(domain: int, namespace: str) -> FileLock | None:
     """The lock of a domain that the user wants; None: this process has it."""
-    if domain in _held:
+    if (domain, namespace) in _held:
         return None
     try:
-        lock = FileLock(domain_lock(domain), "space-robot")
+        lock = FileLock(domain_lock(domain, namespace), "space-robot")
     except HeldError as error:
-        raise _refusal(domain, error.holder) from None
+        raise _refusal(domain, namespace, error.holder) from None
     try:
-        _see_that_nobody_is_there(domain)
+        _see_that_nobody_is_there(domain, namespace)
     except BaseException:
         lock.release()
         raise
     return lock
 
 
-def _see_that_nobody_is_there(domain: int) -> None:
+def _see_that_nobody_is_there(domain: int, namespace: str) -> None:
     """Refuse nodes, but wait for those that are ending because their starter has been killed."""
     until = time.monotonic() + PATIENCE_S
-    while nodes := nodes_in(domain):
+    while nodes := nodes_in(domain, namespace):
         for node in nodes:
             if not node.starter or _is_alive(node.starter) or time.monotonic() > until:
-                raise _refusal(domain, node)
+                raise _refusal(domain, namespace, node)
         time.sleep(LOOK_S)
 
 
-def _refusal(domain: int, holder: Holder) -> InputError:
+def _refusal(domain: int, namespace: str, holder: Holder) -> InputError:
+    where = "" if namespace == ROOT else f"namespace {namespace} of "
     return InputError(
-        f"ROS domain {domain} is taken by {holder.name}: end that one, or take another domain "
-        "with --domain, or ROS_DOMAIN_ID"
+        f"{where}ROS domain {domain} is taken by {holder.name}: end that one, take another domain "
+        "with --domain, or ROS_DOMAIN_ID, or fly in a namespace of its own with fly --namespace"
     )
 
 

@@ -58,7 +58,7 @@ def follow(
         InputError: others publish its topics, or have its nodes' names.
         FlightError: it cannot go on.
     """
-    monitor = Monitor(domain)
+    monitor = Monitor(domain, flight.plan.namespace)
     try:
         follower = _Follower(graph, flight, parameters, monitor, stopped)
         with flight_progress(follower.total_s, flight.controller.law.name) as show:
@@ -87,7 +87,7 @@ class _Follower:
             graph, monitor,
             planned=frozenset(NODE_OF[fault.kind] for fault in flight.orchestrator_faults),
             restart_command=(
-                partial(_restart_command, parameters["controller"])
+                partial(_restart_command, parameters["controller"], flight.plan.namespace)
                 if flight.plan.restart_controller
                 else None
             ),
@@ -178,7 +178,9 @@ def _remark(
     return f"{speed}errors: {of_base}joints {errors[1]:.1e} {unit}"
 
 
-def _restart_command(parameters: Mapping[str, Any], absent: Collection[str]) -> list[str]:
+def _restart_command(
+    parameters: Mapping[str, Any], namespace: str, absent: Collection[str]
+) -> list[str]:
     """Return the command of a controller that is started again while some nodes are ``absent``.
 
     The recorder must have found it before it begins: the bag would lack what it answered until
@@ -186,4 +188,4 @@ def _restart_command(parameters: Mapping[str, Any], absent: Collection[str]) -> 
     """
     listeners = wait_for("controller", absent)
     again = {"wait_for": listeners, "listener_timeout": LISTENER_TIMEOUT_S}
-    return node_command("controller", {**parameters, **again})
+    return node_command("controller", {**parameters, **again}, namespace)

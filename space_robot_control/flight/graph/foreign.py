@@ -23,8 +23,9 @@ class ForeignNodes:
     """Refuses a domain where others publish the flight's topics or have its nodes' names."""
 
     def __init__(self, node: Any, names: Sequence[str]) -> None:
-        """``node``: an rclpy node to look with; ``names``: of the flight's nodes."""
-        self._node, self._names = node, [f"/{name}" for name in names]
+        """``node``: an rclpy node to look with; ``names``: of the flight's in its namespace."""
+        namespace = node.get_namespace().rstrip("/")
+        self._node, self._names = node, [f"{namespace}/{name}" for name in names]
         self._joined_at = self._look_at = time.monotonic()
         self._seen: Counter[str] = Counter()
 

@@ -7,6 +7,7 @@ from contextlib import suppress
 from typing import Any, NamedTuple
 
 from space_robot_msgs_py import topics
+from space_robot_msgs_py.config.namespace import relative
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.wire.controller_telemetry import SIGNALS, TelemetryCodec
 from space_robot_msgs_py.wire.definitions import decode
@@ -33,14 +34,16 @@ class Event(NamedTuple):
 class Monitor:
     """Simulated time from /clock, errors from telemetry, the nodes' modes from /diagnostics."""
 
-    def __init__(self, domain: int) -> None:
+    def __init__(self, domain: int, namespace: str = topics.ROOT) -> None:
+        """Join the graph in the ``namespace`` of a robot; what others report is passed over."""
         from space_robot_msgs_py.ros.endpoints import (
             FollowedSubscription,
             PolledCallbackGroup,
             RawSubscription,
         )
 
-        self._visitor = TemporaryNode("flight_monitor", domain)
+        self._visitor = TemporaryNode("flight_monitor", domain, namespace)
+        self._namespace = namespace
         self.node = self._visitor.node
         group = PolledCallbackGroup()
         self._clock = FollowedSubscription(self.node, topics.CLOCK, group, depth=CLOCK_DEPTH)
@@ -52,7 +55,7 @@ class Monitor:
         self.errors: tuple[float, float] | None = None
         """Largest current attitude error (eps) and joint error (rad)."""
         self.modes: dict[str, str] = {}
-        """The mode of each node, by ROS name."""
+        """The mode of each node, by its name in the namespace."""
         self._levels: dict[str, int] = {}
         self.values: dict[str, dict[str, str]] = {}
         """The values that each node reported last."""
@@ -94,7 +97,9 @@ class Monitor:
         return [event for status in statuses for event in self._take_status(status)]
 
     def _take_status(self, status: Any) -> list[Event]:
-        name, mode = status.name, status.message
+        mode = status.message
+        if not (name := relative(f"/{status.name}", self._namespace)):
+            return []
         self.heard_at[name] = time.monotonic()
         self.values[name] = {item.key: item.value for item in status.values}
         before, self.modes[name] = self.modes.get(name), mode

@@ -21,7 +21,7 @@ def change_state(node: Any, names: Sequence[str], transition: str, check: Check)
 
     Args:
         node: the rclpy node to call from.
-        names: ROS names of the nodes.
+        names: names of the nodes in the namespace of that one.
         transition: its label, as ``configure``.
         check: see `Check`.
 
@@ -36,7 +36,7 @@ def change_state(node: Any, names: Sequence[str], transition: str, check: Check)
 
     number = getattr(Transition, f"TRANSITION_{transition.upper()}")
     request = ChangeState.Request(transition=Transition(id=number))
-    answers = _call(node, ChangeState, [f"/{name}/change_state" for name in names], request, check)
+    answers = _call(node, ChangeState, [f"{name}/change_state" for name in names], request, check)
     return [name for name, answer in zip(names, answers, strict=True) if not answer.success]
 
 
@@ -47,7 +47,7 @@ def set_parameters(
 
     Args:
         node: the rclpy node to call from.
-        name: ROS name of the node whose parameters they are.
+        name: name of the node whose parameters they are, in the namespace of that one.
         parameters: their values.
         check: see `Check`.
 
@@ -61,7 +61,7 @@ def set_parameters(
     request = SetParametersAtomically.Request(
         parameters=[make(n, value=v).to_parameter_msg() for n, v in parameters.items()]
     )
-    service = f"/{name}/set_parameters_atomically"
+    service = f"{name}/set_parameters_atomically"
     (answer,) = _call(node, SetParametersAtomically, [service], request, check)
     if not answer.result.successful:
         raise FlightError(f"{name} refused to change its parameters: {answer.result.reason}")

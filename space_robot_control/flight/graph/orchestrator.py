@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import click
@@ -16,6 +17,7 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.bag.selection import Selection
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
 from ..bag_path import check_bag_path
@@ -57,18 +59,25 @@ def fly(
     check_bag_path(bag)
     require_ros()
     compile_kernels(bool(flight.plant.names.actuators))
-    with ros_domain(flight.plan.domain) as domain, stop_signals() as stopped:
+    namespace = flight.plan.namespace
+    with ros_domain(flight.plan.domain, namespace) as domain, stop_signals() as stopped:
         _claim(bag)
         begin = time.monotonic()
         try:
-            _say(f"flying on ROS_DOMAIN_ID={domain}, recording to {bag}")
+            within = "" if namespace == topics.ROOT else f" in namespace {namespace}"
+            _say(f"flying on ROS_DOMAIN_ID={domain}{within}, recording to {bag}")
             for remark in remarks:
                 _say(remark)
             parameters = flight_parameters(flight, bag)
-            with Graph(_commands(flight, parameters), node_environment(domain)) as graph:
+            with (
+                TemporaryDirectory(prefix="space_robot_fly_") as folder,
+                Graph(
+                    _commands(flight, parameters, Path(folder)), node_environment(domain)
+                ) as graph,
+            ):
                 what_happened = follow(graph, flight, parameters, domain, stopped)
         except BaseException as error:
-            if not _has_states(bag):
+            if not _has_states(bag, namespace):
                 shutil.rmtree(bag, ignore_errors=True)
             elif isinstance(error, SpaceRobotError):
                 error.args = (f"{error}; what was flown is in {bag}",)
@@ -82,12 +91,15 @@ def fly(
     return report
 
 
-def _commands(flight: Flight, parameters: Mapping[str, Mapping[str, Any]]) -> dict[str, list[str]]:
-    """Command lines of the processes: one a node, or one for all."""
+def _commands(
+    flight: Flight, parameters: Mapping[str, Mapping[str, Any]], folder: Path
+) -> dict[str, list[str]]:
+    """Command lines of the processes: one a node, or one for all; their files go to ``folder``."""
     told = {node: {**values, "autostart": False} for node, values in parameters.items()}
+    namespace = flight.plan.namespace
     if flight.plan.composed:
-        return {NAME: composed_command(told)}
-    return {node: node_command(node, values) for node, values in told.items()}
+        return {NAME: composed_command(told, namespace, folder)}
+    return {node: node_command(node, values, namespace) for node, values in told.items()}
 
 
 def _claim(bag: Path) -> None:
@@ -103,10 +115,11 @@ def _claim(bag: Path) -> None:
         raise
 
 
-def _has_states(bag: Path) -> bool:
+def _has_states(bag: Path, namespace: str) -> bool:
     """Tell if a tick was flown."""
     try:
-        return next(open_bag(bag).messages(topics.JOINT_STATES), None) is not None
+        found = Selection(open_bag(bag), {}, namespace).batches()
+        return any(topic is topics.JOINT_STATES for topic, _ in found)
     except (InputError, OSError):
         return False
 

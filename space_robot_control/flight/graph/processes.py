@@ -18,6 +18,7 @@ from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.ros import lifeline
 from space_robot_msgs_py.ros.process_environment import DEFAULTS
 from space_robot_msgs_py.ros.run_module import clean_environment, module_command
+from space_robot_msgs_py.topics import ROOT
 
 from ..node_modules import MODULES
 
@@ -45,24 +46,23 @@ def node_environment(domain: int) -> dict[str, str]:
     }  # fmt: skip
 
 
-def node_command(node: str, parameters: Mapping[str, Any]) -> list[str]:
+def node_command(node: str, parameters: Mapping[str, Any], namespace: str = ROOT) -> list[str]:
     """The command line of a node: through ``ros2 run`` where that works, else directly."""
     command = (
         ["ros2", "run", PACKAGE, f"{node}_node"]
         if has_ros2_run()
         else module_command(MODULES[node])
     )
-    return command + ros_arguments(parameters)
+    return command + ros_arguments(parameters, namespace)
 
 
-def ros_arguments(parameters: Mapping[str, Any], node: str = "") -> list[str]:
-    """Parameters as a node's command line takes them; only for the named ``node``, if given."""
-    prefix = f"{node}:" if node else ""
-    arguments = ["--ros-args"] if parameters else []
+def ros_arguments(parameters: Mapping[str, Any], namespace: str = ROOT) -> list[str]:
+    """Parameters and namespace as a node's command line takes them."""
+    arguments = [] if namespace == ROOT else ["-r", f"__ns:={namespace}"]
     for name, value in parameters.items():
         # JSON is YAML, which ROS reads
-        arguments += ["-p", f"{prefix}{name}:={json.dumps(value)}"]
-    return arguments
+        arguments += ["-p", f"{name}:={json.dumps(value)}"]
+    return ["--ros-args", *arguments] if arguments else []
 
 
 class NodeProcess:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 
 from space_robot_msgs_py.ros.process_environment import set_defaults
+from space_robot_msgs_py.topics import ROOT
 
 
 class TemporaryNode:
-    """Joins a domain under ``<name>_<pid>``, without services or logs of its own."""
+    """Joins a domain as ``<name>_<pid>``, without services or logs of its own."""
 
-    def __init__(self, name: str, domain: int) -> None:
+    def __init__(self, name: str, domain: int, namespace: str = ROOT) -> None:
         set_defaults()
         import rclpy
         from rclpy.context import Context
@@ -22,7 +23,7 @@ class TemporaryNode:
             signal_handler_options=SignalHandlerOptions.NO,
         )  # fmt: skip
         self.node = rclpy.create_node(
-            f"{name}_{os.getpid()}", context=self._context,
+            f"{name}_{os.getpid()}", context=self._context, namespace=namespace,
             start_parameter_services=False, enable_rosout=False,
         )  # fmt: skip
 

@@ -36,6 +36,8 @@ class Options:
     """Simulated time before which the last state lies."""
     remap: Mapping[str, str] = field(default_factory=dict)
     """Our topic by the bag's."""
+    namespace: str | None = None
+    """Of the robot in the bag (None: the only one)."""
     domain: int | None = None
     trust: bool = False
     """True if modules and files that the bag names may be opened."""

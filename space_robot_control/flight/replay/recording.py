@@ -14,7 +14,8 @@ from space_robot_msgs_py.bag.accounts import noted_accounts
 from space_robot_msgs_py.bag.description import read_description
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.message_accounting import message_tick, topics_with_allowed_gaps
-from space_robot_msgs_py.bag.reader import REQUIRED, first_states, missing, timebase_of
+from space_robot_msgs_py.bag.reader import first_states, missing, timebase_of
+from space_robot_msgs_py.bag.robots import REQUIRED
 from space_robot_msgs_py.bag.selection import Selection
 from space_robot_msgs_py.config.text import printable
 from space_robot_msgs_py.errors import InputError, MessageError
@@ -45,8 +46,15 @@ class ReferenceMessage(NamedTuple):
 class Recording:
     """The messages of a bag that a controller has seen, and its answers. Knows no ROS."""
 
-    def __init__(self, path: Path, remap: Mapping[str, str] | None = None) -> None:
-        """Open the bag in ``path``; ``remap``: our topic by the bag's.
+    def __init__(
+        self, path: Path, remap: Mapping[str, str] | None = None, namespace: str | None = None
+    ) -> None:
+        """Open the bag in ``path``.
+
+        Args:
+            path: the bag.
+            remap: our topic by the bag's.
+            namespace: of the robot; None: of the only one in the bag.
 
         Raises:
             InputError: no bag is there, it cannot be read, or has no states or references.
@@ -54,7 +62,7 @@ class Recording:
         self.path = path
         with self._readable():
             self._bag = open_bag(path)
-            self._selection = Selection(self._bag, remap or {})
+            self._selection = Selection(self._bag, remap or {}, namespace)
             flight = read_description(self._bag.custom_data())
             counts: Counter[Topic] = Counter()
             for topic, batch in self._selection.batches():
@@ -66,6 +74,8 @@ class Recording:
             self.timebase, doubts = timebase_of(stamps, flight)
             if doubts:
                 raise InputError(doubts[0])
+        self.namespace = self._selection.namespace
+        """Of the robot that flew."""
         self.flight: dict[str, Any] = flight
         """The flight as recorded; empty for a bag of another recorder."""
         self.parts = tuple(topic for topic in topics.STATES if counts[topic])

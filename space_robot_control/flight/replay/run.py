@@ -40,7 +40,7 @@ def replay(options: Options) -> Replay:
         InputError: bag or options cannot be used; nothing was started.
         FlightError: the controller did not start.
     """
-    recording = Recording(options.bag, options.remap)
+    recording = Recording(options.bag, options.remap, options.namespace)
     with tempfile.TemporaryDirectory(prefix="space_robot_replay_") as folder:
         choice = ControllerChoice(
             recording.flight, Path(folder), options.controller, options.gains, options.parameters,

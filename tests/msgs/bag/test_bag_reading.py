@@ -14,6 +14,7 @@ from bags import (
     TIMEBASE,
     Entry,
     Recorded,
+    assert_same_flight,
     entries_of,
     mcap_of,
     messages_of,
@@ -27,7 +28,6 @@ from paths import DATA
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, Writer
 
 from space_robot_msgs_py import topics
-from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import FLIGHT_KEY
@@ -46,16 +46,6 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
 @pytest.fixture(scope="module")
 def entries(recorded: Recorded) -> list[Entry]:
     return entries_of(recorded.folder)
-
-
-def assert_same_flight(log: FlightLog, original: FlightLog) -> None:
-    assert log.damage == ()
-    assert log.unfinished == ""
-    assert log.joint_names == original.joint_names
-    assert log.timebase == original.timebase
-    assert not any(log.lost.values())
-    for name in COLUMNS:
-        np.testing.assert_array_equal(getattr(log, name), getattr(original, name), name)
 
 
 def _plain(writer: Writer) -> None:

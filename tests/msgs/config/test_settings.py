@@ -39,6 +39,15 @@ def test_every_shipped_parameter_file_is_one() -> None:
             assert node_parameters(path, node.strip("/").removesuffix("_node"))
 
 
+def test_a_file_may_speak_to_a_node_of_any_namespace(tmp_path: Path) -> None:
+    path = tmp_path / "case.yaml"
+    for name in ("plant_node", "/plant_node", "/**/plant_node", "/**"):
+        path.write_text(f"{name}: {{ros__parameters: {{realtime: true}}}}")
+        assert node_parameters(path, "plant") == {"realtime": True}
+    path.write_text("/**/mission_node: {ros__parameters: {realtime: true}}")
+    assert node_parameters(path, "plant") == {}
+
+
 def test_a_node_waits_for_listeners_to_what_it_sends_alone() -> None:
     assert PlantNodeSettings.resolve({"wait_for": ["a:/clock", "b", ""]}).wait_for[0] == "a:/clock"
     for schema, entry, sent in (

@@ -20,6 +20,7 @@ from space_robot_msgs_py.ros.locks import (
     FileLock,
     HeldError,
     Holder,
+    commands_in,
     domain_lock,
     look,
     node_lock,
@@ -36,7 +37,7 @@ print("ready", flush=True)
 time.sleep(60)
 """
 NAMES = st.lists(st.from_regex(r"[a-z][a-z0-9_]{0,5}", fullmatch=True), min_size=1, max_size=3)
-KINDS: list[Callable[[int, str], Path]] = [topic_lock, node_lock, lambda d, name: domain_lock(d)]
+KINDS: list[Callable[[int, str], Path]] = [topic_lock, node_lock, domain_lock]
 
 
 @pytest.fixture(autouse=True)
@@ -87,6 +88,25 @@ def test_looking_takes_nothing() -> None:
     lock.release()
 
 
+def test_nodes_of_a_namespace_are_not_those_of_others() -> None:
+    names = ("/plant_node", "/sat1/plant_node", "/sat1/arm/plant_node", "/sat11/plant_node")
+    locks = [FileLock(node_lock(7, name), name) for name in names]
+    for name in names:
+        namespace = name.removesuffix("/plant_node") or "/"
+        assert [node.name for node in nodes_in(7, namespace)] == [f"{name} (pid {os.getpid()})"]
+    for lock in locks:
+        lock.release()
+
+
+def test_commands_of_a_domain_are_those_in_all_its_namespaces() -> None:
+    places = [(7, "/"), (7, "/sat1"), (7, "/fleet/sat2"), (70, "/"), (70, "/sat1")]
+    locks = [FileLock(domain_lock(*place), "space-robot") for place in places]
+    assert [len(commands_in(domain)) for domain in (7, 70, 0)] == [3, 2, 0]
+    for lock in locks:
+        lock.release()
+    assert commands_in(7) == []
+
+
 @given(
     st.tuples(st.sampled_from(KINDS), st.integers(0, 232), NAMES),
     st.tuples(st.sampled_from(KINDS), st.integers(0, 232), NAMES),
@@ -96,5 +116,4 @@ def test_every_topic_and_node_of_every_domain_has_its_own_lock(
     other: tuple[Callable[[int, str], Path], int, list[str]],
 ) -> None:
     paths = [kind(domain, "/" + "/".join(name)) for kind, domain, name in (one, other)]
-    same_names = one[2] == other[2] or one[0] is KINDS[2]
-    assert (paths[0] == paths[1]) == (one[:2] == other[:2] and same_names)
+    assert (paths[0] == paths[1]) == (one == other)
