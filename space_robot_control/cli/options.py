@@ -192,7 +192,8 @@ OPTIONS: dict[str, Decorator] = {
         help="printed, tuned, robust, default (printed where it flies), or a path."),
     "robot": click.option(
         "--robot", default="paper", show_default=True,
-        help="paper, seven_joint, or a path to a robot's YAML, URDF or folder."),
+        help="paper, seven_joint, dual_arm, flexible_panels, boom, ets_vii, or a path to a robot's "
+        "YAML, URDF or folder."),
     "mission": click.option(
         "--mission", default="", help="Mission by name or path [default: the robot's]."),
     "duration": click.option(

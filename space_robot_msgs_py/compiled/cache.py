@@ -21,11 +21,12 @@ def cache_directory() -> Path:
 
     Where that cannot be written, a folder of the user's own among the temporary files.
     """
-    root = Path(__file__).resolve().parents[2]
+    here = Path(__file__).resolve()
+    root = here.parents[2]
     digest = hashlib.sha256(str(root).encode())  # Numba keeps installations apart, so do we
     for source in sorted(root.glob("space_robot_*/**/*.py")):
         text = source.read_bytes()
-        if b"@kernel" in text or b"@subroutine" in text:
+        if b"@kernel" in text or b"@subroutine" in text or source.parent == here.parent:
             digest.update(text)
     home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     base = os.environ.get("NUMBA_CACHE_DIR") or str(Path(home) / "space_robot")

@@ -8,6 +8,7 @@ all three packages: any edit starts a fresh cache, and all processes share what 
 from __future__ import annotations
 
 import ctypes
+import hashlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar, cast
@@ -21,7 +22,21 @@ _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _njit: Any = numba.njit
 config: Any = numba.config
 _FunctionType: Any = numba.types.WrapperAddressProtocol
+_RecordType: Any = numba.types.Record
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+
+
+def _mangling_args(record: Any) -> tuple[str, tuple[str]]:
+    """Return what tells a record in the names of machine code: its layout.
+
+    Numba numbers the records of a process as they come. Kernels for records of two sizes, compiled
+    and cached by two processes, may thus bear one name; a third that loads both would run the same
+    machine code for both.
+    """
+    return "Record", (hashlib.sha256(str(record).encode()).hexdigest(),)
+
+
+_RecordType.mangling_args = property(_mangling_args)
 
 
 def kernel(function: _Function) -> _Function:

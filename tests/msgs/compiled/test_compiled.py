@@ -78,3 +78,23 @@ def test_the_temporary_folder_is_nobody_elses(
     (tmp_path / "trap").mkdir()
     mine.symlink_to(tmp_path / "trap")  # somebody was here first
     assert _temporary_cache() != mine
+
+
+NAMES = """
+import numba
+from space_robot_msgs_py.compiled import kernels
+from space_robot_sim.dynamics.rho_space import RhoSpaceModel
+for n in {sizes}:
+    print(n, numba.from_dtype(RhoSpaceModel.dtype(n)).mangling_args)
+"""
+
+
+def test_records_have_the_same_name_in_machine_code_whichever_process_compiles_it() -> None:
+    """A process may load what two others have compiled: one name must be one layout."""
+    first, second = (
+        subprocess.check_output([sys.executable, "-c", NAMES.format(sizes=sizes)], text=True)
+        for sizes in ((6, 8), (8, 6))
+    )
+    assert sorted(first.splitlines()) == sorted(second.splitlines())
+    six, eight = (line.split(maxsplit=1)[1] for line in first.splitlines())
+    assert six != eight
