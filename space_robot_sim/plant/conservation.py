@@ -1,4 +1,8 @@
-"""Momentum and kinetic energy of robot and wheels, from a state: what a flight must conserve."""
+"""Momentum and energy of robot and wheels, from a state: what a flight must conserve.
+
+Of a robot with passive joints kinetic and spring energy together are kept, but for what the dampers
+take.
+"""
 
 from __future__ import annotations
 
@@ -51,6 +55,18 @@ def kinetic_energy(robot: Robot, state: RobotState, wheels: WheelSettings = NO_W
     of_base, of_wheels = wheels.unit_axes @ state.omega_base, state.wheel_velocities[: wheels.count]
     spin = _spin_momenta(wheels, state) @ (of_base + 0.5 * of_wheels)
     return float(0.5 * velocity @ inertia @ velocity + spin)
+
+
+def spring_energy(robot: Robot, state: RobotState) -> float:
+    """Return the energy that the springs of the passive joints hold, J."""
+    stretched = state.passive_positions[: len(robot.springs)] - [s.rest for s in robot.springs]
+    return float(0.5 * np.array([s.stiffness for s in robot.springs]) @ stretched**2)
+
+
+def damping_loss(robot: Robot, state: RobotState) -> float:
+    """Return the power that the dampers of the passive joints take, W."""
+    velocities = state.passive_velocities[: len(robot.springs)]
+    return float(np.array([s.damping for s in robot.springs]) @ velocities**2)
 
 
 def _spin_momenta(wheels: WheelSettings, state: RobotState) -> Array:
