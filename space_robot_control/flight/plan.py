@@ -9,6 +9,7 @@ from space_robot_msgs_py.config.files import GIVEN
 from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
+from space_robot_sim.environment.friction import coefficients
 from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.plant.plant import Plant
@@ -165,8 +166,7 @@ class Flight:
     @property
     def has_friction(self) -> bool:
         """True if the joints have friction."""
-        friction = self.plant_settings.friction
-        return friction.coulomb > 0.0 or friction.viscous > 0.0
+        return bool(coefficients(self.robot, self.plant_settings.friction).any())
 
     @property
     def gains_used(self) -> dict[str, list[float]]:

@@ -12,6 +12,7 @@ from space_robot_sim.dynamics.attitude import rotation_matrix
 from space_robot_sim.dynamics.rho_space import RhoSpaceModel, rho_space_into
 from space_robot_sim.environment.disturbance import Disturbance, disturbance_torque
 from space_robot_sim.environment.environment import EnvironmentSettings
+from space_robot_sim.environment.friction import coefficients
 from space_robot_sim.environment.payload import with_payload
 from space_robot_sim.robot import Robot
 
@@ -72,18 +73,19 @@ def _smooth_force(
     rotation_matrix(quaternion, rotation)
     disturbance = Disturbance.build(robot.n, case.disturbance) if case else None
     force, torque = np.empty((count, robot.n + 3)), np.zeros(robot.n + 3)
+    viscous = coefficients(robot, case.friction)[:, 1] if case else np.zeros(robot.n)
     for k, (theta, rates, accelerations) in enumerate(chunk.joints):
         rho_space_into(robot.model, quaternion, theta, still, rates, model)
         force[k] = model.inertia[:, 3:] @ accelerations + model.bias
         if case and disturbance is not None:
             disturbance_torque(disturbance, k * SAMPLING, torque)
             force[k, :3] += to_force @ rotation.T @ torque[:3]
-            force[k, 3:] += torque[3:] + case.friction.viscous * rates
+            force[k, 3:] += torque[3:] + viscous * rates
     return force
 
 
 def _coulomb(robot: Robot, settings: MissionSettings, case: EnvironmentSettings) -> Array:
     rates = sampled_reference(robot, settings).joints[:, 1]
     force = np.zeros((len(rates), robot.n + 3))
-    force[:, 3:] = case.friction.coulomb * np.sign(rates)
+    force[:, 3:] = coefficients(robot, case.friction)[: robot.n, 0] * np.sign(rates)
     return force

@@ -26,7 +26,7 @@ class TorqueLimitSettings(StrictModel):
         0.0, description="largest torque on each base axis, N m (0: none); of an ideal base"
     )
     joint_torque_limit: Limit = Field(
-        0.0, description="largest torque on each joint, N m (0: none)"
+        0.0, description="largest torque on each joint, N m or N (0: none)"
     )
 
 

@@ -32,13 +32,26 @@ Coefficient = Annotated[float, Field(ge=0.0, le=1e6)]
 class FrictionSettings(StrictModel):
     """``f_f = f_C sign(thetadot) + f_V thetadot`` on every joint; ``|f_f| <= f_C`` at rest."""
 
-    coulomb: Coefficient = Field(0.02, description="Coulomb friction f_C of each joint, N m")
-    viscous: Coefficient = Field(0.2, description="viscous friction f_V of each joint, N m s/rad")
+    coulomb: Coefficient = Field(0.02, description="Coulomb friction f_C of each joint, N m or N")
+    viscous: Coefficient = Field(
+        0.2, description="viscous friction f_V of each joint, N m s/rad or N s/m"
+    )
     set_valued: bool = Field(
         True,
         description="a joint at rest is held by up to f_C (false: sign(thetadot) inside the "
         "integration step, which chatters by itself, as in simple simulators)",
     )
+
+
+def coefficients(robot: Robot, settings: FrictionSettings) -> Array:
+    """Return f_C and f_V (N, 2) of all joints: their own, or the settings'.
+
+    N m and N m s/rad, N and N s/m of prismatic joints. Passive joints have their own only.
+    """
+    usual = np.zeros((robot.joint_count, 2))
+    usual[: robot.n] = settings.coulomb, settings.viscous
+    own = np.array(robot.friction).reshape(robot.joint_count, 2)
+    return np.where(np.isnan(own), usual, own)
 
 
 class Friction(Record):
@@ -60,11 +73,10 @@ class Friction(Record):
         """Give each joint its own friction, or the settings', which passive joints do not have."""
         friction = cls.allocate(robot.n)
         assign(friction, count=robot.joint_count, set_valued=settings.set_valued)
+        found = coefficients(robot, settings)
         for row, joint in enumerate(robot.order):
-            own = robot.friction[joint]
-            usual = (settings.coulomb, settings.viscous) if joint < robot.n else (0.0, 0.0)
             friction.row[joint] = row
-            friction.coulomb[row], friction.viscous[row] = np.where(np.isnan(own), usual, own)
+            friction.coulomb[row], friction.viscous[row] = found[joint]
         return friction
 
     @staticmethod

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles import pinocchio_mass_matrix, rho_space_inertia
+from passive_robot import PASSIVE_ROBOT
 from random_robots import State, random_quaternion, random_robot
 
 from space_robot_control.flight.plan import Flight, FlightPlan
@@ -14,9 +15,11 @@ from space_robot_control.tuning.inertia import (
     free_inertia,
     inertia_along,
     inertia_in_rho,
+    loose_inertia,
     semi_floating_inertia,
 )
 from space_robot_control.tuning.spectrum import eigenvalues
+from space_robot_sim.robot.dynamics import mass_matrix
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 6, 9]))
@@ -90,3 +93,25 @@ def test_along_a_mission_without_base_no_attitude_is_singular() -> None:
     again = inertia_along(flight.robot, turned, step=5.0, controls_base=False)
     assert found.shape == (7, 6, 6)
     np.testing.assert_array_equal(again, found)
+
+
+def test_loose_joints_give_way_and_locked_ones_do_not() -> None:
+    """The accelerations of attitude and motors under their forces alone, from the whole inertia."""
+    flight = Flight(FlightPlan(robot=PASSIVE_ROBOT))
+    robot, rest = flight.robot, [spring.rest for spring in flight.robot.springs]
+    theta = np.array([[0.3, 0.5, -0.8], [-1.2, 1.1, 2.0]])
+    moved = [3, 4, 5, 6, 7, 8]
+    for positions, found in zip(theta, loose_inertia(robot, theta), strict=True):
+        whole = mass_matrix(robot, [1.0, 0.0, 0.0, 0.0], [*positions, *rest])
+        expected = np.linalg.inv(np.linalg.inv(whole)[np.ix_(moved, moved)])
+        np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-10)
+        locked = semi_floating_inertia(robot.nominal, positions[np.newaxis])[0]
+        assert np.linalg.eigvalsh(locked - found).min() > -1e-12
+    both = inertia_along(robot, flight.mission_settings, step=2.0)
+    assert both.shape == (10, 6, 6)
+    quaternion = np.array([1.0, 0.0, 0.0, 0.0])
+    start = robot.from_degrees(flight.mission_settings.waypoints_deg[:3])[np.newaxis]
+    for row, inertia in (
+        (0, semi_floating_inertia(robot.nominal, start)), (5, loose_inertia(robot, start))
+    ):  # fmt: skip
+        np.testing.assert_allclose(both[row], inertia_in_rho(quaternion, inertia)[0], rtol=1e-12)
