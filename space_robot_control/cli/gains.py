@@ -122,6 +122,9 @@ def _command(context: click.Context) -> str:
         if context.get_parameter_source(name) == ParameterSource.DEFAULT:
             continue
         value = context.params[name]
+        if getattr(option, "is_flag", False):
+            words.append(option.opts[0])
+            continue
         if name == "parameters":
             given = [(f"{n}.{key}", v) for n, own in value.items() for key, v in own.items()]
             value = [f"{parameter}={json.dumps(v)}" for parameter, v in given]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -173,6 +174,32 @@ def _list_faults(
     return given
 
 
+def _robot_options(function: Any) -> Any:
+    """Give a command --robot, with --base and --repair, which are a part of a URDF's name."""
+
+    @functools.wraps(function)
+    def with_choice_of_urdf(*args: Any, base: str | None, repair: bool, **options: Any) -> Any:
+        if base or repair:
+            from space_robot_sim.robot.choice import with_choice
+
+            options["robot"] = with_choice(options["robot"], base, repair)
+        return function(*args, **options)
+
+    for option in (REPAIR, BASE, ROBOT):
+        option(with_choice_of_urdf)
+    return with_choice_of_urdf
+
+
+ROBOT = click.option(
+    "--robot", default="paper", show_default=True,
+    help="paper, seven_joint, dual_arm, flexible_panels, boom, ets_vii, or a path to a robot's "
+    "YAML, URDF or folder.",
+)  # fmt: skip
+BASE = click.option("--base", metavar="LINK", help="The satellite, of a URDF [default: its root].")
+REPAIR = click.option(
+    "--repair", is_flag=True, help="Repair the defects of a URDF that can be; each is told."
+)
+
 OPTIONS: dict[str, Decorator] = {
     "controller": click.option(
         "--controller", default="tde_stc", show_default=True,
@@ -190,10 +217,7 @@ OPTIONS: dict[str, Decorator] = {
     "gains": click.option(
         "--gains", default="default", show_default=True,
         help="printed, tuned, robust, default (printed where it flies), or a path."),
-    "robot": click.option(
-        "--robot", default="paper", show_default=True,
-        help="paper, seven_joint, dual_arm, flexible_panels, boom, ets_vii, or a path to a robot's "
-        "YAML, URDF or folder."),
+    "robot": _robot_options,
     "mission": click.option(
         "--mission", default="", help="Mission by name or path [default: the robot's]."),
     "duration": click.option(
@@ -269,7 +293,11 @@ def plan_flight(**options: Any) -> Flight:
 
 
 def remarks_on(flight: Flight) -> list[str]:
-    """Return what there is to say of gains with too little margin and of joints asked too much."""
+    """Return what there is to say of a flight before it begins.
+
+    Of a robot's file that was repaired, of gains with too little margin, of joints that are asked
+    too much.
+    """
     from ..tuning.gain_check import pair_corner
     from ..tuning.warning import limit_remarks, margin_remarks
 
@@ -280,7 +308,8 @@ def remarks_on(flight: Flight) -> list[str]:
         flown, flight.plant.robot, flight.mission_settings, corner, flight.controls_base,
         on_thrusters=bool(names.thrusters and not names.wheels),
     )  # fmt: skip
-    return on_gains + limit_remarks(flight.plant.robot, flight.mission_settings)
+    on_limits = limit_remarks(flight.plant.robot, flight.mission_settings)
+    return [*(f"repaired: {text}" for text in flight.robot.repairs), *on_gains, *on_limits]
 
 
 OUTPUT = file_option("--output", help="File to write the JSON to as well.")

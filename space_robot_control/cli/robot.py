@@ -6,15 +6,13 @@ from pathlib import Path
 
 import click
 
-from .options import file_option, flight_options
+from .options import BASE, REPAIR, file_option, flight_options
 
 
 @click.command()
 @click.argument("robot", default="paper")
-@click.option("--base", metavar="LINK", help="The satellite, of a URDF [default: its root].")
-@click.option(
-    "--repair", is_flag=True, help="Repair the defects of a URDF that can be; each is told."
-)
+@BASE
+@REPAIR
 @file_option("--out", help="Write all numbers as a robot's YAML, to edit it or to fly it.")
 @flight_options("json")
 def robot(robot: str, base: str | None, repair: bool, out: Path | None, as_json: bool) -> None:

@@ -16,7 +16,7 @@ from space_robot_msgs_py.config.trees import Tree, nest
 from space_robot_msgs_py.config.validation import one_of, read_yaml, short
 from space_robot_msgs_py.config.yaml_text import check_file, is_folder
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.robot.find import robot_files
+from space_robot_sim.robot.find import new_command, robot_files
 
 from ..laws import ControlLaw, find_law, laws
 from .settings import DEFAULT, DEFAULT_SETS, OF_THE_SET, ControllerNodeSettings
@@ -48,7 +48,7 @@ def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
         raise InputError("a robot that no file tells has no gains of its own: give some")
     if (folder := found.gains) is None:
         raise InputError(
-            f"robot {short(robot)} has no gains of its own: `space-robot new {found.file}` makes "
+            f"robot {short(robot)} has no gains of its own: `{new_command(robot)}` makes "
             "it some, with a mission; or name a folder of <law>.yaml files as gains"
         )
     if gain_set == DEFAULT:

@@ -6,7 +6,7 @@ from typing import Any
 
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.robot import Robot
-from space_robot_sim.robot.find import robot_content
+from space_robot_sim.robot.find import robot_source
 
 from .node_settings import FlightSettings
 from .objects import robot_setting
@@ -21,8 +21,8 @@ class Robots:
 
     def __init__(self, settings: FlightSettings, given: str | Robot) -> None:
         """``given``: by the flight's options."""
-        self._given = {} if isinstance(given, str) else {robot_setting(given): given}
-        self._contents: dict[str, dict[str, Any]] = {}
+        self._read_ones = {} if isinstance(given, str) else {robot_setting(given): given}
+        self._contents = {name: robot.content for name, robot in self._read_ones.items()}
         self.plant, self.controller, mission = (
             self._read(node.robot)
             for node in (settings.plant, settings.controller, settings.mission)
@@ -37,12 +37,10 @@ class Robots:
                 )
 
     def _read(self, name: str) -> Robot:
-        if name in self._given:
-            self._contents[name] = self._given[name].content
-            return self._given[name]
-        if name not in self._contents:
-            self._contents[name] = robot_content(name)
-        return Robot.from_dict(self._contents[name], where=name)
+        if name not in self._read_ones:
+            source = robot_source(name)
+            self._read_ones[name], self._contents[name] = source.robot, source.content
+        return self._read_ones[name]
 
     @property
     def description(self) -> dict[str, Any]:

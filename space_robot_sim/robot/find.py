@@ -1,7 +1,7 @@
 """A robot by its name or its files, and where its mission and its gains are.
 
-A robot is named by a name of ``config/robots``, by a path to a ``.yaml``, ``.urdf`` or ``.xacro``,
-or by a folder of its own:
+A robot is named by a name of ``config/robots``, by a path to a ``.yaml``, ``.urdf`` or ``.xacro``
+(with what is chosen of it: see `space_robot_sim.robot.choice`), or by a folder of its own:
 
     robot.yaml (or robot.urdf, robot.xacro)
     mission.yaml
@@ -14,6 +14,7 @@ names out of bags open nothing but what is shipped.
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,8 +24,9 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.config.yaml_text import check_file, is_folder
 from space_robot_msgs_py.errors import InputError
 
+from .choice import split_choice
 from .robot import Robot
-from .source import URDF, YAML, read_robot_file
+from .source import URDF, YAML, RobotSource, read_robot_file
 
 OWN = "robot"
 """Name, less its ending, of the robot's file in a folder of its own."""
@@ -57,6 +59,7 @@ def robot_files(robot: str) -> RobotFiles:
     """
     if robot == GIVEN:
         return RobotFiles(GIVEN, Path(GIVEN), None, None)
+    robot = split_choice(robot).name
     path = Path(robot)
     if robot.endswith((*YAML, *URDF)):
         check_file(path)
@@ -76,13 +79,19 @@ def find_robot(robot: str, base: str | None = None, repair: bool = False) -> Rob
 
     Args:
         robot: see above.
-        base: the link that is the satellite, of a URDF (None: its root).
-        repair: whether a URDF's defects are repaired.
+        base: the link that is the satellite, of a URDF (None: what the name says, else its root).
+        repair: whether a URDF's defects are repaired, or the name says so.
 
     Raises:
         InputError: there is no such robot, or its file is wrong.
     """
-    return read_robot_file(robot_files(robot).file, base, repair).robot
+    return robot_source(robot, base, repair).robot
+
+
+def robot_source(robot: str, base: str | None = None, repair: bool = False) -> RobotSource:
+    """Read a robot's file by name or path, as `find_robot` does."""
+    chosen = split_choice(robot)
+    return read_robot_file(robot_files(robot).file, base or chosen.base, repair or chosen.repair)
 
 
 def robot_content(robot: str) -> dict[str, Any]:
@@ -91,7 +100,7 @@ def robot_content(robot: str) -> dict[str, Any]:
     Raises:
         InputError: see `find_robot`.
     """
-    return read_robot_file(robot_files(robot).file).content
+    return robot_source(robot).content
 
 
 def mission_file(robot: str, mission: str = "") -> Path:
@@ -108,7 +117,7 @@ def mission_file(robot: str, mission: str = "") -> Path:
     if found.mission is None:
         find_robot(robot)  # what is wrong with that comes first
         raise InputError(
-            f"robot {short(robot)} has no mission of its own: `space-robot new {found.file}` "
+            f"robot {short(robot)} has no mission of its own: `{new_command(robot)}` "
             "makes it one, with gains; or name a mission"
         )
     return found.mission
@@ -123,12 +132,21 @@ def mission_layers(robot: str, mission: str) -> list[Path]:
     return [] if mission == GIVEN else [mission_file(robot, mission)]
 
 
+def new_command(robot: str) -> str:
+    """Return the command that makes a mission and gains for a robot."""
+    chosen = split_choice(robot)
+    words = ["space-robot", "new", str(robot_files(robot).file)]
+    words += ["--base", chosen.base] if chosen.base else []
+    return shlex.join([*words, *(["--repair"] if chosen.repair else [])])
+
+
 def robot_as_path(robot: str) -> str:
     """Return what a user means by a robot's name: ``r`` is the folder ``r/`` if none is called so.
 
     Not for names out of bags: these open no folder of the user's.
     """
-    if not robot or "/" in robot or robot.endswith((*YAML, *URDF)) or robot in robot_names():
+    name = split_choice(robot).name
+    if not name or "/" in name or name.endswith((*YAML, *URDF)) or robot in robot_names():
         return robot
     return f"{robot}/" if is_folder(Path(robot)) else robot
 

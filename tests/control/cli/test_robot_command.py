@@ -146,3 +146,16 @@ def test_the_process_ends_with_code_2(name: str, tmp_path: Path) -> None:
 def test_a_sound_urdf_lacks_a_mission_only(capsys: pytest.CaptureFixture[str]) -> None:
     assert _run(["simulate", "--robot", str(ARM)]) == 2
     assert "has no mission of its own: `space-robot new" in capsys.readouterr().err
+
+
+def test_base_and_repair_are_a_part_of_the_name(
+    bad: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of every command that takes --robot."""
+    for command in (["simulate"], ["fly"], ["stability"], ["gains", "check"]):
+        assert _run([*command, "--robot", str(bad), "--base", "fore", "--repair"]) == 2
+        assert f"`space-robot new {bad} --base fore --repair`" in capsys.readouterr().err
+        assert _run([*command, "--robot", str(bad), "--base", "fore"]) == 2
+        assert "triangle" in capsys.readouterr().err
+    assert _run(["simulate", "--base", "fore"]) == 2
+    assert "no URDF" in capsys.readouterr().err
