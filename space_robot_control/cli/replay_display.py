@@ -100,5 +100,10 @@ def _print_first(first: dict[str, Any], console: Console) -> None:
 def _print_axes(report: dict[str, Any], console: Console) -> None:
     names = ("RMS recorded", "RMS replayed", "RMS of difference", "largest difference")
     columns = Column("axis", is_label=True), *(Column(name, spec=".4g") for name in names)
-    rows = [[axis, *numbers.values()] for axis, numbers in report["axes"].items()]
+    rows = [
+        [axis if unit == "N m" else f"{axis} ({unit})", *numbers]
+        for axis, (unit, *numbers) in (
+            (name, found.values()) for name, found in report["axes"].items()
+        )
+    ]
     print_table(Table.of("torque, N m, over the ticks compared", columns, rows), console)

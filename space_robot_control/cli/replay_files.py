@@ -24,7 +24,7 @@ COLUMNS = 3
 
 
 def write_csv(comparison: Comparison, period: float, path: Path) -> None:
-    """Write a row a tick: tick, time, s, and the torques of each axis, N m (empty: none)."""
+    """Write a row a tick: tick, time, s, and the torques of each axis, N m, or N (empty: none)."""
     ticks, recorded, replayed = comparison.table()
     names = [
         f"{axis}_{which}" for which in ("recorded", "replayed") for axis in comparison.axis_names
@@ -52,6 +52,7 @@ def torques(comparison: Comparison, period: float, title: str) -> Figure:
         both = np.column_stack([recorded[:, index], replayed[:, index]])
         plot_lines(axes, time, both, dashed=True)
         axes.set_title(plain(name))
-        axes.set(xlabel="time (s)", ylabel="torque (N m)")
+        unit = comparison.units[index]
+        axes.set(xlabel="time (s)", ylabel="force (N)" if unit == "N" else f"torque ({unit})")
     legend_above(figure, ("recorded", "replayed"), dashed=True)
     return figure

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,10 +30,21 @@ class Comparison:
     """Commands of the ticks that were played."""
 
     def __init__(
-        self, axis_names: tuple[str, ...], played: Ticks, recorded: Commands, replayed: Commands
-    ) -> None:
-        """``played``: the ticks whose state was sent to the controller."""
+        self, axis_names: tuple[str, ...], played: Ticks, recorded: Commands, replayed: Commands,
+        forces: Collection[str] = (),
+    ) -> None:  # fmt: skip
+        """Compare them.
+
+        Args:
+            axis_names: of all that is commanded.
+            played: the ticks whose state was sent to the controller.
+            recorded: in flight.
+            replayed: now.
+            forces: the axes whose commands are in N: of prismatic joints and thrusters.
+        """
         self.axis_names = axis_names
+        self.units = tuple("N" if name in forces else "N m" for name in axis_names)
+        """Of each axis."""
         self._recorded, self._replayed = recorded, replayed
         self._played = np.unique(played)
         is_played = np.isin(recorded.ticks, self._played)
@@ -44,9 +56,9 @@ class Comparison:
         """(K,) Ticks with both."""
         self._at, self._again = np.flatnonzero(is_played)[at], again
         self.recorded: Array = recorded.torque[self._at]
-        """(K, m) N m."""
+        """(K, m) in `units`."""
         self.replayed: Array = replayed.torque[again]
-        """(K, m) N m."""
+        """(K, m) in `units`."""
         self.unanswered: Ticks = np.setdiff1d(recorded.ticks[is_played], replayed.ticks)
         """Ticks with a recorded command that have none now."""
         self.unrecorded: Ticks = np.setdiff1d(replayed.ticks, recorded.ticks)
@@ -125,6 +137,7 @@ class Comparison:
             },
             "axes": {
                 name: {
+                    "unit": self.units[i],
                     "recorded_rms": _rms(self.recorded[:, i]),
                     "replayed_rms": _rms(self._replayed_torque[:, i]),
                     "difference_rms": _rms(difference[:, i]),

@@ -115,8 +115,9 @@ class _Run:
         played = player.played
         if error and not len(played):
             raise error
+        forces = *choice.names.thrusters, *recording.flight.get("prismatic_joints", ())
         comparison = Comparison(
-            names, played, self._recorded_until(played, error), answers.commands()
+            names, played, self._recorded_until(played, error), answers.commands(), forces
         )
         return Replay(
             options, choice, recording, comparison, self._laws, self._skipped, elapsed, error

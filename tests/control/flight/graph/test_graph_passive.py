@@ -35,4 +35,6 @@ def test_passive_joints_swing_in_the_graph_as_in_one_process(
         np.testing.assert_array_equal(getattr(recorded, column), getattr(log, column), column)
     assert np.abs(recorded.passive_velocities).max() > 0.0
     assert set(flown.report["rms"]["mean_axis"]) >= {"joints_revolute", "joints_prismatic"}
-    assert replay(Options(flown.bag, domain=domain, trust=True)).comparison.is_identical
+    again = replay(Options(flown.bag, domain=domain, trust=True))
+    assert again.comparison.is_identical
+    assert [axis["unit"] for axis in again.report()["axes"].values()] == [*["N m"] * 4, "N", "N m"]
