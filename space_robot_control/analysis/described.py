@@ -15,11 +15,14 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import laws_of
-from space_robot_msgs_py.config.validation import validate
+from space_robot_msgs_py.config.validation import short, validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
+from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.environment import EnvironmentSettings
+from space_robot_sim.environment.events import Event, named_targets, parse_events
 from space_robot_sim.environment.payload import with_payload
+from space_robot_sim.faults.schedule import tick_from
 from space_robot_sim.plant.settings import PlantNodeSettings
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.find import find_robot
@@ -97,7 +100,40 @@ def momentum_of(log: FlightLog) -> MomentumSeries:
     """
     environment = environment_of(log)
     robot = with_payload(robot_of(log), environment.payload)
-    return MomentumSeries(robot, flown_actuators(log), environment.disturbance)
+    captures = Captures(events_of(log), robot, log.timebase.period)
+    return MomentumSeries(captures, flown_actuators(log), environment.disturbance)
+
+
+def events_of(log: FlightLog) -> list[Event]:
+    """Return what was captured and released, by time.
+
+    Raises:
+        InputError: what the bag tells cannot be, or names a file and the bag is not trusted.
+    """
+    texts = [str(text) for text in log.flight.get("events", ())]
+    if not log.trusted:
+        for name in named_targets(texts):
+            check_file("target", name)
+    return parse_events(texts)
+
+
+def event_labels(log: FlightLog) -> list[str]:
+    """Say in a few words each what was captured and released; as the bag has it if it cannot be."""
+    try:
+        return [event.label for event in events_of(log)]
+    except InputError:
+        return [short(str(text)) for text in log.flight.get("events", ())]
+
+
+def event_times(log: FlightLog) -> Array:
+    """Return the times of the flight's events within ``log``, s; none if they are not known."""
+    try:
+        ticks = np.array([tick_from(e.time_s, log.timebase.period) for e in events_of(log)])
+    except InputError:
+        ticks = np.empty(0)
+    inside = (log.first_tick <= ticks) & (ticks < log.first_tick + log.ticks)
+    times: Array = ticks[inside] * log.timebase.period
+    return times
 
 
 def _plant_settings(log: FlightLog, keys: Sequence[str] = ()) -> PlantNodeSettings:

@@ -3,7 +3,8 @@
 The base's inertia in the robot's file includes its wheels, locked. So the robot's momentum is
 that of everything with locked wheels, and the wheels' is what their spin relative to the base adds,
 ``sum a_k J_k Omega_k``. Motors and joints only move it from one to the other: the sum changes by
-what comes from outside, that is thrusters and the disturbances of (61), and by nothing else.
+what comes from outside, that is thrusters, the disturbances of (61) and what a captured or released
+target has, and by nothing else.
 """
 
 from __future__ import annotations
@@ -16,12 +17,14 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.bag.blocks import Metric, joined, last_rows
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
+from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.base_axes import cross, to_inertial
 from space_robot_sim.robot.momentum import Motion, robot_momentum
 
 from .base_demand import axes_of
+from .before_events import state_before
 
 Array = NDArray[np.float64]
 
@@ -47,19 +50,67 @@ class Momentum(NamedTuple):
 
 
 class MomentumSeries:
-    """Follows the momentum through a flight, block by block."""
+    """Follows the momentum through a flight, block by block.
+
+    At the tick of a capture or release it is that after it; the change is from outside.
+    """
 
     def __init__(
-        self, robot: Robot, flown: BaseActuatorSettings, disturbance: DisturbanceSettings
+        self, captures: Captures, flown: BaseActuatorSettings, disturbance: DisturbanceSettings
     ) -> None:
-        """``robot``: that flew, payload included; ``flown``: what turned its base."""
-        self._robot, self.flown = robot, flown
-        self._disturbance = disturbance
-        self._before: FlightLog | None = None
-        self._outside = np.zeros(3)
+        """``captures``: of the robot that flew, payload included; ``flown``: what turned it."""
+        self._captures, self.flown, self._disturbance = captures, flown, disturbance
+        self._part: _OfOneRobot | None = None
 
     def add(self, log: FlightLog) -> Momentum:
         """Take further rows of the flight and return their momentum."""
+        start, stop = log.first_tick, log.first_tick + log.ticks
+        if self._part is None:  # the first state that is known is that after the first tick's
+            self._part = self._begin(self._captures.robot_at(start), np.zeros(3))
+            start += 1
+        found, begin = [], log.first_tick
+        for tick in self._captures.ticks(start, stop):
+            if tick > begin:
+                found.append(self._part.add(_rows(log, begin, tick)))
+            found.append(self._exchange(_rows(log, tick, tick + 1)))
+            begin = tick + 1
+        if begin < stop:
+            found.append(self._part.add(_rows(log, begin, stop)))
+        return Momentum(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+
+    def _begin(self, robot: Robot, outside: Array) -> _OfOneRobot:
+        return _OfOneRobot(robot, self.flown, self._disturbance, outside)
+
+    def _exchange(self, row: FlightLog) -> Momentum:
+        """Take the tick of one event or several, as they happen one after the other."""
+        exchanges = self._captures.at(row.first_tick)
+        states = [row]
+        for exchange in reversed(exchanges):
+            states.insert(0, state_before(exchange, states[0], self.flown.wheels))
+        assert self._part is not None
+        for exchange, state, after in zip(exchanges, states[:-1], states[1:], strict=True):
+            before = self._part.add(state)
+            bare = self._begin(exchange.after, np.zeros(3)).add(after)
+            outside = before.outside[0] + bare.total[0] - before.total[0]
+            self._part = self._begin(exchange.after, outside)
+            found = self._part.add(after)
+        return found
+
+
+class _OfOneRobot:
+    """Follows the momentum of a robot that holds the same all the time."""
+
+    def __init__(
+        self, robot: Robot, flown: BaseActuatorSettings, disturbance: DisturbanceSettings,
+        outside: Array,
+    ) -> None:  # fmt: skip
+        """``outside``: (3,) N m s that have come from outside at the first row."""
+        self._robot, self._flown, self._disturbance = robot, flown, disturbance
+        self._before: FlightLog | None = None
+        self._outside = outside
+
+    def add(self, log: FlightLog) -> Momentum:
+        """Take further rows, see `MomentumSeries.add`."""
         rows = joined(self._before, log)
         axes, skipped = axes_of(rows), rows.ticks - log.ticks
         motion = Motion(
@@ -67,7 +118,7 @@ class MomentumSeries:
             rows.omega_base, rows.all_positions, rows.all_velocities,
         )  # fmt: skip
         found = robot_momentum(self._robot, motion)
-        wheels = self.flown.wheels
+        wheels = self._flown.wheels
         spin = wheels.spin_momenta(rows.wheel_velocities) @ wheels.unit_axes
         outside = self._from_outside(rows, axes, found.centre_of_mass)
         self._before, self._outside = last_rows(log, 1), outside[-1].copy()
@@ -81,8 +132,8 @@ class MomentumSeries:
         """Return the angular impulse up to each row, the first row's known, (N, 3) N m s."""
         period, time = rows.timebase.period, rows.time
         impulse = np.zeros((rows.ticks, 3))
-        if self.flown.thruster_count:
-            thrusters = self.flown.thrusters
+        if self._flown.thruster_count:
+            thrusters = self._flown.thrusters
             force = rows.thrusts @ thrusters.unit_directions
             torque = rows.thrusts @ np.cross(thrusters.places, thrusters.unit_directions)
             each = [  # turned as the base is before and after the interval
@@ -151,6 +202,11 @@ def _torque(axes: Array, centre_of_mass: Array, force: Array, torque: Array) -> 
     """(N, 3) N m about the common CoM, inertial axes; of force and torque on the base's axes."""
     pushed, turned = to_inertial(axes, force.T), to_inertial(axes, torque.T)
     return (turned - cross(centre_of_mass.T, pushed)).T
+
+
+def _rows(log: FlightLog, start: int, stop: int) -> FlightLog:
+    """Return the rows of the ticks from ``start`` to before ``stop``."""
+    return log.rows(start - log.first_tick, stop - log.first_tick)
 
 
 def _longest(vectors: Array) -> float:

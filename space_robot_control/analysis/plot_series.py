@@ -13,7 +13,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
 from .attitude_drift import controls_base
-from .described import robot_of
+from .described import event_times, robot_of
 from .metrics import AxisIndex, error_columns, torque_columns, tracking_error
 from .pointing import PointingError, pointing_error
 from .ripple import RippleSpectrum, ripple_spectrum
@@ -76,6 +76,8 @@ class PlotSeries(NamedTuple):
     """(K,) of every answer, by the wall clock; None for flights without any."""
     ripple: RippleSpectrum | None
     """None where the robot is not known, or the flight is too short."""
+    events: Array
+    """Times of what was captured and released, s."""
 
     @classmethod
     def of(cls, log: FlightLog) -> Self:
@@ -97,6 +99,7 @@ class PlotSeries(NamedTuple):
             pointing,
             latency,
             ripple,
+            event_times(log),
         )
 
 

@@ -18,6 +18,7 @@ from .columns import recording
 from .described import (
     actuators_of,
     estimator,
+    event_labels,
     flown_actuators,
     momentum_of,
     navigation_of,
@@ -120,6 +121,7 @@ class Analysis:
         self._head = {
             **{key: block.flight.get(key) for key in DESCRIBED},
             "faults": [str(fault) for fault in block.flight.get("faults", ())],
+            "events": event_labels(block),
             "sensors": sensors_of(block),
             "navigation": navigation_of(block),
             "actuators": actuators_of(block),

@@ -41,6 +41,8 @@ def remarks(report: Report) -> list[str]:
     """Say in sentences what was lost, damaged or left unanswered."""
     lost = {topic: count for topic, count in report["lost"].items() if count}
     found = [f"messages lost: {lost or 'none'}"]
+    if report["events"]:
+        found.append(f"events: {', '.join(report['events'])}")
     if drift := report["attitude_drift"]:
         found.append(
             f"{FREE}: its attitude is no error but drift, {drift['max_deg']:.4g} deg at most and "

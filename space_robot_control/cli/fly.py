@@ -49,6 +49,7 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
       space-robot fly --domain 7 --namespace /sat1
       space-robot fly --swap 5:tde_smc --swap 10:tde_stc
       space-robot fly --fault kill_controller@3 --restart-controller
+      space-robot fly --event capture@10:target.yaml
       space-robot fly --fault drop_state@2-4:0.1 --fault noise_gyro@0:1e-5 --seed 7
     """
     from space_robot_msgs_py.errors import FlightError

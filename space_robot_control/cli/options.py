@@ -254,6 +254,10 @@ OPTIONS: dict[str, Decorator] = {
         "--fault", "faults", multiple=True, metavar="KIND@T[-END][:ARG]", callback=_list_faults,
         help="Inject a fault at T simulated seconds; may be repeated; --fault list lists all "
         "kinds."),
+    "event": click.option(
+        "--event", "events", multiple=True, metavar="capture@T:TARGET|release@T[:SPEED]",
+        help="Capture a target (of config/targets, or a path to its YAML) or let it go at T "
+        "simulated seconds; may be repeated [default: the mission's events]."),
     "seed": click.option(
         "--seed", type=int, default=0, help="Seed of the random numbers of faults and sensors."),
     "set": click.option(

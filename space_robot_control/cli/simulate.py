@@ -23,6 +23,7 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
       space-robot simulate --bag flights/in_process
       space-robot simulate --sensors fine --seed 3
       space-robot simulate --fault torque_scale@2:base=0.99 --fault noise_gyro@0:1e-6
+      space-robot simulate --event capture@10:small_satellite --event release@25:0.05
     """
     from ..flight.bag_path import check_bag_path
     from ..flight.disk_space import room_remark

@@ -47,6 +47,7 @@ GRADES = ("ideal", "fine", "tactical", "coarse")
     "navigation",
     "latency",
     "friction",
+    "event",
     "set",
     "json",
 )

@@ -74,6 +74,9 @@ class FlightSettings(NamedTuple):
                 if config_directory() not in file.parents:
                     told = dict(flatten(node_parameters(file, node.node)))
                     given[node.node] = {**told, **given[node.node]}
+        if events := [str(event) for event in plant.parsed_events]:  # their files' numbers too
+            given["plant"]["events"] = events
+            plant = plant.model_copy(update={"events": events})
         given["controller"].setdefault("actuators", plant.actuators)
         if plant.realtime:  # by the wall clock there is no time to wait
             given["controller"] = {"reference_timeout": 0.0, **given["controller"]}

@@ -164,6 +164,11 @@ class Flight:
         return [*in_plant, *self.plan.faults_of(PROCESS_KINDS)]
 
     @property
+    def events(self) -> list[str]:
+        """The texts of all events, by their times, with the targets' numbers."""
+        return [str(exchange.event) for exchange in self.plant.captures.exchanges]
+
+    @property
     def has_friction(self) -> bool:
         """True if the joints have friction."""
         return bool(coefficients(self.robot, self.plant_settings.friction).any())
@@ -226,6 +231,7 @@ class Flight:
             **self._navigation,
             "seed": plant.fault_seed,
             **({"faults": self.faults} if self.faults else {}),
+            **({"events": self.events} if self.events else {}),
             **({"swaps": swaps} if swaps else {}),
             **({"restart_controller": True} if self.plan.restart_controller else {}),
             "parameters": self.parameters,

@@ -53,6 +53,7 @@ class _Names(_Open):
     gains: Text = ""
     swaps: list[Text] = Field(default_factory=list)
     faults: list[Text] = Field(default_factory=list)
+    events: list[Text] = Field(default_factory=list)
 
 
 class _Description(_Names):

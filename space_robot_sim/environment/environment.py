@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from pydantic import Field
 
 from space_robot_msgs_py.compiled.records import Record, assign, nested
@@ -10,7 +12,7 @@ from space_robot_msgs_py.config.validation import StrictModel
 from ..faults.schedule import PartFault
 from ..robot import Robot
 from .disturbance import Disturbance, DisturbanceSettings
-from .events import EventTexts
+from .events import Event, EventTexts, parse_events
 from .friction import Friction, FrictionSettings, StuckJoint
 from .payload import PayloadSettings
 
@@ -26,6 +28,21 @@ class EnvironmentSettings(StrictModel):
         description="what is captured and released: capture@T:TARGET, release@T[:SPEED], see "
         "docs/manual",
     )
+
+    @property
+    def parsed_events(self) -> list[Event]:
+        """The events, by their times; files of targets are read.
+
+        Raises:
+            InputError: see `parse_events`.
+        """
+        texts = [text for text in self.events if text.strip()]
+        return parse_events(texts, self.events_folder) if texts else []
+
+    @property
+    def events_folder(self) -> Path:
+        """The folder in which files of targets are looked for, beside the one we are in."""
+        return Path()
 
 
 class Environment(Record):

@@ -124,6 +124,16 @@ def check_events(texts: list[str]) -> list[str]:
     return texts
 
 
+def named_targets(texts: Iterable[str]) -> list[str]:
+    """Return the names and paths of targets in texts of events: what `parse_events` would open.
+
+    Raises:
+        InputError: a text that can be no event.
+    """
+    found = [_split(text) for text in texts if text.strip()]
+    return [name for kind, _, name in found if kind == "capture" and not name.startswith("{")]
+
+
 EventTexts = Annotated[Texts, AfterValidator(check_events)]
 
 

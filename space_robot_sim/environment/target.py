@@ -14,7 +14,7 @@ from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, validate
 
 from ..dynamics.attitude import rotation_matrix
-from ..robot.file import Inertia, Mass, Vector, inertia_tensor
+from ..robot.file import Inertia, Mass, Vector
 
 Array = NDArray[np.float64]
 
@@ -91,12 +91,6 @@ class Target(StrictModel):
         out, quaternion = np.empty((3, 3)), np.array(self.place.quaternion)
         rotation_matrix(quaternion / np.linalg.norm(quaternion), out)
         return out
-
-    @property
-    def inertia_on_tool(self) -> Array:
-        """(3, 3) kg m2 about the target's CoM, on the tool's axes."""
-        turned: Array = self.rotation @ inertia_tensor(self.inertia) @ self.rotation.T
-        return turned
 
 
 class _Document(StrictModel):

@@ -24,6 +24,7 @@ from ..actuators.actuators import (
     reports_given,
 )
 from ..dynamics.model import Model
+from ..environment.captures import Captures
 from ..environment.environment import Environment, EnvironmentSettings
 from ..environment.payload import with_payload
 from ..robot import Robot
@@ -117,13 +118,15 @@ class Plant:
         settings.check(robot, getattr(settings, "actuators", "given"))
         self.names = settings.robot_names(robot)
         """Those of all that is told of the robot and asked of it."""
-        self.robot = with_payload(robot, settings.payload)
+        robot = with_payload(robot, settings.payload)
+        self.captures = Captures(settings.parsed_events, robot, period)
+        """What is captured and released in the flight."""
         self.period = period
         self.block = PlantMemory.block(n)
         """The plant's `PlantMemory`, for compiled loops."""
         memory = self.memory
         assign(
-            memory, model=self.robot.model, environment=Environment.build(self.robot, settings),
+            memory, model=robot.model, environment=Environment.build(robot, settings),
             actuators=Actuators.build(n, settings, period), substeps=settings.substeps,
         )  # fmt: skip
         self.command_delay_buffer = command_delay_buffer(
@@ -144,6 +147,8 @@ class Plant:
         self.truth.joint_positions[:] = positions[:n]
         self.truth.passive_positions[: len(robot.springs)] = positions[n:]
         self.truth.wheel_velocities[:] = speeds
+        if self.captures.exchanges:  # so that no tick has to wait for it
+            tell_truth(self.block)
         sensors = Sensors.build(n, settings, period, memory.truth, robot.is_prismatic[:n])
         schedule = settings.schedule(self.names, period)
         check_faults(schedule, settings)
@@ -166,6 +171,11 @@ class Plant:
     def tick(self) -> int:
         """Ticks flown so far."""
         return self.state.tick
+
+    @property
+    def robot(self) -> Robot:
+        """The robot as it flies now, with payload and what it holds."""
+        return self.captures.robot_at(self.tick)
 
     @property
     def memory(self) -> PlantMemory:
@@ -196,9 +206,17 @@ class Plant:
             self.begin_tick(tick + 1)
 
     def begin_tick(self, tick: int) -> None:
-        """Begin ``tick``, whose true state is known: faults begin and end, the sensors measure."""
+        """Begin ``tick``, whose true state is known, and let the sensors measure it.
+
+        Events happen; faults begin and end.
+        """
         self.state.tick = self.truth.tick = tick
-        self.next_change = self._part_faults.apply(tick, self.memory)
+        memory = self.memory
+        if self.captures.apply(tick, memory.model, memory.x):
+            tell_truth(self.block)
+        self.next_change = min(
+            self._part_faults.apply(tick, memory), self.captures.next_tick(tick)
+        )  # fmt: skip
         if not self._is_ideal:
             self.next_change = min(self.next_change, self._draws.refill(tick))
         if self.measures_truth and tick == 0:  # what `sense` would say, without compiled code
@@ -238,6 +256,13 @@ def step(
     if goes_on:
         sense(memory.sensors, memory.truth, tick + 1, period, memory.measured)
     return fastest
+
+
+@kernel
+def tell_truth(block: Block) -> None:
+    """Call `write_truth` from Python."""
+    memory = block[0]
+    write_truth(memory.model, memory.x, memory.rotation, memory.truth)
 
 
 @kernel

@@ -58,6 +58,11 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         description="who must listen before the first tick: NODE:TOPIC, or NODE to all it sends",
     )
 
+    @property
+    def events_folder(self) -> Path:
+        """The folder of the mission's file; where we are if it has none."""
+        return next((file.parent for file in mission_layers(self.robot, self.mission)), Path())
+
     @classmethod
     def layers(cls, selected: Mapping[str, str]) -> list[Path]:
         """Add mission (where the arm starts), case (what disturbs it), sensors and actuators."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..metrics import unit_of
 from ..plot_series import PlotSeries
 from ..pointing import ARCSEC
-from .style import Look, house_style, legend_above, page, plot_lines
+from .style import Look, house_style, legend_above, mark_events, page, plot_lines
 
 Array = NDArray[np.float64]
 
@@ -48,7 +48,7 @@ def errors_and_torques(flights: Mapping[str, PlotSeries]) -> Figure:
         lambda key: f"|{words(key)}| ({unit_of(key)})",
         False,
     )
-    return _draw([errors, torques], list(flights))
+    return _draw([errors, torques], list(flights), _events(flights))
 
 
 @house_style()
@@ -70,7 +70,7 @@ def pointing(flights: Mapping[str, PlotSeries]) -> Figure:
             ("base_drift", "base's drift (m)", 1.0),
         )
     ]
-    return _draw([panels], list(flights))
+    return _draw([panels], list(flights), _events(flights))
 
 
 @house_style()
@@ -98,7 +98,12 @@ def latency_histogram(flights: Mapping[str, PlotSeries]) -> Figure:
     return figure
 
 
-def _draw(columns: list[list[_Panel]], names: list[str]) -> Figure:
+def _events(flights: Mapping[str, PlotSeries]) -> Array:
+    """Return the times at which something was captured or released in any flight, s."""
+    return np.unique(np.concatenate([series.events for series in flights.values()]))
+
+
+def _draw(columns: list[list[_Panel]], names: list[str], events: Array) -> Figure:
     """Plot columns of as many panels over time, under one legend of all flights."""
     rows = len(columns[0])
     figure = page(18.0 + 38.0 * rows)
@@ -106,6 +111,7 @@ def _draw(columns: list[list[_Panel]], names: list[str]) -> Figure:
     for panels, column in zip(columns, grid.T, strict=True):
         for axes, panel in zip(column, panels, strict=True):
             _draw_panel(axes, panel, names)
+            mark_events(axes, events)
         column[-1].set_xlabel("time (s)")
     figure.align_ylabels()
     legend_above(figure, names, dashed=True)

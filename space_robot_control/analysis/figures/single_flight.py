@@ -11,10 +11,19 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from ..attitude_drift import attitude_drift, controls_base
+from ..described import event_times
 from ..metrics import tracking_error
 from ..plot_series import tick_times
 from ..waypoints import junction_ticks, waypoint_ticks
-from .style import PAGE_WIDTH, house_style, legend_above, mark_moments, page, plot_lines
+from .style import (
+    PAGE_WIDTH,
+    house_style,
+    legend_above,
+    mark_events,
+    mark_moments,
+    page,
+    plot_lines,
+)
 
 Array = NDArray[np.float64]
 
@@ -61,7 +70,8 @@ def control_results(log: FlightLog, title: str) -> Figure:
     """Draw Figs. 6 to 9: errors and torques of the base (left) and of the joints (right).
 
     Below, the torques are enlarged round the junctions of the mission's segments, if the flight
-    has reached one. Where nothing turned the base, its drift stands in the place of its error.
+    has reached one; upright lines are captures and releases. Where nothing turned the base, its
+    drift stands in the place of its error.
 
     Args:
         log: a flight, whole or cut short.
@@ -85,6 +95,7 @@ def control_results(log: FlightLog, title: str) -> Figure:
         plot_lines(torques, time, torque[:, part])
         for axes in (errors, torques):
             mark_moments(axes, moments)
+            mark_events(axes, event_times(log))
         errors.tick_params(labelbottom=False)
         errors.set_ylabel(error_label)
         torques.set(xlabel="time (s)", ylabel=torque_label)

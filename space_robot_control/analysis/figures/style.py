@@ -147,6 +147,12 @@ def mark_moments(axes: Axes, moments: Array) -> None:
         axes.axvline(moment, color=GREY, linewidth=0.8, linestyle=":", zorder=1.5)
 
 
+def mark_events(axes: Axes, times: Array) -> None:
+    """Draw upright lines where something was captured or released, s."""
+    for time in times:
+        axes.axvline(time, color=GREY, linewidth=0.8, zorder=1.5)
+
+
 def legend_above(
     where: Axes | FigureBase, names: Sequence[str], *, dashed: bool, width: float = PAGE_WIDTH - 20
 ) -> Legend:

@@ -24,6 +24,7 @@ from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
+from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.robot import Robot
 
@@ -91,7 +92,7 @@ def _turned(quaternion: Array, vector: Array) -> Array:
 
 
 def budget(log: FlightLog, robot: Robot, actuators: BaseActuatorSettings, *cuts: int) -> Any:
-    metric = MomentumBudget(MomentumSeries(robot, actuators, NO_DISTURBANCE))
+    metric = MomentumBudget(MomentumSeries(Captures((), robot, PERIOD), actuators, NO_DISTURBANCE))
     for start, stop in zip((0, *cuts), (*cuts, log.ticks), strict=True):
         metric.add(log.rows(start, stop), np.empty(0))
     return metric.result()
@@ -196,5 +197,5 @@ def test_payload_and_disturbance_are_those_of_the_case(paper_robot: Robot) -> No
     log = still_log(paper_robot, 5, hardware(wheels=WHEELS))
     log.flight["case"] = "4-2"
     series = momentum_of(log)
-    assert series._robot.mass[-1] > paper_robot.mass[-1]
+    assert series._captures.robot_at(0).mass[-1] > paper_robot.mass[-1]
     assert series._disturbance.scale > 0.0

@@ -23,12 +23,21 @@ pytest.importorskip("rclpy")
 COLUMNS = (*STATE_FIELDS, *ACTUATOR_FIELDS, "commanded_torque", "actuator_commands")
 MESSAGE_FAULTS = ("drop_state@0.05-0.1:0.2", "delay_command@0.15-0.2:2", "nan_state@0.25-0.3:0.3")
 PART_FAULTS = ("wheel_fail@0.2:2", "thruster_stuck_on@0.1-0.2:thruster_1")
+EVENTS = ["capture@0.15:tumbling_satellite", "release@0.3:0.05"]
 OPTIONS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     "wheels": ({"actuators": "wheels"}, ()),
     "thrusters": ({"actuators": "thrusters", "controller": "ctc"}, ("--composed",)),
-    "both": ({"actuators": "wheels_and_thrusters", "sensors": "fine"}, ("--composed",)),
+    "both": (
+        {"actuators": "wheels_and_thrusters", "sensors": "fine", "events": EVENTS},
+        ("--composed",),
+    ),
     "faults": (
-        {"actuators": "wheels_and_thrusters", "seed": 2, "faults": [*PART_FAULTS, *MESSAGE_FAULTS]},
+        {
+            "actuators": "wheels_and_thrusters",
+            "seed": 2,
+            "events": EVENTS[:1],
+            "faults": [*PART_FAULTS, *MESSAGE_FAULTS],
+        },
         ("--composed",),
     ),
 }
@@ -39,8 +48,8 @@ def flown(request: pytest.FixtureRequest, fly: Callable[..., Flown]) -> tuple[Fl
     options, more = OPTIONS[request.param]
     words = ["--duration", "0.4", *more]
     for name, value in options.items():
-        if name == "faults":
-            words += [word for fault in value for word in ("--fault", fault)]
+        if name in ("faults", "events"):
+            words += [word for text in value for word in (f"--{name[:-1]}", text)]
         else:
             words += [f"--{name}", str(value)]
     return fly(*words), FlightPlan.model_validate({"duration": 0.4, **options})

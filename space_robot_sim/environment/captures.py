@@ -1,0 +1,119 @@
+"""The captures and releases of a flight: the robot that flies after each, and when they come."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..dynamics.model import Model
+from ..faults.schedule import tick_from
+from ..robot import Robot
+from .events import Capture, Event, in_order
+from .grasp import Grasp
+from .impact import Impact
+
+Array = NDArray[np.float64]
+
+
+class Exchange(NamedTuple):
+    """An event in ticks: the robot before it, the one after it, and which of them holds."""
+
+    tick: float
+    event: Event
+    before: Robot
+    after: Robot
+    grasp: Grasp
+    """Of what is captured or let go."""
+
+    def impact(
+        self, quaternion: Array, joint_positions: Array, wheel_axes: Array, wheel_inertia: Array
+    ) -> Impact:
+        """Return what passes over in a configuration, see `Impact`."""
+        holding = self.after if isinstance(self.event, Capture) else self.before
+        return Impact(
+            holding, self.grasp, quaternion, joint_positions, wheel_axes, wheel_inertia
+        )  # fmt: skip
+
+    def velocity_after(self, impact: Impact, velocity: Array) -> Array:
+        """Return the velocities that the event leads to, as in `Impact`."""
+        if isinstance(self.event, Capture):
+            return impact.capture(self.event.target.motion, velocity)
+        return impact.release(self.event.speed, velocity)
+
+    def velocity_before(self, impact: Impact, velocity: Array) -> Array:
+        """Invert `velocity_after`."""
+        if isinstance(self.event, Capture):
+            return impact.before_capture(self.event.target.motion, velocity)
+        return impact.before_release(self.event.speed, velocity)
+
+
+class Captures:
+    """The events of one flight of a robot; what they do depends on nothing but tick and state."""
+
+    def __init__(self, events: Sequence[Event], robot: Robot, period: float) -> None:
+        """Place the events in ticks of ``period`` seconds.
+
+        Raises:
+            InputError: they cannot follow one another, or name a tool that ``robot`` has not.
+        """
+        self._robot = robot
+        self.exchanges: list[Exchange] = []
+        """By their ticks."""
+        for event in in_order(events):
+            tick = tick_from(event.time_s, period)
+            if isinstance(event, Capture):
+                grasp = Grasp.of(robot, event.target)
+                found = Exchange(tick, event, robot, grasp.holding(robot), grasp)
+            else:
+                last = self.exchanges[-1]
+                found = Exchange(tick, event, last.after, robot, last.grasp)
+            self.exchanges.append(found)
+            found.impact(*self._at_zero)  # its compiled code is loaded now, not in flight
+
+    @property
+    def _at_zero(self) -> tuple[Array, Array, Array, Array]:
+        """A configuration of the robot, for `Exchange.impact`."""
+        joints = np.zeros(self._robot.joint_count)
+        return np.array([1.0, 0.0, 0.0, 0.0]), joints, np.zeros((0, 3)), np.zeros(0)
+
+    def at(self, tick: int) -> list[Exchange]:
+        """Return what happens at the begin of ``tick``."""
+        return [exchange for exchange in self.exchanges if exchange.tick == tick]
+
+    def ticks(self, start: int, stop: int) -> list[int]:
+        """Return the ticks from ``start`` to before ``stop`` at which something happens."""
+        return sorted({int(e.tick) for e in self.exchanges if start <= e.tick < stop})
+
+    def next_tick(self, tick: int) -> float:
+        """Return the first tick after ``tick`` at which something happens (inf: there is none)."""
+        return next((e.tick for e in self.exchanges if e.tick > tick), math.inf)
+
+    def robot_at(self, tick: float) -> Robot:
+        """Return the robot with what it holds once ``tick`` has begun."""
+        past = [exchange for exchange in self.exchanges if exchange.tick <= tick]
+        return past[-1].after if past else self._robot
+
+    def apply(self, tick: int, model: Model, x: Array) -> bool:
+        """Let the events of ``tick`` change a plant's ``model`` and its state ``x``.
+
+        ``x`` is as in `space_robot_sim.plant.integrator.Stages`. Returns whether there are any.
+        """
+        exchanges = self.at(tick)
+        for exchange in exchanges:
+            n, wheels = self._robot.joint_count, int(model.wheel_count)
+            row = model.row[:n].astype(np.intp)
+            velocities = x[7 + n : 13 + 2 * n + wheels]
+            places = [*range(6), *(6 + row), *range(6 + n, 6 + n + wheels)]
+            impact = exchange.impact(
+                x[3:7], x[7 : 7 + n][row], model.wheel_axis[:wheels], model.wheel_inertia[:wheels]
+            )
+            velocities[places] = exchange.velocity_after(impact, velocities[places])
+            body, of_robot = exchange.grasp.body, exchange.after.model
+            body = 1 + int(row[body - 1]) if body else 0
+            for name in ("mass", "inertia", "com"):
+                getattr(model, name)[body] = getattr(of_robot, name)[body]
+        return bool(exchanges)

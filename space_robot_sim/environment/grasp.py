@@ -1,0 +1,62 @@
+"""A target in the robot's hand: from then on a part of the body that carries the tool."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.config.validation import one_of
+
+from ..robot import Robot
+from ..robot.file import inertia_tensor
+from .target import Target
+
+Array = NDArray[np.float64]
+
+
+class Grasp(NamedTuple):
+    """Where a body of the robot holds a target, on the axes of that body."""
+
+    body: int
+    """Number of the body, 0 for the base."""
+    mass: float
+    """kg, of the target."""
+    com: Array
+    """(3,) m, of the target's centre of mass."""
+    inertia: Array
+    """(3, 3) kg m2, of the target about its centre of mass."""
+    tool_axes: Array
+    """(3, 3) axes of the tool that holds it, as columns."""
+
+    @classmethod
+    def of(cls, robot: Robot, target: Target) -> Grasp:
+        """Place ``target`` in the tool that it names, or in the robot's first one.
+
+        Raises:
+            InputError: the robot has no such tool.
+        """
+        tools = {tool.name: tool for tool in robot.tools}
+        tool = robot.tool
+        if target.tool:
+            where = f" of robot {robot.name!r} for target {target.name!r}"
+            tool = tools[one_of(target.tool, tools, "tool", where)]
+        axes = tool.rotation @ target.rotation
+        return cls(
+            tool.body, target.mass, tool.position + tool.rotation @ target.place.position,
+            axes @ inertia_tensor(target.inertia) @ axes.T, tool.rotation,
+        )  # fmt: skip
+
+    def holding(self, robot: Robot) -> Robot:
+        """Return ``robot`` with the target welded to its body."""
+        body, masses = self.body, robot.mass.copy()
+        coms, tensors = robot.com.copy(), robot.inertia.copy()
+        masses[body] += self.mass
+        coms[body] += self.mass / masses[body] * (self.com - robot.com[body])
+        tensors[body] += self.inertia
+        for mass, com in ((robot.mass[body], robot.com[body]), (self.mass, self.com)):
+            arm = com - coms[body]
+            tensors[body] += mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+        return replace(robot, mass=masses, com=coms, inertia=tensors)

@@ -1,0 +1,138 @@
+"""What a capture or a release does to the velocities: momentum passes over at once, exactly.
+
+The impact is perfectly inelastic. Positions stay; motors, springs and friction are finite, so they
+give no momentum in no time; what the target gives, the robot takes. With H the inertia of the robot
+that holds the target, its wheels included, J the Jacobian of the target in the robot's hand, M the
+target's inertia and u the velocity of the target relative to the place that holds it,
+
+    H (qdot+ - qdot-) = J^T M u
+
+for a capture (u is that before), and the same with a minus for a release (u is that after, of a
+spring). It follows from ``H = H_robot + J^T M J`` and the sum ``H_robot qdot + J^T M u_target`` of
+the momenta, which stays. The kinetic energy falls at a capture, by
+``u^T (M^-1 + J H_robot^-1 J^T)^-1 u / 2`` (Wittenburg, Dynamics of Multibody Systems, 2008,
+chapter 6).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..robot import Robot
+from ..robot.base_axes import base_axes
+from ..robot.dynamics import mass_matrix
+from ..robot.frames import BodyFrame, body_frames
+from .grasp import Grasp
+from .target import Motion
+
+Array = NDArray[np.float64]
+
+
+class Impact:
+    """A robot of N joints and W wheels at the instant at which it takes or lets go a target.
+
+    Velocities are ``qdot = [v0, w0, thetadot, Omega]`` (N+6+W,), the base's on inertial axes, m/s
+    and rad/s; spatial ones have their linear part first, on inertial axes.
+    """
+
+    def __init__(
+        self, holding: Robot, grasp: Grasp, quaternion: Array, joint_positions: Array,
+        wheel_axes: Array, wheel_inertia: Array,
+    ) -> None:  # fmt: skip
+        """Compute J and ``H^-1 J^T M``.
+
+        Args:
+            holding: the robot with the target, see `Grasp.holding`.
+            grasp: the target.
+            quaternion: (4,) of the base, unit.
+            joint_positions: (N,) of all joints, rad or m.
+            wheel_axes: (W, 3) unit vectors in the base frame.
+            wheel_inertia: (W,) kg m2 of the rotors about their axes.
+        """
+        base = base_axes(quaternion[:, np.newaxis])
+        walk = body_frames(holding, (base[0], base[1], base[2]), joint_positions[:, np.newaxis])
+        frames = {frame.body: frame for frame in walk}
+        carrier = frames[grasp.body]
+        axes = _axes(carrier)
+        self._tool_axes = axes @ grasp.tool_axes
+        self._size = holding.joint_count + 6
+        self.jacobian = np.zeros((6, self._size + len(wheel_inertia)))
+        """(6, N+6+W) velocity of the target, as a part of the robot, by qdot."""
+        self._fill_jacobian(holding, frames, grasp)
+        mass = np.zeros((6, 6))
+        mass[:3, :3] = grasp.mass * np.eye(3)
+        mass[3:, 3:] = axes @ grasp.inertia @ axes.T
+        inertia = _with_wheels(
+            mass_matrix(holding, quaternion, joint_positions),
+            wheel_axes @ base[:, :, 0], wheel_inertia,
+        )  # fmt: skip
+        self._gain = np.linalg.solve(inertia, (mass @ self.jacobian).T)
+        """(N+6+W, 6) change of qdot by u."""
+
+    def capture(self, motion: Motion, velocity: Array) -> Array:
+        """Return qdot after a capture at ``velocity``."""
+        found: Array = velocity + self._gain @ self._relative(motion, velocity)
+        return found
+
+    def before_capture(self, motion: Motion, velocity: Array) -> Array:
+        """Return qdot before a capture that led to ``velocity``."""
+        if motion.relative_to == "tool":
+            return velocity - self._gain @ self._relative(motion, velocity)
+        # qdot+ = qdot- + K (u_target - J qdot-)
+        known: Array = velocity - self._gain @ _spatial(motion)
+        matrix = np.eye(len(velocity)) - self._gain @ self.jacobian
+        return np.asarray(np.linalg.solve(matrix, known), dtype=np.float64)
+
+    def release(self, speed: float, velocity: Array) -> Array:
+        """Return qdot after a release at ``velocity`` by a spring, m/s along z of the tool."""
+        found: Array = velocity - self._gain[:, :3] @ (speed * self._tool_axes[:, 2])
+        return found
+
+    def before_release(self, speed: float, velocity: Array) -> Array:
+        """Return qdot before a release that led to ``velocity``."""
+        return self.release(-speed, velocity)
+
+    def _relative(self, motion: Motion, velocity: Array) -> Array:
+        """Return u of a target before its capture."""
+        if motion.relative_to == "tool":
+            parts = self._tool_axes @ motion.velocity, self._tool_axes @ motion.angular_velocity
+            return np.concatenate(parts)
+        relative: Array = _spatial(motion) - self.jacobian @ velocity
+        return relative
+
+    def _fill_jacobian(self, robot: Robot, frames: dict[int, BodyFrame], grasp: Grasp) -> None:
+        """Write the columns of the base and of the joints between it and the hand."""
+        carrier = frames[grasp.body]
+        place = (carrier.origin + carrier.on_outer_axes(grasp.com))[:, 0]
+        self.jacobian[:, :6] = np.eye(6)
+        self.jacobian[:3, 3:6] = np.cross(np.eye(3), place).T
+        body = grasp.body
+        while body:
+            joint, frame = body - 1, frames[body]
+            axis, column = frame.z[:, 0], self.jacobian[:, 5 + body]
+            if robot.is_prismatic[joint]:
+                column[:3] = axis
+            else:
+                column[:3], column[3:] = np.cross(axis, place - frame.origin[:, 0]), axis
+            body = int(robot.parent[joint])
+
+
+def _axes(frame: BodyFrame) -> Array:
+    """Return the axes of a frame as columns, (3, 3)."""
+    return np.column_stack([frame.x, frame.y, frame.z])
+
+
+def _spatial(motion: Motion) -> Array:
+    return np.array([*motion.velocity, *motion.angular_velocity])
+
+
+def _with_wheels(inertia: Array, axes: Array, rotors: Array) -> Array:
+    """Return the inertia with rows for the wheels, whose axes (W, 3) are on inertial axes."""
+    size, count = len(inertia), len(rotors)
+    found = np.zeros((size + count, size + count))
+    found[:size, :size] = inertia
+    found[3:6, size:] = (rotors[:, np.newaxis] * axes).T
+    found[size:, 3:6] = found[3:6, size:].T
+    found[size:, size:] = np.diag(rotors)
+    return found
