@@ -102,9 +102,9 @@ def tune(context: click.Context, /, output: Path, **options: Any) -> None:
       space-robot gains tune --robot seven_joint --case 1 --case 2 --margin 0.03 -o my_gains
       space-robot fly --gains my_gains
     """
+    from ..campaign.gain_set import tuned_set, write_set
     from ..flight.terminal import terminal
     from ..tuning.method import Wishes
-    from .gains_tuned import tuned_set, write_set
 
     names = ("margin", "mass_uncertainty", "bandwidth", "ripple")
     wishes, cases = Wishes(*(options.pop(name) for name in names)), options.pop("cases")

@@ -1,4 +1,4 @@
-"""The gain set of ``space-robot gains tune``: from options to files."""
+"""A gain set made for a robot and a mission: from options to files."""
 
 from __future__ import annotations
 
