@@ -12,6 +12,7 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.files import named_layers
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 from space_robot_msgs_py.config.validation import read_yaml
+from space_robot_msgs_py.config.yaml_text import is_folder
 from space_robot_sim.robot.find import robot_files
 
 from .allocation.settings import AllocationSettings
@@ -42,7 +43,8 @@ def set_file(robot: str, gains: str) -> list[Path]:
         folder = folder / str(chosen.pop()) if len(chosen) == 1 else folder / DEFAULT
     elif "/" not in gains:
         folder = folder / gains
-    return [file for file in (folder / OF_THE_SET,) if file.is_file()]
+    file = folder / OF_THE_SET
+    return [file] if is_folder(folder) and file.is_file() else []
 
 
 class ControllerNodeSettings(NodeSettings):
