@@ -51,6 +51,7 @@ setup(
         "apt": ["colcon-common-extensions", "numpy<2", "pyarrow<26"],
         # tests/benchmarks; bsk (Basilisk) holds back numpy and matplotlib, so a venv of its own
         "bench": ["bsk", "hypothesis", "mujoco", "pin", "psutil>=5.9"],
+        "gym": ["gymnasium>=1.0"],  # space_robot_control.scenario.gymnasium_env
         "mutation": ["cosmic-ray"],  # tests/mutation
         "parquet": ["pyarrow>=14"],  # `analyze --parquet`
         # ROS 2 Jazzy from wheels; never a requirement, for apt's ROS must stay untouched
@@ -62,6 +63,7 @@ setup(
         "soak": ["psutil>=5.9"],  # `soak`
         "test": [
             "cvxpy",
+            "gymnasium>=1.0",
             "hypothesis",
             "mujoco",
             "mypy",

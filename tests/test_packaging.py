@@ -20,10 +20,10 @@ from space_robot_msgs_py import topics
 
 ROOT = Path(__file__).resolve().parents[1]
 EXECUTABLES = sorted((ROOT / "resource/executables").iterdir())
-TOOLS = ("mujoco", "cvxpy", "hypothesis", "pinocchio", "psutil", "pyarrow", "xacro")
+TOOLS = ("mujoco", "cvxpy", "gymnasium", "hypothesis", "pinocchio", "psutil", "pyarrow", "xacro")
 PYPI = {"yaml": "pyyaml", "typing_extensions": "typing-extensions", "pinocchio": "pin"}
 """Names on PyPI of modules that are not called as their package."""
-OF_EXTRAS = {"psutil": "soak", "pyarrow": "parquet", "xacro": "xacro"}
+OF_EXTRAS = {"gymnasium": "gym", "psutil": "soak", "pyarrow": "parquet", "xacro": "xacro"}
 """Packages that one command needs, and their extra."""
 ROSDEP = {"pyyaml": "yaml"}
 """Names of rosdep's keys, behind python3-, where they are not the package's."""

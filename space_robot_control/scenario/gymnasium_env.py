@@ -1,0 +1,155 @@
+"""A bench as an environment of Gymnasium, for learning: to follow the mission with torques.
+
+from space_robot_control.scenario.gymnasium_env import SpaceRobotEnv
+env = SpaceRobotEnv(Scenario(controller=None, sensors="fine"))
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import RobotState
+
+try:
+    import gymnasium
+    from gymnasium.spaces import Box
+except ImportError:
+    raise ImportError("that needs gymnasium: pip install 'space_robot[gym]'") from None
+
+from .scenario import Scenario
+
+Array = NDArray[np.float64]
+ScenarioDraw = Callable[[np.random.Generator], Scenario]
+
+WORST_COST = 100.0
+"""Cost a second at which an episode is lost: that of a joint that is 10 rad off."""
+RATE_WEIGHT, ACTION_WEIGHT = 0.1, 1e-3
+"""Shares of squared rates, rad2/s2, and squared actions in the cost a second; squared errors, rad2,
+count in full."""
+LARGEST = 1e4
+"""Of an observation's numbers; what exceeds it is cut."""
+NAME = "space_robot/Tracking-v0"
+"""That `gymnasium.make` knows it by, once this module is imported."""
+
+
+class SpaceRobotEnv(gymnasium.Env[Array, Array]):
+    """Follows a scenario's mission, m = n+3 axes: base x, y, z, then the n joints with motors.
+
+    - Observation (2 m + n,), as the sensors measure: the error ``rho_d - rho`` (m,), of the base
+      the vector part of the quaternion, of joints rad (or m); its rate (m,), of the base the
+      angular velocity in the base frame, rad/s; the joints' positions (n,).
+    - Action (m,) from -1 to 1: the torque in parts of ``torque_scale``, held over
+      ``ticks_per_step`` ticks. On the base's axes hardware gives it as far as it can.
+    - Reward: -cost dt for every step of dt s, from the truth, with the cost a second
+      ``4 |e_eps|^2 + |e_theta|^2 + 0.1 |edot|^2 + 0.001 |action|^2``.
+    - Terminated: the cost is `WORST_COST` or more, or the flight has diverged. All that is left of
+      the mission is charged at `WORST_COST` a second then, so that an early end never pays.
+    - Truncated: the mission, or the scenario's ``duration``, is over.
+
+    An episode's sensors and faults have a seed of their own, which `reset` draws. ``bench`` is the
+    `Bench` below; its snapshots may be restored between two steps.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario | ScenarioDraw | None = None,
+        ticks_per_step: int = 20,
+        torque_scale: ArrayLike = 10.0,
+    ) -> None:
+        """Put the scenario on a bench.
+
+        Args:
+            scenario: None: the paper's. A function of a random generator is asked for another one
+                at every reset, for robots and missions at random; the joints stay as many.
+            ticks_per_step: 20 of 0.5 ms are 100 steps/s.
+            torque_scale: torque, N m (of prismatic joints N), of an action of 1: one or (m,).
+
+        Raises:
+            InputError: the scenario cannot be flown, or a number is out of its range.
+        """
+        if scenario is None:
+            scenario = Scenario(controller=None)
+        self._draw = None if isinstance(scenario, Scenario) else scenario
+        first = scenario if isinstance(scenario, Scenario) else scenario(np.random.default_rng(0))
+        self.bench = first.bench()
+        m = self.bench.axes
+        if ticks_per_step < 1:
+            raise InputError(f"ticks_per_step: 1 or more is allowed, got {ticks_per_step}")
+        scale = np.asarray(torque_scale, dtype=np.float64)
+        if scale.shape not in ((), (m,)) or not np.all((scale > 0.0) & np.isfinite(scale)):
+            raise InputError(f"torque_scale: 1 or {m} numbers above 0 are allowed, got {scale}")
+        self._ticks, self._scale = ticks_per_step, scale
+        self._high = np.full(3 * m - 3, LARGEST)
+        self._high[:3] = 2.0
+        self.observation_space = Box(-self._high, self._high, dtype=np.float64)
+        self.action_space = Box(-1.0, 1.0, (m,), np.float64)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin an episode; ``options`` has none."""
+        super().reset(seed=seed)
+        if self._draw is not None:
+            bench = self._draw(self.np_random).bench()
+            if bench.axes != self.bench.axes:
+                raise InputError(
+                    f"scenario: {self.bench.axes} axes were expected, got {bench.axes}"
+                )
+            self.bench = bench
+        state = self.bench.reset(int(self.np_random.integers(2**31)))
+        return self._observation(state), self._info()
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Hold an action over ``ticks_per_step`` ticks, fewer at the end of the mission."""
+        bench = self.bench
+        first, torque = bench.tick, self._scale * action
+        for _ in range(self._ticks):
+            bench.step(torque)
+            if bench.done:
+                break
+        cost = self._cost(action)
+        has_failed = bench.outcome not in ("", "complete") or not cost < WORST_COST
+        charged = bench.ticks if has_failed else bench.tick
+        reward = -(WORST_COST if has_failed else cost) * (charged - first) * bench.period
+        truncated = bench.done and not has_failed
+        return self._observation(bench.state), reward, has_failed, truncated, self._info()
+
+    def _observation(self, state: RobotState) -> Array:
+        error, rate = self._errors(state)
+        found = np.concatenate((error, rate, state.joint_positions))
+        cut: Array = np.clip(np.nan_to_num(found), -self._high, self._high)
+        return cut
+
+    def _errors(self, state: RobotState) -> tuple[Array, Array]:
+        """Return the errors of positions and of rates, (m,) each."""
+        reference = self.bench.reference
+        side = 1.0 if state.quaternion @ reference.quaternion >= 0.0 else -1.0
+        eps = side * reference.quaternion[1:] - state.quaternion[1:]
+        return (
+            np.concatenate((eps, reference.joint_positions - state.joint_positions)),
+            np.concatenate((
+                reference.omega_base - state.omega_base,
+                reference.joint_velocities - state.joint_velocities,
+            )),
+        )  # fmt: skip
+
+    def _cost(self, action: Array) -> float:
+        """Return the cost a second of the true state; NaN if that is none."""
+        error, rate = self._errors(self.bench.truth)
+        return float(
+            4.0 * error[:3] @ error[:3] + error[3:] @ error[3:] + RATE_WEIGHT * rate @ rate
+            + ACTION_WEIGHT * action @ action
+        )  # fmt: skip
+
+    def _info(self) -> dict[str, Any]:
+        bench = self.bench
+        return {"time_s": bench.time, "outcome": bench.outcome, "reason": bench.reason}
+
+
+if NAME not in gymnasium.registry:
+    gymnasium.register(NAME, f"{__name__}:{SpaceRobotEnv.__name__}")
