@@ -1,0 +1,42 @@
+"""The code of docs/manual/python.md runs as it stands there, block after block."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+from paths import DOCS
+
+BLOCK = re.compile(r"```python( gym)?\n(.*?)```", re.DOTALL)
+
+
+def blocks(of_gym: bool) -> list[str]:
+    text = (DOCS / "manual/python.md").read_text("utf-8")
+    return [code for gym, code in BLOCK.findall(text) if bool(gym) == of_gym]
+
+
+@pytest.fixture(scope="module")
+def names() -> dict[str, Any]:
+    """What the blocks, but Gymnasium's, have made."""
+    found: dict[str, Any] = {}
+    for code in blocks(of_gym=False):
+        exec(compile(code, "python.md", "exec"), found)
+    return found
+
+
+def test_the_blocks_run(names: dict[str, Any]) -> None:
+    assert len(blocks(of_gym=False)) == 4
+    bench = names["bench"]
+    assert bench.outcome == "complete"
+    assert bench.tick == bench.ticks == 60_000
+    error = bench.reference.joint_positions - bench.truth.joint_positions
+    assert abs(error).max() < 0.01
+
+
+def test_the_block_of_gymnasium_runs(names: dict[str, Any]) -> None:
+    pytest.importorskip("gymnasium")
+    (code,) = blocks(of_gym=True)
+    found = {"Scenario": names["Scenario"]}
+    exec(compile(code, "python.md", "exec"), found)
+    assert found["is_over"]
