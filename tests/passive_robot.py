@@ -5,4 +5,4 @@ from __future__ import annotations
 from paths import DATA
 
 PASSIVE_ROBOT = str(DATA / "passive_robot")
-"""Of its three joints with motors ``boom`` slides; of its three without ``slosh`` does."""
+"""Of its six joints with motors ``boom`` slides; of its three without ``slosh`` does."""

@@ -19,7 +19,9 @@ ROBOT = Robot.from_yaml(DATA / "passive_robot" / "robot.yaml")
 
 
 def mission(end: list[float], times: tuple[float, float] = (0.0, 10.0)) -> MissionSettings:
-    return MissionSettings(waypoint_times=list(times), waypoints_deg=[0.0, 0.2, 0.0, *end])
+    return MissionSettings(
+        waypoint_times=list(times), waypoints_deg=[0.0, 0.2, *[0.0] * 4, *end, *[0.0] * 3]
+    )
 
 
 @pytest.mark.parametrize(
@@ -59,7 +61,7 @@ def test_too_fast_is_what_the_reference_is(span: float, shoulder: float, boom: f
 
 
 def test_forces_are_held_against_efforts() -> None:
-    found = too_strong(ROBOT, np.array([[39.0, -21.0, 1e9], [-39.5, 3.0, 0.0]]))
+    found = too_strong(ROBOT, np.array([[39.0, -21.0, *[1e9] * 4], [-39.5, 3.0, *[0.0] * 4]]))
     assert [(b.joint, b.asked, b.limit, b.unit) for b in found] == [("boom", 21.0, 20.0, "N")]
 
 
@@ -75,5 +77,5 @@ def test_remarks_name_joint_number_and_unit() -> None:
 
 
 def test_a_single_waypoint_asks_for_nothing() -> None:
-    held = MissionSettings(waypoint_times=[0.0], waypoints_deg=[0.0, 0.2, 0.0])
+    held = MissionSettings(waypoint_times=[0.0], waypoints_deg=[0.0, 0.2, *[0.0] * 4])
     assert not limit_remarks(ROBOT, held)

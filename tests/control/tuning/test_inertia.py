@@ -99,8 +99,8 @@ def test_loose_joints_give_way_and_locked_ones_do_not() -> None:
     """The accelerations of attitude and motors under their forces alone, from the whole inertia."""
     flight = Flight(FlightPlan(robot=PASSIVE_ROBOT))
     robot, rest = flight.robot, [spring.rest for spring in flight.robot.springs]
-    theta = np.array([[0.3, 0.5, -0.8], [-1.2, 1.1, 2.0]])
-    moved = [3, 4, 5, 6, 7, 8]
+    theta = np.array([[0.3, 0.5, -0.8, 0.1, -0.4, 1.0], [-1.2, 1.1, 2.0, -0.7, 0.6, 0.2]])
+    moved = range(3, 12)
     for positions, found in zip(theta, loose_inertia(robot, theta), strict=True):
         whole = mass_matrix(robot, [1.0, 0.0, 0.0, 0.0], [*positions, *rest])
         expected = np.linalg.inv(np.linalg.inv(whole)[np.ix_(moved, moved)])
@@ -108,9 +108,9 @@ def test_loose_joints_give_way_and_locked_ones_do_not() -> None:
         locked = semi_floating_inertia(robot.nominal, positions[np.newaxis])[0]
         assert np.linalg.eigvalsh(locked - found).min() > -1e-12
     both = inertia_along(robot, flight.mission_settings, step=2.0)
-    assert both.shape == (10, 6, 6)
+    assert both.shape == (10, 9, 9)
     quaternion = np.array([1.0, 0.0, 0.0, 0.0])
-    start = robot.from_degrees(flight.mission_settings.waypoints_deg[:3])[np.newaxis]
+    start = robot.from_degrees(flight.mission_settings.waypoints_deg[:6])[np.newaxis]
     for row, inertia in (
         (0, semi_floating_inertia(robot.nominal, start)), (5, loose_inertia(robot, start))
     ):  # fmt: skip

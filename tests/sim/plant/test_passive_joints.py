@@ -24,16 +24,18 @@ from space_robot_sim.robot.dynamics import mass_matrix
 Array = NDArray[np.float64]
 PERIOD = 5e-4
 NO_FRICTION = FrictionSettings(coulomb=0.0, viscous=0.0)
+MOTORS = 6
+"""As many as the paper's robot has, whose compiled kernels serve."""
 BASE_MASS, WHEEL_MASS, TANK_MASS = 40.0, 2.0, 8.0
 SPRING = {"stiffness": 90.0, "damping": 3.0, "rest_deg": 0.05}
 BALL = [0.5, 0.5, 0.5, 0.0, 0.0, 0.0]
 
 
 def sloshing(joint: str) -> Robot:
-    """A base whose motor turns a ball about its own centre, and a ball on a spring along z."""
+    """A base whose motors turn balls about their own centres, and a ball on a spring along z."""
     centred: dict[str, Any] = {"inertia": BALL, "com": [0.0, 0.0, 0.0], "parent": "base"}
     links = [
-        {"name": "spinner", "mass": WHEEL_MASS, **centred},
+        *({"name": f"spinner{k}", "mass": WHEEL_MASS, **centred} for k in range(MOTORS)),
         {"name": "tank", "mass": TANK_MASS, "joint": joint, "passive": SPRING, **centred},
     ]
     base = {"mass": BASE_MASS, "inertia": [9.0, 9.0, 9.0, 0.0, 0.0, 0.0]}
@@ -44,19 +46,21 @@ def sloshing(joint: str) -> Robot:
 def test_two_bodies_on_a_spring_swing_as_the_formula_says(joint: str) -> None:
     """``m x'' + c x' + k (x - rest) = 0``, m the reduced mass, or moment, of the two bodies."""
     robot = sloshing(joint)
-    plant = Plant(robot, PlantSettings(initial_joints_deg=[0.0], friction=NO_FRICTION), PERIOD)
+    plant = Plant(
+        robot, PlantSettings(initial_joints_deg=[0.0] * MOTORS, friction=NO_FRICTION), PERIOD
+    )
     (spring,) = robot.springs
     of_base, of_tank = (
-        (BASE_MASS + WHEEL_MASS, TANK_MASS) if joint == "prismatic" else (9.0, 0.5)
-    )  # the spinner does not turn with the base: nothing drives it
+        (BASE_MASS + MOTORS * WHEEL_MASS, TANK_MASS) if joint == "prismatic" else (9.0, 0.5)
+    )  # the spinners do not turn with the base: nothing drives them
     mass = of_base * of_tank / (of_base + of_tank)
     stretched = 0.1
-    plant.memory.x[8] = spring.rest + stretched
+    plant.memory.x[7 + MOTORS] = spring.rest + stretched
     decay = 0.5 * spring.damping / mass
     pulsation = np.sqrt(spring.stiffness / mass - decay**2)
     for _ in range(4):
         for _ in range(500):
-            plant.step(Command(plant.tick, np.zeros(4)))
+            plant.step(Command(plant.tick, np.zeros(3 + MOTORS)))
         t = plant.tick * PERIOD
         swing = np.cos(pulsation * t) + decay / pulsation * np.sin(pulsation * t)
         expected = spring.rest + stretched * np.exp(-decay * t) * swing
@@ -67,10 +71,14 @@ def test_dampers_take_what_motion_and_springs_lose() -> None:
     """Of a robot with a bending panel, sloshing fuel, and an arm, pushed and let go."""
     robot = Robot.from_yaml(DATA / "passive_robot" / "robot.yaml")
     n = robot.n
-    settings = PlantSettings(initial_joints_deg=[10.0, 0.3, 20.0], friction=NO_FRICTION)
+    settings = PlantSettings(
+        initial_joints_deg=[10.0, 0.3, 20.0, 0.0, 30.0, 0.0], friction=NO_FRICTION
+    )
     plant = Plant(robot, settings, PERIOD)
     for _ in range(400):
-        plant.step(Command(plant.tick, np.array([60.0, -30.0, 40.0, 6.0, -4.0, 1.0])))
+        plant.step(
+            Command(plant.tick, np.array([60.0, -30.0, 40.0, 6.0, -4.0, 1.0, 0.3, -0.2, 0.1]))
+        )
 
     def energy() -> float:
         return kinetic_energy(robot, plant.truth) + spring_energy(robot, plant.truth)
@@ -95,7 +103,7 @@ def test_the_nominal_robot_is_the_whole_one_with_its_passive_joints_held_at_rest
     But for the moments of the base, whose centre of mass has others' share in it then.
     """
     robot = Robot.from_yaml(DATA / "passive_robot" / "robot.yaml")
-    attitude, joints = [0.5, 0.5, -0.5, 0.5], [0.4, 0.7, -1.1]
+    attitude, joints = [0.5, 0.5, -0.5, 0.5], [0.4, 0.7, -1.1, 0.2, 0.8, -0.3]
     rest = [spring.rest for spring in robot.springs]
     whole = mass_matrix(robot, attitude, [*joints, *rest])
     moved = mass_matrix(robot.nominal, attitude, joints)

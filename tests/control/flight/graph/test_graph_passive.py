@@ -37,4 +37,8 @@ def test_passive_joints_swing_in_the_graph_as_in_one_process(
     assert set(flown.report["rms"]["mean_axis"]) >= {"joints_revolute", "joints_prismatic"}
     again = replay(Options(flown.bag, domain=domain, trust=True))
     assert again.comparison.is_identical
-    assert [axis["unit"] for axis in again.report()["axes"].values()] == [*["N m"] * 4, "N", "N m"]
+    assert [axis["unit"] for axis in again.report()["axes"].values()] == [
+        *["N m"] * 4,
+        "N",
+        *["N m"] * 4,
+    ]
