@@ -12,13 +12,14 @@ from pathlib import PurePath
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, PlainValidator
+from pydantic import BaseModel, BeforeValidator, PlainValidator
 
 from space_robot_msgs_py.config.files import GIVEN
 from space_robot_msgs_py.config.trees import Tree, nest
 from space_robot_msgs_py.config.validation import StrictModel, validate
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.environment import EnvironmentSettings
+from space_robot_sim.environment.events import Capture, Release
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.find import robot_as_path, robot_names
 from space_robot_sim.sensors.sensors import SensorSettings
@@ -43,6 +44,8 @@ def _plain(value: Any) -> Any:
     """Return a copy as files have it: mappings, lists, numbers, texts."""
     if isinstance(value, BaseModel):
         return value.model_dump()
+    if isinstance(value, (Capture, Release)):
+        return str(value)
     if isinstance(value, Mapping):
         return {str(key): _plain(inner) for key, inner in value.items()}
     if isinstance(value, (np.ndarray, np.generic)):
@@ -103,6 +106,7 @@ MissionGiven = Annotated[Any, PlainValidator(_settings(MissionSettings, OF_PLANT
 Case = Annotated[Any, PlainValidator(_settings(EnvironmentSettings))]
 Sensors = Annotated[Any, PlainValidator(_settings(SensorSettings))]
 Actuators = Annotated[Any, PlainValidator(_settings(ActuatorSettings))]
+EventText = Annotated[str, BeforeValidator(_plain)]
 
 
 def robot_setting(robot: str | Robot) -> str:

@@ -18,6 +18,7 @@ from .faults import KINDS
 from .objects import (
     Actuators,
     Case,
+    EventText,
     Gains,
     LawGiven,
     MissionGiven,
@@ -62,7 +63,7 @@ class FlightPlan(StrictModel):
     fifo_priority: int = 0
     faults: list[str] = Field(default_factory=list)
     """The faults, each as ``KIND@T[-END][:ARGUMENT]``, see `space_robot_control.flight.faults`."""
-    events: list[str] = Field(default_factory=list)
+    events: list[EventText] = Field(default_factory=list)
     """What is captured and released, see `space_robot_sim.environment.events`; none: what the
     mission says."""
     seed: Annotated[int, Field(ge=0)] = 0

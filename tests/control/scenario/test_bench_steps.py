@@ -21,8 +21,9 @@ RICH = Scenario(
     controller="tde_stc", case="3", sensors="fine", actuators="wheels", command_latency_ticks=2,
     swaps=["0.05:tde_smc"], navigation="filtered", duration=0.12,
     faults=["noise_gyro@0.02-0.06:1e-5", "torque_scale@0.03:base=0.9", "encoder_stuck@0.04-0.05:2"],
+    events=["capture@0.02:small_satellite", "release@0.035:0.1"],
 )  # fmt: skip
-"""All that has a memory: sensors, wheels, delayed commands, faults, a filter, a swap of laws."""
+"""All that has a memory: sensors, wheels, delayed commands, faults, events, a filter, a swap."""
 
 
 @pytest.fixture(scope="module")

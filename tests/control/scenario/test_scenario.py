@@ -26,6 +26,8 @@ from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.config.files import config_directory
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_sim.environment.environment import EnvironmentSettings
+from space_robot_sim.environment.events import Capture, Release
+from space_robot_sim.environment.target import Target
 from space_robot_sim.robot import Robot
 
 NAMED: dict[str, Any] = {
@@ -117,6 +119,18 @@ def test_robots_and_laws_of_nobody_fly(own: Any, paper_mission: dict[str, Any]) 
     assert flight.metrics["attitude"] < 1e-8
     assert flight.log.flight["robot"] == "heavy"
     assert Robot.from_dict(flight.log.flight["robot_file"]).mass[0] == heavy.mass[0]
+
+
+def test_events_as_objects(paper_mission: dict[str, Any], tmp_path: Path) -> None:
+    """In the options or in the mission, with a target that no file tells."""
+    capture = Capture(0.02, Target(name="debris", mass=20.0, inertia=[1.0, 1, 1, 0, 0, 0]))
+    given = [capture, Release(0.05)]
+    flight = Scenario(events=given, duration=0.1).fly(tmp_path / "bag")
+    assert flight.metrics["events"] == ["capture@0.02:debris", "release@0.05"]
+    mission = {**paper_mission, "events": given}
+    assert same_bits(Scenario(mission=mission, duration=0.1).fly().log, flight.log)
+    assert not same_bits(Scenario(duration=0.1).fly().log, flight.log)
+    assert read_flight(tmp_path / "bag").flight["events"] == [str(event) for event in given]
 
 
 def test_a_law_as_an_object_brings_gains_and_keeps_its_memory(named: FlownFlight) -> None:

@@ -51,9 +51,6 @@ def test_the_shipped_robot(paper_robot: Robot) -> None:
 @pytest.mark.parametrize(
     ("key", "value", "said"),
     [
-        ("order", [0, 0, 1, 2, 3, 4], "order: each joint once"),
-        ("order", [0, 1], "order: 6 joints were expected"),
-        ("order", [1, 0, 2, 3, 4, 5], "order: each joint once, a parent's before its own"),
         ("weight", 1.0, "weight: unknown key"),
         ("bodies", [], "bodies"),
     ],
