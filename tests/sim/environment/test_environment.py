@@ -15,7 +15,12 @@ from space_robot_sim.environment.disturbance import (
     DisturbanceSettings,
     disturbance_torque,
 )
-from space_robot_sim.environment.friction import Friction, FrictionSettings, friction_torque
+from space_robot_sim.environment.friction import (
+    Friction,
+    FrictionSettings,
+    coefficients,
+    friction_torque,
+)
 from space_robot_sim.environment.payload import PayloadSettings, with_payload
 from space_robot_sim.robot import Robot
 
@@ -99,6 +104,30 @@ def test_each_joint_has_its_own_friction(coefficients: list[float], rate: float)
         coulomb, viscous = coefficients[joint], coefficients[4 + joint]
         expected = coulomb * np.sign(rate) + viscous * rate
         assert friction(joints, joint, rate) == expected
+
+
+def test_a_robots_own_friction_comes_before_the_settings() -> None:
+    """And the settings' before none, but for passive joints, which have their own alone."""
+    spring = {"stiffness": 9.0, "damping": 0.1}
+    body = {"mass": 2.0, "inertia": [0.1, 0.1, 0.1, 0.0, 0.0, 0.0], "com": [0.1, 0.0, 0.0]}
+    links = [
+        {"name": "panel", **body, "passive": spring},
+        {"name": "own", **body, "friction": {"coulomb": 0.3, "viscous": 0.0}},
+        {"name": "usual", **body},
+        {
+            "name": "rubbing",
+            **body,
+            "passive": spring,
+            "friction": {"coulomb": 0.0, "viscous": 2.0},
+        },
+    ]
+    base = {key: body[key] for key in ("mass", "inertia")}
+    robot = Robot.from_dict({"robot": {"name": "four", "base": base, "links": links}})
+    assert robot.all_joint_names == ("own", "usual", "panel", "rubbing")
+    found = coefficients(robot, FrictionSettings(coulomb=0.02, viscous=0.2))
+    assert found.tolist() == [[0.3, 0.0], [0.02, 0.2], [0.0, 0.0], [0.0, 2.0]]
+    friction = Friction.build(robot, FrictionSettings(coulomb=0.02, viscous=0.2))
+    assert friction.viscous[:4].tolist() == [found[j, 1] for j in robot.order]
 
 
 def test_friction_of_a_joint_that_breaks_away_opposes_what_comes() -> None:

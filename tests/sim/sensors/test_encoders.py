@@ -11,6 +11,7 @@ from scipy import stats
 from sensor_bench import PERIOD, Bench, N, a_state
 
 from space_robot_msgs_py.samples import RobotState
+from space_robot_sim.sensors.encoders import Encoders, EncoderSettings
 
 Array = NDArray[np.float64]
 
@@ -30,6 +31,20 @@ def test_an_angle_is_a_whole_number_of_steps_of_a_turn(bits: int) -> None:
     told = Bench(encoders={"bits": bits}).measure(state).joint_positions
     np.testing.assert_allclose(told / step, np.round(told / step), atol=1e-6)
     assert np.abs(told - state.joint_positions).max() <= 0.5 * step * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize("bits", [0, 12])
+def test_the_step_of_a_joint_that_slides_is_a_share_of_a_metre(bits: int) -> None:
+    """Beside joints that turn, in the step and in what is told at rest."""
+    slides, settings = np.arange(N) % 3 == 1, EncoderSettings(bits=bits)
+    rest = a_state().block[0]
+    encoders = Encoders.build(N, settings, PERIOD, rest, slides)
+    step = np.where(slides, 1.0, 2.0 * np.pi) / 2**bits if bits else np.zeros(N)
+    np.testing.assert_array_equal(encoders.step, step)
+    told = encoders.told[0]
+    if bits:
+        np.testing.assert_allclose(told / step, np.round(told / step), atol=1e-9)
+    assert (np.abs(told - rest.joint_positions) <= 0.5 * step * (1.0 + 1e-9)).all()
 
 
 def test_the_error_of_quantisation_is_uniform() -> None:
