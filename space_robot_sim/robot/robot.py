@@ -66,7 +66,12 @@ class Robot(TreeArrays):
 
     @classmethod
     def from_urdf(cls, path: str | Path, base: str | None = None, repair: bool = False) -> Robot:
-        """Read and check a URDF or xacro file: see `space_robot_sim.robot.urdf.read_urdf`.
+        """Read and check a URDF, or a xacro file where that package is installed.
+
+        Args:
+            path: the file.
+            base: the link that is the satellite; the root if None.
+            repair: mend the defects that can be mended, and tell them in `repairs`.
 
         Raises:
             InputError: in one line that names link or joint, line, value and the repair, if any.

@@ -16,12 +16,9 @@ from .fields import HERE, Frame
 from .findings import Report
 from .graph import Edge, Tree
 from .inertia import inertia_defect, nearest_inertia, solid_inertia
-from .links import Link
+from .links import NOTHING, Link
 
 Array = NDArray[np.float64]
-
-NOTHING = 1e-9
-"""kg: lighter bodies count as massless."""
 
 
 def mend_massless(links: Mapping[str, Link], tree: Tree, report: Report) -> None:

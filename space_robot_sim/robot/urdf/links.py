@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 ELEMENTS = ("inertial", "visual", "collision")
 EXTENSIONS = ("contact", "gravity", "self_collision_checking", "sensor", "verbose")
+NOTHING = 1e-9
+"""kg: lighter bodies count as massless."""
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
@@ -105,7 +107,7 @@ def _read_inertial(inertial: Element, link: Link, fields: Fields) -> None:
     xx, yy, zz, xy, xz, yz = values
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     link.inertia = frame.rotation @ tensor @ frame.rotation.T
-    if link.mass == 0.0 and link.inertia.any():
+    if link.mass < NOTHING and link.inertia.any():
         report.repaired(
             inertia.line, part, "inertia without mass", f"{np.trace(link.inertia):g} kg m2 (trace)",
             "the inertia is left out",

@@ -30,5 +30,6 @@ def expand_xacro(path: Path) -> str:
             document = xacro.process_file(str(path))
         return str(document.toprettyxml(indent="  "))
     except (Exception, SystemExit) as error:  # whatever the expressions in a file come to
-        words = " ".join(f"{error} {said.getvalue()}".split())
+        words, more = (" ".join(text.split()) for text in (str(error), said.getvalue()))
+        words += "" if more in words else f" {more}"
         raise InputError(f"{path}: xacro cannot expand it ({words[:300]})") from None

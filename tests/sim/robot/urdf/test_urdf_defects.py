@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from paths import DOCS
-from urdf_defects import DEFECTS, GOOD, LIMIT, with_defect
+from urdf_defects import DEFECTS, FORE, GOOD, LIMIT, with_defect
 
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.robot import Robot
@@ -86,6 +87,15 @@ def test_all_defects_are_counted(given: Path) -> None:
     with pytest.raises(InputError, match=r"line 7: .*\(and 1 more\)$"):
         read_urdf(given)
     assert [finding.line for finding in read_urdf(given, repair=True).findings] == [7, 37]
+
+
+def test_next_to_no_mass_has_no_inertia(given: Path) -> None:
+    """Else it would be added, unphysical perhaps, to that of the link it is merged into."""
+    given.write_text(GOOD.replace(FORE, '<mass value="1e-12"/>'))
+    found = read_urdf(given, repair=True)
+    assert [finding.repair.split()[-1] for finding in found.findings] == ["'upper'", "out"]
+    robot = Robot.of_tree(found.name, found.bodies)
+    np.testing.assert_allclose(np.linalg.eigvalsh(robot.inertia[1]), [0.5, 1.9, 2.1])
 
 
 def test_the_manual_lists_them_all() -> None:

@@ -19,6 +19,7 @@ from random_urdf import random_urdf
 from space_robot_control.cli.main import _run
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.robot import Robot
+from space_robot_sim.robot.find import find_robot
 from space_robot_sim.robot.urdf import read_urdf
 
 GOOD = (DATA / "arm.urdf").read_text()
@@ -42,12 +43,13 @@ def said_by_the_command(path: Path) -> str:
     return said
 
 
-def outcome(path: Path, text: str, seed: int) -> None:
+def outcome(path: Path, text: str | bytes, seed: int) -> None:
     """See that a robot comes of a text, one that can fly, or one line."""
     try:
-        path.write_text(text)
+        data = text.encode() if isinstance(text, str) else text
     except UnicodeEncodeError:
         return
+    path.write_bytes(data)
     base = random.Random(seed).choice([None, "hull", "fore", "hand", "link1"])
     said_outside = said_by_the_command(path)
     for repair in (False, True):
@@ -63,6 +65,8 @@ def outcome(path: Path, text: str, seed: int) -> None:
             assert len(said) < 1000
             assert repair or base or said in said_outside
         else:
+            flown = find_robot(str(path), base, repair)
+            assert flown.joint_names == robot.joint_names
             assert np.all(robot.mass > 0.0)
             assert np.all(np.linalg.eigvalsh(robot.inertia) > 0.0)
             for array in (robot.com, robot.rotation, robot.offset, robot.inertia):
@@ -138,6 +142,20 @@ def test_odd_values(path: Path, text: str, seed: int) -> None:
 @given(text=elements(), seed=st.integers(0, 9))
 def test_moved_elements(path: Path, text: str, seed: int) -> None:
     outcome(path, text, seed)
+
+
+@settings(max_examples=150)
+@given(
+    places=st.lists(
+        st.tuples(st.integers(0, len(GOOD) - 1), st.integers(0, 255)), min_size=1, max_size=8
+    ),
+    seed=st.integers(0, 9),
+)
+def test_wrong_bytes(path: Path, places: list[tuple[int, int]], seed: int) -> None:
+    data = bytearray(GOOD.encode())
+    for place, byte in places:
+        data[place] = byte
+    outcome(path, bytes(data), seed)
 
 
 @pytest.mark.parametrize(
