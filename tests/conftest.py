@@ -54,7 +54,8 @@ WITH_ROS = ("control/flight/graph/", "control/flight/replay/")
 SLOW = (
     "benchmarks/", "control/campaign/", "control/paper/", "control/cli/test_output.py",
     "control/cli/test_stability_command.py", "control/flight/test_interruption.py",
-    "control/flight/test_long_flights.py", "msgs/bag/test_bag_fuzz.py",
+    "control/flight/test_long_flights.py", "control/flight/test_shipped_robots.py",
+    "msgs/bag/test_bag_fuzz.py",
     "msgs/bag/test_description_fuzz.py", "test_packaging.py", "test_shown_outputs.py",
 )  # fmt: skip
 """Folders and files whose tests take seconds each."""
