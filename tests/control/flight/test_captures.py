@@ -11,6 +11,7 @@ import pytest
 import yaml
 from paths import CONFIG
 
+from space_robot_control import Scenario
 from space_robot_control.analysis import analyze
 from space_robot_control.analysis.figures.single_flight import control_results
 from space_robot_control.analysis.words import remarks
@@ -69,6 +70,19 @@ def test_compiled_stretches_fly_as_single_ticks_do(bag: tuple[Path, FlightLog]) 
         command = flight.controller.update(flight.plant.state, reference)
         np.testing.assert_array_equal(command.torque[:9], log.commanded_torque[tick])
         flight.plant.step(command)
+
+
+def test_a_bench_goes_back_behind_a_capture(bag: tuple[Path, FlightLog]) -> None:
+    """The robot that flies on is the bare one again."""
+    bench, bare = Scenario(**PLAN).bench(), bag[1].omega_base
+    while bench.tick < 150:
+        bench.step()
+    snapshot = bench.save()
+    for _ in range(2):
+        bench.restore(snapshot)
+        while bench.tick < 450:
+            bench.step()
+            np.testing.assert_array_equal(bench.state.omega_base, bare[bench.tick])
 
 
 def test_the_analysis_counts_what_the_targets_bring(bag: tuple[Path, FlightLog]) -> None:

@@ -25,12 +25,9 @@ MESSAGE_FAULTS = ("drop_state@0.05-0.1:0.2", "delay_command@0.15-0.2:2", "nan_st
 PART_FAULTS = ("wheel_fail@0.2:2", "thruster_stuck_on@0.1-0.2:thruster_1")
 EVENTS = ["capture@0.15:tumbling_satellite", "release@0.3:0.05"]
 OPTIONS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
-    "wheels": ({"actuators": "wheels"}, ()),
+    "wheels": ({"actuators": "wheels", "events": EVENTS}, ()),
     "thrusters": ({"actuators": "thrusters", "controller": "ctc"}, ("--composed",)),
-    "both": (
-        {"actuators": "wheels_and_thrusters", "sensors": "fine", "events": EVENTS},
-        ("--composed",),
-    ),
+    "both": ({"actuators": "wheels_and_thrusters", "sensors": "fine"}, ("--composed",)),
     "faults": (
         {
             "actuators": "wheels_and_thrusters",
