@@ -9,12 +9,13 @@ before any module uses them; so it is a hundred times slower, and for short test
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from space_robot_msgs_py.compiled import kernels
+from space_robot_msgs_py.compiled.records import Record
 
 
 def _as_it_is(function: Any, *_: Any) -> Any:
@@ -27,47 +28,35 @@ def _field_first(self: np.record, name: str) -> Any:
     return self[name] if name in fields else np.void.__getattribute__(self, name)
 
 
-class _RecordFunction:
-    """A `RecordFunction` that reads what lies at the addresses of its records."""
+class _PlainFunction:
+    """As `RecordFunction`: called with records, or with their addresses, each followed by its n."""
 
     def __init__(
-        self, function: Callable[..., None], layouts: Sequence[np.dtype[Any]], _: object
+        self, function: Any, records: Iterable[type[Record]], seen_as: Iterable[type[Record]]
     ) -> None:
-        self._function, self._layouts = function, layouts
+        self._function, self._records, self._seen_as = function, tuple(records), tuple(seen_as)
+
+    def call(self, *arguments: Any) -> None:
+        *places, last = arguments
+        pairs = zip(self._records, places[::2], places[1::2], strict=True)
+        found = [_record_at(address, record.dtype(n)) for record, address, n in pairs]
+        self._function(*found, last)
 
     def __call__(self, *arguments: Any) -> None:
         *records, last = arguments
-        self.call(*(record.__array_interface__["data"][0] for record in records), last)
-
-    def call(self, *arguments: Any) -> None:
-        *addresses, last = arguments
-        places = zip(self._layouts, addresses, strict=True)
-        records = [
-            np.frombuffer((ctypes.c_char * layout.itemsize).from_address(address), layout)[0]
-            for layout, address in places
-        ]
-        self._function(*records, last)
-
-
-class _PlainFunction:
-    """As `RecordFunction`: called with records, or with their addresses."""
-
-    def __init__(self, function: Any, layouts: Iterable[np.dtype[Any]], _: Any) -> None:
-        self._function, self._layouts = function, tuple(layouts)
-
-    def call(self, *arguments: Any) -> None:
-        *addresses, period = arguments
-        self._function(*map(_record_at, addresses, self._layouts), period)
-
-    def __call__(self, *arguments: Any) -> None:
-        *records, period = arguments
-        self.call(*(record.__array_interface__["data"][0] for record in records), period)
+        places: list[int] = []
+        for record, kind in zip(records, self._seen_as, strict=True):
+            n = next(n for n in range(MOST_JOINTS) if kind.dtype(n) == record.dtype)
+            places += (record.__array_interface__["data"][0], n)
+        self.call(*places, last)
 
 
 def _record_at(address: int, layout: np.dtype[Any]) -> Any:
     memory = (ctypes.c_char * layout.itemsize).from_address(address)
     return np.ndarray((1,), layout, buffer=memory)[0]
 
+
+MOST_JOINTS = 65
 
 kernels.kernel = kernels.subroutine = _as_it_is  # type: ignore[assignment]
 kernels.RecordFunction = _PlainFunction  # type: ignore[assignment,misc]

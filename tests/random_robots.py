@@ -15,7 +15,7 @@ from space_robot_sim.robot import Robot
 Array = NDArray[np.float64]
 
 JOINTS = (1, 3, 6, 7)
-"""FieldReader of joints of random robots: few, because kernels are compiled for each."""
+"""Numbers of joints of random robots."""
 
 
 class State(NamedTuple):

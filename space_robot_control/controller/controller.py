@@ -178,7 +178,7 @@ class Controller:
         """Ask the base's actuators, if it has any, for the torque demanded of the base."""
         command = self.last_command
         if self._actuators.size:
-            self.allocate.call(self._address, tick)
+            self.allocate.call(self._address, 0, tick)  # its layout is that of any n
             command.torque[-self._actuators.size :] = self._actuators
         command.tick = tick
         return command

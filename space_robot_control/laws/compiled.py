@@ -7,18 +7,16 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from space_robot_msgs_py.compiled.kernels import RecordFunction
-from space_robot_msgs_py.compiled.records import Block, Record, prefix, shaped
+from space_robot_msgs_py.compiled.records import Block, Record, prefix
 
-from .base import Array, ControlLaw, LawMemory, Signals
+from .base import Array, ControlLaw, LawMemory, Signals, per_axis
 
 
 class SomeGains(Record):
-    """The gains of a law that is not known: there is a number at least."""
+    """The gains of a law that is not known: there is one at least."""
 
-    first: float = shaped(lambda n: ())
+    first: Array = per_axis("of the gains")
 
 
 class LawCode(NamedTuple):
@@ -53,9 +51,8 @@ class CompiledLaw(ControlLaw):
     @property
     def function(self) -> RecordFunction:
         """The kernel, compiled for this law's records."""
-        n = len(self.memory.s) - 3
         own: list[Any] = [self.gains_type, self.memory_type]  # classes, which can be hashed
-        return _compiled(type(self).kernel, *own, n)
+        return _compiled(type(self).kernel, *own)
 
     @property
     def code(self) -> LawCode:
@@ -67,13 +64,14 @@ class CompiledLaw(ControlLaw):
 
     def force(self, signals: Signals) -> Array:
         """Run the kernel; ``signals`` is a `Signals.view`."""
-        self.function.call(signals.address, self.gains.address, self.memory.address, self.period)
+        n = len(self.memory.s) - 3
+        self.function.call(
+            signals.address, n, self.gains.address, n, self.memory.address, n, self.period
+        )
         force: Array = self.memory.force
         return force
 
 
 @cache
-def _compiled(kernel: Callable[..., None], gains: Any, memory: Any, n: int) -> RecordFunction:
-    layouts: list[np.dtype[Any]] = [record.dtype(n) for record in (Signals, gains, memory)]
-    seen_as = [record.dtype(n) for record in (Signals, SomeGains, LawMemory)]
-    return RecordFunction(kernel, layouts, seen_as)
+def _compiled(kernel: Callable[..., None], gains: Any, memory: Any) -> RecordFunction:
+    return RecordFunction(kernel, (Signals, gains, memory), (Signals, SomeGains, LawMemory))

@@ -8,35 +8,22 @@ all three packages: any edit starts a fresh cache, and all processes share what 
 from __future__ import annotations
 
 import ctypes
-import hashlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar, cast
 
 import numba
-import numpy as np
 
+from . import block_type  # noqa: F401  (what Numba makes of a block)
 from .cache import cache_directory
+from .record_type import RecordType
+from .records import Record
 
 _OPTIONS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 _njit: Any = numba.njit
 config: Any = numba.config
 _FunctionType: Any = numba.types.WrapperAddressProtocol
-_RecordType: Any = numba.types.Record
 _Function = TypeVar("_Function", bound=Callable[..., Any])
-
-
-def _mangling_args(record: Any) -> tuple[str, tuple[str]]:
-    """Return what tells a record in the names of machine code: its layout.
-
-    Numba numbers the records of a process as they come. Kernels for records of two sizes, compiled
-    and cached by two processes, may thus bear one name; a third that loads both would run the same
-    machine code for both.
-    """
-    return "Record", (hashlib.sha256(str(record).encode()).hexdigest(),)
-
-
-_RecordType.mangling_args = property(_mangling_args)
 
 
 def kernel(function: _Function) -> _Function:
@@ -65,27 +52,27 @@ def subroutine(function: _Function) -> _Function:
 class RecordFunction(_FunctionType):  # type: ignore[misc]
     """A kernel of records, and a float at last, as a value that a compiled loop can be given.
 
-    The kernel is compiled for the layouts of its own records. A loop sees it as a function of
-    other layouts, which all such kernels share, and is compiled once for all of them: a record
-    is passed by its address, and what lies there is the kernel's affair alone.
+    A loop sees it as a function of the records that all such kernels share the beginning of, and is
+    compiled once for all of them: a record is passed by its address and its number of joints, and
+    what lies there is the kernel's affair alone.
     """
 
     def __init__(
-        self, function: Callable[..., Any], layouts: Iterable[np.dtype[Any]],
-        seen_as: Iterable[np.dtype[Any]],
+        self, function: Callable[..., Any], records: Iterable[type[Record]],
+        seen_as: Iterable[type[Record]],
     ) -> None:  # fmt: skip
-        """``layouts``: of the kernel's records; ``seen_as``: those a loop passes in their place."""
+        """``records``: the kernel's; ``seen_as``: those that a loop passes in their place."""
         compiled: Any = function
-        own, self._signature = _signature(layouts), _signature(seen_as)
+        own, self._signature = _signature(records), _signature(seen_as)
         with _our_cache():
             try:
                 self._code = numba.cfunc(own, cache=True, error_model="numpy")(compiled.py_func)
             except OSError:  # no room in the cache
                 self._code = numba.cfunc(own, error_model="numpy")(compiled.py_func)
         self._address = int(self._code.address or 0)
-        pointers = [ctypes.c_void_p] * (len(own.args) - 1)
-        self.call = ctypes.CFUNCTYPE(None, *pointers, ctypes.c_double)(self._address)
-        """Run it from Python, on the records at these addresses."""
+        arguments = [ctypes.c_void_p, ctypes.c_ssize_t] * (len(own.args) - 1)
+        self.call = ctypes.CFUNCTYPE(None, *arguments, ctypes.c_double)(self._address)
+        """Run it from Python, on the records at these addresses, each followed by its n."""
 
     def __wrapper_address__(self) -> int:
         """Address of the machine code, for Numba."""
@@ -96,8 +83,8 @@ class RecordFunction(_FunctionType):  # type: ignore[misc]
         return self._signature
 
 
-def _signature(layouts: Iterable[np.dtype[Any]]) -> Any:
-    return numba.void(*(numba.from_dtype(layout) for layout in layouts), numba.float64)
+def _signature(records: Iterable[type[Record]]) -> Any:
+    return numba.void(*(RecordType(record.layout()) for record in records), numba.float64)
 
 
 @contextmanager

@@ -1,21 +1,23 @@
-"""Named arrays in one block of memory, whose sizes a kernel knows when it is compiled.
+"""Named arrays in one block of memory, for Python and for compiled code.
 
-A kernel that takes a `Record` gets one pointer instead of a dozen arrays to check and unpack,
-and its loops over links and axes have constant bounds. NumPy and Numba both read the fields by
-attribute, so the same declaration serves Python and compiled code.
+A kernel that takes a `Record` gets one pointer, and the number of joints, instead of a dozen arrays
+to check and unpack. NumPy and Numba both read the fields by attribute, so the same declaration
+serves both: NumPy is given the layout for one n, Numba the formula for every n.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import Self
+
+from .layouts import Layout, dimensions_of
 
 Block = NDArray[Any]
 """An array (1,) of one record; Numba takes it ten times faster than the record."""
@@ -65,6 +67,12 @@ class Record:
         return found
 
     @classmethod
+    def layout(cls) -> Layout:
+        """Memory layout for any number of joints."""
+        record: Any = cls
+        return _layout(record)
+
+    @classmethod
     def dtype(cls, n: int) -> np.dtype[Any]:
         """Memory layout for a robot of ``n`` joints."""
         record: Any = cls
@@ -106,6 +114,15 @@ def assign(record: Record, **values: Any) -> None:
         cast(Any, record)[name] = value
 
 
+@cache
+def _layout(record: Any) -> Layout:
+    fields: list[Any] = []
+    for name, value in record.fields().items():
+        is_field = isinstance(value, Field)
+        fields.append((name, dimensions_of(name, value.shape) if is_field else value.layout()))
+    return Layout(tuple(fields))
+
+
 @lru_cache(maxsize=256)
 def _dtype(record: Any, n: int) -> np.dtype[Any]:
     fields: list[Any] = []
@@ -114,4 +131,16 @@ def _dtype(record: Any, n: int) -> np.dtype[Any]:
             fields.append((name, np.float64, value.shape(n)))
         else:
             fields.append((name, value.dtype(n)))
-    return np.dtype((np.record, np.dtype(fields, align=True)))
+    found = np.dtype((np.record, np.dtype(fields, align=True)))
+    layout = record.layout()
+    if _LAYOUTS.setdefault(found, layout) != layout:
+        raise TypeError(f"{record.__name__} cannot be told from another record of equal names")
+    return found
+
+
+_LAYOUTS: dict[np.dtype[Any], Layout] = {}
+
+
+def layout_of(dtype: np.dtype[Any]) -> Layout | None:
+    """Return the layout that a record's dtype is one of; None: it is of no record."""
+    return _LAYOUTS.get(dtype)

@@ -126,5 +126,5 @@ def allocation_code(is_used: bool) -> RecordFunction:
 
     Given as a value it is compiled once, and not into every loop; without hardware not at all.
     """
-    layout = [Allocation.dtype(0)]  # that of any number of joints
-    return RecordFunction(allocate if is_used else _leave_alone, layout, layout)
+    record = (Allocation,)
+    return RecordFunction(allocate if is_used else _leave_alone, record, record)

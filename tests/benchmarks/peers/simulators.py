@@ -97,7 +97,8 @@ class Ours:
             disturbance=DisturbanceSettings(scale=scale),
         )  # fmt: skip
         self.plant = Plant(start.robot, settings, PERIOD)
-        self.plant.block[0].x[: start.x.size] = start.x
+        self._size = start.x.size
+        self.plant.block[0].x[: self._size] = start.x
         self._torque, self._ticks = start.torque.copy(), 0
         self._force = np.zeros(n + 6 + MOST_WHEELS)
 
@@ -118,7 +119,7 @@ class Ours:
 
     @property
     def x(self) -> Array:
-        return np.array(self.plant.block[0].x[:-MOST_WHEELS])
+        return np.array(self.plant.block[0].x[: self._size])
 
 
 class MuJoCo:

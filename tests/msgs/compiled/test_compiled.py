@@ -81,20 +81,21 @@ def test_the_temporary_folder_is_nobody_elses(
 
 
 NAMES = """
-import numba
-from space_robot_msgs_py.compiled import kernels
+from space_robot_msgs_py.compiled.record_type import RecordType
 from space_robot_sim.dynamics.rho_space import RhoSpaceModel
-for n in {sizes}:
-    print(n, numba.from_dtype(RhoSpaceModel.dtype(n)).mangling_args)
+from space_robot_sim.plant.plant import PlantMemory
+for record in {records}:
+    print(record.__name__, RecordType(record.layout()).mangling_args)
 """
 
 
 def test_records_have_the_same_name_in_machine_code_whichever_process_compiles_it() -> None:
     """A process may load what two others have compiled: one name must be one layout."""
+    orders = ("RhoSpaceModel, PlantMemory", "PlantMemory, RhoSpaceModel")
     first, second = (
-        subprocess.check_output([sys.executable, "-c", NAMES.format(sizes=sizes)], text=True)
-        for sizes in ((6, 8), (8, 6))
+        subprocess.check_output([sys.executable, "-c", NAMES.format(records=records)], text=True)
+        for records in orders
     )
     assert sorted(first.splitlines()) == sorted(second.splitlines())
-    six, eight = (line.split(maxsplit=1)[1] for line in first.splitlines())
-    assert six != eight
+    one, other = (line.split(maxsplit=1)[1] for line in first.splitlines())
+    assert one != other

@@ -1,0 +1,165 @@
+"""Records in compiled code: a pointer and the number of joints n, one type for all n.
+
+Numba's own type of a record has the place of every field as a constant, so that whatever takes the
+record is compiled anew for every n. Here places and shapes are computed from the formulas of
+`Layout` where a field is read. What a kernel sees is the same: numbers and arrays by attribute, and
+records within records. A record from Python tells n by its size.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+import numpy as np
+from numba.core import cgutils, imputils, types
+from numba.core.pythonapi import NativeValue
+from numba.core.registry import cpu_target
+from numba.core.typing.templates import AttributeTemplate, infer_getattr
+from numba.core.typing.typeof import typeof_impl
+from numba.extending import models, register_model, unbox
+from numba.np import arrayobj
+
+from .layouts import Dimension, Layout, Polynomial
+from .records import layout_of
+
+BYTES = 8
+"""Of a float64, of which all records consist."""
+_INT = cgutils.intp_t
+_FLOAT = cpu_target.target_context.get_value_type(types.float64)
+_typeof_scalar = typeof_impl.dispatch(np.generic)
+
+
+class RecordType(types.Type):
+    """A record of a layout."""
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+        super().__init__(f"Record{digest(layout)}")
+
+    @property
+    def key(self) -> Any:
+        """What tells it from another type, for Numba."""
+        return self.layout
+
+
+def digest(layout: Layout) -> str:
+    """Return a short name, by which Numba finds in its cache what takes the layout."""
+    return hashlib.sha256(repr(layout).encode()).hexdigest()[:16]
+
+
+@register_model(RecordType)
+class _RecordModel(models.StructModel):
+    def __init__(self, manager: Any, kind: RecordType) -> None:
+        super().__init__(manager, kind, [("data", types.voidptr), ("n", types.intp)])
+
+
+@typeof_impl.register(np.record)
+def _typeof_record(value: Any, context: Any) -> Any:
+    layout = layout_of(value.dtype)
+    return RecordType(layout) if layout else _typeof_scalar(value, context)
+
+
+@unbox(RecordType)
+def _unbox_record(kind: RecordType, scalar: Any, c: Any) -> Any:
+    buffer = c.pyapi.alloca_buffer()
+    pointer = c.pyapi.extract_record_data(scalar, buffer)
+    record = cgutils.create_struct_proxy(kind)(c.context, c.builder)
+    record.data = pointer
+    words = c.builder.bitcast(buffer, _INT.as_pointer())
+    length = c.builder.load(c.builder.gep(words, [_INT(2)]))  # Py_buffer.len
+    record.n = joints(c.builder, kind.layout.size, length)
+    return NativeValue(
+        record._getvalue(), is_error=cgutils.is_null(c.builder, pointer),
+        cleanup=lambda: c.pyapi.release_buffer(buffer),
+    )  # fmt: skip
+
+
+def joints(builder: Any, size: Polynomial, itemsize: Any) -> Any:
+    """Emit the n for which a record of ``size`` numbers has so many bytes; 0 if all have."""
+    a, b, c = size
+    numbers = builder.sub(builder.sdiv(itemsize, _INT(BYTES)), _INT(a))
+    if c == 0:
+        return builder.sdiv(numbers, _INT(b)) if b else _INT(0)
+    # b n + c n^2 = numbers, and the root is a whole number
+    square = builder.add(builder.mul(numbers, _INT(4 * c)), _INT(b * b))
+    sqrt = builder.module.declare_intrinsic("llvm.sqrt", [_FLOAT])
+    root = builder.call(sqrt, [builder.sitofp(square, _FLOAT)])
+    n = builder.fdiv(builder.fsub(root, _FLOAT(float(b))), _FLOAT(2.0 * c))
+    return builder.fptosi(builder.fadd(n, _FLOAT(0.5)), _INT)
+
+
+@infer_getattr
+class _RecordAttributes(AttributeTemplate):
+    key = RecordType
+
+    def generic_resolve(self, record: RecordType, name: str) -> Any:  # type: ignore[override]
+        found = record.layout.find(name)
+        if found is None:
+            return None
+        kind = found[1]
+        if isinstance(kind, Layout):
+            return RecordType(kind)
+        return types.Array(types.float64, len(kind), "C") if kind else types.float64
+
+
+@imputils.lower_getattr_generic(RecordType)
+def _get_field(context: Any, builder: Any, kind: RecordType, value: Any, name: str) -> Any:
+    record = cgutils.create_struct_proxy(kind)(context, builder, value=value)
+    offset, field = _found(kind, name)
+    place = _place(builder, record.data, offset, record.n)
+    if isinstance(field, Layout):
+        inner = cgutils.create_struct_proxy(RecordType(field))(context, builder)
+        inner.data, inner.n = place, record.n
+        return inner._getvalue()
+    numbers = builder.bitcast(place, _FLOAT.as_pointer())
+    if not field:
+        return builder.load(numbers)
+    array = arrayobj.make_array(types.Array(types.float64, len(field), "C"))(context, builder)
+    shape = [value_of(builder, Polynomial(*dimension), record.n) for dimension in field]
+    strides: list[Any] = []
+    step: Any = _INT(BYTES)
+    for k, length in enumerate(reversed(shape)):
+        strides.insert(0, step)
+        step = builder.mul(step, length, flags=["nsw"]) if k + 1 < len(shape) else step
+    arrayobj.populate_array(
+        array, data=numbers, shape=cgutils.pack_array(builder, shape),
+        strides=cgutils.pack_array(builder, strides), itemsize=_INT(BYTES), meminfo=None,
+        parent=None,
+    )  # fmt: skip
+    return array._getvalue()
+
+
+@imputils.lower_setattr_generic(RecordType)
+def _set_field(context: Any, builder: Any, sig: Any, args: Any, name: str) -> None:
+    kind, value_type = sig.args
+    offset, field = _found(kind, name)
+    if field != ():
+        raise TypeError(f"write {name}[:] = ...")
+    record = cgutils.create_struct_proxy(kind)(context, builder, value=args[0])
+    number = context.cast(builder, args[1], value_type, types.float64)
+    place = _place(builder, record.data, offset, record.n)
+    builder.store(number, builder.bitcast(place, number.type.as_pointer()))
+
+
+def _found(kind: RecordType, name: str) -> tuple[Polynomial, tuple[Dimension, ...] | Layout]:
+    found = kind.layout.find(name)
+    assert found is not None
+    return found
+
+
+def _place(builder: Any, data: Any, offset: Polynomial, n: Any) -> Any:
+    factors = Polynomial(*(BYTES * factor for factor in offset))
+    return cgutils.pointer_add(builder, data, value_of(builder, factors, n))
+
+
+def value_of(builder: Any, polynomial: Polynomial, n: Any) -> Any:
+    """Emit ``a + (b + c n) n``."""
+    total: Any = None
+    for factor in reversed(polynomial):
+        if total is not None:
+            total = builder.mul(total, n, flags=["nsw"])
+            total = builder.add(total, _INT(factor), flags=["nsw"]) if factor else total
+        elif factor:
+            total = _INT(factor)
+    return _INT(0) if total is None else total
