@@ -8,22 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
+from ...analysis.figures.overlay import words
 from ...analysis.figures.style import Look, grid, house_style, legend_above, page, plain
+from ...analysis.metrics import unit_of
 from ...analysis.tables import Column, Group, Table
 from .run import Row
 from .scenario import Law
 
-SHOWN = {
-    "attitude": ("attitude", ""),
-    "joints_1_3": ("joints 1-3", "rad"),
-    "joints_4_6": ("joints 4-6", "rad"),
-    "ripple_base_torque": ("base ripple", "N m"),
-    "fast_ripple_base_torque": ("> 25 Hz", "N m"),
-    "ripple_torque_1_3": ("ripple 1-3", "N m"),
-    "ripple_torque_4_6": ("ripple 4-6", "N m"),
-}
-"""Heading and unit of the figures that tables show, by name."""
-DRAWN = ("attitude", "ripple_base_torque", "joints_4_6", "ripple_torque_4_6")
+ERRORS, RIPPLE, FAST = ("attitude", "joints_"), "ripple_", "fast_ripple_base_torque"
+"""Beginnings of the names of metrics that tables show."""
 
 
 class Cell(NamedTuple):
@@ -36,6 +29,35 @@ class Cell(NamedTuple):
     failed: int
     metrics: dict[str, tuple[float, float, float]]
     """5 %, 50 % and 95 % of those that did not fail, by name; none if all did."""
+
+
+def shown(found: Sequence[Cell]) -> dict[str, tuple[str, str]]:
+    """Return heading and unit of the metrics that tables show, by name: errors, then ripple."""
+    names = list(dict.fromkeys(name for cell in found for name in cell.metrics))
+    errors = [name for name in names if name.startswith(ERRORS)]
+    ripples = [name for name in names if name.startswith(RIPPLE) or name == FAST]
+    if FAST in ripples:  # beside what it is a share of
+        ripples.remove(FAST)
+        ripples.insert(1, FAST)
+    return {
+        **{name: (words(name), unit_of(name).strip("-")) for name in errors},
+        **{name: (_ripple_of(name), unit_of(name.split(RIPPLE)[1])) for name in ripples},
+    }
+
+
+def drawn(found: Sequence[Cell]) -> list[str]:
+    """Return the metrics that a figure shows: of the base, then of the outermost joints."""
+    names = list(shown(found))
+    errors = [name for name in names if name.startswith(ERRORS)]
+    ripples = [name for name in names if name.startswith(RIPPLE)]
+    return list(dict.fromkeys([*errors[:1], *ripples[:1], *errors[-1:], *ripples[-1:]]))
+
+
+def _ripple_of(name: str) -> str:
+    if name == FAST:
+        return "> 25 Hz"
+    column = name.removeprefix(RIPPLE)
+    return "base ripple" if column == "base_torque" else f"ripple {words(column).split(' ')[1]}"
 
 
 def cells(rows: Sequence[Row]) -> list[Cell]:
@@ -68,15 +90,15 @@ def hardware(found: Sequence[Cell]) -> dict[str, list[str]]:
 
 def summary_table(found: Sequence[Cell]) -> Table:
     """Tabulate the medians, a group for every hardware."""
-    flown_with = hardware(found)
+    flown_with, told = hardware(found), shown(found)
     columns = (
         Column("law", is_label=True), Column("gains", is_label=True),
-        *(Column(name, unit, ".2g") for name, unit in SHOWN.values()),
+        *(Column(name, unit, ".2g") for name, unit in told.values()),
         Column("failed"),
     )  # fmt: skip
     groups: dict[tuple[str, ...], list[list[Any]]] = {}
     for cell, *names in zip(found, *flown_with.values(), strict=True):
-        middles = [cell.metrics[name][1] if name in cell.metrics else None for name in SHOWN]
+        middles = [cell.metrics[name][1] if name in cell.metrics else None for name in told]
         row = [cell.law.controller, cell.law.gains, *middles, f"{cell.failed} of {cell.flights}"]
         groups.setdefault(tuple(names), []).append([*names, *row])
     return Table(
@@ -107,9 +129,12 @@ def figure(found: Sequence[Cell]) -> Figure:
     titles = [", ".join(map(plain, names)) for names in zip(*hardware(found).values(), strict=True)]
     kinds = list(dict.fromkeys(titles))
     laws = list(dict.fromkeys(cell.law for cell in found))
+    told, names = shown(found), drawn(found)
+    if not names:
+        return page(12.0, "None of these flights came to its end.")
     sheet = page(130.0)
     legend_above(sheet, [law.title for law in laws], dashed=False)
-    for axes, name in zip(grid(sheet, len(DRAWN), 2, shared=False), DRAWN, strict=True):
+    for axes, name in zip(grid(sheet, len(names), 2, shared=False), names, strict=True):
         for number, law in enumerate(laws):
             look, shift = Look.of(number), 0.09 * (number - 0.5 * (len(laws) - 1))
             own = [
@@ -123,7 +148,7 @@ def figure(found: Sequence[Cell]) -> Figure:
                 places, middle, yerr=(middle - low, high - middle), color=look.colour,
                 marker=look.marker, linestyle="none", markersize=4,
             )  # fmt: skip
-        heading, unit = SHOWN[name]
+        heading, unit = told[name]
         axes.set_yscale("log")
         axes.set_ylabel(f"{heading} ({unit})" if unit else f"{heading} error")
         axes.set_xticks(range(len(kinds)), kinds)

@@ -14,7 +14,14 @@ from click.testing import CliRunner
 from space_robot_control.campaign.sweep import Law, Sweep, sweep
 from space_robot_control.campaign.sweep.run import Row
 from space_robot_control.campaign.sweep.scenario import Draw
-from space_robot_control.campaign.sweep.summary import as_records, cells, figure, summary_table
+from space_robot_control.campaign.sweep.summary import (
+    as_records,
+    cells,
+    drawn,
+    figure,
+    shown,
+    summary_table,
+)
 from space_robot_control.cli.main import cli
 from space_robot_control.flight.plan import Flight
 from space_robot_msgs_py.errors import InputError
@@ -44,9 +51,9 @@ def test_a_base_that_nothing_turns_has_dashes_beside_one_that_is_held() -> None:
     for cell in free:
         assert not {"attitude", "ripple_base_torque"} & cell.metrics.keys()
         assert cell.metrics["joints_1_3"][1] > 0.0
-    for shown in (found, free):
-        summary_table(shown)
-        figure(shown).canvas.draw()
+    for some in (found, free):
+        summary_table(some)
+        figure(some).canvas.draw()
 
 
 def test_all_laws_fly_the_same_robot_and_noise() -> None:
@@ -90,7 +97,38 @@ def test_medians_and_spread_leave_failures_out_and_count_them() -> None:
     assert record[1]["metrics"] == {}
     texts = list(summary_table([good, bad]).texts(summary_table([good, bad]).groups[0]))
     assert [line[-1] for line in texts] == ["0 of 5", "1 of 1"]
-    assert len(figure([good, bad]).axes) == 4
+    assert [axes.get_ylabel() for axes in figure([good, bad]).axes] == [
+        "attitude error", "base ripple (N m)"
+    ]  # fmt: skip
+    assert not figure([bad]).axes
+
+
+@pytest.mark.parametrize(
+    ("joints", "forces", "told", "last"),
+    [
+        (
+            ["joints_1_3", "joints_4_6"], ["torque_1_3", "torque_4_6"],
+            [("joints 1-3", "rad"), ("joints 4-6", "rad"), ("base ripple", "N m"),
+             ("> 25 Hz", "N m"), ("ripple 1-3", "N m"), ("ripple 4-6", "N m")],
+            ["joints_4_6", "ripple_torque_4_6"],
+        ),
+        (
+            ["joints_revolute", "joints_prismatic"], ["torque_revolute", "force_prismatic"],
+            [("joints revolute", "rad"), ("joints prismatic", "m"), ("base ripple", "N m"),
+             ("> 25 Hz", "N m"), ("ripple revolute", "N m"), ("ripple prismatic", "N")],
+            ["joints_prismatic", "ripple_force_prismatic"],
+        ),
+    ],
+)  # fmt: skip
+def test_what_is_shown_is_what_the_robot_has(
+    joints: list[str], forces: list[str], told: list[tuple[str, str]], last: list[str]
+) -> None:
+    errors, columns = ["attitude", *joints], ["base_torque", *forces]
+    every = [f"{kind}_{name}" for kind in ("ripple", "fast_ripple") for name in columns]
+    metrics = dict.fromkeys([*errors, *columns, *every], 1.0)
+    found = cells([Row(Draw(STC, "ideal", 0), "", metrics)])
+    assert [*shown(found).values()] == [("attitude", ""), *told]
+    assert drawn(found) == ["attitude", "ripple_base_torque", *last]
 
 
 def test_sets_of_actuators_are_flown_like_grades_of_sensors() -> None:
