@@ -4,15 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .robot import Robot
-from .robot.dynamics import bias_force, forward_dynamics, mass_matrix
 
 if TYPE_CHECKING:
     from space_robot_msgs_py.bag.flight_log import FlightLog
 
+    from .robot.dynamics import bias_force, forward_dynamics, mass_matrix
+
 __all__ = ["Robot", "bias_force", "forward_dynamics", "load_bag", "mass_matrix"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the dynamics when they are asked for: a node that needs none starts sooner."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from .robot import dynamics
+
+    return getattr(dynamics, name)
 
 
 def load_bag(

@@ -5,9 +5,8 @@ from __future__ import annotations
 from functools import cached_property
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from matplotlib.figure import Figure
 from typing_extensions import Self
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -15,13 +14,16 @@ from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 
 from ..analysis import analyze
-from ..analysis.figures.figure_set import FigureSet
-from ..analysis.figures.style import save_figure
 from ..analysis.report_tables import rms_table
 from ..analysis.words import flown
 from ..flight.ending import COMPLETE, Ending
 from ..flight.plan import Flight
 from .report import flight_report
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..analysis.figures.figure_set import FigureSet
 
 
 class FlownFlight:
@@ -130,6 +132,8 @@ class FlownFlight:
         drawings = self._figures.drawings()
         figure = drawings[one_of(name, drawings, "figure")].draw()
         if path is not None:
+            from ..analysis.figures.style import save_figure  # slow to import
+
             save_figure(figure, Path(path))
         return figure
 
@@ -155,6 +159,8 @@ class FlownFlight:
 
     @cached_property
     def _figures(self) -> FigureSet:
+        from ..analysis.figures.figure_set import FigureSet  # slow to import
+
         figures = FigureSet()
         figures.add("flight", self.log.longest_stretch())
         return figures

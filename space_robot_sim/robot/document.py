@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from .file import BASE, inertia_elements
 from .robot import Robot
@@ -86,6 +85,8 @@ def _limits(robot: Robot, joint: int) -> dict[str, Any]:
 def _origin(rotation: Array, position: Array) -> dict[str, Any]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of two angles about one axis one is zero: as good as any
+        from scipy.spatial.transform import Rotation  # slow to import
+
         rpy = Rotation.from_matrix(rotation).as_euler("xyz", degrees=True)
     return {"xyz": _numbers(position), "rpy_deg": _numbers(rpy)}
 

@@ -9,7 +9,6 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
-from scipy.spatial.transform import Rotation
 from typing_extensions import Self
 
 from space_robot_msgs_py.config.validation import StrictModel
@@ -90,6 +89,8 @@ class FrameFile(StrictModel):
     def rotation(self) -> Array:
         """(3, 3) its axes, as columns, on its parent's axes; exact at right angles."""
         if self.origin:
+            from scipy.spatial.transform import Rotation  # slow to import
+
             turned = Rotation.from_euler("xyz", self.origin.rpy_deg, degrees=True).as_matrix()
             return _exact_at_right_angles(turned)
         alpha = np.radians(self.alpha_deg)

@@ -1,0 +1,28 @@
+"""What starts often starts soon: nodes and commands import nothing slow that they do not need."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+SLOW = {"matplotlib", "scipy.spatial", "scipy.signal", "scipy.optimize", "pyarrow"}
+"""A tenth of a second of the processor's and more each; five processes start for a flight."""
+
+
+@pytest.mark.parametrize(
+    ("modules", "slow"),
+    [
+        ("space_robot_control.mission_node, space_robot_msgs_py.recorder_node", {*SLOW, "numba"}),
+        ("space_robot_control.controller_node, space_robot_sim.plant_node", SLOW),
+        ("space_robot_control.flight.graph.orchestrator, space_robot_control.scenario", SLOW),
+        ("space_robot_control.cli.main", {*SLOW, "numba", "numpy", "pydantic"}),
+    ],
+)
+def test_slow_libraries_are_imported_where_they_are_used(modules: str, slow: set[str]) -> None:
+    if "_node" in modules:
+        pytest.importorskip("rclpy")
+    code = f"import sys, {modules}; print(*sorted({slow!r} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.returncode) == ("\n", 0), done.stderr
