@@ -18,7 +18,7 @@ from space_robot_msgs_py.errors import SpaceRobotError
 
 SECTIONS = (
     "plant", "wheels", "laws", "simulate", "reproduce", "graph", "composed", "clock", "recorder",
-    "start-up", "compile", "peers", "growth",
+    "start-up", "compile", "python", "peers", "growth",
 )  # fmt: skip
 BESIDE_PEERS = {"peers", "growth"}
 
@@ -43,10 +43,11 @@ def bench(
 
     SECTION is one of plant, wheels (beside Basilisk's), laws, simulate, reproduce; on the ROS 2
     graph: graph, composed, clock, recorder (10 minutes), start-up; compile (a first start, and one
-    with a robot of another size); beside MuJoCo, Pinocchio and Basilisk: peers (one step of the
-    plant) and growth (over the number of joints) [default: all]. Shown are the median and the
-    spread of several repetitions, how many times better that is than what stands beside it, and
-    what was asked. A machine that does other work meanwhile shows in the spread.
+    with a robot of another size); python (a tick stepped from Python); beside MuJoCo, Pinocchio and
+    Basilisk: peers (one step of the plant) and growth (over the number of joints) [default: all].
+    Shown are the median and the spread of several repetitions, how many times better that is than
+    what stands beside it, and what was asked. A machine that does other work meanwhile shows in the
+    spread.
 
     Exit code 1: a peer moves otherwise than the plant, so it is not the same robot.
 

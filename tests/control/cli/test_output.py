@@ -184,6 +184,7 @@ def test_a_flight_that_diverges_is_told_in_json_too(tmp_path: Path) -> None:
         tick = report["diverged"]["tick"]
         assert f"diverged at tick {tick}" in report["error"]
         assert report["error"] in result.stderr
+        assert (report["outcome"], report["reason"]) == ("diverged", report["error"])
         assert report["diverged"]["time_s"] == pytest.approx(tick * 0.0005)
         if bag:
             assert 0 < report["ticks"] <= tick + 1

@@ -120,6 +120,7 @@ def test_a_flight_that_diverges_ends_with_the_tick(tmp_path: Path) -> None:
     report = json.loads(result.stdout)
     assert report["diverged"], result.stderr
     assert report["diverged"]["tick"] == report["ticks"] == 11
+    assert (report["outcome"], report["ended_at_s"]) == ("diverged", 0.0055)
 
 
 def test_ctrl_c_closes_the_bag_and_leaves_no_process(tmp_path: Path) -> None:
