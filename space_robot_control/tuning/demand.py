@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ from ..mission.mission import MissionSettings
 from .inertia import SAMPLING, attitude_jacobian, sampled_reference
 
 Array = NDArray[np.float64]
+NOTHING = 1e-9
+"""Of the largest acceleration asked of an axis: less is rounding."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,21 @@ class Demand:
     """Largest difference from the nominal robot's, alone in space."""
     nominal: Array
     """Largest |F_S| of the nominal robot, alone in space."""
+
+    def on_all_axes(self, inertia: Array) -> Demand:
+        """Return the same with a demand on the axes that the mission asks nothing of.
+
+        A motion in a plane leaves some axes alone; gains of zero would as well. They count as if
+        they were asked for the smallest acceleration of all others. ``inertia``: (m,) of each axis.
+        """
+        return Demand(*(_filled(force, inertia) for force in astuple(self)))
+
+
+def _filled(force: Array, inertia: Array) -> Array:
+    acceleration = force / inertia
+    is_asked = acceleration > NOTHING * acceleration.max()
+    least = np.min(acceleration, where=is_asked, initial=np.inf)
+    return np.where(is_asked, force, inertia * least) if is_asked.any() else force
 
 
 def demand(robot: Robot, mission: MissionSettings, cases: Sequence[EnvironmentSettings]) -> Demand:

@@ -114,6 +114,7 @@ def tune(
     """
     margin, share = wishes.margin, wishes.mass_uncertainty
     shape = axis_inertia(inertia)
+    asked = asked.on_all_axes(shape)
     found = eigenvalues(inertia, shape)
     low, high = float(found.min()), float(found.max())
     size = margin * (1.0 + share) / low

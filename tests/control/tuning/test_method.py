@@ -163,3 +163,20 @@ def test_bandwidth_is_also_what_computed_torque_allows() -> None:
 def test_noise_beyond_any_low_pass_is_refused() -> None:
     with pytest.raises(InputError, match="allow more ripple"):
         tune(*scene(), Wishes(0.05, 0.2), PERIOD, white(10.0))
+
+
+def test_axes_that_nothing_is_asked_of_have_gains_as_well() -> None:
+    """A motion in a plane asks the base for nothing about two of its axes, but for rounding."""
+    inertia, asked = scene()
+    idle = [0, 2]
+    factor = np.ones(len(asked.peak))
+    factor[idle] = 0.0, 1e-17
+    planar = Demand(asked.peak * factor, asked.slope * factor, asked.unknown * factor,
+                    asked.nominal * factor)  # fmt: skip
+    found = tune(inertia, planar, Wishes(0.05, 0.2), PERIOD)
+    usual = tuned(Wishes(0.05, 0.2))
+    for law, gains in found.gains.items():
+        for name, values in gains.items():
+            assert np.all(values > 0.0), (law, name)
+            busy = np.delete(np.arange(len(values)), idle)
+            np.testing.assert_array_equal(values[busy], usual.gains[law][name][busy])
