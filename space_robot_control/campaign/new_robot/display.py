@@ -11,11 +11,9 @@ def rms_table(made: NewRobot) -> Table:
     """Return the RMS of errors and torques under every law, mean over the axes."""
     flights = made.flights
     keys = dict.fromkeys(key for flown in flights.values() for key in flown.rms)
-    columns = [
-        Column(is_label=True), Column("unit"), *(Column(law, spec=".3g") for law in flights)
-    ]  # fmt: skip
+    columns = [Column(is_label=True), *(Column(law, spec=".3g") for law in flights)]
     rows = [
-        [key, unit_of(key), *(flown.rms.get(key, "ended") for flown in flights.values())]
+        [f"{key}, {unit_of(key)}", *(flown.rms.get(key, "ended") for flown in flights.values())]
         for key in keys
     ]
     seconds = made.mission.waypoint_times[-1]
