@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from random_robots import random_inertia
 from scipy.spatial.transform import Rotation
 
-from space_robot_sim.robot.file import inertia_tensor
+from space_robot_sim.robot.inertia import inertia_tensor
 from space_robot_sim.robot.tree import Body, Joint, JointFriction, Spring, Tool
 
 Array = NDArray[np.float64]

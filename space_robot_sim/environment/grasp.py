@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.config.validation import one_of
 
 from ..robot import Robot
-from ..robot.file import inertia_tensor
+from ..robot.inertia import inertia_tensor
 from .target import Target
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from pydantic import Field
 from space_robot_msgs_py.config.validation import StrictModel
 
 from ..robot import Robot
-from ..robot.file import Inertia
+from ..robot.inertia import Inertia
 
 
 class PayloadSettings(StrictModel):

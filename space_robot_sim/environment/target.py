@@ -14,7 +14,8 @@ from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, validate
 
 from ..dynamics.attitude import rotation_matrix
-from ..robot.file import Inertia, Mass, Vector
+from ..robot.file import Vector
+from ..robot.inertia import Inertia, Mass
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .file import BASE, inertia_elements
+from .file import BASE
+from .inertia import inertia_elements
 from .robot import Robot
 
 Array = NDArray[np.float64]

@@ -14,42 +14,12 @@ from typing_extensions import Self
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.topics import BASE_AXES
 
+from .inertia import Inertia, Mass, check_inertia, inertia_tensor
 from .tree import Body, Joint, JointFriction, JointLimits, Spring, Tool
 
 Array = NDArray[np.float64]
 
 
-def inertia_tensor(values: list[float]) -> Array:
-    """Return ``[Ixx, Iyy, Izz, Ixy, Ixz, Iyz]``, kg m2, as a symmetric (3, 3) tensor."""
-    xx, yy, zz, xy, xz, yz = values
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def inertia_elements(tensors: Array) -> Array:
-    """Invert `inertia_tensor`, for (..., 3, 3) tensors."""
-    t = tensors
-    moments = [t[..., 0, 0], t[..., 1, 1], t[..., 2, 2]]
-    return np.stack([*moments, t[..., 0, 1], t[..., 0, 2], t[..., 1, 2]], axis=-1)
-
-
-def _physical_inertia(values: list[float]) -> list[float]:
-    moments = np.linalg.eigvalsh(inertia_tensor(values))
-    if moments[0] <= 0.0:
-        raise ValueError(
-            f"inertia must be positive definite, its smallest principal moment is {moments[0]:g}"
-        )
-    if moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
-        raise ValueError(
-            "inertia must meet the triangle inequality (no principal moment above the sum of the "
-            f"other two), its principal moments are {', '.join(f'{m:g}' for m in moments)}"
-        )
-    return values
-
-
-Mass = Annotated[float, Field(gt=0.0)]
-Inertia = Annotated[
-    list[float], Field(min_length=6, max_length=6), AfterValidator(_physical_inertia)
-]
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Coefficient = Annotated[float, Field(ge=0.0)]
 
@@ -170,7 +140,7 @@ class LinkFile(FrameFile):
     @field_validator("inertia", mode="after")
     @classmethod
     def _is_physical(cls, inertia: list[float], info: ValidationInfo) -> list[float]:
-        return inertia if info.data.get("mass") == 0.0 else _physical_inertia(inertia)
+        return inertia if info.data.get("mass") == 0.0 else check_inertia(inertia)
 
     @field_validator("friction", "passive", mode="after")
     @classmethod

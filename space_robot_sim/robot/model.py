@@ -5,7 +5,7 @@ from __future__ import annotations
 from space_robot_msgs_py.compiled.records import assign
 
 from ..dynamics.model import Model
-from .file import inertia_elements
+from .inertia import inertia_elements
 from .tree import TreeArrays
 
 

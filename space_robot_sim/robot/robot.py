@@ -14,7 +14,8 @@ from space_robot_msgs_py.config.validation import read_yaml, validate
 from space_robot_msgs_py.topics import BASE_AXES
 
 from ..dynamics.model import Model
-from .file import _Document, inertia_tensor
+from .file import _Document
+from .inertia import inertia_tensor
 from .model import model_of
 from .numbers import Document, are_numbers, numbers_of
 from .tree import Joint, TreeArrays
