@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from .options import flight_options
+from .options import BASE, REPAIR, flight_options
 
 
 @click.command()
@@ -16,10 +16,8 @@ from .options import flight_options
     "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
     help="Folder to make [default: the file's name, here].",
 )  # fmt: skip
-@click.option("--base", metavar="LINK", help="The satellite, of a URDF [default: its root].")
-@click.option(
-    "--repair", is_flag=True, help="Repair the defects of a URDF that can be; each is told."
-)
+@BASE
+@REPAIR
 @click.option("--force", is_flag=True, help="Replace an older folder of this command.")
 @flight_options("json")
 def new(
