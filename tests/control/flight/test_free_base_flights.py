@@ -82,8 +82,8 @@ def turning_rate(robot: Robot, q: Array, qdot: Array) -> Array:
     com, moving, angles = [place], [velocity], [rate]
     for i in range(robot.n):
         along = np.exp(1j * angle)
-        place = place + robot.a[i] * along
-        velocity = velocity + 1j * rate * robot.a[i] * along
+        place = place + robot.offset[i, 0] * along
+        velocity = velocity + 1j * rate * robot.offset[i, 0] * along
         angle, rate = angle + q[..., i], rate + qdot[..., i]
         arm = (robot.com[i + 1, 0] + 1j * robot.com[i + 1, 1]) * np.exp(1j * angle)
         com.append(place + arm)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg
@@ -14,7 +16,6 @@ from space_robot_control.flight.simulate import simulate
 from space_robot_control.tuning.inertia import inertia_along, semi_floating_inertia
 from space_robot_control.tuning.spectrum import Spectrum, eigenvalues, spectrum
 from space_robot_msgs_py.errors import DivergedError
-from space_robot_sim.robot import Robot
 
 
 def some_inertia(rng: np.random.Generator, m: int) -> np.ndarray:
@@ -80,10 +81,9 @@ def test_wrong_masses_move_eigenvalues_no_further_than_said(seed: int, share: fl
     rng = np.random.default_rng(seed)
     robot = Flight(FlightPlan()).robot
     factors = 1.0 + rng.uniform(-share, share, (2, robot.n + 1))
-    wrong = Robot(
-        robot.name, robot.joint_names, robot.mass * factors[0],
-        robot.inertia * factors[1][:, np.newaxis, np.newaxis], robot.com, robot.alpha, robot.a,
-        robot.d, robot.tool,
+    wrong = replace(
+        robot, mass=robot.mass * factors[0],
+        inertia=robot.inertia * factors[1][:, np.newaxis, np.newaxis],
     )  # fmt: skip
     theta, h_bar = rng.uniform(-np.pi, np.pi, (1, robot.n)), np.array(H_BAR)
     nominal = eigenvalues(semi_floating_inertia(robot, theta), h_bar)
