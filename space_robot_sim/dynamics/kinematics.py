@@ -36,7 +36,8 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
     A joint's frame at zero lies at ``rotation`` and ``offset`` of its parent's; from there it turns
     about its z axis or slides along it. For modified Denavit-Hartenberg numbers that is
     ``T(i-1 -> i) = Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(theta_i) Tz(d_i)``. ``quaternion`` (4,) is the
-    base's attitude, ``joint_positions`` (N,) rad, or m of prismatic joints.
+    base's attitude, ``joint_positions`` (N,) rad, or m of prismatic joints, in the order of
+    ``model``.
     """
     rotation_matrix(quaternion, data.rotation)
     r = data.rotation
@@ -45,7 +46,7 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
     )  # fmt: skip
     joint = (0.0, 0.0, 0.0)
     keep_frame(axes, joint, data.frame[0])
-    # three loops: one that calls and one that is long would keep no numbers in registers
+    # loops of their own: a call within the long one would drive its numbers out of the registers
     for j in range(int(model.joint_count)):
         data.turn[j, 0], data.turn[j, 1] = np.cos(joint_positions[j]), np.sin(joint_positions[j])
     for j in range(int(model.joint_count)):
