@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from space_robot_msgs_py.config.validation import StrictModel
 
@@ -12,7 +12,15 @@ Mode = Literal["direct", "filtered"]
 AS_THE_SENSORS = -1.0
 """In place of a number: as the sensors' own settings say."""
 
-Sigma = Annotated[float, Field(ge=-1.0, le=1e3)]
+LEAST_SIGMA = 1e-12
+"""A noise above 0 that is smaller counts as this: the filter's numbers are of its square."""
+
+
+def _no_smaller(sigma: float) -> float:
+    return max(sigma, LEAST_SIGMA) if sigma > 0.0 else sigma
+
+
+Sigma = Annotated[float, Field(ge=-1.0, le=1e3), AfterValidator(_no_smaller)]
 Corner = Annotated[float, Field(ge=0.0, le=1e5)]
 
 

@@ -13,6 +13,7 @@ from space_robot_control.controller.navigation.navigation import (
     Navigation,
     navigate,
 )
+from space_robot_control.controller.navigation.settings import NavigationFilterSettings
 from space_robot_msgs_py.errors import InputError, UnusableStateError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_sim import Robot
@@ -123,6 +124,16 @@ def test_what_does_not_fit_is_refused(key: str, value: object, why: str) -> None
 
 def filtered_loop(robot: Robot) -> Loop:
     return Loop(robot, law_of("tde_stc"), navigation=SETTINGS)
+
+
+@pytest.mark.parametrize("angle", [5e-324, 1e-200, 1e3])
+@pytest.mark.parametrize("rate", [0.0, 5e-324, 1e3])
+def test_noises_whose_squares_vanish_give_a_filter(angle: float, rate: float) -> None:
+    """They count as the least that there is."""
+    given = NAVIGATION.model_dump() | {"joint_angle_noise": angle, "joint_rate_noise": rate}
+    joints = Navigation.build(6, NavigationFilterSettings(**given), PERIOD).joints
+    assert np.isfinite(joints.angle_gain).all()
+    assert np.isfinite(joints.rate_gain).all()
 
 
 @pytest.mark.parametrize(("field", "value"), [("quaternion", 1.1), ("omega_base", np.nan)])
