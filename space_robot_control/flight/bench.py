@@ -1,8 +1,10 @@
-"""A flight step by step, for laws under development and for learning; the same bits as flown whole.
+"""A flight step by step, for laws under development and for learning.
 
-state = bench.reset(seed=1)
-while not bench.done:
-state = bench.step(torque_of(state))
+    state = bench.reset(seed=1)
+    while not bench.done:
+        state = bench.step(torque_of(state))
+
+The bits are those of the flight flown whole.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..dynamics.model import Model
 from ..faults.schedule import tick_from
 from ..robot import Robot
+from ..robot.dynamics import generalised_rows
 from .events import Capture, Event, in_order
 from .grasp import Grasp
 from .impact import Impact
@@ -107,7 +108,7 @@ class Captures:
             n, wheels = self._robot.joint_count, int(model.wheel_count)
             row = model.row[:n].astype(np.intp)
             velocities = x[7 + n : 13 + 2 * n + wheels]
-            places = [*range(6), *(6 + row), *range(6 + n, 6 + n + wheels)]
+            places = [*generalised_rows(self._robot), *range(6 + n, 6 + n + wheels)]
             impact = exchange.impact(
                 x[3:7], x[7 : 7 + n][row], model.wheel_axis[:wheels], model.wheel_inertia[:wheels]
             )

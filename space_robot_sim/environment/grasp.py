@@ -12,6 +12,7 @@ from space_robot_msgs_py.config.validation import one_of
 
 from ..robot import Robot
 from ..robot.inertia import inertia_tensor
+from ..robot.tree import parallel_axes
 from .target import Target
 
 Array = NDArray[np.float64]
@@ -57,6 +58,5 @@ class Grasp(NamedTuple):
         coms[body] += self.mass / masses[body] * (self.com - robot.com[body])
         tensors[body] += self.inertia
         for mass, com in ((robot.mass[body], robot.com[body]), (self.mass, self.com)):
-            arm = com - coms[body]
-            tensors[body] += mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+            tensors[body] += parallel_axes(mass, com - coms[body])
         return replace(robot, mass=masses, com=coms, inertia=tensors)

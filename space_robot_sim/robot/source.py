@@ -15,7 +15,6 @@ from space_robot_msgs_py.errors import InputError
 from .document import document_of
 from .robot import Robot
 from .tree import Visual
-from .urdf import read_urdf
 from .urdf_file import is_urdf
 
 YAML, URDF = (".yaml", ".yml"), (".urdf", ".xacro")
@@ -66,9 +65,7 @@ def read_robot_file(file: Path, base: str | None = None, repair: bool = False) -
 
 
 def _of_urdf(file: Path, base: str | None, repair: bool) -> RobotSource:
-    found = read_urdf(file, base, repair)
-    robot = Robot.of_tree(found.name, found.bodies, where=str(file))
-    robot = replace(robot, repairs=tuple(map(str, found.findings)))
+    robot = Robot.from_urdf(file, base, repair)
     return _of_robot(robot, file, f"From {file.name}{f', base {base}' if base else ''}.")
 
 

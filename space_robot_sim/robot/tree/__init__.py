@@ -2,7 +2,7 @@
 
 from .arrays import TreeArrays
 from .bodies import Body, Joint, JointFriction, JointKind, JointLimits, Spring, Tool, Visual
-from .flatten import axes_with_z, flatten
+from .flatten import axes_with_z, flatten, parallel_axes
 
 __all__ = [
     "Body",
@@ -16,4 +16,5 @@ __all__ = [
     "Visual",
     "axes_with_z",
     "flatten",
+    "parallel_axes",
 ]

@@ -82,6 +82,12 @@ def axes_with_z(axis: Array) -> Array:
     return np.column_stack((x, np.cross(axis, x), axis))
 
 
+def parallel_axes(mass: float, arm: Array) -> Array:
+    """Return what a mass (kg) at ``arm`` (3,), m, adds to the inertia about a point, kg m2."""
+    found: Array = mass * ((arm @ arm) * np.eye(3) - np.outer(arm, arm))
+    return found
+
+
 def _check_names(bodies: Sequence[Body], where: str) -> dict[str, Body]:
     by_name = {body.name: body for body in bodies}
     names = [body.name for body in bodies]
@@ -164,9 +170,7 @@ def _merged(first: Body, members: list[Body], where: str) -> Body:
 
 def _about(body: Body, point: Array) -> Array:
     """Return the body's inertia about ``point``, kg m2 (parallel axes)."""
-    arm = body.com - point
-    moved: Array = body.inertia + body.mass * ((arm @ arm) * np.eye(3) - np.outer(arm, arm))
-    return moved
+    return body.inertia + parallel_axes(body.mass, body.com - point)
 
 
 def _put_base_at_com(found: list[Moved]) -> None:
