@@ -1,0 +1,1 @@
+"""What a campaign's table says: requirements met or not, laws compared, what drives an error."""
