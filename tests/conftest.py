@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 ROBOTS = CONFIG / "robots"
 
-TOOLS = ("cvxpy", "gymnasium", "hypothesis", "mujoco", "pinocchio", "psutil", "pyarrow")
+TOOLS = ("cvxpy", "gymnasium", "hypothesis", "mujoco", "pandas", "pinocchio", "psutil", "pyarrow")
 """Of the tests only. Where `colcon test` finds one missing, the modules that use it are skipped,
 whichever of their helpers imports it."""
 

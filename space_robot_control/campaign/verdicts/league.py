@@ -1,0 +1,75 @@
+"""The laws of a campaign in an order, as far as it is shown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .paired import Comparison, compare_all
+from .quantiles import Estimate, quantile
+from .values import laws_of, measured, of_law
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+TAIL = 0.99
+"""The quantile that stands beside the median."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A law in the league of a metric."""
+
+    law: str
+    rank: int
+    """One more than the laws shown to be better, so several laws may share a rank."""
+    runs: int
+    failures: int
+    """Flights without a number; the quantiles count them as worse than any."""
+    median: Estimate
+    tail: Estimate
+    """The quantile `TAIL`."""
+
+
+@dataclass(frozen=True)
+class League:
+    """All laws by one metric at one point of the grid."""
+
+    metric: str
+    standings: list[Standing]
+    """By rank, then by median, then by the tail."""
+    comparisons: list[Comparison]
+    """Of all pairs, on which the ranks rest."""
+
+
+def league(table: DataFrame, column: str, confidence: float = 0.95) -> League:
+    """Rank the laws by a metric of which less is better.
+
+    Args:
+        table: rows of a campaign, at one point of its grid.
+        column: as in ``metric.attitude_rms``.
+        confidence: of intervals, and of all findings of this league together.
+    """
+    comparisons = compare_all(table, column, confidence)
+    standings = []
+    for law in laws_of(table):
+        values = measured(of_law(table, law), column)
+        beaten_by = sum(
+            c.finding == ("worse" if c.law == law else "better")
+            for c in comparisons
+            if law in (c.law, c.other)
+        )
+        standings.append(
+            Standing(
+                law,
+                1 + beaten_by,
+                len(values),
+                int(np.sum(np.isinf(values))),
+                quantile(values, 0.5, confidence),
+                quantile(values, TAIL, confidence),
+            )
+        )
+    standings.sort(key=lambda s: (s.rank, s.median.value, s.tail.value))
+    return League(column.removeprefix("metric."), standings, comparisons)

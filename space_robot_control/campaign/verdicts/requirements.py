@@ -1,0 +1,152 @@
+"""Requirements: met, not met or undecided, by order statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .order_statistics import Outlook, bound_rank, is_met, is_missed, outlook, runs_needed
+from .shares import Interval, share_limits
+from .values import NOT_OF_THE_LAW, ended, laws_of, measured, of_law, parts
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+Array = NDArray[np.float64]
+Word = Literal["met", "not met", "undecided"]
+
+
+class Demand(Protocol):
+    """A requirement as a campaign's file has it."""
+
+    @property
+    def below(self) -> float | None:
+        """The metric's upper limit, or none."""
+
+    @property
+    def above(self) -> float | None:
+        """Its lower limit, or none."""
+
+    @property
+    def share(self) -> float:
+        """The share of the cases in which it is to be met."""
+
+    @property
+    def confidence(self) -> float:
+        """The confidence with which that is to be shown."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the runs of a law say about a requirement."""
+
+    requirement: str
+    law: str
+    point: str
+    """Of the campaign's grid; empty if it has none."""
+    word: Word
+    runs: int
+    failures: int
+    """Runs that miss the requirement, those that did not come to their end among them."""
+    not_ended: int
+    """Of the failures: flights that did not come to their end."""
+    not_of_the_law: int
+    """Of those: killed, out of time or refused."""
+    limits: Interval
+    """The share of cases that meet it is at least and at most this: each at the confidence."""
+    bound: float | None
+    """The metric is no worse than this in the demanded share of the cases, at the confidence.
+
+    Infinite: too many flights failed. None: there are too few runs to say.
+    """
+    needed_without_failure: int | None
+    """Further runs that would show it met if none of them failed."""
+    outlook: Outlook | None
+    """When it would be decided if failures go on as they did; None if it is, or cannot be said."""
+
+    @property
+    def share(self) -> float:
+        """The share of the runs that met it; NaN of no runs."""
+        return 1.0 - self.failures / self.runs if self.runs else float("nan")
+
+
+def verdicts(
+    table: DataFrame, require: Mapping[str, Demand], grid: Sequence[str] = ()
+) -> list[Verdict]:
+    """Judge every law by every requirement, at every point of the grid.
+
+    Args:
+        table: rows of a campaign, of independent runs.
+        require: the requirements by name; ``require.<name>`` are their columns.
+        grid: names of the variables that are grids.
+    """
+    return [
+        verdict(name, demand, of_law(part.table, law), law, part.point)
+        for name, demand in require.items()
+        for part in parts(table, grid)
+        for law in laws_of(part.table)
+    ]
+
+
+def verdict(name: str, demand: Demand, rows: DataFrame, law: str = "", point: str = "") -> Verdict:
+    """Judge the rows of one law by one requirement.
+
+    Args:
+        name: of the requirement.
+        demand: what it asks for.
+        rows: one a run.
+        law: for the verdict.
+        point: for the verdict.
+    """
+    badness = worse_is_larger(demand, rows, name)
+    runs, failures = len(badness), int(np.sum(~(badness < _limit(demand))))
+    share, confidence = demand.share, demand.confidence
+    word: Word = "undecided"
+    if runs and is_met(failures, runs, share, confidence):
+        word = "met"
+    elif runs and is_missed(failures, runs, share, confidence):
+        word = "not met"
+    needed = runs_needed(failures, share, confidence)
+    rank = bound_rank(runs, share, confidence) if runs else None
+    bound = None if rank is None else float(np.sort(badness)[rank - 1])
+    if bound is not None and demand.above is not None:
+        bound = -bound
+    return Verdict(
+        name, law, point, word, runs, failures,
+        int(np.sum(~ended(rows))), int(rows["outcome"].isin(NOT_OF_THE_LAW).sum()),
+        share_limits(runs - failures, runs, confidence), bound,
+        None if needed is None else max(0, needed - runs),
+        outlook(failures, runs, share, confidence) if runs and word == "undecided" else None,
+    )  # fmt: skip
+
+
+def worse_is_larger(demand: Demand, rows: DataFrame, name: str) -> Array:
+    """Return a requirement's metric of each run, turned so that more is worse, infinite if failed.
+
+    Args:
+        demand: the requirement.
+        rows: one a run.
+        name: of the requirement.
+    """
+    column = f"require.{name}"
+    if demand.above is None:
+        return measured(rows, column)
+    return measured(rows.assign(**{column: -rows[column].astype(float)}), column)
+
+
+def _limit(demand: Demand) -> float:
+    if demand.above is not None:
+        return -demand.above
+    return np.inf if demand.below is None else demand.below
+
+
+def overall(words: Iterable[Word]) -> Word:
+    """Sum up several verdicts: not met if one is not, met if all are."""
+    found = list(words)
+    if "not met" in found:
+        return "not met"
+    return "met" if found and all(word == "met" for word in found) else "undecided"
