@@ -81,7 +81,7 @@ clean:
 # Stamps: what is installed in .venv, renewed when the packaging changes.
 $(VENV)/.flies: setup.py pyproject.toml | $(VENV)/.made
 	@echo "installing space_robot and ROS 2 into $(VENV): a minute or two, once"
-	@$(PIP_INSTALL) --editable '.[ros,soak]'
+	@$(PIP_INSTALL) --editable '.[ros,soak,campaign]'
 	@touch $@
 
 $(VENV)/.tests: setup.py pyproject.toml | $(VENV)/.made

@@ -51,6 +51,8 @@ setup(
         "apt": ["colcon-common-extensions", "numpy<2", "pyarrow<26"],
         # tests/benchmarks; bsk (Basilisk) holds back numpy and matplotlib, so a venv of its own
         "bench": ["bsk", "hypothesis", "mujoco", "pin", "psutil>=5.9"],
+        "campaign": ["pandas>=2.1", "pyarrow>=14"],  # tables of `campaign`
+        "dask": ["distributed>=2024.1"],  # `campaign run --scheduler`
         "gym": ["gymnasium>=1.0"],  # space_robot_control.scenario.gymnasium_env
         "mutation": ["cosmic-ray"],  # tests/mutation
         "parquet": ["pyarrow>=14"],  # `analyze --parquet`
@@ -63,11 +65,12 @@ setup(
         "soak": ["psutil>=5.9"],  # `soak`
         "test": [
             "cvxpy",
+            "distributed>=2024.1",
             "gymnasium>=1.0",
             "hypothesis",
             "mujoco",
             "mypy",
-            "pandas",
+            "pandas>=2.1",
             "pin",
             "pre-commit",
             "psutil>=5.9",
