@@ -13,7 +13,7 @@ ROOMS = {
         "errors", "topics", "compiled", "samples", "config", "wire", "bag", "ros", "recorder_node",
     ),
     "space_robot_sim": (
-        "dynamics", "robot", "faults", "environment", "actuators", "sensors", "plant",
+        "elementary", "dynamics", "robot", "faults", "environment", "actuators", "sensors", "plant",
         "plant_node",
     ),
     "space_robot_control": (

@@ -1,0 +1,60 @@
+"""Natural exponential and logarithm."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from space_robot_msgs_py.compiled.kernels import kernel
+
+LN2 = (0.6931471803691238, 1.9082149292705877e-10)
+"""The logarithm of two in two parts, the first of 32 bits: a multiple by an exponent is exact."""
+LARGEST, SMALLEST = 709.782712893384, -745.1332191019412
+"""Of arguments whose exponential is a number, and not 0."""
+(E2, E3, E4, E5, E6, E7, E8, E9, E10, E11, E12, E13, E14) = (
+    1.0 / math.factorial(k) for k in range(2, 15)
+)
+(L1, L2, L3, L4, L5, L6, L7, L8, L9, L10, L11) = (2.0 / (2 * k + 1) for k in range(1, 12))
+
+
+@kernel
+def exp(x: float) -> float:
+    """Return e to the ``x``; 0 and infinity where floats end.
+
+    Its error is below 0.9 units in the last place, of numbers that have all their bits.
+    """
+    if not x <= LARGEST:  # NaN, too
+        return x if np.isnan(x) else math.inf
+    if x < SMALLEST:
+        return 0.0
+    twos = np.floor(x / (LN2[0] + LN2[1]) + 0.5)
+    high, low = x - twos * LN2[0], twos * LN2[1]
+    r = high - low
+    series = E8 + r * (E9 + r * (E10 + r * (E11 + r * (E12 + r * (E13 + r * E14)))))
+    series = E2 + r * (E3 + r * (E4 + r * (E5 + r * (E6 + r * (E7 + r * series)))))
+    return math.ldexp(1.0 + (high + (r * r * series - low)), int(twos))
+
+
+@kernel
+def log(x: float) -> float:
+    """Return the natural logarithm of ``x``; minus infinity of 0, NaN below.
+
+    With ``1 + f`` the mantissa between sqrt(1/2) and sqrt(2), and ``s = f / (2 + f)``, it is
+    ``2 artanh(s) = f - s (f - R)``, ``R = 2 s^2/3 + 2 s^4/5 + ...``. Its error is below
+    0.9 units in the last place.
+    """
+    if not x > 0.0:
+        return -math.inf if x == 0.0 else math.nan
+    if x == math.inf:
+        return x
+    mantissa, exponent = math.frexp(x)
+    if mantissa < math.sqrt(0.5):
+        mantissa, exponent = 2.0 * mantissa, exponent - 1
+    f, twos = mantissa - 1.0, float(exponent)
+    s = f / (2.0 + f)
+    z = s * s
+    rest = L6 + z * (L7 + z * (L8 + z * (L9 + z * (L10 + z * L11))))
+    rest = z * (L1 + z * (L2 + z * (L3 + z * (L4 + z * (L5 + z * rest)))))
+    half = 0.5 * f * f
+    return twos * LN2[0] - ((half - (s * (half + rest) + twos * LN2[1])) - f)
