@@ -1,0 +1,71 @@
+"""What a worker does: it calls the function with one item after the other."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import os
+import pickle
+import signal
+import traceback
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from typing import Any
+
+PR_SET_PDEATHSIG = 1
+"""Of prctl(2): the signal that a process gets when the one that forked it ends."""
+
+
+class WorkerTraceback(Exception):  # noqa: N818 - shown as the cause of an error, never raised
+    """The traceback of an error that was raised in a worker."""
+
+    def __str__(self) -> str:
+        """Return it as Python prints it."""
+        return f"\n{self.args[0]}"
+
+
+def work(function: Callable[[Any], Any], connection: Connection, starter: int) -> None:
+    """Answer every pickled item that comes, until the other end is closed.
+
+    Args:
+        function: called with the items.
+        connection: brings items, takes answers, see `unpacked`.
+        starter: pid of the process that forked this one, with which it ends.
+    """
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != starter:  # it ended before
+        return
+    # to look through what the modules hold, and a figure half drawn, costs a tenth of the time
+    gc.freeze()
+    gc.set_threshold(100_000)
+    while True:
+        try:
+            item = connection.recv_bytes()
+        except (EOFError, OSError):
+            return
+        connection.send_bytes(answer(function, item))
+
+
+def answer(function: Callable[[Any], Any], item: bytes) -> bytes:
+    """Call the function with a pickled item and pickle its result, or its error."""
+    try:
+        return pickle.dumps((function(pickle.loads(item)), None, ""))
+    except Exception as error:
+        text = traceback.format_exc()
+        try:
+            packed = pickle.dumps((None, error, text))
+            pickle.loads(packed)
+        except Exception:  # an error that cannot travel: its text can
+            packed = pickle.dumps((None, RuntimeError(f"{type(error).__name__}: {error}"), text))
+        return packed
+
+
+def unpacked(packed: bytes) -> tuple[Any, Exception | None]:
+    """Return result and error of an `answer`; the error has its traceback as its cause."""
+    try:
+        result, error, text = pickle.loads(packed)
+    except Exception as failure:  # a result that cannot be read again
+        return None, failure
+    if error is not None:
+        error.__cause__ = WorkerTraceback(text)
+    return result, error
