@@ -122,15 +122,13 @@ def _forked_worker(
 
     def begin() -> None:
         end.close()
-        work(function, Connection(descriptor), server)
+        work(function, connection, server)
 
     try:
-        pid = _fork(begin)
+        with Connection(descriptor) as connection:
+            pid = _fork(begin)
     except OSError as error:
         return -(error.errno or 1)
-    finally:
-        if os.getpid() == server:
-            os.close(descriptor)
     workers.add(pid)
     return pid
 
