@@ -48,6 +48,8 @@ class FlightPlan(StrictModel):
     actuators: Actuators = "ideal"
     """Of the base."""
     robot: RobotGiven = "paper"
+    plant_robot: RobotGiven | None = None
+    """What the plant is in truth; controller and mission know ``robot`` (None: that it is)."""
     mission: MissionGiven = ""
     """Empty: the robot's own."""
     duration: Annotated[float | None, Field(gt=0.0, le=1e6)] = None

@@ -51,7 +51,7 @@ class Flight:
         self.recorder_settings = settings.recorder
         self.period = settings.plant.period
         self.timebase = settings.plant.timebase
-        self._robots = Robots(settings, plan.robot)
+        self._robots = Robots(settings, plan.robot, plan.plant_robot)
         self.robot = self._robots.plant
         mission = settings.mission
         self._mission_name = mission.mission or robot_files(mission.robot).name

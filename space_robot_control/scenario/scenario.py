@@ -38,6 +38,7 @@ class Scenario(FlightPlan):
     An option that names a file may be the object itself, or its numbers:
 
     - ``robot``: a `Robot`; with the mission and gains of the shipped one of its name, if any
+    - ``plant_robot``: what the plant is in truth, where controller and mission know another one
     - ``controller``: a `ControlLaw` class or object; None: none, for `bench`
     - ``gains``: numbers by gain, over the default set: ``{"k_1": 3.0, "h_bar": [...]}``, one for
       all axes or n+3 (base x, y, z, joints); or such a mapping for each of several laws

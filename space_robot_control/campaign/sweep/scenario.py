@@ -14,24 +14,7 @@ from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_sim.robot.find import mission_file, robot_as_path, robot_content
 
 from ...flight.plan import FlightPlan
-
-
-class Law(NamedTuple):
-    """A control law with a gain set."""
-
-    controller: str
-    gains: str
-
-    @classmethod
-    def parse(cls, text: str) -> Law:
-        """From ``LAW`` or ``LAW=GAINS``."""
-        controller, _, gains = text.partition("=")
-        return cls(controller, gains or "default")
-
-    @property
-    def title(self) -> str:
-        """For a person."""
-        return f"{self.controller}, {self.gains.rstrip('/').rpartition('/')[2]}"
+from ..study import Law
 
 
 class Draw(NamedTuple):

@@ -12,8 +12,8 @@ from ...analysis.figures.overlay import words
 from ...analysis.figures.style import Look, grid, house_style, legend_above, page, plain
 from ...analysis.metrics import unit_of
 from ...analysis.tables import Column, Group, Table
+from ..study import Law
 from .run import Row
-from .scenario import Law
 
 ERRORS, RIPPLE, FAST = ("attitude", "joints_"), "ripple_", "fast_ripple_base_torque"
 """Beginnings of the names of metrics that tables show."""
