@@ -97,11 +97,8 @@ class Pool:
             yield from self._take_in()
 
     def close(self) -> None:
-        """End all processes."""
+        """End all processes; another thread may be in `run`, which fails then."""
         self._server.close()
-        for worker in self._workers.values():
-            worker.connection.close()
-        self._workers.clear()
 
     def _give_out(self, rest: Iterator[Any]) -> Dones:
         """Give every worker something to do, then something small to go on with."""

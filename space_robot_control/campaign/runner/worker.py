@@ -66,6 +66,11 @@ def unpacked(packed: bytes) -> tuple[Any, Exception | None]:
         result, error, text = pickle.loads(packed)
     except Exception as failure:  # a result that cannot be read again
         return None, failure
-    if error is not None:
+    return result, with_traceback(error, text)
+
+
+def with_traceback(error: Exception | None, text: str) -> Exception | None:
+    """Return an error from another process with its traceback, if it came with one, as cause."""
+    if error is not None and text:
         error.__cause__ = WorkerTraceback(text)
-    return result, error
+    return error
