@@ -25,6 +25,7 @@ setup(
     package_data={
         "space_robot_control.analysis": ["templates/*.j2"],
         "space_robot_control.analysis.figures": ["*.mplstyle"],
+        "space_robot_control.campaign.report": ["templates/*.j2"],
         "space_robot_control.paper.reproduction": ["templates/*.j2"],
         "space_robot_msgs_py.ros": ["*.xml"],
     },

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 BINS = 100
-SERIES = ("attitude", "joints_1_3", "joints_4_6", "base_torque")
+SERIES = ("attitude", "base_torque")
 
 
 def made_table(

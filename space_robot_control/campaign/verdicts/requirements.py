@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .design import grid_names, independent_rows
 from .order_statistics import Outlook, bound_rank, is_met, is_missed, outlook, runs_needed
 from .shares import Interval, share_limits
 from .values import NOT_OF_THE_LAW, ended, laws_of, measured, of_law, parts
@@ -16,28 +16,10 @@ from .values import NOT_OF_THE_LAW, ended, laws_of, measured, of_law, parts
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+    from ..study import Requirement, Study
+
 Array = NDArray[np.float64]
 Word = Literal["met", "not met", "undecided"]
-
-
-class Demand(Protocol):
-    """A requirement as a campaign's file has it."""
-
-    @property
-    def below(self) -> float | None:
-        """The metric's upper limit, or none."""
-
-    @property
-    def above(self) -> float | None:
-        """Its lower limit, or none."""
-
-    @property
-    def share(self) -> float:
-        """The share of the cases in which it is to be met."""
-
-    @property
-    def confidence(self) -> float:
-        """The confidence with which that is to be shown."""
 
 
 @dataclass(frozen=True)
@@ -74,25 +56,25 @@ class Verdict:
         return 1.0 - self.failures / self.runs if self.runs else float("nan")
 
 
-def verdicts(
-    table: DataFrame, require: Mapping[str, Demand], grid: Sequence[str] = ()
-) -> list[Verdict]:
+def verdicts(table: DataFrame, study: Study) -> list[Verdict]:
     """Judge every law by every requirement, at every point of the grid.
 
     Args:
-        table: rows of a campaign, of independent runs.
-        require: the requirements by name; ``require.<name>`` are their columns.
-        grid: names of the variables that are grids.
+        table: rows of the campaign; ``require.<name>`` are the requirements' columns.
+        study: its file.
     """
+    rows = independent_rows(table, study.design)
     return [
         verdict(name, demand, of_law(part.table, law), law, part.point)
-        for name, demand in require.items()
-        for part in parts(table, grid)
+        for name, demand in study.require.items()
+        for part in parts(rows, grid_names(table, study.vary))
         for law in laws_of(part.table)
     ]
 
 
-def verdict(name: str, demand: Demand, rows: DataFrame, law: str = "", point: str = "") -> Verdict:
+def verdict(
+    name: str, demand: Requirement, rows: DataFrame, law: str = "", point: str = ""
+) -> Verdict:
     """Judge the rows of one law by one requirement.
 
     Args:
@@ -124,7 +106,7 @@ def verdict(name: str, demand: Demand, rows: DataFrame, law: str = "", point: st
     )  # fmt: skip
 
 
-def worse_is_larger(demand: Demand, rows: DataFrame, name: str) -> Array:
+def worse_is_larger(demand: Requirement, rows: DataFrame, name: str) -> Array:
     """Return a requirement's metric of each run, turned so that more is worse, infinite if failed.
 
     Args:
@@ -138,15 +120,7 @@ def worse_is_larger(demand: Demand, rows: DataFrame, name: str) -> Array:
     return measured(rows.assign(**{column: -rows[column].astype(float)}), column)
 
 
-def _limit(demand: Demand) -> float:
+def _limit(demand: Requirement) -> float:
     if demand.above is not None:
         return -demand.above
     return np.inf if demand.below is None else demand.below
-
-
-def overall(words: Iterable[Word]) -> Word:
-    """Sum up several verdicts: not met if one is not, met if all are."""
-    found = list(words)
-    if "not met" in found:
-        return "not met"
-    return "met" if found and all(word == "met" for word in found) else "undecided"

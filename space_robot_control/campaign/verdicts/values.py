@@ -23,8 +23,10 @@ NOT_OF_THE_LAW = ("killed", "out_of_time", "refused")
 class Part(NamedTuple):
     """The rows of one point of a campaign's grid."""
 
+    values: tuple[str, ...]
+    """Of the grid's variables there."""
     point: str
-    """What tells it from others, as in ``sensors = fine``; empty if there is no grid."""
+    """It in words, as in ``sensors = fine``; empty if there is no grid."""
     table: DataFrame
 
 
@@ -36,13 +38,15 @@ def parts(table: DataFrame, grid: Sequence[str]) -> list[Part]:
         grid: names of the variables that are grids.
     """
     if not grid:
-        return [Part("", table)]
+        return [Part((), "", table)]
     columns = [f"vary.{name}" for name in grid]
-    groups = table.groupby(columns, sort=False, dropna=False)
-    return [
-        Part(", ".join(f"{n} = {_word(v)}" for n, v in zip(grid, values, strict=True)), rows)
-        for values, rows in groups
-    ]
+    found = []
+    for key, rows in table.groupby(columns, sort=False, dropna=False):
+        values = tuple(_word(value) for value in key)
+        names = (name.removeprefix("scenario.") for name in grid)
+        point = ", ".join(f"{name} = {v}" for name, v in zip(names, values, strict=True))
+        found.append(Part(values, point, rows))
+    return found
 
 
 def _word(value: Any) -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,15 +9,19 @@ from campaign_tables import made_table
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot_control.campaign.verdicts.requirements import Verdict, overall, verdict, verdicts
+from space_robot_control.campaign.study import Requirement, Study
+from space_robot_control.campaign.verdicts.requirements import Verdict, verdict, verdicts
 
 
-@dataclass(frozen=True)
-class Demand:
-    below: float | None = None
-    above: float | None = None
-    share: float = 0.997
-    confidence: float = 0.9
+def demand_of(
+    below: float | None = None,
+    above: float | None = None,
+    share: float = 0.997,
+    confidence: float = 0.9,
+) -> Requirement:
+    return Requirement.model_validate(
+        {"metric": "x", "below": below, "above": above, "in": share, "confidence": confidence}
+    )
 
 
 def rows(values: list[float], failed: int = 0, outcome: str = "diverged") -> pd.DataFrame:
@@ -31,47 +33,47 @@ def rows(values: list[float], failed: int = 0, outcome: str = "diverged") -> pd.
     })  # fmt: skip
 
 
-def judge(demand: Demand, table: pd.DataFrame) -> Verdict:
+def judge(demand: Requirement, table: pd.DataFrame) -> Verdict:
     return verdict("x", demand, table)
 
 
 def test_767_runs_without_failure_meet_997_at_90() -> None:
-    assert judge(Demand(1.0), rows([0.5] * 767)).word == "met"
-    found = judge(Demand(1.0), rows([0.5] * 766))
+    assert judge(demand_of(1.0), rows([0.5] * 767)).word == "met"
+    found = judge(demand_of(1.0), rows([0.5] * 766))
     assert (found.word, found.needed_without_failure) == ("undecided", 1)
     assert found.outlook is not None
     assert (found.outlook.runs, found.outlook.met) == (767, True)
 
 
 def test_one_failure_asks_for_1296_runs() -> None:
-    assert judge(Demand(1.0), rows([0.5] * 1295, failed=1)).word == "met"
-    found = judge(Demand(1.0), rows([0.5] * 1000, failed=1))
+    assert judge(demand_of(1.0), rows([0.5] * 1295, failed=1)).word == "met"
+    found = judge(demand_of(1.0), rows([0.5] * 1000, failed=1))
     assert (found.word, found.needed_without_failure) == ("undecided", 295)
 
 
 def test_many_failures_show_that_it_is_missed() -> None:
-    found = judge(Demand(1.0), rows([0.5] * 950 + [2.0] * 50))
+    found = judge(demand_of(1.0), rows([0.5] * 950 + [2.0] * 50))
     assert (found.word, found.failures, found.outlook) == ("not met", 50, None)
     assert found.limits.high < 0.997
 
 
 @pytest.mark.parametrize("value", [1.0, 2.0, np.nan, np.inf])
 def test_what_is_not_below_the_limit_is_a_failure(value: float) -> None:
-    assert judge(Demand(1.0), rows([value])).failures == 1
+    assert judge(demand_of(1.0), rows([value])).failures == 1
 
 
 @pytest.mark.parametrize("outcome", ["diverged", "killed", "out_of_time", "refused", "unanswered"])
 def test_a_flight_that_did_not_end_is_a_failure_whatever_its_number(outcome: str) -> None:
-    found = judge(Demand(1.0), rows([0.5] * 9, failed=1, outcome=outcome))
+    found = judge(demand_of(1.0), rows([0.5] * 9, failed=1, outcome=outcome))
     assert (found.failures, found.not_ended) == (1, 1)
     assert found.not_of_the_law == (outcome in ("killed", "out_of_time", "refused"))
-    above = judge(Demand(above=-1.0), rows([0.5] * 9, failed=1, outcome=outcome))
+    above = judge(demand_of(above=-1.0), rows([0.5] * 9, failed=1, outcome=outcome))
     assert above.failures == 1
 
 
 def test_the_bound_counts_failed_flights_as_infinite() -> None:
     """Of 59 runs the largest bounds 95 % at 95 %, of 93 the second largest."""
-    demand = Demand(100.0, share=0.95, confidence=0.95)
+    demand = demand_of(100.0, share=0.95, confidence=0.95)
     numbers = [float(n) for n in range(1, 94)]
     assert judge(demand, rows(numbers[:59])).bound == 59.0
     assert judge(demand, rows(numbers)).bound == 92.0
@@ -81,13 +83,13 @@ def test_the_bound_counts_failed_flights_as_infinite() -> None:
 
 
 def test_a_requirement_from_below_mirrors_one_from_above() -> None:
-    demand = Demand(above=3.0, share=0.95, confidence=0.95)
+    demand = demand_of(above=3.0, share=0.95, confidence=0.95)
     found = judge(demand, rows([float(n) for n in range(1, 94)]))
     assert (found.failures, found.bound) == (3, 2.0)
 
 
 def test_no_runs_decide_nothing() -> None:
-    found = judge(Demand(1.0), rows([]))
+    found = judge(demand_of(1.0), rows([]))
     assert (found.word, found.runs, found.needed_without_failure) == ("undecided", 0, 767)
     assert found.limits == (0.0, 1.0)
     assert found.bound is None
@@ -101,7 +103,7 @@ def test_no_runs_decide_nothing() -> None:
 def test_bound_limits_and_verdict_say_the_same(
     values: list[float], failed: int, share: float, confidence: float
 ) -> None:
-    found = judge(Demand(1.0, None, share, confidence), rows(values, failed))
+    found = judge(demand_of(1.0, None, share, confidence), rows(values, failed))
     by_bound = found.bound is not None and found.bound < 1.0
     assert by_bound == (found.word == "met")
     if abs(found.limits.low - share) > 1e-9:
@@ -112,17 +114,14 @@ def test_bound_limits_and_verdict_say_the_same(
 
 def test_every_law_at_every_point_of_the_grid_has_its_verdict() -> None:
     table = made_table(120, grid=("fine", "coarse"))
-    found = verdicts(table, {"pointing": Demand(1e-4, share=0.9)}, ["scenario.sensors"])
+    study = Study.model_validate({
+        "laws": ["ctc"], "vary": {"scenario.sensors": {"grid": ["fine", "coarse"]}},
+        "require": {"pointing": {"metric": "attitude_max", "below": 1e-4, "in": 0.9}},
+    })  # fmt: skip
+    found = verdicts(table, study)
     assert [(v.point, v.law) for v in found] == [
-        (f"scenario.sensors = {point}", law)
+        (f"sensors = {point}", law)
         for point in ("fine", "coarse")
         for law in ("ctc", "tde_stc", "tde_tsmc=robust")
     ]
     assert {v.runs for v in found} == {60}
-
-
-def test_verdicts_are_summed_up() -> None:
-    assert overall(["met", "met"]) == "met"
-    assert overall(["met", "undecided"]) == "undecided"
-    assert overall(["undecided", "not met"]) == "not met"
-    assert overall([]) == "undecided"

@@ -9,6 +9,11 @@ from campaign_tables import made_table
 from scipy.stats import kruskal, qmc, rankdata, spearmanr
 from scipy.stats import sobol_indices as scipy_sobol
 
+from space_robot_control.campaign.verdicts.design import (
+    grid_names,
+    independent_rows,
+    saltelli_values,
+)
 from space_robot_control.campaign.verdicts.sensitivity import rank_correlations, sensitivity
 from space_robot_control.campaign.verdicts.sobol import indices, sobol_indices
 
@@ -152,3 +157,34 @@ def test_rows_with_a_failed_flight_are_left_out_and_counted() -> None:
     assert found is not None
     assert (found.rows, found.left_out) == (62, 2)
     assert sobol_indices(np.full((9, 5), np.nan), ["x1", "x2", "x3"]) is None
+
+
+def test_a_table_of_the_design_becomes_its_rows() -> None:
+    """Runs in any order; one is missing, one failed."""
+    table = pd.DataFrame({
+        "run": range(10), "law": "ctc", "outcome": "complete", "vary.a": 0.0, "vary.b": 0.0,
+        "vary.c": 0.0, "metric.x": np.arange(10.0),
+    })  # fmt: skip
+    table.loc[3, "outcome"] = "diverged"
+    table = table.drop(index=7).sample(frac=1.0, random_state=1)
+    found = saltelli_values(table, "ctc", "metric.x")
+    np.testing.assert_array_equal(found, [[0, 1, 2, np.inf, 4], [5, 6, np.nan, 8, 9]])
+    assert sorted(independent_rows(table, "saltelli")["run"]) == [0, 4, 5, 9]
+    assert len(independent_rows(table, "sobol")) == 9
+
+
+def test_grids_are_told_by_the_file() -> None:
+    table = pd.DataFrame(columns=[f"vary.{name}" for name in (
+        "scenario.sensors", "robot.links[joint1].mass", "robot.links[joint2].mass",
+        "robot.base.mass", "faults.torque_scale@0:all", "faults.torque_scale@0:joint1",
+    )])  # fmt: skip
+    grid, drawn = {"grid": [1, 2]}, {"uniform": [0, 1]}
+    vary = {
+        "scenario.sensors": grid, "robot.links[*].mass": grid, "robot.base.mass": drawn,
+        "faults": {"torque_scale@0:all": grid, "torque_scale@0:joint1": drawn},
+    }  # fmt: skip
+    assert grid_names(table, vary) == [
+        "scenario.sensors", "robot.links[joint1].mass", "robot.links[joint2].mass",
+        "faults.torque_scale@0:all",
+    ]  # fmt: skip
+    assert grid_names(table, {}) == []

@@ -1,0 +1,159 @@
+"""Percentile bands over time: how a campaign's errors and torques run, law beside law."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from ...analysis.figures.overlay import words
+from ...analysis.figures.style import (
+    COLOURS,
+    GREY,
+    Look,
+    grid,
+    house_style,
+    legend_above,
+    page,
+    plain,
+)
+from ...analysis.metrics import unit_of
+from ..verdicts.values import Part, laws_of, of_law
+from .axes import number_log_axis
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+Array = NDArray[np.float64]
+
+SHARES = (0.05, 0.5, 0.95)
+MOST_PANELS = 12
+"""Points of a grid that are drawn."""
+DECADES = 2.0
+"""A worst flight may rise so many decades above the 95 % of all laws before it is cut off."""
+
+
+def series_of(table: DataFrame) -> list[str]:
+    """Return the names of the series of which there are bands."""
+    names = [c.removeprefix("band.") for c in map(str, table) if c.startswith("band.")]
+    return [name for name in names if table[f"band.{name}"].notna().any()]
+
+
+def bands(rows: DataFrame, series: str) -> Array:
+    """Compute the quantiles `SHARES` of a series at every time, and the largest number: (4, bins).
+
+    From its end on a flight that failed counts as worse than any number; the largest is of those
+    that still fly.
+
+    Args:
+        rows: of one law, at one point of the grid.
+        series: a name of `series_of`.
+    """
+    found = [np.asarray(b, np.float64) for b in rows[f"band.{series}"] if np.ndim(b)]
+    found += [np.empty(0)] * (len(rows) - len(found))
+    bins = max(map(len, found))
+    table = np.full((len(found), bins), np.inf)
+    for row, values in zip(table, found, strict=True):
+        row[: len(values)] = values
+    table[np.isnan(table)] = np.inf
+    quantiles = np.quantile(table, SHARES, axis=0, method="inverted_cdf")
+    largest = np.max(table, axis=0, where=np.isfinite(table), initial=0.0)
+    found_bands: Array = np.vstack([quantiles, largest])
+    return found_bands
+
+
+@house_style()
+def band_figure(parts: Sequence[Part], laws: Sequence[str], series: str, time_s: float) -> Figure:
+    """Draw a series over time: a panel a law, or where there is a grid a panel a point.
+
+    Args:
+        parts: points of the grid; one if there is none.
+        laws: of the campaign.
+        series: a name of `series_of`.
+        time_s: what all bins last together, s.
+    """
+    shown = parts[:MOST_PANELS]
+    found = {
+        (number, law): bands(of_law(part.table, law), series)
+        for number, part in enumerate(shown)
+        for law in laws_of(part.table)
+    }
+    found = {key: value for key, value in found.items() if value.size}
+    if not found:
+        return page(12.0, "No flight has a series over time.")
+    per_law = len(shown) == 1
+    titles = list(laws) if per_law else [part.point for part in shown]
+    columns = columns_of(len(titles))
+    figure = page(16.0 + 42.0 * -(-len(titles) // columns))
+    panels = grid(figure, len(titles), columns)
+    for (number, law), values in found.items():
+        index = laws.index(law)
+        axes = panels[index if per_law else number]
+        edges = np.linspace(0.0, time_s, values.shape[1] + 1)
+        time, drawn = 0.5 * (edges[1:] + edges[:-1]), np.where(np.isinf(values), np.nan, values)
+        if per_law:
+            _draw_band(axes, time, drawn, COLOURS[2])
+        else:
+            look = Look.of(index)
+            axes.plot(time, drawn[1], color=look.colour, linestyle=look.dashes)
+            axes.plot(time, drawn[2], color=look.colour, linestyle=look.dashes, linewidth=0.5)
+    unit = unit_of(series).strip("-")
+    for axes, title in zip(panels, titles, strict=True):
+        axes.set_title(plain(title))
+    for number in range(0, len(panels), columns):
+        panels[number].set_ylabel(f"{words(series)} ({unit})" if unit else f"{words(series)} error")
+    for axes in panels[-columns:]:
+        axes.set_xlabel("time (s)")
+    _scale(panels[0], list(found.values()))
+    if per_law:
+        _name_bands(figure)
+    else:
+        legend_above(figure, list(laws), dashed=True)
+    return figure
+
+
+def columns_of(panels: int) -> int:
+    """Return in how many columns so many panels stand."""
+    return 2 if panels in (2, 4) else min(3, panels)
+
+
+def _draw_band(axes: Axes, time: Array, drawn: Array, colour: str) -> None:
+    low, middle, high, worst = drawn
+    # where more than 5 % have failed the band has no upper edge: it is open to the top
+    top = np.where(np.isnan(high), np.nanmax(drawn, initial=0.0) * 1e6, high)
+    axes.fill_between(time, low, top, color=colour, alpha=0.25, linewidth=0.0)
+    axes.plot(time, middle, color=colour)
+    axes.plot(time, worst, color=GREY, linewidth=0.6)
+
+
+def _name_bands(figure: Figure) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    colour = COLOURS[2]
+    figure.legend(
+        handles=[
+            Line2D([], [], color=colour, label="median"),
+            Patch(color=colour, alpha=0.25, linewidth=0.0, label="5 % to 95 %"),
+            Line2D([], [], color=GREY, linewidth=0.6, label="worst of those still flying"),
+        ],
+        loc="outside upper left", ncols=3,
+    )  # fmt: skip
+
+
+def _scale(axes: Axes, found: Sequence[Array]) -> None:
+    """Make the common vertical axis logarithmic, from the least of the 5 % on."""
+    axes.set_yscale("log", nonpositive="mask")
+    low, high, worst = (
+        np.concatenate([v[k][np.isfinite(v[k]) & (v[k] > 0.0)] for v in found]) for k in (0, 2, 3)
+    )
+    usual = high if len(high) else worst
+    if not len(low) or not len(usual):
+        return
+    top = min(float(worst.max()), float(usual.max()) * 10.0**DECADES)
+    axes.set_ylim(0.5 * float(np.percentile(low, 2.0)), 2.0 * top)
+    number_log_axis(axes, "y")

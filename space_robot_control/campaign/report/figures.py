@@ -1,0 +1,73 @@
+"""The figures of a report, one after the other, with what each shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import NamedTuple
+
+from matplotlib.figure import Figure
+
+from ...analysis.figures.overlay import words
+from ..verdicts.values import is_known
+from .bands import MOST_PANELS, band_figure, series_of
+from .distributions import distribution_figure
+from .findings import Findings
+from .influence_figures import grid_figure, influence_figure, sobol_figure
+
+MOST_INFLUENCES = 4
+"""Points of a grid of which influences are drawn; the table has all."""
+
+
+class Drawing(NamedTuple):
+    """A figure that can be drawn."""
+
+    section: str
+    """``league``, ``bands``, ``distributions`` or ``sensitivity``."""
+    stem: str
+    """Of its file."""
+    caption: str
+    draw: Callable[[], Figure]
+
+
+def drawings(findings: Findings) -> Iterator[Drawing]:
+    """Yield all figures that the rows allow; none is drawn yet."""
+    subject, parts, laws = findings.subject, findings.parts, findings.laws
+    known = [q for q in findings.metrics if is_known(subject.table, q.column)]
+    several = len(parts) > 1
+    if several and known:
+        caption = "Medians, with bars from 5 % to 95 % of the runs, at every point of the grid"
+        draw = partial(grid_figure, parts, laws, known, findings.grid)
+        yield Drawing("league", "grid", caption, draw)
+    first = f" (the first {MOST_PANELS} points of the grid)" if len(parts) > MOST_PANELS else ""
+    lines = "median (thick) and 95 % (thin) of the runs" if several else "percentiles of the runs"
+    for name in series_of(subject.table):
+        caption = f"{words(name)} over time: {lines} at each time{first}"
+        draw = partial(band_figure, parts, laws, name, subject.time_s)
+        yield Drawing("bands", f"band_{name}", caption, draw)
+    required = [q for q in findings.required if is_known(subject.table, q.column)]
+    for quantity in [*required, *known]:
+        of = f" ({quantity.name})" if quantity.requirement else ""
+        caption = f"Distribution of {quantity.heading}{of} over the runs{first}"
+        draw = partial(distribution_figure, parts, laws, quantity)
+        yield Drawing("distributions", f"distribution_{quantity.name}", caption, draw)
+    for quantity in findings.driven:
+        for number, part in enumerate(parts[:MOST_INFLUENCES]):
+            of = f", {part.point}" if part.point else ""
+            found = [s for p, q, s in findings.sensitivities if (p, q) == (part, quantity)]
+            if found:
+                caption = f"What drives {quantity.heading}{of}"
+                stem = f"influence_{quantity.name}_{number}"
+                yield Drawing("sensitivity", stem, caption, partial(influence_figure, found))
+    for metric in dict.fromkeys(s.metric for s in findings.sobol):
+        found_indices = [s for s in findings.sobol if s.metric == metric]
+        caption = f"Sobol indices of {metric}"
+        draw = partial(sobol_figure, found_indices)
+        yield Drawing("sensitivity", f"sobol_{metric}", caption, draw)
+
+
+def summary_figure(findings: Findings) -> Figure | None:
+    """Draw the one figure that says most: the first of the laws, or of the distributions."""
+    found = {drawing.section: drawing for drawing in reversed([*drawings(findings)])}
+    chosen = found.get("league") or found.get("distributions")
+    return chosen.draw() if chosen else None

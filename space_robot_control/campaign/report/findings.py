@@ -1,0 +1,157 @@
+"""All that a report says of a campaign, found once for terminal, page and JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..verdicts.design import (
+    SALTELLI,
+    grid_names,
+    independent_rows,
+    saltelli_values,
+    variables,
+)
+from ..verdicts.league import League, league
+from ..verdicts.requirements import Verdict, verdicts
+from ..verdicts.sensitivity import Sensitivity, sensitivity
+from ..verdicts.sobol import SobolIndices, sobol_indices
+from ..verdicts.values import Part, ended, is_known, laws_of, measured, parts
+from .quantities import Quantity, chosen, of_requirement
+from .subject import Subject
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+CONFIDENCE = 0.95
+"""Of all intervals and comparisons; a requirement has its own."""
+
+
+class Findings:
+    """What the rows of a campaign say.
+
+    Args:
+        subject: the campaign.
+        metrics: names of those that laws are compared by; the usual ones if there are none.
+
+    Raises:
+        InputError: there is no such metric.
+    """
+
+    def __init__(self, subject: Subject, metrics: Sequence[str] = ()) -> None:
+        self.subject = subject
+        self.metrics = chosen(subject.table, subject.study.require, metrics)
+        self.required = [of_requirement(*item) for item in subject.study.require.items()]
+        self.grid = grid_names(subject.table, subject.study.vary)
+        self.rows = independent_rows(subject.table, subject.study.design)
+        """Those that can be taken for independent draws; all, unless the design is for indices."""
+        self.parts: list[Part] = parts(self.rows, self.grid)
+        self.laws = laws_of(subject.table)
+
+    @property
+    def whole(self) -> Part:
+        """Return all rows, of whatever point of the grid."""
+        return Part((), "", self.rows)
+
+    @cached_property
+    def verdicts(self) -> list[Verdict]:
+        """Return the verdict on every requirement, law and point of the grid."""
+        return verdicts(self.subject.table, self.subject.study)
+
+    @cached_property
+    def leagues(self) -> list[tuple[Part, Quantity, League]]:
+        """Return the league of every metric at every point of the grid."""
+        return [
+            (part, metric, league(part.table, metric.column, CONFIDENCE))
+            for metric in self.metrics
+            for part in self.parts
+            if is_known(part.table, metric.column)
+        ]
+
+    @cached_property
+    def driven(self) -> list[Quantity]:
+        """Return what sensitivities and worst runs are of: requirements, or the first metric."""
+        known = [q for q in self.required if q.column in self.subject.table]
+        return known or self.metrics[:1]
+
+    @cached_property
+    def sensitivities(self) -> list[tuple[Part, Quantity, Sensitivity]]:
+        """Return what drives each quantity under each law at each point of the grid."""
+        found = []
+        for quantity in self.driven:
+            for part in self.parts:
+                rows = self.worse_is_larger(part.table, quantity)
+                for law in laws_of(rows):
+                    if result := sensitivity(rows, law, quantity.column, CONFIDENCE):
+                        found.append((part, quantity, result))
+        return found
+
+    def worst(self, part: Part, quantity: Quantity, count: int = 10, law: str = "") -> DataFrame:
+        """Return the worst rows: flights that failed, the earliest first, then by their numbers.
+
+        Args:
+            part: of the grid.
+            quantity: by which.
+            count: rows at most.
+            law: of which law; of all if empty.
+        """
+        rows = self.worse_is_larger(part.table, quantity)
+        if law:
+            rows = rows[rows["law"] == law]
+        times = rows["ended_at_s"].to_numpy(np.float64, na_value=0.0)
+        order = np.lexsort((rows["run"], times, -measured(rows, quantity.column)))
+        return part.table.loc[rows.index[order[:count]]]
+
+    @staticmethod
+    def worse_is_larger(rows: DataFrame, quantity: Quantity) -> DataFrame:
+        """Return the rows with the quantity's sign such that more of it is worse."""
+        if quantity.sign > 0:
+            return rows
+        return rows.assign(**{quantity.column: -rows[quantity.column].astype(float)})
+
+    @cached_property
+    def sobol(self) -> list[SobolIndices]:
+        """Return Sobol indices of each quantity under each law, if the design is for them."""
+        table = self.subject.table
+        if self.subject.study.design != SALTELLI:
+            return []
+        found = [
+            sobol_indices(
+                saltelli_values(table, law, metric.column), variables(table), law, metric.heading,
+                CONFIDENCE,
+            )
+            for metric in self.metrics
+            for law in self.laws
+        ]  # fmt: skip
+        return [each for each in found if each]
+
+    @property
+    def remarks(self) -> list[str]:
+        """Return what a reader must know of these rows, a sentence each."""
+        subject, table = self.subject, self.subject.table
+        found, asked = [], subject.runs * len(subject.study.laws)
+        if len(table) < asked:
+            found.append(
+                f"The campaign is not finished: {len(table)} of {asked} flights have been flown; "
+                "all numbers are of these."
+            )
+        counts = table["outcome"].value_counts()
+        foreign = [f"{counts[o]} {o}" for o in ("killed", "out_of_time", "refused") if o in counts]
+        if foreign:
+            found.append(
+                f"Of the flights that did not come to their end {', '.join(foreign)}: they count "
+                "as failures, though the law may be without blame."
+            )
+        if not ended(table).any():
+            found.append("No flight came to its end, so there are no metrics.")
+        if (design := subject.study.design) != "independent":
+            found.append(
+                f"The runs are of the design {design}, not independent of one another: verdicts "
+                "and intervals, which take them for independent, are approximate."
+                + " They are of its points A and B."
+                * (design == SALTELLI)
+            )
+        return found

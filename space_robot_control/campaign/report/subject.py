@@ -1,0 +1,43 @@
+"""What a report is about: a campaign's file, rows and software."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import yaml
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from ..study import Study
+
+
+@dataclass(frozen=True)
+class Subject:
+    """The campaign that a report is about."""
+
+    folder: Path
+    """As the user wrote it, for the commands that are shown."""
+    study: Study
+    seed: int
+    runs: int
+    """That were asked for."""
+    table: DataFrame
+    """The rows that there are."""
+    about: Mapping[str, str] = field(default_factory=dict)
+    """Versions and the like, by what they are of."""
+
+    @property
+    def text(self) -> str:
+        """Return the campaign's file, as it was checked."""
+        content = self.study.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+        return yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110)
+
+    @property
+    def time_s(self) -> float:
+        """Return how long the flights are that came to their end, s; 0 if none did."""
+        complete = self.table.loc[self.table["outcome"] == "complete", "ended_at_s"]
+        return float(complete.max()) if len(complete) else 0.0
