@@ -1,0 +1,112 @@
+"""Campaigns from Python: a file, and what comes of flying it.
+
+found = Campaign.load("my.yaml").run(runs=10_000, seed=7, out="campaigns/a")
+found.table, found.verdicts, found.rerun(4711).log
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import yaml
+
+from space_robot_msgs_py.config.yaml_text import read_file
+
+from ..runner import cores
+from ..store.folder import JOURNAL, TABLE, begin_or_resume, held_folder
+from ..store.journal import Journal
+from ..store.schema import Schema
+from ..store.table import check_tables, file_digest, write_table
+from ..study import Study, read_study
+from .bags import fly_bags
+from .flights import Flights, Progress
+from .flown_campaign import FlownCampaign
+from .preparation import Preparation
+
+WRITTEN = "table"
+"""Note of the journal: runs and rows of the table, and the digest of its bytes."""
+
+
+class Campaign:
+    """Many flights of what a study varies, under each of its laws."""
+
+    def __init__(self, study: Study) -> None:
+        """Take a study; what it names is looked up by `run`."""
+        self.study = study
+        self._text = ""
+
+    @classmethod
+    def load(cls, path: str | Path) -> Campaign:
+        """Read a campaign's file, by its path or by a name of ``config/campaigns``.
+
+        Raises:
+            InputError: in one line, naming file and key.
+        """
+        found = cls(read_study(path))
+        found._text = read_file(Path(found.study.where))
+        return found
+
+    def run(
+        self,
+        runs: int | None = None,
+        seed: int = 0,
+        out: str | Path | None = None,
+        workers: int | None = None,
+        scheduler: str | None = None,
+        timeout_s: float | None = None,
+        progress: Callable[[Progress], object] | None = None,
+    ) -> FlownCampaign:
+        """Fly the campaign, or what is left of it, to its table.
+
+        What is in the table depends on file, seed, runs and software alone: not on workers, nor on
+        how often it was interrupted. Ctrl-C (KeyboardInterrupt) leaves the table of what is done.
+
+        Args:
+            runs: draws of all that is varied, each flown by every law; None: as the file says.
+            seed: of all draws.
+            out: the campaign's folder; the same one again resumes. None: a temporary one, which
+                lasts as long as what is returned.
+            workers: processes that fly; 0: this one; None: one a processor.
+            scheduler: address of a Dask scheduler whose workers fly instead.
+            timeout_s: longest wall-clock time of a flight; its row says ``out_of_time`` then.
+            progress: called at the beginning and after each flight.
+
+        Raises:
+            InputError: something cannot be flown; the folder holds something else; disk full.
+        """
+        check_tables()
+        asked = Preparation.of(self.study, seed, runs)
+        manifest = asked.manifest
+        temporary = None if out is not None else TemporaryDirectory(prefix="space-robot-campaign-")
+        folder = Path(temporary.name if temporary else str(out))
+        with held_folder(folder):
+            begin_or_resume(folder, manifest, self._text or as_yaml(self.study))
+            with Journal(folder / JOURNAL, self.study.laws) as journal:
+                flights = Flights(asked.flyer, asked.runs, journal)
+                processes = cores() if workers is None else workers
+                options = {"workers": processes, "scheduler": scheduler, "timeout_s": timeout_s}
+                try:
+                    if not flights.are_complete:
+                        asked.compile()
+                        flights.fly(progress or (lambda told: None), options)
+                finally:  # whatever ended it: the rows that there are have their table
+                    runs_of_table = flights.precision.stop
+                    _write(folder, journal, manifest.table, runs_of_table)
+                fly_bags(folder, asked.flyer, journal, runs_of_table, processes)
+        return FlownCampaign(folder, temporary, flights.kept)
+
+
+def as_yaml(study: Study) -> str:
+    """Write a study as a campaign's file."""
+    content = study.model_dump(by_alias=True, exclude_defaults=True)
+    return yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+
+
+def _write(folder: Path, journal: Journal, schema: Schema, runs: int) -> None:
+    """Write the table of the first ``runs`` runs, unless it is there."""
+    digest = file_digest(folder / TABLE)
+    if not digest or journal.note(WRITTEN) != f"{runs} {journal.count(runs)} {digest}":
+        digest = write_table(folder / TABLE, schema, journal.rows(runs))
+        journal.make_note(WRITTEN, f"{runs} {journal.count(runs)} {digest}")

@@ -1,0 +1,115 @@
+"""One run of a campaign under one law, flown in this process to its row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import closing
+from dataclasses import dataclass
+from functools import lru_cache
+
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import FlightError, InputError
+
+from ...flight.ending import FAILED, Ending
+from ...flight.plan import Flight
+from ...flight.simulate import fly_blocks
+from ..draws import Draws
+from ..study import Study
+from .measure import Measure
+from .row import REFUSED, Row, Task, Value, one_line_of
+
+
+@dataclass(frozen=True)
+class RowFlyer:
+    """Flies any task of a campaign; it can be sent to other processes, and on to other machines."""
+
+    text: str
+    """Of the study, as JSON: so a flyer is small, and two that are equal share their draws."""
+    where: str
+    """The study's file, for errors."""
+    seed: int
+    runs: int
+    """Of the design."""
+
+    @classmethod
+    def of(cls, study: Study, seed: int, runs: int) -> RowFlyer:
+        """Return the flyer of a campaign."""
+        return cls(study.model_dump_json(by_alias=True), study.where, seed, runs)
+
+    @property
+    def study(self) -> Study:
+        """What the campaign is to fly."""
+        return _loaded(self)[0]
+
+    @property
+    def draws(self) -> Draws:
+        """The campaign's draws, made once a process.
+
+        Raises:
+            InputError: a variable that there is not; names its key.
+        """
+        return _loaded(self)[1]
+
+    def __call__(self, task: Task) -> Row:
+        """Fly a task; whatever happens, a row comes of it.
+
+        Args:
+            task: run and law.
+        """
+        vary: dict[str, Value] = {}
+        try:
+            vary = self.draws.values(task.run)
+            return self.row_of(task, vary, self.draws.scenario(task.run, task.law).check())
+        except InputError as error:
+            return Row(task, REFUSED, str(error), vary=vary).digested()
+        except Exception as error:  # a mistake in someone's law must not end a campaign
+            return Row(task, FAILED, one_line_of(error), vary=vary).digested()
+
+    def row_of(self, task: Task, vary: dict[str, Value], flight: Flight) -> Row:
+        """Fly a flight in the memory of one block."""
+        ending = Ending.complete(flight.ticks, flight.period)
+        measure = Measure(flight, self.study.require)
+        with closing(fly_blocks(flight)) as blocks:
+            try:
+                for block in blocks:
+                    measure.add(block)
+            except FlightError as error:
+                ending = Ending.early(error, flight.period)
+        return _row(task, vary, flight, ending, measure)
+
+    def row_of_log(
+        self, task: Task, flight: Flight, ending: Ending, blocks: Iterable[FlightLog]
+    ) -> Row:
+        """Return the row of a flight that has been flown, with the same bits.
+
+        Args:
+            task: run and law.
+            flight: its plant stands where the flight ended.
+            ending: of it.
+            blocks: of its log, as `blocks_of` cuts it.
+        """
+        measure = Measure(flight, self.study.require)
+        if ending.error is None:
+            for block in blocks:
+                measure.add(block)
+        return _row(task, self.draws.values(task.run), flight, ending, measure)
+
+
+def _row(
+    task: Task, vary: dict[str, Value], flight: Flight, ending: Ending, measure: Measure
+) -> Row:
+    state = flight.plant.truth.block.tobytes()
+    if ending.error is not None:
+        found = Row(task, ending.outcome, ending.reason, ending.ended_at_s, vary)
+    else:
+        found = Row(
+            task, ending.outcome, "", ending.ended_at_s, vary,
+            measure.metrics(), measure.require(), measure.bands(),
+        )  # fmt: skip
+    return found.digested(state)
+
+
+@lru_cache(maxsize=4)
+def _loaded(flyer: RowFlyer) -> tuple[Study, Draws]:
+    study = Study.model_validate_json(flyer.text).named(flyer.where)
+    return study, Draws(study, flyer.seed, flyer.runs)

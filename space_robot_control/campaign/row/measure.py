@@ -1,0 +1,88 @@
+"""The blocks of one flight to all numbers of its row; nothing else is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import InputError
+
+from ...analysis.metrics import tracking_error
+from ...flight.plan import Flight
+from ..study import Requirement
+from .bands import Bands
+from .columns import Columns
+from .window import Window, WindowMetrics
+
+
+class Measure:
+    """Sums up a flight block by block: its metrics, its requirements' metrics and its bands."""
+
+    def __init__(self, flight: Flight, require: Mapping[str, Requirement]) -> None:
+        """Take the flight, which need not have been flown, and the requirements by name."""
+        self._robot, columns = flight.robot, Columns.of_flight(flight)
+        self._columns = columns
+        self._whole = WindowMetrics(Window(), columns.metrics, columns)
+        self._require = {
+            name: WindowMetrics(_window(demand), [demand.metric], columns)
+            for name, demand in require.items()
+            if not _is_whole(demand)
+        }
+        self._same = {name: demand.metric for name, demand in require.items() if _is_whole(demand)}
+        self._bands = Bands(flight.ticks)
+
+    def add(self, block: FlightLog) -> None:
+        """Take the next block of the flight."""
+        error = tracking_error(block)
+        sizes = self._columns.sizes(block, error)
+        self._bands.add(block.first_tick, sizes)
+        for metrics in (self._whole, *self._require.values()):
+            metrics.add(block, error, sizes, self._robot)
+
+    def metrics(self) -> dict[str, float]:
+        """Return the metrics of the whole flight that there are, by name."""
+        return self._whole.result()
+
+    def require(self) -> dict[str, float]:
+        """Return the metric of each requirement in its window, by the requirement's name."""
+        whole = self.metrics()
+        found = {name: whole.get(metric) for name, metric in self._same.items()}
+        for name, window in self._require.items():
+            found[name] = next(iter(window.result().values()), None)
+        return {name: value for name, value in found.items() if value is not None}
+
+    def bands(self) -> dict[str, NDArray[np.float32]]:
+        """Return the bands of each column over time."""
+        return self._bands.result()
+
+
+def check_requirements(flight: Flight, require: Mapping[str, Requirement], where: str) -> None:
+    """See that a flight has what is required of it.
+
+    Args:
+        flight: the nominal one.
+        require: the requirements by name.
+        where: the file, for errors.
+
+    Raises:
+        InputError: a metric that there is not, or a window that begins after the flight.
+    """
+    columns, end = Columns.of_flight(flight), flight.ticks * flight.period
+    for name, demand in require.items():
+        columns.check(demand.metric, f"{where}: require.{name}.metric")
+        if demand.from_s >= end:
+            raise InputError(
+                f"{where}: require.{name}.from_s: must be before the end of the flight "
+                f"({end:g} s), got {demand.from_s:g}"
+            )
+
+
+def _window(demand: Requirement) -> Window:
+    return Window(demand.from_s, demand.to_s)
+
+
+def _is_whole(demand: Requirement) -> bool:
+    return _window(demand) == Window()

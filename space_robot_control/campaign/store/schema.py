@@ -1,0 +1,47 @@
+"""The columns of a campaign's table, in their order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from space_robot_msgs_py.config.validation import StrictModel
+
+from ..row.row import Row
+
+Kind = Literal["int64", "float64", "str", "float32s"]
+
+
+class Schema(StrictModel):
+    """What the table of a campaign has columns for."""
+
+    vary: dict[str, Literal["float64", "str"]]
+    """The kind of each variable."""
+    metrics: list[str]
+    require: list[str]
+    bands: list[str]
+    bins: Annotated[int, Field(ge=1)]
+    """Of a band; a row without one has a null for it."""
+
+    def columns(self) -> Iterator[tuple[str, Kind]]:
+        """Yield name and kind of each column."""
+        yield from (("run", "int64"), ("law", "str"), ("outcome", "str"), ("reason", "str"))
+        yield "ended_at_s", "float64"
+        yield from ((f"vary.{name}", kind) for name, kind in self.vary.items())
+        yield from ((f"metric.{name}", "float64") for name in self.metrics)
+        yield from ((f"require.{name}", "float64") for name in self.require)
+        yield from ((f"band.{name}", "float32s") for name in self.bands)
+        yield "digest", "str"
+
+    def values(self, row: Row) -> Iterator[Any]:
+        """Yield a row's value of each column; None where there is none."""
+        yield from (row.task.run, row.task.law, row.outcome, row.reason, row.ended_at_s)
+        for name, kind in self.vary.items():
+            value = row.vary.get(name)
+            yield str(value) if kind == "str" and value is not None else value
+        yield from (row.metrics.get(name) for name in self.metrics)
+        yield from (row.require.get(name) for name in self.require)
+        yield from (row.bands.get(name) for name in self.bands)
+        yield row.digest
