@@ -36,6 +36,7 @@ def cli() -> None:
       space-robot analyze flights/<bag>...          metrics of recorded flights
       space-robot replay flights/<bag>              its states to a live controller, compared
       space-robot sweep --navigation filtered       laws over grades of sensors
+      space-robot campaign run FILE --runs 1000     all is dispersed: verdicts with confidence
       space-robot reproduce                         the paper's Table V and figures, flown again
       space-robot soak --minutes 5                  random flights with faults
     """

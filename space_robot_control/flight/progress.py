@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.text import Text
 
 from .terminal import say, terminal
 
@@ -47,7 +56,40 @@ def counting_progress(what: str) -> Iterator[Callable[[int], Callable[[], None]]
         yield begin
 
 
-def _bar(done: str, *more: TextColumn) -> Progress:
+@contextmanager
+def rated_progress(what: str) -> Iterator[Callable[[int, int, str], None]]:
+    """A progress line with rate and time left, for many things of which some may be done before.
+
+    It begins when it is first called: with how many are done, how many there are, and a remark.
+    """
+    with ExitStack() as stack:
+        progress: Progress | None = None
+
+        def show(done: int, total: int, remark: str) -> None:
+            nonlocal progress
+            if progress is None:
+                told = TextColumn("{task.fields[remark]}", markup=False)
+                counts = "{task.completed:.0f}/{task.total:.0f}"
+                progress = stack.enter_context(
+                    _bar(counts, _Rate(), TimeRemainingColumn(compact=True), told)
+                )
+                progress.add_task(what, completed=done, total=total, remark=remark)
+            else:
+                progress.update(progress.task_ids[0], completed=done, total=total, remark=remark)
+
+        yield show
+
+
+class _Rate(ProgressColumn):
+    """How many are done a second, of late."""
+
+    def render(self, task: Task) -> Text:
+        """Return what the column shows."""
+        speed = task.finished_speed or task.speed
+        return Text(f"{speed:.3g}/s" if speed else "")
+
+
+def _bar(done: str, *more: ProgressColumn) -> Progress:
     """Make a line with a bar; ``done`` beside it tells how far things are."""
     return Progress(
         TextColumn("{task.description}", markup=False), BarColumn(bar_width=24), TextColumn(done),

@@ -92,8 +92,9 @@ class Flights:
 
     def _unflown(self, task: Task, error: Exception | None) -> Row:
         """Return the row of a flight whose process brought none."""
-        outcomes = {WorkerDiedError: KILLED, OutOfTimeError: OUT_OF_TIME}
-        outcome = outcomes.get(type(error), FAILED)
+        outcome = FAILED
+        if isinstance(error, (WorkerDiedError, OutOfTimeError)):
+            outcome = KILLED if isinstance(error, WorkerDiedError) else OUT_OF_TIME
         reason = one_line_of(error) if outcome == FAILED and error else str(error)
         return Row(task, outcome, reason, vary=self._flyer.draws.values(task.run))
 
