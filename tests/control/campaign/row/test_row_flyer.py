@@ -54,10 +54,13 @@ def test_a_draw_that_makes_no_flight_is_refused(monkeypatch: pytest.MonkeyPatch)
     def refuse(self: Scenario) -> None:
         raise InputError("no such robot")
 
+    flying = flyer()
+    values = flying.draws.values(1)
     monkeypatch.setattr(Scenario, "check", refuse)
-    row = RowFlyer.of(flyer().study, 4, 5)
-    with_draws = row(TASK)
-    assert (with_draws.outcome, with_draws.reason) == ("refused", "no such robot")
+    row = flying(TASK)
+    assert row.outcome == "refused"
+    assert "no such robot" in row.reason
+    assert row.vary == values
 
 
 def test_a_mistake_in_the_code_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
