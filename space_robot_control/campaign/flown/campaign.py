@@ -26,7 +26,7 @@ from .flown_campaign import FlownCampaign
 from .preparation import Preparation
 
 WRITTEN = "table"
-"""Note of the journal: runs and rows of the table, and the digest of its bytes."""
+"""Note of the journal: the runs in the table and the digest of its bytes; none while it flies."""
 
 
 class Campaign:
@@ -90,6 +90,7 @@ class Campaign:
                 try:
                     if not flights.are_complete:
                         asked.compile()
+                        journal.make_note(WRITTEN, "")  # until it has the rows to come
                         flights.fly(progress or (lambda told: None), options)
                 finally:  # whatever ended it: the rows that there are have their table
                     runs_of_table = flights.precision.stop
@@ -107,6 +108,6 @@ def as_yaml(study: Study) -> str:
 def _write(folder: Path, journal: Journal, schema: Schema, runs: int) -> None:
     """Write the table of the first ``runs`` runs, unless it is there."""
     digest = file_digest(folder / TABLE)
-    if not digest or journal.note(WRITTEN) != f"{runs} {journal.count(runs)} {digest}":
+    if not digest or journal.note(WRITTEN) != f"{runs} {digest}":
         digest = write_table(folder / TABLE, schema, journal.rows(runs))
-        journal.make_note(WRITTEN, f"{runs} {journal.count(runs)} {digest}")
+        journal.make_note(WRITTEN, f"{runs} {digest}")

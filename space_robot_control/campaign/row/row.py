@@ -31,7 +31,7 @@ class Task(NamedTuple):
     """As the campaign's file has it: ``LAW`` or ``LAW=GAINS``."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Row:
     """What came of a flight; what there is not is left out of the mappings."""
 

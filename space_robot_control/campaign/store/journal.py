@@ -78,12 +78,6 @@ class Journal:
             for run, law, outcome, numbers, bands in found:
                 yield _row(Task(run, self._laws[law]), outcome, numbers, bands)
 
-    def count(self, runs: int) -> int:
-        """Count the rows of the runs before ``runs``."""
-        with self._told():
-            query = "SELECT count(*) FROM rows WHERE run < ?"
-            return int(self._database.execute(query, (runs,)).fetchone()[0])
-
     def note(self, name: str) -> str:
         """Return a note; empty if there is none of that name."""
         with self._told():

@@ -126,7 +126,7 @@ def test_any_row_flies_again_to_the_same_bits(undisturbed: FlownCampaign) -> Non
         again = FlownCampaign.open(undisturbed.folder).rerun(11, law)
         assert again.is_same, again.verdict
         assert again.log.ticks == 400
-    with pytest.raises(InputError, match="run 20: .* has no row of it"):
+    with pytest.raises(InputError, match=r"run 20: .* has no row of it"):
         undisturbed.rerun(20)
     with pytest.raises(InputError, match="unknown law 'tde': choose one of tde_stc, ctc=tuned"):
         undisturbed.rerun(0, "tde")

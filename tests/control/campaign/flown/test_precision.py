@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binomtest
 
@@ -21,6 +21,7 @@ def study(half_width: float) -> Study:
     })  # fmt: skip
 
 
+@settings(max_examples=20)
 @given(
     st.lists(st.booleans(), min_size=2 * RUNS, max_size=2 * RUNS),
     st.sampled_from([0.05, 0.08, 0.12]),

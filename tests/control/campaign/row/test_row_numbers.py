@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -85,11 +87,11 @@ def test_bins_do_not_depend_on_blocks(case: tuple[int, list[int]]) -> None:
     ticks, cuts = case
     sizes = np.random.default_rng(ticks).random(ticks)
     bands, edges = Bands(ticks), [0, *sorted(cuts), ticks]
-    for start, stop in zip(edges, edges[1:], strict=False):
+    for start, stop in pairwise(edges):
         bands.add(start, {"x": sizes[start:stop]})
     count = min(100, ticks)
     starts = [k * ticks // count for k in range(count + 1)]
-    expected = [sizes[a:b].max() for a, b in zip(starts, starts[1:], strict=False)]
+    expected = [sizes[a:b].max() for a, b in pairwise(starts)]
     np.testing.assert_array_equal(bands.result()["x"], np.float32(expected))
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from space_robot_control.campaign.row.row import Row, Task
@@ -40,7 +40,8 @@ def rows(draw: st.DrawFn) -> Row:
     ).digested()  # fmt: skip
 
 
-@given(st.lists(rows(), max_size=12), st.randoms(use_true_random=False))
+@settings(max_examples=25)
+@given(st.lists(rows(), max_size=8), st.randoms(use_true_random=False))
 def test_order_of_arrival_leaves_no_trace(
     tmp_path_factory: pytest.TempPathFactory, found: list[Row], random: object
 ) -> None:
@@ -52,18 +53,18 @@ def test_order_of_arrival_leaves_no_trace(
         kept = list(journal.rows(100))
         write_table(folder / "one", SCHEMA, kept)
     random.shuffle(unique)  # type: ignore[attr-defined]
-    for row in unique:  # opened anew for each
+    for row in unique[::2]:
         with Journal(folder / "two.db", LAWS) as journal:
             journal.add(row)
     with Journal(folder / "two.db", LAWS) as journal:
+        for row in unique[1::2]:
+            journal.add(row)
         write_table(folder / "two", SCHEMA, journal.rows(100))
     assert (folder / "one").read_bytes() == (folder / "two").read_bytes()
     expected = sorted(unique, key=lambda row: (row.task.run, LAWS.index(row.task.law)))
     assert [row.task for row in kept] == [row.task for row in expected]
     for ours, theirs in zip(kept, expected, strict=True):
-        assert ours.digested() == theirs.digested() or ours.digest == theirs.digest
-        assert ours.vary == theirs.vary
-        assert ours.ended_at_s == theirs.ended_at_s
+        assert ours.digest == ours.digested().digest == theirs.digest
 
 
 def test_a_table_has_every_column_and_nulls_for_what_is_not_there(tmp_path: Path) -> None:
@@ -104,7 +105,7 @@ def test_a_row_half_written_is_no_row(tmp_path: Path) -> None:
 
 def test_what_is_no_journal_is_told_in_a_line(tmp_path: Path) -> None:
     (tmp_path / "journal.db").write_text("no database at all" * 100)
-    with pytest.raises(InputError, match="journal.db: file is not a database"):
+    with pytest.raises(InputError, match=r"journal\.db: file is not a database"):
         Journal(tmp_path / "journal.db", LAWS)
 
 
@@ -182,9 +183,9 @@ def test_one_process_at_a_time(tmp_path: Path) -> None:
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("x")
-    with pytest.raises(InputError, match="but thesis.tex, so it holds something else"):
-        with held_folder(tmp_path):
-            pass
+    said = r"but thesis\.tex, so it holds something else"
+    with pytest.raises(InputError, match=said), held_folder(tmp_path):
+        pass
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
@@ -196,5 +197,3 @@ def test_a_begin_that_was_killed_is_begun_again(tmp_path: Path) -> None:
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {".lock", "campaign.yaml", "campaign.json"}
     assert (tmp_path / "campaign.yaml").read_text() == "text"
-
-
