@@ -14,14 +14,14 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, PlainValidator
 
-from space_robot_msgs_py.config.files import GIVEN
+from space_robot_msgs_py.config.files import GIVEN, is_named
 from space_robot_msgs_py.config.trees import Tree, nest
 from space_robot_msgs_py.config.validation import StrictModel, validate
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.events import Capture, Release
 from space_robot_sim.robot import Robot
-from space_robot_sim.robot.find import robot_as_path, robot_names
+from space_robot_sim.robot.find import ROBOTS, robot_as_path
 from space_robot_sim.sensors.sensors import SensorSettings
 
 from ..controller.plain_laws import law_of
@@ -116,7 +116,7 @@ def robot_setting(robot: str | Robot) -> str:
     """
     if isinstance(robot, str):
         return robot_as_path(robot)
-    return robot.name if robot.name in robot_names() else GIVEN
+    return robot.name if is_named(ROBOTS, robot.name) else GIVEN
 
 
 def law_given(law: Any) -> str | type[ControlLaw] | ControlLaw | None:

@@ -42,13 +42,18 @@ def named_file(kind: str, name: str) -> Path:
         check_file(path)
         return path
     folder = config_directory() / kind
-    names = sorted(file.stem for file in folder.glob("*.yaml"))
-    if name not in names:
+    if not is_named(kind, name):
+        names = sorted(file.stem for file in folder.glob("*.yaml"))
         raise InputError(
             f"unknown {kind.rstrip('s')} {short(name)}: choose one of {', '.join(names)}, "
             "or a path to a .yaml file"
         )
     return folder / f"{name}.yaml"
+
+
+def is_named(kind: str, name: str) -> bool:
+    """Tell whether there is ``config/<kind>/<name>.yaml``."""
+    return "/" not in name and (config_directory() / kind / f"{name}.yaml").is_file()
 
 
 def named_layers(kind: str, name: str) -> list[Path]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Iterable
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 
@@ -35,20 +37,30 @@ class StrictModel(BaseModel):
 Schema = TypeVar("Schema", bound=BaseModel)
 
 
+MOST_KEPT = 100_000
+"""Characters of a text whose content is kept."""
+
+
 def read_yaml(path: Path) -> dict[str, Any]:
-    """Read the mapping in a YAML file.
+    """Read the mapping in a YAML file; the caller may change it.
 
     Raises:
         InputError: the file is missing, unreadable, no file, not YAML, or not a mapping.
     """
     text = read_file(path)
     try:
-        content = parse_yaml(text)
+        content = pickle.loads(_pickled(text)) if len(text) <= MOST_KEPT else parse_yaml(text)
     except YamlTextError as error:
         raise InputError(f"{path}: {error}") from None
     if not isinstance(content, dict):
         raise InputError(f"{path}: a mapping was expected, got {type(content).__name__}")
     return content
+
+
+@lru_cache(maxsize=128)
+def _pickled(text: str) -> bytes:
+    """Parse a text once: flight after flight reads the same files, and parsing is slow."""
+    return pickle.dumps(parse_yaml(text))
 
 
 def validate(schema: type[Schema], content: Any, where: str) -> Schema:
@@ -83,13 +95,15 @@ def one_line(error: ValidationError, schema: type[BaseModel], where: str) -> str
 
 
 def _allowed_keys(schema: Any, location: tuple[int | str, ...]) -> list[str]:
-    """Return the names of the fields of the model at a location within ``schema``."""
+    """Return the names, in files, of the fields of the model at a location within ``schema``."""
     for step in location:
-        if isinstance(step, str):
+        if hasattr(schema, "model_fields"):
             schema = schema.model_fields[step].annotation
-        while not hasattr(schema, "model_fields"):  # Annotated, list
+        else:  # an item of a list, a value of a mapping
+            schema = get_args(schema)[-1]
+        while get_origin(schema) not in (None, list, dict):  # Annotated, a union with None
             schema = get_args(schema)[0]
-    return sorted(schema.model_fields)
+    return sorted(field.alias or name for name, field in schema.model_fields.items())
 
 
 def short(value: Any) -> str:

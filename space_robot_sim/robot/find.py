@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from space_robot_msgs_py.config.files import GIVEN, config_directory, named_file
+from space_robot_msgs_py.config.files import GIVEN, config_directory, is_named, named_file
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.config.yaml_text import check_file, is_folder
 from space_robot_msgs_py.errors import InputError
@@ -28,6 +28,8 @@ from .choice import split_choice
 from .robot import Robot
 from .source import URDF, YAML, RobotSource, read_robot_file
 
+ROBOTS = "robots"
+"""The folder of the shipped robots in the config folder."""
 OWN = "robot"
 """Name, less its ending, of the robot's file in a folder of its own."""
 OWN_MISSION, OWN_GAINS = "mission.yaml", "gains"
@@ -48,7 +50,7 @@ class RobotFiles:
 
 def robot_names() -> list[str]:
     """Return the names of the shipped robots."""
-    return sorted(file.stem for file in (config_directory() / "robots").glob("*.yaml"))
+    return sorted(file.stem for file in (config_directory() / ROBOTS).glob("*.yaml"))
 
 
 def robot_files(robot: str) -> RobotFiles:
@@ -66,12 +68,12 @@ def robot_files(robot: str) -> RobotFiles:
         return _own_folder(path) if path.stem == OWN else _in_config(path)
     if "/" in robot:
         return _own_folder(_file_of(path))
-    if robot not in (names := robot_names()):
+    if not is_named(ROBOTS, robot):
         raise InputError(
-            f"unknown robot {short(robot)}: choose one of {', '.join(names)}, or a path to a "
-            ".yaml or .urdf file or to a folder"
+            f"unknown robot {short(robot)}: choose one of {', '.join(robot_names())}, or a path "
+            "to a .yaml or .urdf file or to a folder"
         )
-    return _in_config(config_directory() / "robots" / f"{robot}.yaml")
+    return _in_config(config_directory() / ROBOTS / f"{robot}.yaml")
 
 
 def find_robot(robot: str, base: str | None = None, repair: bool = False) -> Robot:
@@ -146,7 +148,7 @@ def robot_as_path(robot: str) -> str:
     Not for names out of bags: these open no folder of the user's.
     """
     name = split_choice(robot).name
-    if not name or "/" in name or name.endswith((*YAML, *URDF)) or robot in robot_names():
+    if not name or "/" in name or name.endswith((*YAML, *URDF)) or is_named(ROBOTS, robot):
         return robot
     return f"{robot}/" if is_folder(Path(robot)) else robot
 

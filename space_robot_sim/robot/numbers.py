@@ -6,6 +6,7 @@ So bags keep a robot that no file tells. Who writes a robot by hand has a file's
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
@@ -54,30 +55,6 @@ class BodyNumbers(StrictModel):
     joint: JointNumbers | None
     tools: list[ToolNumbers]
 
-    @classmethod
-    def of(cls, body: Body) -> BodyNumbers:
-        """Take those of a body."""
-        joint = body.joint and {
-            "name": body.joint.name,
-            "kind": body.joint.kind,
-            "rotation": body.joint.rotation.tolist(),
-            "offset": body.joint.offset.tolist(),
-            "limits": _known(body.joint.limits),
-            "friction": _known(body.joint.friction),
-            "spring": body.joint.spring and list(body.joint.spring),
-        }
-        tools = [
-            {
-                "name": t.name, "rotation": t.rotation.tolist(), "position": t.position.tolist(),
-                "rank": t.rank,
-            }
-            for t in body.tools
-        ]  # fmt: skip
-        return cls.model_validate({
-            "name": body.name, "mass": body.mass, "inertia": body.inertia.tolist(),
-            "com": body.com.tolist(), "parent": body.parent, "joint": joint, "tools": tools,
-        })  # fmt: skip
-
     @property
     def body(self) -> Body:
         """The body that they are of."""
@@ -119,13 +96,36 @@ def are_numbers(content: dict[str, Any]) -> bool:
 
 
 def numbers_of(name: str, bodies: Sequence[Body]) -> dict[str, Any]:
-    """Return the mapping of a robot's own numbers."""
-    found = [BodyNumbers.of(body) for body in bodies]
-    return Document(robot=RobotNumbers(name=name, bodies=found)).model_dump()
+    """Return the mapping of a robot's own numbers, as `Document` has it."""
+    return {"robot": {"name": name, "bodies": [_body_numbers(body) for body in bodies]}}
+
+
+def _body_numbers(body: Body) -> dict[str, Any]:
+    """Return those of a body, without a check: that costs more than a short flight's set-up."""
+    joint = body.joint and {
+        "name": body.joint.name,
+        "kind": body.joint.kind,
+        "rotation": body.joint.rotation.tolist(),
+        "offset": body.joint.offset.tolist(),
+        "limits": _known(body.joint.limits),
+        "friction": _known(body.joint.friction),
+        "spring": [float(v) for v in body.joint.spring] if body.joint.spring else None,
+    }
+    tools = [
+        {
+            "name": t.name, "rotation": t.rotation.tolist(), "position": t.position.tolist(),
+            "rank": t.rank,
+        }
+        for t in body.tools
+    ]  # fmt: skip
+    return {
+        "name": body.name, "mass": float(body.mass), "inertia": body.inertia.tolist(),
+        "com": body.com.tolist(), "parent": body.parent, "joint": joint, "tools": tools,
+    }  # fmt: skip
 
 
 def _known(row: Sequence[float]) -> list[float | None]:
-    return [value if np.isfinite(value) else None for value in row]
+    return [float(value) if math.isfinite(value) else None for value in row]
 
 
 def _or(row: list[float | None], default: Sequence[float]) -> list[float]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from space_robot_msgs_py.config.validation import read_yaml
-from space_robot_msgs_py.config.yaml_text import read_file
+from space_robot_msgs_py.config.yaml_text import parse_yaml, read_file
 from space_robot_msgs_py.errors import InputError
 
 from .document import document_of
@@ -35,7 +36,7 @@ class RobotSource:
     findings: tuple[str, ...] = ()
     """Defects of a URDF that were repaired."""
 
-    @property
+    @cached_property
     def robot(self) -> Robot:
         """The robot, built of `content` whatever the file: a bag that tells that tells this one."""
         robot = Robot.from_dict(self.content, where=self.where)
@@ -59,9 +60,15 @@ def read_robot_file(file: Path, base: str | None = None, repair: bool = False) -
         raise InputError(f"{file}: no URDF, so there is no base to choose and nothing to repair")
     content = read_yaml(file)
     if not is_urdf(content):
-        return RobotSource(str(file), content, read_file(file))
+        return _of_yaml(str(file), read_file(file))
     robot = Robot.from_yaml(file)
     return _of_robot(robot, file, f"From {file.name} and the URDF that it names.")
+
+
+@lru_cache(maxsize=16)
+def _of_yaml(where: str, text: str) -> RobotSource:
+    """Flight after flight flies the same robots: each is built once."""
+    return RobotSource(where, parse_yaml(text), text)
 
 
 def _of_urdf(file: Path, base: str | None, repair: bool) -> RobotSource:

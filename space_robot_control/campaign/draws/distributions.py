@@ -12,13 +12,17 @@ from typing_extensions import Self
 
 from space_robot_msgs_py.config.validation import StrictModel, short, validate
 from space_robot_msgs_py.errors import InputError
-
-from .quantiles import exp, log, normal_probability, normal_quantile
+from space_robot_sim.elementary.exponential import exp, log
+from space_robot_sim.elementary.normal import normal_cdf, quantile
 
 Value = float | int | str | bool
 """What is drawn; a whole number is one only out of a list."""
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 Values = Annotated[list[bool | int | float | str], Field(min_length=1, max_length=100_000)]
+
+
+LEAST_SHARE = 2.0**-1000
+"""Below it a normal number is not asked for."""
 
 
 class Distribution(StrictModel):
@@ -85,7 +89,7 @@ class Normal(Distribution):
     @cached_property
     def _probabilities(self) -> tuple[float, float]:
         low, high = (
-            otherwise if bound is None else normal_probability((bound - self.normal) / self.sigma)
+            otherwise if bound is None else normal_cdf((bound - self.normal) / self.sigma)
             for bound, otherwise in ((self.low, 0.0), (self.high, 1.0))
         )
         return low, high
@@ -93,9 +97,8 @@ class Normal(Distribution):
     def quantile(self, u: float) -> float:
         """See `Distribution`."""
         low, high = self._probabilities
-        value = self.normal + self.sigma * normal_quantile(
-            min(max(low + u * (high - low), 2.0**-1000), 1.0 - 2.0**-53)
-        )
+        share = min(max(low + u * (high - low), LEAST_SHARE), 1.0 - 2.0**-53)
+        value = self.normal + self.sigma * quantile(share)
         value = value if self.low is None else max(value, self.low)
         return value if self.high is None else min(value, self.high)
 

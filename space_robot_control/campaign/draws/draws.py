@@ -184,4 +184,4 @@ def _told(value: Value) -> float | str:
 
 
 def _shown(value: Value) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(_told(value))
+    return str(_told(value)) if isinstance(value, (str, bool)) else f"{value:g}"

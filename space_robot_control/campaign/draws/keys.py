@@ -16,15 +16,10 @@ BITS = 52
 """Random bits of a number from `uniform`; one more makes it the middle of its interval."""
 
 
-def key_of(seed: int, name: str) -> int:
-    """Return the key, 128 bits, of all that is drawn by a name."""
-    digest = blake2b(f"{seed}:{name}".encode(), digest_size=16, person=_PERSON).digest()
-    return int.from_bytes(digest, "little")
-
-
 def bits(seed: int, name: str, number: int) -> int:
-    """Return 64 random bits."""
-    return int(np.random.Philox(key=key_of(seed, name), counter=number).random_raw())
+    """Return 64 random bits: BLAKE2 of what they are a function of."""
+    text = f"{seed}:{number}:{name}".encode()
+    return int.from_bytes(blake2b(text, digest_size=8, person=_PERSON).digest(), "little")
 
 
 def uniform(seed: int, name: str, number: int) -> float:
@@ -45,5 +40,6 @@ def noise_seed(seed: int, number: int) -> int:
 @lru_cache(maxsize=256)
 def permutation(seed: int, name: str, length: int) -> NDArray[np.int64]:
     """Return the numbers 0 to ``length`` - 1 in random order."""
-    raw = np.random.Philox(key=key_of(seed, f"{name}:permutation")).random_raw(length)
+    key = bits(seed, f"{name}:permutation", 0)
+    raw = np.random.Philox(key=key).random_raw(length)  # a counter's cipher: defined bit by bit
     return np.argsort(raw, kind="stable")

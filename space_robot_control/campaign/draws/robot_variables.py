@@ -12,12 +12,12 @@ from pydantic import Field
 
 from space_robot_msgs_py.config.validation import StrictModel, one_of, validate
 from space_robot_msgs_py.errors import InputError
+from space_robot_sim.elementary.exponential import exp
 from space_robot_sim.robot import Robot
 
 from .changes import Changes
 from .distributions import Distribution, Normal, Value, read_distribution
 from .names import Part, chosen
-from .quantiles import exp
 from .variable import Variable
 
 LEAST = 0.01
