@@ -156,5 +156,5 @@ def test_what_was_read_reads_again() -> None:
 
 
 def test_names_of_shipped_campaigns_are_told() -> None:
-    with pytest.raises(InputError, match="unknown campaign 'frist': choose one of .*first"):
+    with pytest.raises(InputError, match=r"unknown campaign 'frist': choose one of .*first"):
         read_study("frist")
