@@ -101,7 +101,9 @@ def as_markdown(title: str, tables: Sequence[Table]) -> str:
         lines.append("|" + "---|" * len(table.columns))
         for group in table.groups:
             lines += ["| " + " | ".join(row) + " |" for row in table.texts(group)]
-        lines += ["", *table.notes]
+        lines.append("")
+        for note in table.notes:
+            lines += [note, ""]
     return "\n".join(lines)
 
 

@@ -21,6 +21,8 @@ INFLUENCES = 3
 """Variables a law."""
 SECOND_INTERVAL = 5
 """The column of the league for which a terminal has no room."""
+PLAIN, PARTIAL = 1, 2
+"""The columns of the sensitivities, for one of which it has."""
 
 
 def print_report(findings: Findings, console: Console) -> None:
@@ -52,8 +54,14 @@ def tables(findings: Findings) -> Iterator[Table]:
     else:
         yield from split(verdict_table(findings))
         yield from split(_without(league_table(findings), SECOND_INTERVAL))
-        yield from split(sensitivity_table(findings, INFLUENCES))
+        yield from split(_without(sensitivity_table(findings, INFLUENCES), _weaker(findings)))
     yield from split(sobol_table(findings.sobol, INFLUENCES))
+
+
+def _weaker(findings: Findings) -> int:
+    """Return which correlations are left out: the plain ones, if there are partial ones."""
+    has_partial = any(i.partial for _, _, s in findings.sensitivities for i in s.influences)
+    return PLAIN if has_partial else PARTIAL
 
 
 def _without(table: Table, place: int) -> Table:
