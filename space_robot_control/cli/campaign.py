@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from .campaign_report import report
 from .options import folder_option
 
 if TYPE_CHECKING:
@@ -21,7 +22,11 @@ def campaign() -> None:
     Examples:
       space-robot campaign run first --runs 200 --seed 7 --out campaigns/a
       space-robot campaign rerun campaigns/a 47 --bag flights/47
+      space-robot campaign report campaigns/a --html a.html
     """
+
+
+campaign.add_command(report)
 
 
 @campaign.command()

@@ -15,18 +15,15 @@ import yaml
 from space_robot_msgs_py.config.yaml_text import read_file
 
 from ..runner import cores
-from ..store.folder import JOURNAL, TABLE, begin_or_resume, held_folder
+from ..store.folder import JOURNAL, begin_or_resume, held_folder
 from ..store.journal import Journal
-from ..store.schema import Schema
-from ..store.table import check_tables, file_digest, write_table
+from ..store.table import check_tables
 from ..study import Study, read_study
 from .bags import fly_bags
+from .current_table import WRITTEN, write_if_older
 from .flights import Flights, Progress
 from .flown_campaign import FlownCampaign
 from .preparation import Preparation
-
-WRITTEN = "table"
-"""Note of the journal: the runs in the table and the digest of its bytes; none while it flies."""
 
 
 class Campaign:
@@ -94,7 +91,7 @@ class Campaign:
                         flights.fly(progress or (lambda told: None), options)
                 finally:  # whatever ended it: the rows that there are have their table
                     runs_of_table = flights.precision.stop
-                    _write(folder, journal, manifest.table, runs_of_table)
+                    write_if_older(folder, journal, manifest.table, runs_of_table)
                 fly_bags(folder, asked.flyer, journal, runs_of_table, processes)
         return FlownCampaign(folder, temporary, flights.kept)
 
@@ -103,11 +100,3 @@ def as_yaml(study: Study) -> str:
     """Write a study as a campaign's file."""
     content = study.model_dump(by_alias=True, exclude_defaults=True)
     return yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
-
-
-def _write(folder: Path, journal: Journal, schema: Schema, runs: int) -> None:
-    """Write the table of the first ``runs`` runs, unless it is there."""
-    digest = file_digest(folder / TABLE)
-    if not digest or journal.note(WRITTEN) != f"{runs} {digest}":
-        digest = write_table(folder / TABLE, schema, journal.rows(runs))
-        journal.make_note(WRITTEN, f"{runs} {digest}")

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import yaml
+
+from space_robot_msgs_py.errors import InputError
+
+from ..flown import FlownCampaign
+from ..flown.current_table import recover_table
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -41,3 +47,23 @@ class Subject:
         """Return how long the flights are that came to their end, s; 0 if none did."""
         complete = self.table.loc[self.table["outcome"] == "complete", "ended_at_s"]
         return float(complete.max()) if len(complete) else 0.0
+
+
+def subject_of(campaign: FlownCampaign) -> Subject:
+    """Return what a report on a campaign is about: all rows that have been flown.
+
+    Raises:
+        InputError: its table cannot be read, or has no row.
+    """
+    with suppress(InputError):  # another process flies it, or it cannot be written: as it is
+        recover_table(campaign.folder, campaign.study)
+    if campaign.table.empty:
+        raise InputError(f"{campaign.folder}: no flight has been flown yet")
+    manifest = campaign.manifest
+    about = {name: text for name, text in manifest.software.items() if text}
+    if manifest.commit:
+        about["commit"] = manifest.commit
+    about |= {f"digest of {name}": digest[:16] for name, digest in manifest.files.items()}
+    return Subject(
+        campaign.folder, campaign.study, campaign.seed, campaign.runs, campaign.table, about
+    )
