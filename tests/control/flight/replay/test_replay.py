@@ -8,6 +8,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.samples import Command
 from space_robot_msgs_py.wire.codecs import CommandCodec
+from space_robot_sim.robot.find import find_robot
 
 pytest.importorskip("rclpy")
 TICKS = 300
@@ -68,6 +70,16 @@ def altered(bag: Path, copy: Path, change: Callable[[str, int, bytes], bytes | N
             recorder.record(topics.BY_NAME[name], changed)
     recorder.close()
     return copy
+
+
+def test_a_plant_that_is_another_robot_in_truth_is_replayed_to_the_same_bits(
+    recorded: Callable[..., Path], play: Callable[..., Replay]
+) -> None:
+    nominal = find_robot("paper")
+    report = play(
+        recorded(controller="ctc", plant_robot=replace(nominal, mass=1.1 * nominal.mass))
+    ).report()
+    assert report["identical"], report["first_difference"]
 
 
 @pytest.mark.parametrize("law", sorted(laws()))
