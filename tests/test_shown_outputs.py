@@ -156,3 +156,13 @@ def test_the_page_on_bases_has_what_its_commands_give() -> None:
                     assert float(text) == pytest.approx(found, rel=0.06)
                 else:
                     assert text.strip() == "-"
+
+
+def test_the_page_on_campaigns_has_what_its_commands_print(tmp_path: Path) -> None:
+    """The shipped campaign of 20 runs, and one of its flights again."""
+    folder = str(tmp_path / "a")
+    printed = run("campaign", "run", "first", "--seed", "7", "--out", folder, "--workers", "0")
+    shown = block("docs/manual/campaigns.md", "20 runs, seed 7", "# the worst")
+    check(shown, printed.replace(folder, "campaigns/a"), "20 runs, seed 7")
+    again = run("campaign", "rerun", folder, "11", "--law", "ctc")
+    assert "same digest as the row: " in again
