@@ -124,5 +124,8 @@ def _medians(findings: Findings, found: League) -> list[str]:
 
 
 def best(found: League) -> str:
-    """Name the laws of rank 1, unless every flight failed."""
-    return ", ".join(s.law for s in found.standings if s.rank == 1 and s.failures < s.runs) or "-"
+    """Name the laws of rank 1 that did not fail in every flight, unless these are all laws."""
+    names = [s.law for s in found.standings if s.rank == 1 and s.failures < s.runs]
+    if len(names) == len(found.standings) > 1:
+        return "not told apart"
+    return ", ".join(names) or "-"
