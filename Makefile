@@ -3,7 +3,8 @@
 PYTHON ?= python3
 VENV := .venv
 PACKAGES := space_robot_control space_robot_msgs_py space_robot_sim
-PYTEST := $(VENV)/bin/python -m pytest --numprocesses 2 --dist loadfile
+# A file's tests run in one process; tests/conftest.py has the files in an order that fills both.
+PYTEST := $(VENV)/bin/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
 # Tests of kernels that are short enough without a compiler.
 INTERPRETED := $(addprefix tests/,sim/dynamics sim/environment sim/robot sim/sensors sim/faults \
   control/laws $(addprefix control/controller/test_,tracking.py time_delay_estimation.py controller.py))
@@ -65,7 +66,7 @@ lint: $(VENV)/.tests
 
 # Else both test processes would begin with it.
 kernels: $(VENV)/.tests
-	$(VENV)/bin/python -c "from space_robot_control.flight.compilation import compile_kernels as c; c()"
+	$(VENV)/bin/python -c "from space_robot_control.flight.compilation import compile_kernels as c; c(True)"
 
 bench: $(VENV)/.tests
 	@$(VENV)/bin/python tests/benchmarks $(ARGS)

@@ -20,7 +20,7 @@ else:
     )
     settings.load_profile("ci")
 
-from flights import Flown, Start, ros_environment, space_robot
+from flights import Flown, Start, ros_environment, space_robot_here
 from paths import CONFIG, TESTS
 
 from space_robot_control.flight.graph.domain import ros_domain
@@ -59,6 +59,7 @@ SLOW = (
     "msgs/bag/test_description_fuzz.py", "test_packaging.py", "test_shown_outputs.py",
 )  # fmt: skip
 """Folders and files whose tests take seconds each."""
+LONG = {"ros", "slow"}
 TIMEOUT_S = 600
 """Of each test, its fixtures included: kernels may have to be compiled first."""
 
@@ -80,13 +81,20 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark by fixture and by folder; limit every test's time."""
+    """Mark by fixture and by folder; limit every test's time; files with long tests come first.
+
+    So the test processes of `make test` share the short ones at the end, and end together.
+    """
     for item in items:
         where = item.path.relative_to(TESTS).as_posix()
         for mark in marks(where, getattr(item, "fixturenames", ())):
             item.add_marker(mark)
         if not item.get_closest_marker("timeout"):
             item.add_marker(pytest.mark.timeout(TIMEOUT_S))
+    long = {
+        item.path for item in items if LONG.intersection(mark.name for mark in item.iter_markers())
+    }
+    items.sort(key=lambda item: item.path not in long)
 
 
 @pytest.fixture(scope="session")
@@ -118,7 +126,7 @@ def fly(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Flown]:
     def run(*options: str) -> Flown:
         if options not in flown:
             bag = tmp_path_factory.mktemp("flights") / "bag"
-            result = space_robot("fly", *options, "--bag", str(bag), "--json")
+            result = space_robot_here("fly", *options, "--bag", str(bag), "--json")
             assert result.returncode == 0, result.stderr
             flown[options] = Flown(json.loads(result.stdout), bag, result.stderr)
         return flown[options]

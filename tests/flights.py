@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import os
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import pytest
 
 from space_robot_msgs_py.ros.process_environment import DEFAULTS
 
@@ -36,6 +40,31 @@ def space_robot(
         [*COMMAND, *arguments], capture_output=True, text=True, timeout=timeout, check=False,
         env=environment,
     )  # fmt: skip
+
+
+def space_robot_here(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run ``space-robot`` in this process: what it starts anew takes seconds of the processor.
+
+    For tests of what a command does. Those of how it starts, ends or is ended use `space_robot`.
+    """
+    from space_robot_control.cli.main import main
+
+    streams = {
+        name: io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for name in ("out", "err")
+    }
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in DEFAULTS.items():
+            patch.setenv(name, os.environ.get(name, value))
+        patch.delenv("ROS_DOMAIN_ID", raising=False)
+        with (
+            redirect_stdout(streams["out"]),
+            redirect_stderr(streams["err"]),
+            pytest.raises(SystemExit) as ended,
+        ):
+            main(arguments)
+    code = int(ended.value.code or 0)
+    out, err = (stream.buffer.getvalue().decode() for stream in streams.values())
+    return subprocess.CompletedProcess([*COMMAND, *arguments], code, out, err)
 
 
 @dataclass

@@ -21,7 +21,7 @@ def sections() -> dict[str, list[dict[str, Any]]]:
     result = subprocess.run(
         [sys.executable, str(TESTS / "benchmarks"), *sections, "--short", "--repetitions", "1",
          "--json"],
-        capture_output=True, text=True, timeout=150.0, check=False, env=ros_environment(),
+        capture_output=True, text=True, timeout=500.0, check=False, env=ros_environment(),
     )  # fmt: skip
     assert result.returncode == 0, result.stderr
     found: dict[str, list[dict[str, Any]]] = json.loads(result.stdout)["sections"]

@@ -12,7 +12,7 @@ from typing import Any
 
 import psutil
 import pytest
-from flights import COMMAND, ros_environment, space_robot
+from flights import COMMAND, ros_environment, space_robot, space_robot_here
 
 from space_robot_control.campaign.soak import sample_flight
 from space_robot_msgs_py.bag.reader import read_flight
@@ -32,7 +32,7 @@ def bags(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def report(bags: Path) -> dict[str, Any]:
     file = bags.with_name("soak.json")
     result = space_robot(
-        "soak", "--minutes", "0.3", "--seed", str(SEED), "--duration", str(DURATION_S),
+        "soak", "--minutes", "0.12", "--seed", str(SEED), "--duration", str(DURATION_S),
         "--bags", str(bags), "--json", "--output", str(file),
     )  # fmt: skip
     found: dict[str, Any] = json.loads(result.stdout)
@@ -118,7 +118,7 @@ def test_ctrl_c_ends_with_the_table(tmp_path: Path) -> None:
     ],
 )
 def test_bad_input_is_said_in_a_line(options: tuple[str, ...], words: str) -> None:
-    result = space_robot("soak", *options)
+    result = space_robot_here("soak", *options)
     assert result.returncode == 2
     assert words in result.stderr.splitlines()[-1]
     assert "Traceback" not in result.stderr

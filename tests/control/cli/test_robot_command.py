@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
-from flights import space_robot
+from flights import space_robot_here
 from paths import CONFIG, DATA
 from urdf_defects import DEFECTS, GOOD, with_defect
 
@@ -135,7 +135,7 @@ def test_every_defect_is_one_line_of_every_command(
 def test_the_process_ends_with_code_2(name: str, tmp_path: Path) -> None:
     path = tmp_path / "given.urdf"
     path.write_text(with_defect(name))
-    result = space_robot("simulate", "--robot", str(path))
+    result = space_robot_here("simulate", "--robot", str(path))
     assert result.returncode == 2
     assert result.stdout == ""
     assert result.stderr.startswith(f"space-robot: error: {path}: ")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from flights import COMMAND, ros_environment, space_robot
+from flights import COMMAND, ros_environment, space_robot_here
 
 from space_robot_control.flight.graph.domain import ros_domain
 from space_robot_control.flight.graph.temporary_node import TemporaryNode
@@ -90,7 +90,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
         pass  # a free one, for the flight to take
     process = subprocess.Popen(
         [*COMMAND, "fly", "--duration", str(SECONDS), "--swap", f"{SWAP_S}:tde_smc",
-         "--bag", str(bag), "--domain", str(domain)],
+         "--bag", str(bag), "--domain", str(domain), "--composed"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
     )  # fmt: skip
     try:
@@ -161,6 +161,6 @@ def test_a_part_begins_under_the_law_in_force_there(flown: Flown, domain: int) -
 
 
 def test_another_controller_flies_its_own_law_throughout(flown: Flown) -> None:
-    result = space_robot("replay", str(flown.bag), "--controller", "ctc", "--end", "0.5")
+    result = space_robot_here("replay", str(flown.bag), "--controller", "ctc", "--end", "0.5")
     assert result.returncode == 0, result.stderr
     assert "ctc, gains default" in result.stdout

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flights import space_robot
+from flights import space_robot_here
 
 from space_robot_control.flight.replay.outcome import Options
 from space_robot_control.flight.replay.run import replay
@@ -23,7 +23,7 @@ class Story:
     """A flight's events and bag."""
 
     def __init__(self, bag: Path, *options: str) -> None:
-        self.result = space_robot("fly", "--bag", str(bag), "--json", *options)
+        self.result = space_robot_here("fly", "--bag", str(bag), "--json", *options)
         assert self.result.stdout, self.result.stderr
         assert "Traceback" not in self.result.stderr
         self.report: dict[str, Any] = json.loads(self.result.stdout)
@@ -143,7 +143,7 @@ def test_stopped_mission_is_waited_for_then_followed_again(hangs: Story) -> None
 
 def test_half_a_turn_is_safe_mode_with_its_reason_and_no_nan(tmp_path: Path) -> None:
     story = Story(
-        tmp_path / "bag", "--duration", "0.5",
+        tmp_path / "bag", "--duration", "0.5", "--composed",
         "--set", "plant.initial_quaternion=[0.01, 0.9, 0.3, 0.3]",
     )  # fmt: skip
     assert story.result.returncode == 0

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flights import space_robot
+from flights import space_robot, space_robot_here
 
 from space_robot_control.analysis import analyze
 from space_robot_control.flight.plan import Flight, FlightPlan
@@ -176,7 +176,8 @@ def test_the_bag_is_that_of_the_graph(tmp_path: Path) -> None:
     options = ("--gains", "printed", "--swap", "0.1:ctc")
     bags = {name: tmp_path / name for name in ("fly", "simulate")}
     for command, bag in bags.items():
-        result = space_robot(command, *options, "--bag", str(bag))
+        composed = ("--composed",) if command == "fly" else ()
+        result = space_robot_here(command, *options, *composed, "--bag", str(bag))
         assert result.returncode == 1
         assert "diverged at tick 209 (t = 0.1045 s)" in result.stderr
     found: dict[str, dict[str, list[bytes]]] = {}

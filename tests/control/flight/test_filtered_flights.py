@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from attitude_sensors import attitude_error
-from flights import Flown, space_robot
+from flights import Flown, space_robot_here
 from numpy.typing import NDArray
 
 from space_robot_control.flight.closed_loop import close_loop
@@ -111,12 +111,12 @@ def test_graph_process_and_replay_have_the_same_bits(
     """Under a law and another, with sensors that are not ideal."""
     options = ("--sensors", "fine", "--navigation", "filtered", "--duration", "0.8", "--swap",
                "0.4:tde_smc", "--seed", "3")  # fmt: skip
-    graph = fly(*options)
+    graph = fly(*options, "--composed")
     plan = FlightPlan(
         sensors="fine", navigation="filtered", duration=0.8, swaps=["0.4:tde_smc"], seed=3
     )
     alone = simulate(Flight(plan))
     np.testing.assert_array_equal(load_bag(graph.bag).commanded_torque, alone.commanded_torque)
-    result = space_robot("replay", str(graph.bag))
+    result = space_robot_here("replay", str(graph.bag))
     assert result.returncode == 0, result.stdout + result.stderr
     assert "to the last bit" in result.stdout

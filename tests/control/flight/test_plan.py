@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from flights import Flown, space_robot
+from flights import Flown, space_robot_here
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -356,8 +356,8 @@ def test_graph_and_process_fly_and_say_the_same(
     fly: Callable[..., Flown], tmp_path: Path, options: tuple[str, ...]
 ) -> None:
     given = ["--duration", "0.2", *(word for text in options for word in ("--set", text))]
-    flown = fly(*given)
-    result = space_robot("simulate", *given, "--json", "--bag", str(tmp_path / "bag"))
+    flown = fly(*given, "--composed")
+    result = space_robot_here("simulate", *given, "--json", "--bag", str(tmp_path / "bag"))
     assert result.returncode == 0, result.stderr
     report = json.loads(result.stdout)
     for key in ("controller", "case", "gains", "robot", "rms", "chatter", "lost"):

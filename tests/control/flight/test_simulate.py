@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flights import space_robot
+from flights import space_robot, space_robot_here
 from paths import DOCS
 
 from space_robot_control.analysis import analyze
@@ -93,7 +93,7 @@ def test_faults_of_processes_need_the_graph() -> None:
 
 def test_simulate_prints_what_its_bag_says(tmp_path: Path) -> None:
     bag = tmp_path / "bag"
-    result = space_robot("simulate", "--duration", "0.2", "--bag", str(bag), "--json")
+    result = space_robot_here("simulate", "--duration", "0.2", "--bag", str(bag), "--json")
     assert result.returncode == 0, result.stderr
     ended = {"outcome": "complete", "reason": "", "ended_at_s": 0.2}
     assert json.loads(result.stdout) == analyze(read_flight(bag)) | ended

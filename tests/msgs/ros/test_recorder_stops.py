@@ -86,16 +86,20 @@ def test_inactive_it_writes_nothing_and_then_goes_on(
     assert flying["recorder"].wait(30) == 0
 
 
-@pytest.mark.parametrize("node", ["recorder", "controller", "mission", "plant"])
-def test_cleaned_up_in_flight(flying: Nodes, ground: Ground, node: str) -> None:
-    """Both requests are on their way at once: none may reach a loop that still runs."""
-    assert all(ground.change_at_once(node, flying[node], "deactivate", "cleanup"))
-    assert ground.state(node) == "unconfigured"
-    assert flying[node].poll() is None
-    flying[node].send_signal(signal.SIGINT)
-    output, _ = flying[node].communicate(timeout=30)
-    assert flying[node].returncode == 0, output
-    assert "Invalid" not in output
+def test_cleaned_up_in_flight(flying: Nodes, ground: Ground) -> None:
+    """Both requests are on their way at once: none may reach a loop that still runs.
+
+    One node after the other, while those that are left fly on.
+    """
+    for node in ("recorder", "controller", "mission", "plant"):
+        go_on(ground)
+        assert all(ground.change_at_once(node, flying[node], "deactivate", "cleanup")), node
+        assert ground.state(node) == "unconfigured"
+        assert flying[node].poll() is None, node
+        flying[node].send_signal(signal.SIGINT)
+        output, _ = flying[node].communicate(timeout=30)
+        assert flying[node].returncode == 0, output
+        assert "Invalid" not in output
 
 
 def test_what_was_never_sent_is_not_lost(flying: Nodes, ground: Ground, bag: Path) -> None:

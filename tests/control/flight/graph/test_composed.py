@@ -1,4 +1,7 @@
-"""``fly --composed``: the same nodes in one process, on the real middleware, with the same bits."""
+"""``fly --composed``: the same nodes in one process, on the real middleware, with the same bits.
+
+With faults, too: `test_fault_matrix` flies the same ones in one process and in four.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flights import COMMAND, Flown, ros_environment, space_robot
+from flights import COMMAND, Flown, ros_environment, space_robot, space_robot_here
 
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
@@ -68,18 +71,6 @@ def test_the_report_tells_of_all_nodes_and_nothing_is_lost(fly: Callable[..., Fl
     assert not any(report["lost"].values())
 
 
-def test_faults_of_the_plant_are_brought_about_as_in_four_processes(
-    fly: Callable[..., Flown],
-) -> None:
-    faults = (
-        "--fault", "drop_state@0.1-0.3:0.2", "--fault", "noise_gyro@0:1e-6",
-        "--fault", "delay_command@0.2-0.4:3", "--seed", "7",
-    )  # fmt: skip
-    composed, processes = fly(*SHORT, *faults, "--composed"), fly(*SHORT, *faults)
-    for topic in STATES_AND_COMMANDS:
-        assert messages(composed.bag, topic) == messages(processes.bag, topic), topic.full_name
-
-
 def test_by_the_wall_clock_every_tick_is_flown(fly: Callable[..., Flown]) -> None:
     flown = fly("--duration", "2", "--composed", "--realtime")
     assert flown.report["ticks"] == 4000
@@ -98,7 +89,7 @@ def test_by_the_wall_clock_every_tick_is_flown(fly: Callable[..., Flown]) -> Non
 def test_what_needs_processes_is_refused_in_one_line(
     options: tuple[str, ...], asked: str, tmp_path: Path
 ) -> None:
-    result = space_robot("fly", "--composed", *options, "--bag", str(tmp_path / "bag"))
+    result = space_robot_here("fly", "--composed", *options, "--bag", str(tmp_path / "bag"))
     assert (result.returncode, result.stdout) == (2, "")
     (line,) = result.stderr.splitlines()
     assert asked in line

@@ -5,15 +5,16 @@ Their states go the plant's way to the controller as the joints' and the base's 
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
-from flights import Flown, space_robot
+from flights import Flown
 
 from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.flight.replay.outcome import Options
+from space_robot_control.flight.replay.run import replay
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.samples import ACTUATOR_FIELDS, STATE_FIELDS
@@ -24,7 +25,7 @@ COLUMNS = (*STATE_FIELDS, *ACTUATOR_FIELDS, "commanded_torque", "actuator_comman
 MESSAGE_FAULTS = ("drop_state@0.05-0.1:0.2", "delay_command@0.15-0.2:2", "nan_state@0.25-0.3:0.3")
 PART_FAULTS = ("wheel_fail@0.2:2", "thruster_stuck_on@0.1-0.2:thruster_1")
 EVENTS = ["capture@0.15:tumbling_satellite", "release@0.3:0.05"]
-OPTIONS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
+FLIGHTS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     "wheels": ({"actuators": "wheels", "events": EVENTS}, ()),
     "thrusters": ({"actuators": "thrusters", "controller": "ctc"}, ("--composed",)),
     "both": ({"actuators": "wheels_and_thrusters", "sensors": "fine"}, ("--composed",)),
@@ -40,9 +41,9 @@ OPTIONS: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
 }
 
 
-@pytest.fixture(params=OPTIONS)
+@pytest.fixture(params=FLIGHTS)
 def flown(request: pytest.FixtureRequest, fly: Callable[..., Flown]) -> tuple[Flown, FlightPlan]:
-    options, more = OPTIONS[request.param]
+    options, more = FLIGHTS[request.param]
     words = ["--duration", "0.4", *more]
     for name, value in options.items():
         if name in ("faults", "events"):
@@ -63,13 +64,14 @@ def test_actuators_fly_in_the_graph_as_in_one_process(flown: tuple[Flown, Flight
     assert log.flight == expected.flight
 
 
-def test_a_flight_with_actuators_is_replayed_to_the_bit(flown: tuple[Flown, FlightPlan]) -> None:
+def test_a_flight_with_actuators_is_replayed_to_the_bit(
+    flown: tuple[Flown, FlightPlan], domain: int
+) -> None:
     """The controller has all of its actuators' numbers from the bag."""
     names = Flight(flown[1]).plant.names
-    result = space_robot("replay", str(flown[0].bag), "--json")
-    assert result.returncode == 0, result.stdout + result.stderr
-    report = json.loads(result.stdout)
-    assert report["passed"]
+    done = replay(Options(flown[0].bag, domain=domain))
+    report = done.report()
+    assert done.has_passed, report["first_difference"]
     assert report["equal"] == report["compared"] > 0
     assert set(report["axes"]) == {*names.axes, *names.actuators}
     assert not any(axis["difference_max"] for axis in report["axes"].values())

@@ -24,7 +24,8 @@ COLUMNS = (
 
 def test_a_free_base_drifts_in_the_graph_as_in_one_process(fly: Callable[..., Flown]) -> None:
     """From one law to another, disturbed, and told in the same report."""
-    flown = fly("--actuators", "none", "--case", "3", "--swap", "0.3:ctc", "--duration", "0.5")
+    options = ("--actuators", "none", "--case", "3", "--swap", "0.3:ctc", "--duration", "0.5")
+    flown = fly(*options, "--composed")
     plan = FlightPlan(actuators="none", case="3", swaps=["0.3:ctc"], duration=0.5)
     log, recorded = simulate(Flight(plan)), read_flight(flown.bag)
     for column in COLUMNS:

@@ -27,7 +27,7 @@ def test_passive_joints_swing_in_the_graph_as_in_one_process(
     fly: Callable[..., Flown], domain: int
 ) -> None:
     """Under a law with a model and one without; a replay gives the same commands to the bit."""
-    flown = fly("--robot", PASSIVE_ROBOT, "--swap", "0.3:ctc", "--duration", "0.5")
+    flown = fly("--robot", PASSIVE_ROBOT, "--swap", "0.3:ctc", "--duration", "0.5", "--composed")
     plan = FlightPlan(robot=PASSIVE_ROBOT, swaps=["0.3:ctc"], duration=0.5)
     log, recorded = simulate(Flight(plan)), read_flight(flown.bag)
     assert recorded.flight == log.flight

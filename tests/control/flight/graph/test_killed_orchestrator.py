@@ -10,7 +10,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from flights import COMMAND, ros_environment, space_robot
+from flights import COMMAND, ros_environment, space_robot_here
 
 from space_robot_msgs_py.bag.reader import read_flight
 
@@ -67,7 +67,7 @@ def test_nodes_close_the_bag_and_the_next_flight_has_the_domain(
     flight.kill()
     flight.wait()
     # at once, while they are still ending
-    following = space_robot(
+    following = space_robot_here(
         "fly", "--duration", "0.2", "--domain", str(free_domain), "--bag", str(tmp_path / "next")
     )
     assert following.returncode == 0, following.stderr

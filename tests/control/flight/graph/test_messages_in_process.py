@@ -1,4 +1,7 @@
-"""Flights with faults of every kind: a graph of nodes and one process, message by message."""
+"""Flights with faults of every kind: a graph of nodes and `simulate`, message by message.
+
+One graph has its four processes, the others are composed.
+"""
 
 from __future__ import annotations
 
@@ -45,6 +48,7 @@ OPTIONS: dict[str, dict[str, str]] = {
     "all that is new": {"sensors": "tactical", "navigation": "filtered"}
 }
 """Options of flights beside their faults."""
+IN_PROCESSES = {"late and lost"}
 AHEAD = {topics.REFERENCE_JOINTS.full_name, topics.REFERENCE_BASE.full_name}
 """The mission of a graph sends its reference beyond the flight's end."""
 
@@ -74,6 +78,8 @@ def test_one_process_sends_what_the_graph_sends(
         words += ["--set", f"{node}.hold_ticks=100"]
     for option, value in given.items():
         words += [f"--{option}", value]
+    if name not in IN_PROCESSES:
+        words.append("--composed")
     flown = fly("--duration", "0.5", "--seed", str(SEED), "--swap", SWAP, *words)
     graph, own = messages_by_topic(flown.bag), messages_by_topic(tmp_path / "bag")
     assert own.keys() == graph.keys()

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from flights import COMMAND, ros_environment, space_robot
+from flights import COMMAND, ros_environment, space_robot_here
 
 from space_robot_control.analysis import analyze
 from space_robot_control.flight.bag_path import check_bag_path
@@ -51,7 +51,9 @@ def process(domain: int, *command: str) -> Iterator[subprocess.Popen[str]]:
 
 def refused(domain: int, bag: Path) -> str:
     """Why a flight there is refused; nothing is left of it."""
-    result = space_robot("fly", "--duration", "0.2", "--domain", str(domain), "--bag", str(bag))
+    result = space_robot_here(
+        "fly", "--duration", "0.2", "--domain", str(domain), "--bag", str(bag)
+    )
     assert result.returncode == 2, result.stderr
     assert "what was flown" not in result.stderr
     assert not bag.exists()

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from flights import Start, space_robot
+from flights import Start, space_robot_here
 
 from space_robot_control.flight.graph.listeners import wait_for
 from space_robot_control.flight.graph.monitor import Monitor
@@ -94,13 +94,13 @@ def test_killed_recorder_has_kept_all_but_the_last_moment(
     log = read_flight(bag)
     assert (log.ticks - 1) * log.timebase.period >= sent_s > 0.0
     assert not any(log.lost.values())
-    result = space_robot("analyze", str(bag), "--json")
+    result = space_robot_here("analyze", str(bag), "--json")
     assert json.loads(result.stdout)["unfinished"] == log.unfinished
     assert f"read up to t = {(log.ticks - 1) * PERIOD_S:.4f} s" in log.unfinished
 
 
 def test_recorder_without_room_lets_the_flight_go_on(start: Start, tmp_path: Path) -> None:
-    bag, ticks = tmp_path / "bag", 12_000
+    bag, ticks = tmp_path / "bag", 8_000
     nodes = _start_graph(start, bag, ticks)
     _wait_for_size(bag / "bag_0.mcap", IN_FLIGHT)
     limit = (bag / "bag_0.mcap").stat().st_size + 500_000
@@ -122,7 +122,7 @@ def test_recorder_without_room_lets_the_flight_go_on(start: Start, tmp_path: Pat
 
 def test_recorder_without_its_folder_says_so_at_once(start: Start, tmp_path: Path) -> None:
     bag = tmp_path / "bag"
-    nodes = _start_graph(start, bag, ticks=12_000)
+    nodes = _start_graph(start, bag, ticks=8_000)
     _wait_for_size(bag / "bag_0.mcap", IN_FLIGHT)
     shutil.rmtree(bag)
     removed = time.time()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flights import Flown, space_robot
+from flights import Flown, space_robot_here
 
 from space_robot_control.analysis import analyze
 from space_robot_control.flight.plan import Flight, FlightPlan
@@ -22,14 +22,14 @@ FAULTS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("lost", [[], ["drop_state@0-0.5:0.02"]])
+@pytest.mark.parametrize(("lost", "how"), [([], ()), (["drop_state@0-0.5:0.02"], ("--composed",))])
 def test_truth_measured_and_believed_are_those_of_one_process(
-    fly: Callable[..., Flown], lost: list[str]
+    fly: Callable[..., Flown], lost: list[str], how: tuple[str, ...]
 ) -> None:
     """To the last bit, and so is the report; nothing is lost, but for what a fault keeps back."""
     faults = [*FAULTS, *lost]
     given = [word for fault in faults for word in ("--fault", fault)]
-    flown = fly("--duration", "0.5", *given)
+    flown = fly("--duration", "0.5", *given, *how)
     log = simulate(Flight(FlightPlan(faults=faults, duration=0.5)))
     recorded = read_flight(flown.bag)
     assert recorded.lost == {topic.full_name: 0 for topic in topics.ALL}
@@ -51,5 +51,5 @@ def test_a_replay_plays_what_was_measured(tmp_path: Path) -> None:
     """The controller answers it as in flight, to the last bit: it never sees the truth."""
     plan = FlightPlan(faults=FAULTS, duration=0.4, sensors="fine", navigation="filtered")
     simulate(Flight(plan), tmp_path / "bag")
-    replayed = space_robot("replay", str(tmp_path / "bag"), "--json")
+    replayed = space_robot_here("replay", str(tmp_path / "bag"), "--json")
     assert replayed.returncode == 0, replayed.stderr

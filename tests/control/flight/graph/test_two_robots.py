@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from flights import COMMAND, ros_environment, space_robot
+from flights import COMMAND, ros_environment, space_robot_here
 from paths import CONFIG
 
 from space_robot_control.flight.graph.domain import ros_domain
@@ -77,7 +77,7 @@ def test_both_fly_at_once_and_each_as_simulated(tmp_path: Path, free_domain: int
         for column in COLUMNS:
             np.testing.assert_array_equal(getattr(flown, column), getattr(here, column), column)
         assert flown.laws == here.laws
-    replayed = space_robot("replay", str(bags["/sat1"]), "--namespace", "sat1", "--json")
+    replayed = space_robot_here("replay", str(bags["/sat1"]), "--namespace", "sat1", "--json")
     assert replayed.returncode == 0, replayed.stderr  # each command equal to the last bit
 
 

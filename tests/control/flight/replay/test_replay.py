@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
-from flights import COMMAND, Flown, ros_environment, space_robot
+from flights import COMMAND, Flown, ros_environment, space_robot_here
 
 from space_robot_control.cli.main import main
 from space_robot_control.flight.plan import Flight, FlightPlan
@@ -117,14 +117,15 @@ def test_faulty_states_are_answered_as_in_flight(
         "jitter_state@0.2-0.25:2", "stamp_back@0.25:0.1", "stamp_jump@0.25:0.05",
         "delay_command@0.1-0.2:2",
     ]  # fmt: skip
-    flown = fly("--duration", "0.4", *(word for fault in faults for word in ("--fault", fault)))
+    words = (word for fault in faults for word in ("--fault", fault))
+    flown = fly("--duration", "0.4", "--composed", *words)
     done = play(flown.bag)
     assert done.comparison.is_identical, done.report()["first_difference"]
     assert 400 < len(done.comparison.ticks) < 800
 
 
 def test_a_changed_gain_is_found_with_exit_code_1(recorded: Callable[..., Path]) -> None:
-    result = space_robot(
+    result = space_robot_here(
         "replay", str(recorded()), "--set", "controller.tde_stc.k_1=[40.0]", "--json"
     )
     assert result.returncode == 1
@@ -139,7 +140,7 @@ def test_a_changed_gain_is_found_with_exit_code_1(recorded: Callable[..., Path])
 
 def test_another_law_is_shown_and_not_judged(recorded: Callable[..., Path], tmp_path: Path) -> None:
     table, plot = tmp_path / "torques.csv", tmp_path / "torques.png"
-    result = space_robot(
+    result = space_robot_here(
         "replay", str(recorded()), "--controller", "ctc", "--csv", str(table), "--plot", str(plot)
     )
     assert result.returncode == 0, result.stderr
