@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -59,7 +60,8 @@ SLOW = (
     "msgs/bag/test_description_fuzz.py", "test_packaging.py", "test_shown_outputs.py",
 )  # fmt: skip
 """Folders and files whose tests take seconds each."""
-LONG = {"ros", "slow"}
+FLYING_UNTIL = 0.7
+"""Part of the files after which none of the marked ones is left to begin."""
 TIMEOUT_S = 600
 """Of each test, its fixtures included: kernels may have to be compiled first."""
 
@@ -81,9 +83,10 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark by fixture and by folder; limit every test's time; files with long tests come first.
+    """Mark by fixture and by folder; limit every test's time; bring the files into an order.
 
-    So the test processes of `make test` share the short ones at the end, and end together.
+    Those with marks lie spread among the others, and short ones are left for the end: so the two
+    processes of `make test` seldom fly graphs at once, and end together.
     """
     for item in items:
         where = item.path.relative_to(TESTS).as_posix()
@@ -91,10 +94,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(mark)
         if not item.get_closest_marker("timeout"):
             item.add_marker(pytest.mark.timeout(TIMEOUT_S))
-    long = {
-        item.path for item in items if LONG.intersection(mark.name for mark in item.iter_markers())
+    places: dict[Path, float] = {}
+    marked = {
+        item.path for item in items if {"ros", "slow"} & {m.name for m in item.iter_markers()}
     }
-    items.sort(key=lambda item: item.path not in long)
+    for is_marked, until in ((True, FLYING_UNTIL), (False, 1.0)):
+        files = dict.fromkeys(item.path for item in items if (item.path in marked) == is_marked)
+        places |= {path: until * k / len(files) for k, path in enumerate(files)}
+    items.sort(key=lambda item: places[item.path])
 
 
 @pytest.fixture(scope="session")

@@ -90,7 +90,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
         pass  # a free one, for the flight to take
     process = subprocess.Popen(
         [*COMMAND, "fly", "--duration", str(SECONDS), "--swap", f"{SWAP_S}:tde_smc",
-         "--bag", str(bag), "--domain", str(domain), "--composed"],
+         "--bag", str(bag), "--domain", str(domain)],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
     )  # fmt: skip
     try:
