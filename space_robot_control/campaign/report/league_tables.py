@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from ...analysis.tables import Column, Group, Table, Verdict
 from ..verdicts.league import League, Standing
@@ -85,6 +86,12 @@ def _pair(c: Comparison) -> list[str | Verdict]:
     ]  # fmt: skip
 
 
+def headings(laws: Sequence[str]) -> list[str]:
+    """Return the laws' names for columns, without their gain set if all have the same."""
+    sets = {law.partition("=")[2] for law in laws}
+    return [law.partition("=")[0] for law in laws] if len(sets) == 1 else list(laws)
+
+
 def choice_tables(findings: Findings) -> list[Table]:
     """Tabulate which law to fly at each point of the grid, a table for every metric.
 
@@ -95,13 +102,13 @@ def choice_tables(findings: Findings) -> list[Table]:
 
 def _choices(findings: Findings, metric: Quantity) -> Table:
     rows = [
-        [*part.values, *_medians(findings, found), Verdict("", best(found), "good")]
+        [*part.values, *_medians(findings, found), Verdict("", best(found, findings.laws), "good")]
         for part, quantity, found in findings.leagues
         if quantity is metric
     ]
     columns = [
         *(Column(name.removeprefix("scenario."), is_label=True) for name in findings.grid),
-        *map(Column, findings.laws),
+        *map(Column, headings(findings.laws)),
         Column("to fly", is_label=True),
     ]
     note = (
@@ -123,9 +130,10 @@ def _medians(findings: Findings, found: League) -> list[str]:
     return texts
 
 
-def best(found: League) -> str:
+def best(found: League, laws: Sequence[str]) -> str:
     """Name the laws of rank 1 that did not fail in every flight, unless these are all laws."""
-    names = [s.law for s in found.standings if s.rank == 1 and s.failures < s.runs]
+    named = dict(zip(laws, headings(laws), strict=True))
+    names = [named[s.law] for s in found.standings if s.rank == 1 and s.failures < s.runs]
     if len(names) == len(found.standings) > 1:
         return "not told apart"
     return ", ".join(names) or "-"

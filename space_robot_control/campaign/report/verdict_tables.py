@@ -9,7 +9,7 @@ from ...analysis.tables import Column, Group, Table, Verdict
 from ..verdicts import requirements
 from ..verdicts.values import Part
 from .findings import Findings
-from .league_tables import number
+from .league_tables import headings, number
 from .quantities import Quantity
 
 TONES = {"met": "good", "not met": "bad", "undecided": "open"}
@@ -87,7 +87,7 @@ def verdict_grid(findings: Findings, quantity: Quantity) -> Table:
         rows.append([*part.values, *cells])
     columns = [
         *(Column(name.removeprefix("scenario."), is_label=True) for name in findings.grid),
-        *map(Column, findings.laws),
+        *map(Column, headings(findings.laws)),
     ]
     note = "Runs that miss it, and the verdict."
     return Table(f"{quantity.name}: {demanded(quantity)}", columns, [Group(rows)], [note])
