@@ -19,7 +19,8 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")
-SECONDS = 4
+SECONDS = 5
+"""Long enough after the swap for the pilot to ask for the law, on a busy machine, too."""
 SWAP_S = 3.5
 
 
