@@ -60,7 +60,7 @@ def reproduce(
     """
     from space_robot_msgs_py.config.files import named_file
 
-    from ..campaign.processes import cores
+    from ..campaign.runner import cores
     from ..flight.compilation import compile_kernels
     from ..flight.progress import counting_progress
     from ..paper.reproduction.flights import ROWS, Equipment, Row

@@ -83,7 +83,7 @@ def sweep(
     from ..analysis.files import check_writable, make_folder, whole_file
     from ..analysis.tables import Column, Table, as_csv, as_markdown
     from ..analysis.terminal import print_table
-    from ..campaign.processes import cores
+    from ..campaign.runner import cores
     from ..campaign.sweep import Law, Sweep
     from ..campaign.sweep import sweep as run
     from ..campaign.sweep.summary import as_records, cells, figure, summary_table

@@ -1,6 +1,6 @@
 """One way to run many: in this process, in processes beside it, or on a Dask cluster."""
 
 from .done import Done, OutOfTimeError, WorkerDiedError
-from .run import cores, run_many
+from .run import cores, run_all, run_many
 
-__all__ = ["Done", "OutOfTimeError", "WorkerDiedError", "cores", "run_many"]
+__all__ = ["Done", "OutOfTimeError", "WorkerDiedError", "cores", "run_all", "run_many"]

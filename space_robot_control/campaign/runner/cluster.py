@@ -11,7 +11,7 @@ import itertools
 import logging
 import time
 import uuid
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
@@ -46,7 +46,7 @@ def on_cluster(
     items: Iterable[Any],
     timeout_s: float | None,
     attempts: int,
-) -> Iterator[Any]:
+) -> Generator[Any, None, None]:
     """Yield None when the scheduler is there, then what comes of every item; see `run_many`."""
     with _connected(address) as client:
         yield

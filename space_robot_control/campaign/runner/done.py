@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Generic, TypeVar, cast
 
 from space_robot_msgs_py.errors import SpaceRobotError
 
@@ -28,3 +28,9 @@ class Done(Generic[Item, Result]):
     """What the function returned; None if it did not."""
     error: Exception | None = None
     """What the function raised, a `WorkerDiedError` or an `OutOfTimeError`; else None."""
+
+    def value(self) -> Result:
+        """Return the result, or raise the error."""
+        if self.error is not None:
+            raise self.error
+        return cast(Result, self.result)

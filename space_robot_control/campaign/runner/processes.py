@@ -20,7 +20,7 @@ import socket
 import struct
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
@@ -64,7 +64,7 @@ def in_processes(
     items: Iterable[Any],
     timeout_s: float | None,
     attempts: int,
-) -> Iterator[Any]:
+) -> Generator[Any, None, None]:
     """Yield None when all is ready, then what comes of every item; see `run_many`."""
     pool = Pool(workers, function, timeout_s, attempts)
     try:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import closing
 from typing import Any
 
 from space_robot_msgs_py.errors import InputError
@@ -21,7 +22,7 @@ def run_many(
     scheduler: str | None = None,
     timeout_s: float | None = None,
     attempts: int = 3,
-) -> Iterator[Done[Item, Result]]:
+) -> Generator[Done[Item, Result], None, None]:
     """Yield what comes of every item, in the order in which they end.
 
     Processes are forked, or the cluster is connected to, before this returns. Closing the iterator
@@ -44,7 +45,7 @@ def run_many(
             f"workers {workers}, attempts {attempts}, timeout_s {timeout_s}: at least 0, at least "
             "1, above 0"
         )
-    running: Iterator[Any]
+    running: Generator[Any, None, None]
     if scheduler is not None:
         running = on_cluster(scheduler, function, items, timeout_s, attempts)
     elif workers:
@@ -57,9 +58,32 @@ def run_many(
     return running
 
 
+def run_all(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    workers: int,
+    progress: Callable[[int], Callable[[], None]] = lambda total: lambda: None,
+) -> list[Result]:
+    """Return the results of all items in their order, or raise the first error.
+
+    Args:
+        function: see `run_many`.
+        items: hashable and different ones.
+        workers: see `run_many`.
+        progress: called with the number of items, gives what is called after each.
+    """
+    results = {}
+    with closing(run_many(function, items, workers=workers)) as running:
+        done = progress(len(items))
+        for one in running:
+            results[one.item] = one.value()
+            done()
+    return [results[item] for item in items]
+
+
 def _in_this_process(
     function: Callable[[Item], Result], items: Iterable[Item]
-) -> Iterator[Done[Item, Result]]:
+) -> Generator[Done[Item, Result], None, None]:
     for item in items:
         try:
             done = Done(item, function(item))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,7 +15,7 @@ from space_robot_msgs_py.errors import FlightError
 from ...analysis import Analysis
 from ...flight.plan import Flight
 from ...flight.simulate import fly_blocks
-from ..processes import processes
+from ..runner import run_all
 from .scenario import Draw, Sweep
 
 
@@ -54,13 +55,7 @@ def sweep(
     for draw in study.flights():
         if not draw.number:
             Flight(study.plan(draw, None))
-    draws = list(study.flights())
-    with processes(jobs) as pool:
-        futures = [pool.submit(fly, study, draw) for draw in draws]
-        done = progress(len(draws))  # may start a thread: not before the processes are forked
-        for future in futures:
-            future.add_done_callback(lambda _: done())
-        return [future.result() for future in futures]
+    return run_all(partial(fly, study), list(study.flights()), jobs, progress)
 
 
 def fly(study: Sweep, draw: Draw) -> Row:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 from matplotlib.figure import Figure
 
@@ -25,15 +25,20 @@ COMPARISONS: dict[str, tuple[str, Callable[[Mapping[str, BaseTorque]], Figure]]]
 """Caption and drawing of the figures of all laws, by the name of their files."""
 
 
-def start_comparisons(
-    pool: Executor, results: Sequence[Result], duration: float | None, folder: FigureFolder
-) -> Iterator[Future[None]]:
-    """Draw the mission and the comparisons of ``results`` in other processes."""
+def comparisons(
+    results: Sequence[Result], duration: float | None, folder: FigureFolder
+) -> list[Callable[[], None]]:
+    """Return what draws the mission and the comparisons of ``results``, if any is to be compared.
+
+    Each can be pickled, and be called in another process.
+    """
     flights = {r.row.controller: r.base_torque for r in results if r.base_torque is not None}
-    if flights:
-        yield pool.submit(_draw_mission, duration, folder)
-        for stem in COMPARISONS:
-            yield pool.submit(_draw_comparison, stem, flights, folder)
+    if not flights:
+        return []
+    return [
+        partial(_draw_mission, duration, folder),
+        *(partial(_draw_comparison, stem, flights, folder) for stem in COMPARISONS),
+    ]
 
 
 def _draw_mission(duration: float | None, folder: FigureFolder) -> None:

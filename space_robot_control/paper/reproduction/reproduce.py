@@ -6,7 +6,6 @@ import json
 import platform
 import shutil
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -17,11 +16,11 @@ from space_robot_msgs_py.errors import InputError
 from ...analysis.figures.figure_set import FigureFolder
 from ...analysis.tables import as_csv, as_markdown, as_records
 from ...analysis.template import template
-from ...campaign.processes import processes
+from ...campaign.runner import run_all
 from ...flight.plan import Flight, FlightPlan
 from ...flight.software import commit, versions
 from .claims import claims, claims_table
-from .figures import figure_groups, start_comparisons
+from .figures import comparisons, figure_groups
 from .flights import PERFECT, Equipment, Planned, Result, Row, fly, plan
 from .table import cells, cells_table, chatter, chatter_table, variant_tables
 
@@ -84,9 +83,8 @@ def reproduce(
         work = Path(temporary) / folder.name
         figures = FigureFolder(work / "figures", png=not brief)
         figures.path.mkdir(parents=True)
-        planned = list(plan(rows, brief))
-        with processes(jobs) as pool:
-            results = _fly_and_draw(pool, planned, duration, figures, equipment, progress)
+        results = _fly(list(plan(rows, brief)), duration, figures, equipment, jobs, progress)
+        run_all(_call, comparisons(results, duration, figures), jobs)
         record = _write(rows, results, duration or FULL_DURATION, brief, equipment, figures)
         if folder.exists():
             shutil.rmtree(folder)
@@ -94,27 +92,26 @@ def reproduce(
     return record
 
 
-def _fly_and_draw(
-    pool: Executor,
+def _fly(
     planned: Sequence[Planned],
     duration: float | None,
     figures: FigureFolder,
     equipment: Equipment,
+    jobs: int,
     progress: Callable[[int], Callable[[], None]],
 ) -> list[Result]:
-    """Return the results in the order of ``planned``."""
-    # first those the comparisons wait for, last those that take the shortest
-    order = sorted(planned, key=lambda flight: (not flight.compared, not flight.shown))
-    futures = {flight: pool.submit(fly, flight, duration, figures, equipment) for flight in order}
-    done = progress(len(planned))  # may start a thread: not before the processes are forked
-    for future in futures.values():
-        future.add_done_callback(lambda _: done())
-    compared = [futures[flight].result() for flight in planned if flight.compared]
-    drawings = list(start_comparisons(pool, compared, duration, figures))
-    results = [futures[flight].result() for flight in planned]
-    for drawing in drawings:
-        drawing.result()
-    return results
+    """Fly and draw every row by itself; return the results in the order of ``planned``."""
+
+    def fly_one(flight: Planned) -> Result:
+        return fly(flight, duration, figures, equipment)
+
+    order = sorted(planned, key=lambda flight: not flight.shown)  # those that take longest first
+    results = dict(zip(order, run_all(fly_one, order, jobs, progress), strict=True))
+    return [results[flight] for flight in planned]
+
+
+def _call(draw: Callable[[], None]) -> None:
+    draw()
 
 
 def _write(

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from space_robot_control.campaign.processes import cores
+from space_robot_control.campaign.runner import cores
 from space_robot_control.paper.reproduction.flights import ROWS
 from space_robot_control.paper.reproduction.reproduce import reproduce as run
 

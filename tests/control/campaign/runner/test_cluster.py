@@ -83,7 +83,7 @@ def test_closing_the_iterator_ends_what_runs_there(dask: Any) -> None:
     running = run_many(behave, items, scheduler=dask.scheduler_address)
     pid = next(running).result
     started = time.monotonic()
-    running.close()  # type: ignore[attr-defined]
+    running.close()
     assert time.monotonic() - started < 20.0
     while Path(f"/proc/{pid}").exists():
         assert time.monotonic() < started + 20.0

@@ -51,7 +51,7 @@ def test_closing_the_iterator_leaves_nothing() -> None:
     running = run_many(lambda _: (os.getpid(), os.getppid()), range(100), workers=2)
     pids = {pid for _ in range(20) for pid in next(running).result or ()}
     assert len(pids) in (2, 3)
-    running.close()  # type: ignore[attr-defined]
+    running.close()
     assert not any(is_there(pid) for pid in pids)
 
 
@@ -62,7 +62,7 @@ def test_an_iterator_that_never_began_leaves_nothing() -> None:
     before = children()
     running = run_many(abs, range(100))
     assert children() != before
-    running.close()  # type: ignore[attr-defined]
+    running.close()
     assert children() == before
 
 

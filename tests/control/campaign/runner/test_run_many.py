@@ -47,7 +47,7 @@ def test_items_are_taken_as_they_are_needed(workers: int) -> None:
     running = run_many(reciprocal, (next(taken) for _ in itertools.count()), workers=workers)
     for _ in range(20):
         next(running)
-    running.close()  # type: ignore[attr-defined]
+    running.close()
     assert next(taken) <= 20 + 2 * max(workers, 1)
 
 
