@@ -31,8 +31,6 @@ OF_EXTRAS = {
     "pyarrow": "parquet", "xacro": "xacro",
 }  # fmt: skip
 """Packages that one command needs, and their extra."""
-COMING = {"distributed", "pandas"}
-"""Those of them that nothing imports yet."""
 ROSDEP = {"pyyaml": "yaml"}
 """Names of rosdep's keys, behind python3-, where they are not the package's."""
 
@@ -94,7 +92,7 @@ def test_setup_py_and_the_imports_name_the_same_packages() -> None:
     assert found - set(OF_EXTRAS) - dependencies("exec_depend") == required
     extras = setup_keyword("extras_require")
     for name, extra in OF_EXTRAS.items():
-        assert name in found | COMING
+        assert name in found
         assert name in packages(extras[extra])
         assert name in packages(extras["test"])
 
@@ -117,7 +115,7 @@ def test_the_docs_name_every_extra_that_a_command_needs() -> None:
     extras = setup_keyword("extras_require")
     pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
     text = "\n".join(page.read_text("utf-8") for page in pages)
-    for extra in {OF_EXTRAS[name] for name in OF_EXTRAS.keys() - COMING}:
+    for extra in OF_EXTRAS.values():
         assert f"pip install 'space_robot[{extra}]'" in text, extra
     named = {name for group in re.findall(r"install [^\n]*\[([\w,]+)\]", text)
              for name in group.split(",")}  # fmt: skip
@@ -136,7 +134,7 @@ def test_types_of_untyped_libraries_are_told_of_libraries_that_are_used() -> Non
     (listed,) = re.findall(r"module = \[\n(.*?)\]\nignore_missing_imports", text, re.DOTALL)
     untyped = {PYPI.get(name, name) for name in re.findall(r'"(\w+)\.\*"', listed)}
     messages = {topic.type.split("/")[0] for topic in (*topics.ALL, topics.DIAGNOSTICS)}
-    assert untyped - messages <= third_party_imports() | dependencies("exec_depend") | COMING | {
+    assert untyped - messages <= third_party_imports() | dependencies("exec_depend") | {
         "mujoco",
         "pin",
     }

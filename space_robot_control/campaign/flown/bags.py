@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
 
 from space_robot_msgs_py.errors import FlightError, InputError
 
@@ -17,7 +16,7 @@ from ...flight.ending import DIVERGED, UNANSWERED
 from ...flight.simulate import fly_blocks
 from ..row.fly import RowFlyer
 from ..row.row import Row, Task
-from ..runner import Done, run_many
+from ..runner import run_many
 from ..store.folder import BAGS
 from ..store.journal import Journal
 from ..study import Study
@@ -75,7 +74,7 @@ def fly_bags(folder: Path, flyer: RowFlyer, journal: Journal, runs: int, workers
     if not tasks:
         return
     flown = run_many(BagFlyer(flyer, bags), tasks, workers=workers)
-    with closing(cast(Generator[Done[Task, None], None, None], flown)) as done:
+    with closing(flown) as done:
         for result in done:
             if result.error is not None:
                 raise InputError(f"{bags / bag_name(result.item)}: {result.error}")

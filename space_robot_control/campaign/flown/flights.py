@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...flight.ending import FAILED
 from ..row.fly import RowFlyer
 from ..row.row import KILLED, OUT_OF_TIME, Row, Task, one_line_of
-from ..runner import Done, OutOfTimeError, WorkerDiedError, run_many
+from ..runner import OutOfTimeError, WorkerDiedError, run_many
 from ..store.journal import Journal
 from .precision import Precision
 
@@ -80,7 +80,7 @@ class Flights:
             InputError: the journal cannot be written, or the scheduler is not there.
         """
         done = run_many(self._flyer, self.missing(), **options)
-        with closing(cast(Generator[Done[Task, Row], None, None], done)):
+        with closing(done):
             on_progress(self._progress)
             for result in done:
                 row = result.result or self._unflown(result.item, result.error)
