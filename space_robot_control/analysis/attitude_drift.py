@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.blocks import Metric
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_sim.elementary.arctangent import arctan2
+from space_robot_sim.elementary.matrices import product
 
 Array = NDArray[np.float64]
 
@@ -56,9 +58,9 @@ def attitude_drift(log: FlightLog, start: Array | None = None) -> Array:
     w, x, y, z = q[0] if start is None else start
     # the vector and scalar parts of start^-1 * Q
     back = np.array([[-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w], [w, x, y, z]])
-    turned = q @ back.T
+    turned = product(q, back.T)
     sine = np.linalg.norm(turned[:, :3], axis=1)
-    angle = 2.0 * np.degrees(np.arctan2(sine, np.abs(turned[:, 3])))
+    angle = 2.0 * np.degrees(arctan2(sine, np.abs(turned[:, 3])))
     along = np.copysign(1.0, turned[:, 3]) / np.where(sine > 0.0, sine, 1.0)
     drift: Array = (angle * along)[:, np.newaxis] * turned[:, :3]
     return drift

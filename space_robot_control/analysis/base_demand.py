@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
+from space_robot_sim.elementary.matrices import product
 from space_robot_sim.robot.base_axes import base_axes, to_base, to_inertial
 
 Array = NDArray[np.float64]
@@ -77,7 +78,7 @@ class BaseDemand:
     def _held(self, log: FlightLog, axes: Array) -> Array:
         """Return what the flight's own wheels hold beyond what they held at its first row."""
         wheels = self._flown.wheels
-        held = wheels.spin_momenta(log.wheel_velocities) @ wheels.unit_axes
+        held = product(wheels.spin_momenta(log.wheel_velocities), wheels.unit_axes)
         if self._axes is None:
             self._taken = to_inertial(axes[:, :, :1], held[:1].T)
         at_first = to_base(axes, np.broadcast_to(self._taken, (3, len(held)))).T

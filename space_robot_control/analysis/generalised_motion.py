@@ -30,7 +30,7 @@ def _state(log: FlightLog) -> Array:
 def continuous_quaternion(log: FlightLog) -> Array:
     """(N, 4) the attitude without jumps between Q and -Q, as the controller takes it."""
     q = log.quaternion
-    flips = np.einsum("ij,ij->i", q[1:], q[:-1]) < 0.0
+    flips = np.sum(q[1:] * q[:-1], axis=1) < 0.0
     if not flips.any():
         return q
     sides = np.concatenate([[1.0], np.where(flips, -1.0, 1.0)]).cumprod()
@@ -59,7 +59,7 @@ def applied_force(log: FlightLog) -> Array:
     force = log.applied_torque[1:].copy()
     quaternion, torque = continuous_quaternion(log)[:-1], log.applied_torque[1:, :3]
     eta, eps = quaternion[:, :1], quaternion[:, 1:]
-    along = np.einsum("ij,ij->i", eps, torque)[:, np.newaxis]
+    along = np.sum(eps * torque, axis=1, keepdims=True)
     force[:, :3] = 2.0 * (eta * torque + np.cross(eps, torque) + eps * along / eta)
     return force
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.actuators.thrusters import ThrusterSettings
 from space_robot_sim.actuators.wheels import WheelSettings
+from space_robot_sim.elementary.matrices import product
 
 from .base_demand import Demand
 from .capability import ThrusterTorques, wheel_shares
@@ -114,9 +115,9 @@ class OtherWheelLoad(WheelLoad):
 
     def _series(self, log: FlightLog, demand: Demand) -> WheelRows:
         wheels = self._wheels
-        momentum = demand.momentum @ self._shares.T + self._initial
-        turning = np.cross(demand.omega, momentum @ wheels.unit_axes)
-        torque = -(demand.torque + turning) @ self._shares.T
+        momentum = product(demand.momentum, self._shares.T) + self._initial
+        turning = np.cross(demand.omega, product(momentum, wheels.unit_axes))
+        torque = -product(demand.torque + turning, self._shares.T)
         speed = momentum / wheels.values("rotor_inertia")
         friction = wheels.values("coulomb") * np.sign(speed) + wheels.values("viscous") * speed
         return WheelRows(torque + friction, momentum)
@@ -175,7 +176,7 @@ class ThrusterLoad(Load):
         rate = shares * self._thrusters.mass_flow
         self._rate += float(np.sum(rate))
         if self._rate_of_axes is not None:
-            self._rate_of_axes += rate @ self._parts
+            self._rate_of_axes += product(rate, self._parts)
 
 
 class OtherThrusterLoad(ThrusterLoad):

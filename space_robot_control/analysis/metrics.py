@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.blocks import Metric, blocks_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_sim.elementary.matrices import norm
 
 from .spectrum import PowerAbove
 
@@ -127,7 +128,7 @@ def eq64(each: Array) -> float:
 
     Of other than three axes it is that share of it.
     """
-    return float(np.linalg.norm(each)) / len(each)
+    return norm(each) / len(each)
 
 
 def mean_axis_rms(values: Array) -> float:

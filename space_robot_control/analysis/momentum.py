@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.bag.blocks import Metric, joined, last_rows
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
+from space_robot_sim.elementary.matrices import product
+from space_robot_sim.elementary.sine import sines_cosines
 from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.robot import Robot
@@ -119,7 +121,7 @@ class _OfOneRobot:
         )  # fmt: skip
         found = robot_momentum(self._robot, motion)
         wheels = self._flown.wheels
-        spin = wheels.spin_momenta(rows.wheel_velocities) @ wheels.unit_axes
+        spin = product(wheels.spin_momenta(rows.wheel_velocities), wheels.unit_axes)
         outside = self._from_outside(rows, axes, found.centre_of_mass)
         self._before, self._outside = last_rows(log, 1), outside[-1].copy()
         whole = Momentum(
@@ -134,8 +136,9 @@ class _OfOneRobot:
         impulse = np.zeros((rows.ticks, 3))
         if self._flown.thruster_count:
             thrusters = self._flown.thrusters
-            force = rows.thrusts @ thrusters.unit_directions
-            torque = rows.thrusts @ np.cross(thrusters.places, thrusters.unit_directions)
+            force = product(rows.thrusts, thrusters.unit_directions)
+            arms = np.cross(thrusters.places, thrusters.unit_directions)
+            torque = product(rows.thrusts, arms)
             each = [  # turned as the base is before and after the interval
                 _torque(side, centre, force[1:], torque[1:])
                 for side, centre in (
@@ -193,7 +196,7 @@ def disturbance_impulse(disturbance: DisturbanceSettings, time: Array) -> Array:
     for frequency in disturbance.base_frequencies:
         if frequency:
             omega = 2.0 * np.pi * frequency
-            found += (np.cos(omega * time) - 1.0) / omega
+            found += (sines_cosines(omega * time)[1] - 1.0) / omega
     impulse: Array = disturbance.scale * disturbance.base_amplitude * found
     return impulse
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.blocks import Metric
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_sim.elementary.arctangent import arctan2
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.tool import tool_pose
 
@@ -87,8 +88,7 @@ def pointing_error(log: FlightLog, robot: Robot, start: Array | None = None) -> 
 def angle_between(first: Array, second: Array) -> Array:
     """(N,) rad between unit vectors (N, 3), as exact for small angles as for large ones."""
     across = np.linalg.norm(np.cross(first, second), axis=1)
-    angle: Array = np.arctan2(across, np.einsum("ij,ij->i", first, second))
-    return angle
+    return arctan2(across, np.sum(first * second, axis=1))
 
 
 def rotation_angle(first: Array, second: Array) -> Array:
@@ -99,9 +99,8 @@ def rotation_angle(first: Array, second: Array) -> Array:
     axes = [(first[:, :, k], second[:, :, k]) for k in range(3)]
     # vee(a b^T - b a^T) = b x a for each pair of columns; trace(R) is the sum of their products
     sine = 0.5 * np.linalg.norm(sum(np.cross(b, a) for a, b in axes), axis=1)
-    cosine = 0.5 * (sum(np.einsum("ij,ij->i", a, b) for a, b in axes) - 1.0)
-    angle: Array = np.arctan2(sine, cosine)
-    return angle
+    cosine = 0.5 * (sum(np.sum(a * b, axis=1) for a, b in axes) - 1.0)
+    return arctan2(sine, cosine)
 
 
 def _unit(quaternion: Array) -> Array:

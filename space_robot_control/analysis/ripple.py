@@ -79,7 +79,9 @@ class RippleSpectrum(NamedTuple):
         top = int(tops[np.argmax(power[tops])])
         near = slice(max(0, top - LINE), top + LINE + 1)
         total = float(np.sum(power[near]))
-        return Peak(float(self.frequency[near] @ power[near]) / total, float(np.sqrt(total)))
+        return Peak(
+            float(np.sum(self.frequency[near] * power[near])) / total, float(np.sqrt(total))
+        )
 
 
 class Ripple(Metric):

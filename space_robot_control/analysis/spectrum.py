@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.blocks import BLOCK_TICKS
+from space_robot_sim.elementary.fourier import squared_spectrum
+from space_robot_sim.elementary.sine import sines_cosines
 
 Array = NDArray[np.float64]
 
@@ -105,8 +107,8 @@ class PowerAbove:
         """(2, axes) as in `_power`, of one segment."""
         if len(rows) < 2 or 0.5 / self._period <= self._frequency:
             return np.zeros_like(self._power)
-        window = np.hanning(len(rows))[:, np.newaxis]  # keeps slow motion from leaking upwards
-        f, power = one_sided_power(window * rows, self._period)
+        window = hann(len(rows), len(rows) - 1)  # keeps slow motion from leaking upwards
+        f, power = one_sided_power(window[:, np.newaxis] * rows, self._period)
         return np.stack([np.sum(power[f > self._frequency], axis=0), np.sum(power, axis=0)])
 
 
@@ -154,12 +156,17 @@ class PowerSpectrum:
     def _mean_squares(self, rows: Array) -> Array:
         """(F, axes) of one segment."""
         size = len(rows)
-        window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(size) / size)
+        window = hann(size, size)
         time = np.arange(size) - 0.5 * (size - 1)
-        trend = np.outer(time, time @ rows / (time @ time))
+        trend = np.outer(time, np.sum(time[:, np.newaxis] * rows, axis=0) / np.sum(time * time))
         steady = rows - np.mean(rows, axis=0) - trend
         _, power = one_sided_power(window[:, np.newaxis] * steady, self._period)
         return power / (size * np.sum(window**2))
+
+
+def hann(rows: int, period: int) -> Array:
+    """Return ``rows`` numbers of Hann's window of a ``period`` in rows."""
+    return 0.5 - 0.5 * sines_cosines(2.0 * np.pi * np.arange(rows) / period)[1]
 
 
 def one_sided_power(rows: Array, period: float) -> tuple[Array, Array]:
@@ -167,7 +174,7 @@ def one_sided_power(rows: Array, period: float) -> tuple[Array, Array]:
 
     That of the negative frequencies is added to that of the positive ones.
     """
-    power = np.abs(np.fft.rfft(rows, axis=0)) ** 2
+    power = squared_spectrum(rows)
     f = np.asarray(np.fft.rfftfreq(len(rows), period), np.float64)
     inside = (f > 0.0) & (f < 0.5 / period * (1.0 - 1e-12))
     power[inside] *= 2.0

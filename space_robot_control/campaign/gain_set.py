@@ -11,6 +11,7 @@ import numpy as np
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.dynamics.attitude import SINGULAR_ETA
+from space_robot_sim.elementary.matrices import norm
 from space_robot_sim.environment.payload import with_payload
 
 from ..analysis.files import make_folder, whole_file
@@ -41,7 +42,7 @@ def tuned_set(
     plans = [validate(FlightPlan, {**options, "case": case}, "options") for case in cases]
     settings = [FlightSettings.resolve(plan.options(), plan.parameters) for plan in plans]
     nominal, reference = Robots(settings[0], plans[0].robot).plant, settings[0].mission
-    eta = reference.base_quaternion[0] / float(np.linalg.norm(reference.base_quaternion))
+    eta = reference.base_quaternion[0] / norm(reference.base_quaternion)
     if abs(eta) <= SINGULAR_ETA:
         raise InputError("base_quaternion: turned by 180 degrees, where the laws are singular")
     if len(reference.waypoint_times) < 2:

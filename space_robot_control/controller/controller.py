@@ -14,6 +14,7 @@ from space_robot_msgs_py.compiled.records import Block, assign
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
+from space_robot_sim.elementary.matrices import norm
 from space_robot_sim.robot import Robot
 
 from ..laws import ControlLaw, Signals
@@ -204,8 +205,8 @@ def unusable(status: int, tick: int, quaternion: Array) -> UnusableStateError:
     if status == SINGULAR:
         return SingularAttitudeError(tick, float(quaternion[0]))
     if status == NOT_UNIT:
-        norm = float(np.linalg.norm(quaternion))
-        why = f"the base's quaternion has norm {norm:.6g}, not 1"
+        length = norm(quaternion)
+        why = f"the base's quaternion has norm {length:.6g}, not 1"
         return UnusableStateError(tick, why, "quaternion not unit")
     if status == TOO_LARGE:
         return UnusableStateError(

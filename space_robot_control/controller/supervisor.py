@@ -10,7 +10,6 @@ applied force (`Controller.engage`).
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from enum import Enum
 
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Command, RobotState
+from space_robot_sim.elementary.matrices import norm
 
 from .controller import Controller
 from .kernels import NORM_TOLERANCE
@@ -96,5 +96,5 @@ class Supervisor:
 
 def _is_unit(quaternion: Array) -> bool:
     """Tell if the controller would take it for an attitude."""
-    norm = math.hypot(*quaternion)
-    return abs(norm * norm - 1.0) <= NORM_TOLERANCE
+    length = norm(quaternion)
+    return abs(length * length - 1.0) <= NORM_TOLERANCE

@@ -11,6 +11,7 @@ from pydantic import Field
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import ReferenceChunk
+from space_robot_sim.elementary.matrices import norm
 from space_robot_sim.robot import Robot
 
 from .limits import check_positions
@@ -56,13 +57,13 @@ class Mission:
             )
         if times[0] != 0.0 or np.any(np.diff(times) <= 0.0):
             raise InputError(f"waypoint_times must rise from 0, got {settings.waypoint_times}")
-        norm = float(np.linalg.norm(settings.base_quaternion))
-        if not 1e-3 <= norm <= 1e3:
-            raise InputError(f"base_quaternion must have a norm near 1, got {norm:g}")
+        length = norm(settings.base_quaternion)
+        if not 1e-3 <= length <= 1e3:
+            raise InputError(f"base_quaternion must have a norm near 1, got {length:g}")
         self._times = times
         self._waypoints = robot.from_degrees(np.reshape(settings.waypoints_deg, (len(times), n)))
         check_positions(robot, self._waypoints)
-        self._quaternion = np.array(settings.base_quaternion) / norm
+        self._quaternion = np.array(settings.base_quaternion) / length
         self._period = period
 
     @property

@@ -1,8 +1,9 @@
 """One decorator for every compiled function, with a disk cache that cannot go stale.
 
 Numba's own cache watches only the file a function stands in, so a change in a function it
-calls from another file goes unseen. Here the cache folder's name is a digest of the source of
-all three packages: any edit starts a fresh cache, and all processes share what one compiled.
+calls from another file goes unseen. Here the cache folder's name is a digest of the files of all
+three packages that have kernels: an edit of one of them starts a fresh cache, an edit of another
+file does not, and all processes share what one compiled.
 """
 
 from __future__ import annotations
@@ -29,8 +30,9 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 def kernel(function: _Function) -> _Function:
     """Compile ``function`` on first call, without the GIL, cached on disk.
 
-    IEEE arithmetic is kept as written (no fast-math): the same inputs give the same bits in
-    every process, which is what makes the graph and the in-process flight agree.
+    IEEE arithmetic is kept as written (no fast-math, nothing fused): the same inputs give the same
+    bits in every process and on every processor, if they call no function of the C library (sine,
+    exponential, ...) but the square root.
     """
     with _our_cache():
         compiled = _njit(cache=True, **_OPTIONS)(function)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 
+from ..elementary.sine import sin_cos
 from .algebra import (
     Matrix,
     Symmetric,
@@ -48,7 +49,7 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
     keep_frame(axes, joint, data.frame[0])
     # loops of their own: a call within the long one would drive its numbers out of the registers
     for j in range(int(model.joint_count)):
-        data.turn[j, 0], data.turn[j, 1] = np.cos(joint_positions[j]), np.sin(joint_positions[j])
+        data.turn[j, 1], data.turn[j, 0] = sin_cos(joint_positions[j])
     for j in range(int(model.joint_count)):
         if model.continues[j] == 0.0:
             axes, joint = kept_frame(data.frame[int(model.parent[j])])

@@ -12,6 +12,8 @@ from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.config.validation import StrictModel
 
+from ..elementary.sine import sin_cos
+
 Array = NDArray[np.float64]
 
 Amplitude = Annotated[float, Field(ge=0.0, le=1e6)]
@@ -67,7 +69,7 @@ def disturbance_torque(disturbance: Disturbance, time: float, out: Array) -> Non
         first, last = 3 * group, out.size if group == 2 else min(3 * group + 3, out.size)
         amplitude, torque = disturbance.amplitude[group], 0.0
         if amplitude != 0.0:
-            wave = np.sin(frequency[group, 0] * time) + np.sin(frequency[group, 1] * time)
+            wave = sin_cos(frequency[group, 0] * time)[0] + sin_cos(frequency[group, 1] * time)[0]
             torque = amplitude * wave
         for i in range(first, last):
             out[i] = torque

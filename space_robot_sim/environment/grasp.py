@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.validation import one_of
 
+from ..elementary.matrices import product, turned_tensor
 from ..robot import Robot
 from ..robot.inertia import inertia_tensor
 from ..robot.tree import parallel_axes
@@ -44,10 +45,10 @@ class Grasp(NamedTuple):
         if target.tool:
             where = f" of robot {robot.name!r} for target {target.name!r}"
             tool = tools[one_of(target.tool, tools, "tool", where)]
-        axes = tool.rotation @ target.rotation
+        axes = product(tool.rotation, target.rotation)
         return cls(
-            tool.body, target.mass, tool.position + tool.rotation @ target.place.position,
-            axes @ inertia_tensor(target.inertia) @ axes.T, tool.rotation,
+            tool.body, target.mass, tool.position + product(tool.rotation, target.place.position),
+            turned_tensor(axes, inertia_tensor(target.inertia)), tool.rotation,
         )  # fmt: skip
 
     def holding(self, robot: Robot) -> Robot:

@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..elementary.matrices import product, solve, turned_tensor
 from ..robot import Robot
 from ..robot.base_axes import base_axes
 from ..robot.dynamics import mass_matrix
@@ -55,38 +56,38 @@ class Impact:
         frames = {frame.body: frame for frame in walk}
         carrier = frames[grasp.body]
         axes = _axes(carrier)
-        self._tool_axes = axes @ grasp.tool_axes
+        self._tool_axes = product(axes, grasp.tool_axes)
         self._size = holding.joint_count + 6
         self.jacobian = np.zeros((6, self._size + len(wheel_inertia)))
         """(6, N+6+W) velocity of the target, as a part of the robot, by qdot."""
         self._fill_jacobian(holding, frames, grasp)
         mass = np.zeros((6, 6))
         mass[:3, :3] = grasp.mass * np.eye(3)
-        mass[3:, 3:] = axes @ grasp.inertia @ axes.T
+        mass[3:, 3:] = turned_tensor(axes, grasp.inertia)
         inertia = _with_wheels(
             mass_matrix(holding, quaternion, joint_positions),
-            wheel_axes @ base[:, :, 0], wheel_inertia,
+            product(wheel_axes, base[:, :, 0]), wheel_inertia,
         )  # fmt: skip
-        self._gain = np.linalg.solve(inertia, (mass @ self.jacobian).T)
+        self._gain = solve(inertia, product(mass, self.jacobian).T)
         """(N+6+W, 6) change of qdot by u."""
 
     def capture(self, motion: Motion, velocity: Array) -> Array:
         """Return qdot after a capture at ``velocity``."""
-        found: Array = velocity + self._gain @ self._relative(motion, velocity)
+        found: Array = velocity + product(self._gain, self._relative(motion, velocity))
         return found
 
     def before_capture(self, motion: Motion, velocity: Array) -> Array:
         """Return qdot before a capture that led to ``velocity``."""
         if motion.relative_to == "tool":
-            return velocity - self._gain @ self._relative(motion, velocity)
+            return velocity - product(self._gain, self._relative(motion, velocity))
         # qdot+ = qdot- + K (u_target - J qdot-)
-        known: Array = velocity - self._gain @ _spatial(motion)
-        matrix = np.eye(len(velocity)) - self._gain @ self.jacobian
-        return np.asarray(np.linalg.solve(matrix, known), dtype=np.float64)
+        known: Array = velocity - product(self._gain, _spatial(motion))
+        matrix = np.eye(len(velocity)) - product(self._gain, self.jacobian)
+        return solve(matrix, known)
 
     def release(self, speed: float, velocity: Array) -> Array:
         """Return qdot after a release at ``velocity`` by a spring, m/s along z of the tool."""
-        found: Array = velocity - self._gain[:, :3] @ (speed * self._tool_axes[:, 2])
+        found: Array = velocity - product(self._gain[:, :3], speed * self._tool_axes[:, 2])
         return found
 
     def before_release(self, speed: float, velocity: Array) -> Array:
@@ -96,9 +97,9 @@ class Impact:
     def _relative(self, motion: Motion, velocity: Array) -> Array:
         """Return u of a target before its capture."""
         if motion.relative_to == "tool":
-            parts = self._tool_axes @ motion.velocity, self._tool_axes @ motion.angular_velocity
-            return np.concatenate(parts)
-        relative: Array = _spatial(motion) - self.jacobian @ velocity
+            parts = motion.velocity, motion.angular_velocity
+            return np.concatenate([product(self._tool_axes, part) for part in parts])
+        relative: Array = _spatial(motion) - product(self.jacobian, velocity)
         return relative
 
     def _fill_jacobian(self, robot: Robot, frames: dict[int, BodyFrame], grasp: Grasp) -> None:

@@ -14,6 +14,7 @@ from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, validate
 
 from ..dynamics.attitude import rotation_matrix
+from ..elementary.matrices import norm
 from ..robot.file import Vector
 from ..robot.inertia import Inertia, Mass
 
@@ -21,8 +22,8 @@ Array = NDArray[np.float64]
 
 
 def _unit(quaternion: list[float]) -> list[float]:
-    norm = float(np.linalg.norm(quaternion))
-    if not 1e-3 <= norm <= 1e3:
+    length = norm(quaternion)
+    if not 1e-3 <= length <= 1e3:
         raise ValueError("a quaternion must have a norm near 1")
     return quaternion
 
@@ -90,7 +91,7 @@ class Target(StrictModel):
     def rotation(self) -> Array:
         """(3, 3) rotation from the target's axes to the tool's."""
         out, quaternion = np.empty((3, 3)), np.array(self.place.quaternion)
-        rotation_matrix(quaternion / np.linalg.norm(quaternion), out)
+        rotation_matrix(quaternion / norm(quaternion), out)
         return out
 
 

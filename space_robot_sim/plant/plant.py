@@ -24,6 +24,7 @@ from ..actuators.actuators import (
     reports_given,
 )
 from ..dynamics.model import Model
+from ..elementary.matrices import norm
 from ..environment.captures import Captures
 from ..environment.environment import Environment, EnvironmentSettings
 from ..environment.payload import with_payload
@@ -112,9 +113,9 @@ class Plant:
                 f"initial_joints_deg has {len(settings.initial_joints_deg)} values, "
                 f"robot {robot.name!r} has {n} joints"
             )
-        norm = float(np.linalg.norm(settings.initial_quaternion))
-        if not 1e-3 <= norm <= 1e3:
-            raise InputError(f"initial_quaternion must have a norm near 1, got {norm:g}")
+        length = norm(settings.initial_quaternion)
+        if not 1e-3 <= length <= 1e3:
+            raise InputError(f"initial_quaternion must have a norm near 1, got {length:g}")
         settings.check(robot, getattr(settings, "actuators", "given"))
         self.names = settings.robot_names(robot)
         """Those of all that is told of the robot and asked of it."""
@@ -133,7 +134,7 @@ class Plant:
             memory.actuators, len(self.names.commanded)
         )
         """Ring of the commands that are still on their way."""
-        memory.x[3:7] = np.array(settings.initial_quaternion) / norm
+        memory.x[3:7] = np.array(settings.initial_quaternion) / length
         positions = np.concatenate(
             (robot.from_degrees(settings.initial_joints_deg), [s.rest for s in robot.springs])
         )

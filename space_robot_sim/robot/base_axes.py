@@ -22,13 +22,13 @@ def base_axes(quaternion: Array) -> Array:
 
 def to_inertial(axes: Array, vectors: Array) -> Array:
     """Turn vectors (3, N) on the base's ``axes``, see `base_axes`, to inertial axes, (3, N)."""
-    turned: Array = np.einsum("ijk,ik->jk", axes, vectors)
+    turned: Array = axes[0] * vectors[0] + axes[1] * vectors[1] + axes[2] * vectors[2]
     return turned
 
 
 def to_base(axes: Array, vectors: Array) -> Array:
     """Turn vectors (3, N) on inertial axes to the base's ``axes``, see `base_axes`, (3, N)."""
-    turned: Array = np.einsum("ijk,jk->ik", axes, vectors)
+    turned: Array = axes[:, 0] * vectors[0] + axes[:, 1] * vectors[1] + axes[:, 2] * vectors[2]
     return turned
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..elementary.matrices import product
+from ..elementary.rotations import rpy_of_rotation
 from .file import BASE
 from .inertia import inertia_elements
 from .robot import Robot
@@ -47,7 +48,7 @@ def _link(robot: Robot, joint: int) -> dict[str, Any]:
         "name": robot.all_joint_names[joint],
         "parent": (BASE, *robot.all_joint_names)[robot.parent[joint]],
         "joint": "prismatic" if is_prismatic else "revolute",
-        "origin": _origin(rotation, rotation @ robot.offset[joint]),
+        "origin": _origin(rotation, product(rotation, robot.offset[joint])),
         "mass": float(robot.mass[body]),
         "inertia": _inertia(robot, body),
         "com": _numbers(robot.com[body]),
@@ -84,12 +85,7 @@ def _limits(robot: Robot, joint: int) -> dict[str, Any]:
 
 
 def _origin(rotation: Array, position: Array) -> dict[str, Any]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of two angles about one axis one is zero: as good as any
-        from scipy.spatial.transform import Rotation  # slow to import
-
-        rpy = Rotation.from_matrix(rotation).as_euler("xyz", degrees=True)
-    return {"xyz": _numbers(position), "rpy_deg": _numbers(rpy)}
+    return {"xyz": _numbers(position), "rpy_deg": _numbers(np.degrees(rpy_of_rotation(rotation)))}
 
 
 def _inertia(robot: Robot, body: int) -> list[float]:

@@ -15,6 +15,7 @@ from ..dynamics.kinematics import forward_kinematics, spatial_velocities
 from ..dynamics.model import Data
 from ..dynamics.rho_space import RhoSpaceModel
 from ..dynamics.rnea import rnea_bias
+from ..elementary.matrices import norm
 
 if TYPE_CHECKING:
     from space_robot_msgs_py.compiled.records import Block
@@ -33,10 +34,10 @@ def _vector(value: ArrayLike, size: int, name: str) -> Array:
 
 def _quaternion(value: ArrayLike) -> Array:
     array = _vector(value, 4, "quaternion_wxyz")
-    norm = float(np.linalg.norm(array))
-    if not abs(norm - 1.0) < 1e-6:
-        raise ValueError(f"quaternion_wxyz must have norm 1, got {norm}")
-    return array / norm
+    length = norm(array)
+    if not abs(length - 1.0) < 1e-6:
+        raise ValueError(f"quaternion_wxyz must have norm 1, got {length}")
+    return array / length
 
 
 def generalised_rows(robot: Robot) -> list[int]:

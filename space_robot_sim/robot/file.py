@@ -14,6 +14,8 @@ from typing_extensions import Self
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.topics import BASE_AXES
 
+from ..elementary.matrices import norm, product
+from ..elementary.rotations import exact_sines_cosines, rotation_of_rpy
 from .inertia import Inertia, Mass, check_inertia, inertia_tensor
 from .tree import Body, Joint, JointFriction, JointLimits, Spring, Tool
 
@@ -59,20 +61,15 @@ class FrameFile(StrictModel):
     def rotation(self) -> Array:
         """(3, 3) its axes, as columns, on its parent's axes; exact at right angles."""
         if self.origin:
-            from scipy.spatial.transform import Rotation  # slow to import
-
-            turned = Rotation.from_euler("xyz", self.origin.rpy_deg, degrees=True).as_matrix()
-            return _exact_at_right_angles(turned)
-        alpha = np.radians(self.alpha_deg)
-        c, s = _exact_at_right_angles(np.array([np.cos(alpha), np.sin(alpha)]))
+            return rotation_of_rpy(np.radians(self.origin.rpy_deg))
+        s, c = exact_sines_cosines(np.radians(self.alpha_deg))
         return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
 
     @property
     def offset(self) -> Array:
         """(3,) m, from the parent's frame to this one, on the axes of this one."""
         if self.origin:
-            placed: Array = self.rotation.T @ np.array(self.origin.xyz)
-            return placed
+            return product(self.rotation.T, self.origin.xyz)
         return np.array([self.a, 0.0, self.d])
 
 
@@ -126,7 +123,7 @@ class LinkFile(FrameFile):
     @field_validator("axis", mode="after")
     @classmethod
     def _is_direction(cls, axis: list[float]) -> list[float]:
-        if not np.linalg.norm(axis) > 1e-9:
+        if not norm(axis) > 1e-9:
             raise ValueError("the axis must not be zero")
         return axis
 
@@ -195,7 +192,7 @@ class RobotFile(StrictModel):
 
 def _tools_of(body: str, tools: list[ToolFile], last: str) -> tuple[Tool, ...]:
     return tuple(
-        Tool(tool.name, tool.rotation, tool.rotation @ tool.offset, rank=rank)
+        Tool(tool.name, tool.rotation, product(tool.rotation, tool.offset), rank=rank)
         for rank, tool in enumerate(tools) if (tool.link or last) == body
     )  # fmt: skip
 
@@ -219,17 +216,11 @@ def _body(link: LinkFile, parent: str) -> Body:
         spring = Spring(p.stiffness, p.damping, number(p.rest_deg))
     if link.friction:
         friction = JointFriction(link.friction.coulomb, link.friction.viscous)
-    axis = np.array(link.axis) / np.linalg.norm(link.axis)
+    axis = np.array(link.axis) / norm(link.axis)
     return Body(
         link.name, link.mass, inertia_tensor(link.inertia), np.array(link.com), parent,
         Joint(link.name, kind, link.rotation, link.offset, axis, limits, friction, spring),
     )  # fmt: skip
-
-
-def _exact_at_right_angles(values: Array) -> Array:
-    """Rid sines and cosines of multiples of 90 degrees of the rounding error of pi."""
-    rounded = np.round(values)
-    return np.where(np.abs(values - rounded) < 1e-15, rounded, values)
 
 
 class _Document(StrictModel):

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..elementary.sine import sines_cosines
 from .robot import Robot
 
 Array = NDArray[np.float64]
@@ -50,7 +51,7 @@ def body_frames(
         if robot.is_prismatic[joint]:
             origin = origin + position * z
         else:
-            ct, st = np.cos(position), np.sin(position)
+            st, ct = sines_cosines(position)
             x, y = ct * x + st * y, ct * y - st * x
         frames[joint + 1] = BodyFrame(joint + 1, x, y, z, origin)
         yield frames[joint + 1]

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..elementary.matrices import product
 from .base_axes import base_axes, cross, to_base, to_inertial
 from .frames import BodyFrame, body_frames
 from .robot import Robot
@@ -114,6 +115,6 @@ def _body(robot: Robot, frame: BodyFrame, velocity: Array, omega: Array) -> _Bod
     """Return the body of a frame that moves with ``velocity``."""
     turn = np.array((frame.x, frame.y, frame.z))
     arm = frame.on_outer_axes(robot.com[frame.body])
-    spin = to_inertial(turn, robot.inertia[frame.body] @ to_base(turn, omega))
+    spin = to_inertial(turn, product(robot.inertia[frame.body], to_base(turn, omega)))
     mass = float(robot.mass[frame.body])
     return _Body(mass, frame.origin + arm, velocity + cross(omega, arm), spin)

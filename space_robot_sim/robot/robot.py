@@ -14,6 +14,8 @@ from space_robot_msgs_py.config.validation import read_yaml, validate
 from space_robot_msgs_py.topics import BASE_AXES
 
 from ..dynamics.model import Model
+from ..elementary.matrices import product
+from ..elementary.series import plain_sin_cos
 from .file import _Document
 from .inertia import inertia_tensor
 from .model import model_of
@@ -138,7 +140,7 @@ def _locked(joint: Joint, position: float) -> Joint:
     if joint.kind == "prismatic":
         offset = offset + np.array([0.0, 0.0, position])
     else:
-        c, s = np.cos(position), np.sin(position)
+        s, c = plain_sin_cos(position)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        offset, rotation = turn.T @ offset, rotation @ turn
+        offset, rotation = product(turn.T, offset), product(rotation, turn)
     return Joint(joint.name, "fixed", rotation, offset)

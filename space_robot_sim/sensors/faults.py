@@ -56,7 +56,7 @@ def _change(changes: Mapping[Kind, Change], values: Array, fault: ScheduledFault
 
 def add_noise(sigma: Array, fault: ScheduledFault) -> None:
     """Let a fault's white noise add to what has the standard deviation ``sigma``, in quadrature."""
-    np.hypot(sigma, fault.value, out=sigma)
+    np.sqrt(sigma * sigma + fault.value * fault.value, out=sigma)
 
 
 def coarsen(step: Array, fault: ScheduledFault) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
 
+from ..elementary.normal import normal_numbers
 from ..faults.schedule import BLOCK_TICKS
 
 Array = NDArray[np.float64]
@@ -33,8 +34,8 @@ class Draws:
         block, (seed, drawn) = tick // BLOCK_TICKS, self.drawn
         if block != drawn:
             for key, array in self._arrays:
-                rng = np.random.default_rng((seed, key, block))
-                array[:] = rng.standard_normal(array.shape)
+                bits = np.random.PCG64((seed, key, block)).random_raw(array.size)
+                normal_numbers(bits, array.reshape(-1))
             self.drawn = seed, block
         return (block + 1) * BLOCK_TICKS
 

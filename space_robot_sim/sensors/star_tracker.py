@@ -15,6 +15,8 @@ from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import State
 
+from ..elementary.matrices import norm
+from ..elementary.sine import sin_cos
 from ..faults.grammar import Argument, Kind
 from ..faults.schedule import BLOCK_TICKS, ScheduledFault
 from .faults import SIGMA_RAD, Change, SensorFault, add_noise, coarsen
@@ -33,9 +35,9 @@ def has_direction(vector: list[float]) -> list[float]:
     Raises:
         ValueError: it is far too short or too long.
     """
-    norm = float(np.linalg.norm(vector))
-    if not 1e-3 <= norm <= 1e3:
-        raise ValueError(f"the norm must be near 1, not {norm:g}")
+    length = norm(vector)
+    if not 1e-3 <= length <= 1e3:
+        raise ValueError(f"the norm must be near 1, not {length:g}")
     return vector
 
 
@@ -113,7 +115,7 @@ class StarTracker(Record):
         tracker = cls.allocate(n)
         assign(
             tracker, sigma=[settings.noise_across, settings.noise_about], step=settings.step,
-            boresight=np.array(settings.boresight) / np.linalg.norm(settings.boresight),
+            boresight=np.array(settings.boresight) / norm(settings.boresight),
             interval=interval, delay=delay, held=truth.quaternion,
         )  # fmt: skip
         return tracker
@@ -153,7 +155,8 @@ def expose(tracker: StarTracker, quaternion: Array, draws: Array, out: Array) ->
     out[:] = quaternion
     angle = np.sqrt(x * x + y * y + z * z)
     if angle > 0.0:  # times the quaternion of the rotation x, y, z
-        cosine, sine = np.cos(0.5 * angle), np.sin(0.5 * angle) / angle
+        sine, cosine = sin_cos(0.5 * angle)
+        sine /= angle
         x, y, z = sine * x, sine * y, sine * z
         a, b, c, d = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
         out[0] = a * cosine - b * x - c * y - d * z
@@ -164,9 +167,9 @@ def expose(tracker: StarTracker, quaternion: Array, draws: Array, out: Array) ->
     if step > 0.0:
         for i in range(4):
             out[i] = in_steps(out[i], step)
-        norm = np.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2] + out[3] * out[3])
+        length = np.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2] + out[3] * out[3])
         for i in range(4):
-            out[i] /= norm
+            out[i] /= length
 
 
 def _blind(blind: Array, fault: ScheduledFault) -> None:

@@ -15,6 +15,7 @@ from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.samples import MOST_THRUSTERS
 from space_robot_sim.actuators.thrusters import ThrusterSettings
+from space_robot_sim.elementary.matrices import product
 
 from .non_negative import NonNegative, solve
 from .settings import AllocationSettings
@@ -69,7 +70,7 @@ class Thrusters(Record):
             thrusters, count=count, period=period, force=size, wrench=wrench, shortest=shortest,
             delay=delay,
         )  # fmt: skip
-        assign(thrusters.problem, gram=wrench @ wrench.T)
+        assign(thrusters.problem, gram=product(wrench, wrench.T))
         for row, side in enumerate((1.0, -1.0) if count else ()):
             for i in range(3):
                 find_times(thrusters, side * np.eye(6)[i])

@@ -8,6 +8,7 @@ from typing import Any
 
 from space_robot_msgs_py.config.files import named_file, node_parameters
 from space_robot_msgs_py.config.validation import validate
+from space_robot_sim.elementary.matrices import norm
 from space_robot_sim.sensors.encoders import EncoderSettings
 from space_robot_sim.sensors.gyro import GyroSettings
 from space_robot_sim.sensors.sensors import SensorSettings
@@ -76,8 +77,8 @@ def believed_numbers(sensors: SensorSettings, period: float) -> Mapping[str, Any
 def _of_tracker(tracker: StarTrackerSettings) -> dict[str, Any]:
     rounding = UNIFORM * tracker.step
     return {
-        "tracker_across": max(LEAST_ANGLE, math.hypot(tracker.noise_across, rounding)),
-        "tracker_about": max(LEAST_ANGLE, math.hypot(tracker.noise_about, rounding)),
+        "tracker_across": max(LEAST_ANGLE, norm((tracker.noise_across, rounding))),
+        "tracker_about": max(LEAST_ANGLE, norm((tracker.noise_about, rounding))),
         "tracker_boresight": list(tracker.boresight),
         "tracker_delay": tracker.delay,
     }
@@ -85,9 +86,9 @@ def _of_tracker(tracker: StarTrackerSettings) -> dict[str, Any]:
 
 def _of_gyro(gyro: GyroSettings, period: float) -> dict[str, Any]:
     """The noise of single samples is as good as an angle random walk of this density."""
-    sample = math.hypot(gyro.noise, UNIFORM * gyro.step) * math.sqrt(period)
+    sample = norm((gyro.noise, UNIFORM * gyro.step)) * math.sqrt(period)
     return {
-        "gyro_angle_walk": max(LEAST, math.hypot(gyro.angle_random_walk, sample)),
+        "gyro_angle_walk": max(LEAST, norm((gyro.angle_random_walk, sample))),
         "gyro_rate_walk": gyro.rate_random_walk,
         "gyro_bias": max(LEAST, *(abs(bias) for bias in gyro.initial_bias)),
     }
@@ -96,9 +97,9 @@ def _of_gyro(gyro: GyroSettings, period: float) -> dict[str, Any]:
 def _of_encoders(encoders: EncoderSettings) -> dict[str, Any]:
     """Differenced rates are no news: their noise is that of the angles."""
     step = 2.0 * math.pi / 2.0**encoders.bits if encoders.bits else 0.0
-    rate = math.hypot(encoders.velocity_noise, UNIFORM * encoders.velocity_step)
+    rate = norm((encoders.velocity_noise, UNIFORM * encoders.velocity_step))
     return {
-        "joint_angle_noise": max(LEAST, math.hypot(encoders.noise, UNIFORM * step)),
+        "joint_angle_noise": max(LEAST, norm((encoders.noise, UNIFORM * step))),
         "joint_rate_noise": 0.0 if encoders.difference_ticks else max(LEAST, rate),
     }
 

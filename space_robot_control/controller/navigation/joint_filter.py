@@ -57,7 +57,8 @@ def jerk_density(bandwidth: float, angle_noise: float, rate_noise: float, period
     """Return q, rad2/s5, for a bandwidth, rad/s; noises: standard deviations (rate 0: none)."""
     of_angle = 1.0 / (angle_noise * angle_noise * period)
     of_rate = 1.0 / (rate_noise * rate_noise * period) if rate_noise > 0.0 else 0.0
-    return float(bandwidth**6 / (of_angle + bandwidth**2 * of_rate))
+    square = bandwidth * bandwidth
+    return square * square * square / (of_angle + square * of_rate)
 
 
 def tune(
@@ -73,7 +74,13 @@ def tune(
     slowest = min(bandwidth, rate_noise / angle_noise) if rate_noise > 0.0 else bandwidth
     steps = min(MOST_STEPS, math.ceil(40.0 / min(1.0, slowest * period)))
     steady_gains(
-        filter.angle_gain, filter.rate_gain, angle_noise**2, rate_noise**2, density, period, steps
+        filter.angle_gain,
+        filter.rate_gain,
+        angle_noise * angle_noise,
+        rate_noise * rate_noise,
+        density,
+        period,
+        steps,
     )
 
 
@@ -96,7 +103,9 @@ def steady_gains(
         for j in range(3):  # integral of the jerk's effect, t^(2-i)/(2-i)! on state i
             power = 5 - i - j
             factor = (1.0 if i > 0 else 2.0) * (1.0 if j > 0 else 2.0)
-            noise[i, j] = density * t**power / (power * factor)
+            noise[i, j] = density / (power * factor)
+            for _ in range(power):
+                noise[i, j] *= t
     p[:] = noise
     p[0, 0] += angle_variance
     before, moved = np.zeros((3, 3)), np.zeros((3, 3))

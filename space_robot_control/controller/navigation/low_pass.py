@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, shaped
+from space_robot_sim.elementary.exponential import exp
 
 Array = NDArray[np.float64]
 
 
 def low_pass_weight(corner_hz: float, period: float) -> float:
     """Weight of a new sample in a first-order low-pass; 0 (for none) where ``corner_hz`` is 0."""
-    return 1.0 - math.exp(-2.0 * math.pi * corner_hz * period)
+    return 1.0 - exp(-2.0 * math.pi * corner_hz * period)
 
 
 class LowPass(Record):

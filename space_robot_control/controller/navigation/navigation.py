@@ -9,6 +9,7 @@ from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import State
+from space_robot_sim.elementary.matrices import norm
 
 from .attitude_filter import (
     LONGEST_DELAY,
@@ -64,18 +65,21 @@ class Navigation(Record):
                 f"{LONGEST_DELAY * period:g} s, got {settings.tracker_delay:g} s"
             )
         boresight = np.array(settings.tracker_boresight)
-        norm = float(np.linalg.norm(boresight))
-        if not 1e-3 <= norm <= 1e3:
+        length = norm(boresight)
+        if not 1e-3 <= length <= 1e3:
             raise InputError(
-                f"navigation_filter.tracker_boresight must have a norm near 1, got {norm:g}"
+                f"navigation_filter.tracker_boresight must have a norm near 1, got {length:g}"
             )
-        along = np.outer(boresight, boresight) / norm**2
-        across, about = settings.tracker_across**2, settings.tracker_about**2
+        along = np.outer(boresight, boresight) / (length * length)
+        across = settings.tracker_across * settings.tracker_across
+        about = settings.tracker_about * settings.tracker_about
         assign(navigation, is_filtered=1.0)
         assign(
             navigation.attitude, noise=across * (np.eye(3) - along) + about * along,
-            angle_walk=settings.gyro_angle_walk**2, rate_walk=settings.gyro_rate_walk**2,
-            initial_bias_variance=settings.gyro_bias**2, gate=settings.gate**2, delay=delay,
+            angle_walk=settings.gyro_angle_walk * settings.gyro_angle_walk,
+            rate_walk=settings.gyro_rate_walk * settings.gyro_rate_walk,
+            initial_bias_variance=settings.gyro_bias * settings.gyro_bias,
+            gate=settings.gate * settings.gate, delay=delay,
         )  # fmt: skip
         assign(navigation.low_pass, weight=low_pass_weight(settings.rate_filter_hz, period))
         tune(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.errors import InputError
 
+from ...elementary.matrices import norm, product, turned_tensor
 from .bodies import Body
 
 Array = NDArray[np.float64]
@@ -54,12 +55,12 @@ def flatten(bodies: Sequence[Body], where: str = "robot") -> list[Moved]:
         else:
             carrier, turned, at = place[body.parent]
             if joint.kind == "fixed":
-                rotation = turned @ joint.rotation
-                place[body.name] = (carrier, rotation, at + rotation @ joint.offset)
+                rotation = product(turned, joint.rotation)
+                place[body.name] = (carrier, rotation, at + product(rotation, joint.offset))
             else:
                 axes = axes_with_z(joint.axis)
-                rotation = turned @ joint.rotation @ axes
-                offset = rotation.T @ at + axes.T @ joint.offset
+                rotation = product(product(turned, joint.rotation), axes)
+                offset = product(rotation.T, at) + product(axes.T, joint.offset)
                 joint = replace(joint, rotation=rotation, offset=offset, axis=np.eye(3)[2])
                 place[body.name] = (len(found), axes.T, np.zeros(3))
         number, rotation, at = place[body.name]
@@ -77,14 +78,14 @@ def axes_with_z(axis: Array) -> Array:
     """Return a rotation whose third column is the unit vector ``axis``; exact for z, -x, ..."""
     helper = np.zeros(3)
     helper[np.argmin(np.abs(axis))] = 1.0
-    x = helper - (helper @ axis) * axis
-    x /= np.linalg.norm(x)
+    x = helper - product(helper, axis) * axis
+    x /= norm(x)
     return np.column_stack((x, np.cross(axis, x), axis))
 
 
 def parallel_axes(mass: float, arm: Array) -> Array:
     """Return what a mass (kg) at ``arm`` (3,), m, adds to the inertia about a point, kg m2."""
-    found: Array = mass * ((arm @ arm) * np.eye(3) - np.outer(arm, arm))
+    found: Array = mass * (product(arm, arm) * np.eye(3) - np.outer(arm, arm))
     return found
 
 
@@ -128,19 +129,18 @@ def _moved_to(body: Body, rotation: Array, position: Array) -> Body:
     """Return the body on the axes of another frame, in which its own is so turned and placed."""
 
     def at(vector: Array) -> Array:
-        turned: Array = position + rotation @ vector
-        return turned
+        return position + product(rotation, vector)
 
     return replace(
         body,
-        inertia=rotation @ body.inertia @ rotation.T,
+        inertia=turned_tensor(rotation, body.inertia),
         com=at(body.com),
         tools=tuple(
-            replace(tool, rotation=rotation @ tool.rotation, position=at(tool.position))
+            replace(tool, rotation=product(rotation, tool.rotation), position=at(tool.position))
             for tool in body.tools
         ),
         visuals=tuple(
-            replace(seen, rotation=rotation @ seen.rotation, position=at(seen.position))
+            replace(seen, rotation=product(rotation, seen.rotation), position=at(seen.position))
             for seen in body.visuals
         ),
     )
@@ -181,5 +181,5 @@ def _put_base_at_com(found: list[Moved]) -> None:
     for moved in found[1:]:
         joint = moved.body.joint
         if moved.parent == 0 and joint:
-            offset = joint.offset + joint.rotation.T @ shift
+            offset = joint.offset + product(joint.rotation.T, shift)
             moved.body = replace(moved.body, joint=replace(joint, offset=offset))

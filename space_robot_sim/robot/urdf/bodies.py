@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.validation import short
 
+from ...elementary.matrices import product, turned_tensor
 from ..tree import Body, Joint, JointKind, Tool
 from .fields import HERE, Frame
 from .findings import Report
@@ -164,8 +165,8 @@ def _joint(edge: Edge, parent: Frame) -> Joint:
     if edge.is_reversed:
         offset, axis = -parent.position, -joint.axis
     else:
-        rotation = rotation @ joint.frame.rotation
-        offset = joint.frame.rotation.T @ (joint.frame.position - parent.position)
+        rotation = product(rotation, joint.frame.rotation)
+        offset = product(joint.frame.rotation.T, joint.frame.position - parent.position)
         axis = joint.axis
     return Joint(
         joint.name, cast(JointKind, joint.kind), rotation, offset, axis, joint.limits,
@@ -177,11 +178,15 @@ def _body(link: Link, frame: Frame, joint: Joint | None, parent: str, rank: int 
     """Return a link as a body whose frame is ``frame``, seen from the link's; a tool if ranked."""
     turn, at = frame.rotation.T, frame.position
     visuals = tuple(
-        replace(visual, rotation=turn @ visual.rotation, position=turn @ (visual.position - at))
+        replace(
+            visual,
+            rotation=product(turn, visual.rotation),
+            position=product(turn, visual.position - at),
+        )
         for visual in link.visuals
     )
-    tools = () if rank is None else (Tool(link.name, turn, -turn @ at, rank=rank),)
+    tools = () if rank is None else (Tool(link.name, turn, -product(turn, at), rank=rank),)
     return Body(
-        link.name, link.mass, turn @ link.inertia @ turn.T, turn @ (link.com - at), parent, joint,
-        tools, visuals,
+        link.name, link.mass, turned_tensor(turn, link.inertia), product(turn, link.com - at),
+        parent, joint, tools, visuals,
     )  # fmt: skip

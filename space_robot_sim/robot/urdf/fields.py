@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...elementary.rotations import rotation_of_rpy
 from .elements import Element
 from .findings import Report
 
@@ -89,21 +90,3 @@ class Fields:
             return value
         why = "is no number" if math.isnan(value) else f"must be at most {LARGEST:g}"
         raise self.report.error(element.line, self.part, f"{element.tag}.{name} {why}", text)
-
-
-def rotation_of_rpy(rpy: Array) -> Array:
-    """Return ``Rz(yaw) Ry(pitch) Rx(roll)``: roll, pitch, yaw (rad) about fixed axes x, y, z."""
-    (cr, cp, cy), (sr, sp, sy) = _exact(np.cos(rpy)), _exact(np.sin(rpy))
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
-
-
-def _exact(values: Array) -> Array:
-    """Rid sines and cosines of multiples of 90 degrees of the rounding error of pi."""
-    rounded = np.round(values)
-    return np.where(np.abs(values - rounded) < 1e-15, rounded, values)

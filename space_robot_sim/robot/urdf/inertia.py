@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ...elementary.matrices import principal_axes, turned_tensor
 from ..tree import Visual
 
 Array = NDArray[np.float64]
@@ -52,13 +53,13 @@ def nearest_inertia(inertia: Array) -> Array | None:
     nearest to a matrix that has some is the one with those raised to 0 (Higham 1988), here to a
     little above.
     """
-    moments, axes = np.linalg.eigh(inertia)
+    moments, axes = principal_axes(inertia)
     second = 0.5 * np.sum(moments) - moments
     largest = float(np.max(second))
     if largest <= 0.0:
         return None
     second = np.maximum(second, SLENDER * largest)
-    nearest: Array = axes @ np.diag(np.sum(second) - second) @ axes.T
+    nearest = turned_tensor(axes, np.diag(np.sum(second) - second))
     return 0.5 * (nearest + nearest.T)
 
 
@@ -74,9 +75,11 @@ def solid_inertia(mass: float, visuals: tuple[Visual, ...]) -> tuple[Array, str]
     for visual in visuals:
         if visual.shape != "mesh":
             turn = visual.rotation
-            inertia: Array = turn @ np.diag(_solid(mass, visual.shape, visual.size)) @ turn.T
+            inertia: Array = turned_tensor(turn, np.diag(_solid(mass, visual.shape, visual.size)))
             return inertia, f"the solid {visual.shape} that it looks like"
-    radius = (3.0 * mass / (4.0 * math.pi * SOLID)) ** (1.0 / 3.0)
+    from ...elementary.exponential import exp, log  # slow to import
+
+    radius = exp(log(3.0 * mass / (4.0 * math.pi * SOLID)) / 3.0)
     ball = _solid(mass, "sphere", (radius,))
     return np.diag(ball), f"a solid sphere of {radius:.3g} m (density of water)"
 
@@ -84,10 +87,10 @@ def solid_inertia(mass: float, visuals: tuple[Visual, ...]) -> tuple[Array, str]
 def _solid(mass: float, shape: str, size: tuple[float, ...]) -> list[float]:
     """Return the principal moments of a homogeneous solid, kg m2, on its axes."""
     if shape == "sphere":
-        return [0.4 * mass * size[0] ** 2] * 3
+        return [0.4 * mass * size[0] * size[0]] * 3
     if shape == "cylinder":
         radius, length = size
-        across = mass * (3.0 * radius**2 + length**2) / 12.0
-        return [across, across, 0.5 * mass * radius**2]
-    x, y, z = (mass * edge**2 / 12.0 for edge in size)
+        across = mass * (3.0 * radius * radius + length * length) / 12.0
+        return [across, across, 0.5 * mass * radius * radius]
+    x, y, z = (mass * edge * edge / 12.0 for edge in size)
     return [y + z, x + z, x + y]

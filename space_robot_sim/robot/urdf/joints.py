@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.validation import short
 
+from ...elementary.matrices import norm
 from ..tree import JointFriction, JointLimits
 from .elements import Element
 from .fields import Fields, Frame
@@ -116,15 +117,15 @@ def _axis(element: Element | None, fields: Fields) -> Array:
         return np.array([1.0, 0.0, 0.0])  # as URDF says
     fields.report.check_content(element, fields.part, (), ("xyz",))
     axis = fields.vector(element, "xyz", None)
-    norm = float(np.linalg.norm(axis))
+    length = norm(axis)
     given = element.attributes.get("xyz", "")
-    if norm < NEARLY_ONE:
+    if length < NEARLY_ONE:
         raise fields.report.error(element.line, fields.part, "the axis has no direction", given)
-    if abs(norm - 1.0) > NEARLY_ONE:
+    if abs(length - 1.0) > NEARLY_ONE:
         fields.report.repaired(
             element.line, fields.part, "the axis must have length 1", given, "normalised"
         )
-    return axis / norm
+    return axis / length
 
 
 def _limits(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.validation import short
 
+from ...elementary.matrices import turned_tensor
 from ..tree import Visual
 from .elements import Element
 from .fields import Fields
@@ -106,7 +107,7 @@ def _read_inertial(inertial: Element, link: Link, fields: Fields) -> None:
     values += [fields.number(inertia, product, 0.0) for product in MOMENTS[3:]]
     xx, yy, zz, xy, xz, yz = values
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    link.inertia = frame.rotation @ tensor @ frame.rotation.T
+    link.inertia = turned_tensor(frame.rotation, tensor)
     if link.mass < NOTHING and link.inertia.any():
         report.repaired(
             inertia.line, part, "inertia without mass", f"{np.trace(link.inertia):g} kg m2 (trace)",

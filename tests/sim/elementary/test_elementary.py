@@ -13,6 +13,7 @@ from scipy.stats import norm
 
 from space_robot_sim.elementary.exponential import exp, log
 from space_robot_sim.elementary.normal import normal_cdf, normal_numbers, normal_quantile
+from space_robot_sim.elementary.series import plain_sin_cos
 from space_robot_sim.elementary.sine import sin_cos, sines_cosines
 
 RNG = np.random.default_rng(5)
@@ -80,6 +81,11 @@ def test_sine_and_cosine_beyond_are_those_of_an_angle_as_near_as_its_neighbours(
         sine, cosine = sin_cos(x)
         assert sine**2 + cosine**2 == pytest.approx(1.0, abs=1e-15)
         assert abs(Decimal(sine) - decimal_sin_cos(x)[0]) < Decimal(math.ulp(x) + 1e-15)
+
+
+def test_plain_and_compiled_sine_have_the_same_bits() -> None:
+    for x in (*RNG.uniform(-4.0, 4.0, 50), *RNG.uniform(-1e7, 1e7, 50)):
+        assert plain_sin_cos(float(x)) == sin_cos(x)
 
 
 def test_arrays_have_the_bits_of_their_numbers() -> None:

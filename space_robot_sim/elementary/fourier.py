@@ -1,0 +1,97 @@
+"""The spectrum of real rows: a Fourier transform by Stockham's method, for any number of rows."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.compiled.kernels import kernel
+
+from .sine import sines_cosines
+
+Array = NDArray[np.float64]
+
+
+def squared_spectrum(rows: Array) -> Array:
+    """Return the squared sizes of the transform of real ``rows`` (N, axes), (N // 2 + 1, axes).
+
+    Two rows are one complex number on the way if N is even. It takes long where N has large prime
+    factors.
+    """
+    size, count = len(rows), len(rows) // 2 + 1
+    turns = np.arange(size, dtype=np.float64)
+    angles = 2.0 * math.pi * np.where(turns > size / 2, turns - size, turns) / size
+    sines, cosines = sines_cosines(angles)
+    if size % 2:
+        real, imaginary = _transformed(rows, np.zeros_like(rows), sines, cosines)
+        return (real * real + imaginary * imaginary)[:count]
+    halves = _transformed(rows[0::2], rows[1::2], sines[::2], cosines[::2])
+    found = np.empty((count, rows.shape[1]))
+    _squares(*halves, sines, cosines, found)
+    return found
+
+
+def _transformed(
+    real: Array, imaginary: Array, sines: Array, cosines: Array
+) -> tuple[Array, Array]:
+    """Return the transform of complex rows; ``sines`` and ``cosines`` are those of its angles."""
+    parts = np.ascontiguousarray(real), np.ascontiguousarray(imaginary)
+    sines, cosines = np.ascontiguousarray(sines), np.ascontiguousarray(cosines)
+    for factor, stride in _factors(len(real)):
+        out = np.empty_like(parts[0]), np.empty_like(parts[1])
+        _stage(factor, stride, cosines, sines, *parts, *out)
+        parts = out
+    return parts
+
+
+def _factors(size: int) -> list[tuple[int, int]]:
+    """Return the prime factors of ``size``, each with the product of those before it."""
+    found, stride, factor = [], 1, 2
+    while stride < size:
+        if factor * factor > size // stride:
+            factor = size // stride
+        if (size // stride) % factor:
+            factor += 1
+        else:
+            found.append((factor, stride))
+            stride *= factor
+    return found
+
+
+@kernel
+def _stage(
+    factor: int, stride: int, cosines: Array, sines: Array, real: Array, imaginary: Array,
+    real_out: Array, imaginary_out: Array,
+) -> None:  # fmt: skip
+    """Transform over one ``factor``; ``stride`` transforms of one row each are done before."""
+    size, axes = real.shape
+    rest = size // (stride * factor)
+    for j in range(rest):
+        for t in range(factor):
+            begin = stride * (factor * j + t)
+            for r in range(factor):
+                turn = (r * t * (size // factor) + j * t * stride) % size
+                c, s, other = cosines[turn], sines[turn], stride * (j + rest * r)
+                for q in range(stride):
+                    for k in range(axes):
+                        x, y = real[other + q, k], imaginary[other + q, k]
+                        before = real_out[begin + q, k] if r else 0.0
+                        beside = imaginary_out[begin + q, k] if r else 0.0
+                        real_out[begin + q, k] = before + (c * x + s * y)
+                        imaginary_out[begin + q, k] = beside + (c * y - s * x)
+
+
+@kernel
+def _squares(real: Array, imaginary: Array, sines: Array, cosines: Array, out: Array) -> None:
+    """Square the sizes of the spectrum of which even and odd rows are real and imaginary part."""
+    size, axes = real.shape
+    for f in range(len(out)):
+        a, b = f % size, (size - f) % size
+        for k in range(axes):
+            even, even_i = real[a, k] + real[b, k], imaginary[a, k] - imaginary[b, k]
+            odd, odd_i = imaginary[a, k] + imaginary[b, k], real[b, k] - real[a, k]
+            x = even + (cosines[f] * odd + sines[f] * odd_i)
+            y = even_i + (cosines[f] * odd_i - sines[f] * odd)
+            out[f, k] = 0.25 * (x * x + y * y)

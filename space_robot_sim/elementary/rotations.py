@@ -1,0 +1,51 @@
+"""Rotations by angles about fixed axes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .matrices import norm
+from .series import plain_sin_cos
+
+Array = NDArray[np.float64]
+
+GIMBAL_LOCK = 1e-7
+"""Cosine of the pitch below which roll and yaw are about one axis."""
+
+
+def exact_sines_cosines(angles: ArrayLike) -> tuple[Array, Array]:
+    """Return sines and cosines; those of right angles without the rounding error of pi."""
+    given = np.asarray(angles, dtype=np.float64)
+    found = np.array([plain_sin_cos(float(angle)) for angle in given.flat])
+    exact = _exact(found.reshape(*given.shape, 2))
+    return exact[..., 0], exact[..., 1]
+
+
+def rotation_of_rpy(rpy: ArrayLike) -> Array:
+    """Return ``Rz(yaw) Ry(pitch) Rx(roll)``: roll, pitch, yaw (rad) about fixed axes x, y, z."""
+    (sr, sp, sy), (cr, cp, cy) = exact_sines_cosines(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def rpy_of_rotation(rotation: Array) -> Array:
+    """Invert `rotation_of_rpy`; where roll and yaw turn about one axis, the yaw is 0."""
+    from .arctangent import arctan2  # slow to import
+
+    level = norm(rotation[:2, 0])
+    pitch = arctan2(-rotation[2, 0], level)
+    if level < GIMBAL_LOCK:
+        return np.array([arctan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0])
+    roll = arctan2(rotation[2, 1], rotation[2, 2])
+    return np.array([roll, pitch, arctan2(rotation[1, 0], rotation[0, 0])])
+
+
+def _exact(values: Array) -> Array:
+    rounded = np.round(values)
+    return np.where(np.abs(values - rounded) < 1e-15, rounded, values)
