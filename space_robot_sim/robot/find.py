@@ -17,7 +17,6 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from space_robot_msgs_py.config.files import GIVEN, config_directory, is_named, named_file
 from space_robot_msgs_py.config.validation import short
@@ -94,15 +93,6 @@ def robot_source(robot: str, base: str | None = None, repair: bool = False) -> R
     """Read a robot's file by name or path, as `find_robot` does."""
     chosen = split_choice(robot)
     return read_robot_file(robot_files(robot).file, base or chosen.base, repair or chosen.repair)
-
-
-def robot_content(robot: str) -> dict[str, Any]:
-    """Return what `Robot.from_dict` builds a robot of, by name or path: complete in itself.
-
-    Raises:
-        InputError: see `find_robot`.
-    """
-    return robot_source(robot).content
 
 
 def mission_file(robot: str, mission: str = "") -> Path:

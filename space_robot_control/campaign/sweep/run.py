@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any, NamedTuple
-
-import yaml
 
 from space_robot_msgs_py.errors import FlightError
 
@@ -54,24 +50,18 @@ def sweep(
     """
     for draw in study.flights():
         if not draw.number:
-            Flight(study.plan(draw, None))
+            Flight(study.plan(draw))
     return run_all(partial(fly, study), list(study.flights()), jobs, progress)
 
 
 def fly(study: Sweep, draw: Draw) -> Row:
     """Fly one flight of ``study``."""
-    with tempfile.TemporaryDirectory(prefix="space-robot-sweep-") as folder:
-        robot = None
-        if content := study.robot_file(draw.number):
-            robot = Path(folder) / f"{content['robot']['name']}.yaml"
-            robot.write_text(yaml.safe_dump(content), "utf-8")
-        flight = Flight(study.plan(draw, None if robot is None else str(robot)))
-        analysis = Analysis()
-        try:
-            for block in fly_blocks(flight):
-                analysis.add(block)
-        except FlightError as error:
-            return Row(draw, str(error), {})
+    analysis = Analysis()
+    try:
+        for block in fly_blocks(Flight(study.plan(draw))):
+            analysis.add(block)
+    except FlightError as error:
+        return Row(draw, str(error), {})
     return Row(draw, "", metrics(analysis.report()))
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import copy
 import itertools
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from space_robot_msgs_py.config.validation import StrictModel
-from space_robot_sim.robot.find import mission_file, robot_as_path, robot_content
+from space_robot_sim.robot import Robot
+from space_robot_sim.robot.find import find_robot, robot_as_path
 
 from ...flight.plan import FlightPlan
 from ..study import Law
@@ -48,32 +49,28 @@ class Sweep(StrictModel):
                 for law in self.laws:
                     yield Draw(law, sensors, index, actuators)
 
-    def plan(self, draw: Draw, robot: str | None) -> FlightPlan:
-        """Return the plan of a flight; ``robot`` is the file of the plant's own robot, if any."""
+    def plan(self, draw: Draw) -> FlightPlan:
+        """Return the plan of a flight; the plant alone is the robot of the draw."""
         law, sensors, number, actuators = draw
-        plan = FlightPlan(
+        return FlightPlan(
             controller=law.controller, gains=law.gains, sensors=sensors, actuators=actuators,
-            seed=self.seed + number, **self.common,
+            seed=self.seed + number, plant_robot=self.robot(number), **self.common,
         )  # fmt: skip
-        if robot is None:
-            return plan
-        # the plant's alone: controller and mission keep the nominal one
-        mission = plan.mission or str(mission_file(robot_as_path(plan.robot)))
-        return plan.with_parameters("plant", {"robot": robot, "mission": mission})
 
-    def robot_file(self, index: int) -> dict[str, Any] | None:
-        """Return the robot of a draw as its file has it: every mass and inertia off by a factor.
+    def robot(self, index: int) -> Robot | None:
+        """Return the robot of a draw: every mass and inertia off by a factor.
 
         A body's inertia is scaled as a whole, so it stays one that a body can have. None: the
         nominal robot.
         """
         if not self.spread:
             return None
-        content = copy.deepcopy(robot_content(robot_as_path(self.common.get("robot", "paper"))))
-        bodies = [content["robot"]["base"], *content["robot"]["links"]]
+        given: str | Robot = self.common.get("robot", "paper")
+        nominal = given if isinstance(given, Robot) else find_robot(robot_as_path(given))
         rng = np.random.default_rng((self.seed, index))
-        factors = rng.uniform(1.0 - self.spread, 1.0 + self.spread, (len(bodies), 2)).tolist()
-        for body, (mass, inertia) in zip(bodies, factors, strict=True):
-            body["mass"] = mass * body["mass"]
-            body["inertia"] = [inertia * value for value in body["inertia"]]
-        return content
+        bodies = [0, *(joint + 1 for joint in nominal.order)]
+        factors = rng.uniform(1.0 - self.spread, 1.0 + self.spread, (len(bodies), 2))
+        mass, inertia = nominal.mass.copy(), nominal.inertia.copy()
+        mass[bodies] *= factors[:, 0]
+        inertia[bodies] *= factors[:, 1, np.newaxis, np.newaxis]
+        return replace(nominal, mass=mass, inertia=inertia)

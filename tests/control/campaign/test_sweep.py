@@ -58,27 +58,29 @@ def test_a_base_that_nothing_turns_has_dashes_beside_one_that_is_held() -> None:
 
 def test_all_laws_fly_the_same_robot_and_noise() -> None:
     plan = study(draws=3, spread=0.2, seed=5)
-    seeds = [plan.plan(Draw(law, "fine", 2), None).seed for law in (STC, CTC)]
+    seeds = [plan.plan(Draw(law, "fine", 2)).seed for law in (STC, CTC)]
     assert seeds == [7, 7]
-    assert plan.robot_file(2) == plan.robot_file(2) != plan.robot_file(1)
+
+    def masses(of: Sweep, number: int) -> list[float]:
+        robot = of.robot(number)
+        assert robot
+        return robot.mass.tolist()
+
+    assert masses(plan, 2) == masses(plan, 2) != masses(plan, 1)
     longer = study(draws=9, spread=0.2, seed=5)
-    assert longer.robot_file(2) == plan.robot_file(2), "draws that are added change none"
+    assert masses(longer, 2) == masses(plan, 2), "draws that are added change none"
 
 
-def test_masses_are_off_within_the_spread_and_no_law_is_told(tmp_path: Path) -> None:
+def test_masses_are_off_within_the_spread_and_no_law_is_told() -> None:
     plan = study(spread=0.2)
-    content = plan.robot_file(0)
-    assert content is not None
-    file = tmp_path / "paper.yaml"
-    file.write_text(json.dumps(content))
-    flight = Flight(plan.plan(Draw(STC, "ideal", 0), str(file)))
+    flight = Flight(plan.plan(Draw(STC, "ideal", 0)))
     nominal, flown = flight.controller_settings.robot, flight.robot
     assert nominal == "paper"
     factors = flown.mass / np.array([750.0, 20.0, 35.0, 20.0, 10.0, 20.0, 5.0])
     assert np.all((factors > 0.8) & (factors < 1.2))
     assert np.ptp(factors) > 0.05
     assert flight.mission_settings.waypoints_deg
-    assert study().robot_file(0) is None, "no spread, no other robot"
+    assert study().robot(0) is None, "no spread, no other robot"
 
 
 def row(law: Law, index: int, attitude: float, failure: str = "") -> Row:
