@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import resource
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from space_robot_control.analysis import analyze
 from space_robot_control.campaign.flown import Campaign
 from space_robot_control.campaign.runner import run_many
 from space_robot_control.campaign.study import Study
@@ -25,41 +27,58 @@ MANY = 1000
 """Flights over which the memory is looked at."""
 ITEMS = 5000
 OVERHEAD = Target(1.0 / 1.1, of="ratio")
-"""Asked: at most 10 % more than a plain flight."""
+"""Asked: at most 10 % more processor time than a plain flight."""
 VARY = {"robot.links[*].mass": {"uniform": [0.8, 1.2], "relative": True}}
 
 
 def campaign(options: Options) -> list[Result]:
-    """Flights of a campaign beside those of `simulate`; an empty item; memory over many flights."""
-    found = []
+    """Flights of a campaign beside plain ones; an item that does nothing; memory of many."""
+    found: list[Result] = []
     for duration in (0.2,) if options.short else DURATIONS_S:
         number = FLIGHTS.get(duration, 2)
         options.progress(f"{number} flights of {duration:g} s, plain and as campaigns")
-        seconds = interleave(
-            {
-                "plain": lambda _, d=duration, n=number: _plain(d, n),  # type: ignore[misc]
-                "1": lambda _, d=duration, n=number: _campaign(d, n, 1),  # type: ignore[misc]
-                "2": lambda _, d=duration, n=number: _campaign(d, n, 2),  # type: ignore[misc]
-            },
-            options.batches(usual=5),
-            warm_up=False,
-        )
-        each = {name: [t / number for t in taken] for name, taken in seconds.items()}
-        beside = ("plain flights", each["plain"])
-        found += [
-            Result.timed(f"a flight of {duration:g} s, plain", "ms", each["plain"]),
-            Result.timed(
-                f"of a campaign, {duration:g} s, 1 worker", "ms", each["1"], beside,
-                options.asked(OVERHEAD),
-            ),
-            Result.timed(f"of a campaign, {duration:g} s, 2 workers", "ms", each["2"], beside),
-        ]  # fmt: skip
+        found += _beside_plain(options, duration, number)
     return [*found, *_empty_items(options), *_memory(options)]
 
 
+def _beside_plain(options: Options, duration: float, number: int) -> list[Result]:
+    """A flight's time and, of all processes together, its processor time."""
+    spent: dict[str, list[float]] = {"plain": [], "1 worker": [], "2 workers": []}
+
+    def counted(name: str, workers: int) -> Callable[[int], None]:
+        def fly(_: int) -> None:
+            began = _processor_s()
+            if workers:
+                _campaign(duration, number, workers)
+            else:
+                _plain(duration, number)
+            spent[name].append((_processor_s() - began) / number)
+
+        return fly
+
+    competitors = {name: counted(name, workers) for workers, name in enumerate(spent)}
+    seconds = interleave(competitors, options.batches(usual=5), warm_up=False)
+    each = {name: [taken / number for taken in seconds[name]] for name in spent}
+    found = []
+    for kind, times in (("", each), (", processor time", spent)):
+        found.append(Result.timed(f"a flight of {duration:g} s, plain{kind}", "ms", times["plain"]))
+        for name in ("1 worker", "2 workers"):
+            asked = options.asked(OVERHEAD) if kind and name == "1 worker" else None
+            row = f"of a campaign, {duration:g} s, {name}{kind}"
+            found.append(Result.timed(row, "ms", times[name], ("plain", times["plain"]), asked))
+    return found
+
+
+def _processor_s() -> float:
+    """Of this process and of those that it has waited for."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in used)
+
+
 def _plain(duration: float, number: int) -> None:
+    """Fly and analyse, for a campaign's row has figures of merit, too."""
     for _ in range(number):
-        simulate(Flight(FlightPlan(controller=LAW, case="1", duration=duration)))
+        analyze(simulate(Flight(FlightPlan(controller=LAW, case="1", duration=duration))))
 
 
 def _campaign(
