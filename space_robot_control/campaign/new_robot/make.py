@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from ...laws import laws
 from ...mission.mission import MissionSettings
 from ...tuning.method import Wishes
 from ..gain_set import tuned_set, write_set
+from ..runner import cores, run_all
 from .folder import whole_folder
 from .motion import mission_text, rest_to_rest
 
@@ -91,14 +93,13 @@ def make_robot(
         write_set(tuned, command, place / OWN_GAINS / SET)
         default = "".join(f"{law}: {SET}\n" for law in tuned.gains)
         (place / OWN_GAINS / DEFAULT_SETS).write_text(f"# The set of each law.\n{default}", "utf-8")
-        flights = {}
-        for law in sorted(laws()):
-            step(f"flying {law}")
-            flights[law] = _fly(law, place)
-    return NewRobot(folder, robot, mission, flights)
+        names = sorted(laws())
+        step(f"flying {', '.join(names)}")
+        outcomes = run_all(partial(_fly, place), names, cores())
+    return NewRobot(folder, robot, mission, dict(zip(names, outcomes, strict=True)))
 
 
-def _fly(law: str, folder: Path) -> Outcome:
+def _fly(folder: Path, law: str) -> Outcome:
     flight = Flight(FlightPlan(controller=law, robot=str(folder), case=CASE))
     analysis = Analysis()
     try:

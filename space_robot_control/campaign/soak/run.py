@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import io
+import itertools
 import shutil
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import redirect_stderr, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -24,6 +25,7 @@ from ...flight.graph.following import InterruptedFlightError
 from ...flight.graph.orchestrator import fly, require_ros
 from ...flight.interruption import Interrupted
 from ...flight.plan import Flight, FlightPlan
+from ..runner import run_many
 from .process_monitor import ProcessMonitor, shared_memory_files
 from .sampling import breaks_tracking, command_line, sample_flight
 from .verdict import FlightVerdict, judge
@@ -139,11 +141,15 @@ def soak(
     at_start = shared_memory_files()
     try:
         compile_kernels(with_allocation=True)
-        until = time.monotonic() + seconds
-        while time.monotonic() < until:
-            number = len(done.flights) + 1
+        numbers = _numbers(time.monotonic() + seconds)
+
+        def fly_one(number: int) -> Flown:
             plan = sample_flight(seed, number, duration_s)
-            done.flights.append(_fly(number, plan, folder / f"flight_{number:04d}", bool(bags)))
+            return _fly(number, plan, folder / f"flight_{number:04d}", bool(bags))
+
+        # in this process: its memory is watched, and each flight is a graph of processes already
+        for flown in run_many(fly_one, numbers, workers=0):
+            done.flights.append(flown.value())
             say(done.flights[-1].line())
     except (InterruptedFlightError, Interrupted) as ended:
         done.interrupted_by = ended.number
@@ -154,6 +160,11 @@ def soak(
             folder.rmdir()  # if nothing is in it
     done.shared_memory_files = at_start, shared_memory_files()
     return done
+
+
+def _numbers(until: float) -> Iterator[int]:
+    """Yield 1, 2, ... as long as the monotonic clock is before ``until``."""
+    return itertools.takewhile(lambda _: time.monotonic() < until, itertools.count(1))
 
 
 def _fly(number: int, plan: FlightPlan, bag: Path, keep: bool) -> Flown:
