@@ -16,7 +16,7 @@ CONFIG = [
 
 setup(
     name=NAME,
-    version="0.5.0",
+    version="0.6.0",
     description="Test bed for the flight software of space robots, on ROS 2",
     license="Apache-2.0",
     maintainer="space_robot maintainers",
