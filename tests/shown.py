@@ -43,8 +43,8 @@ def step(number: str) -> float:
 def differences(shown: Sequence[str], printed: Sequence[str]) -> Iterator[str]:
     """Where two texts differ: in words, or by more than one in the last place shown.
 
-    The last place may differ: what is shown is rounded, and where libraries compute (gains, proofs) their
-    last bits are the processor's. Widths of columns do not count.
+    The last place may differ: what is shown is rounded, and where libraries compute (gains,
+    proofs) their last bits are the processor's. Widths of columns do not count.
     """
     for ours, theirs in zip_longest(shown, printed, fillvalue=""):
         numbers = [NUMBER.findall(line) for line in (ours, theirs)]
