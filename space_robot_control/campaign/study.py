@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -44,6 +45,12 @@ class Law(NamedTuple):
     def title(self) -> str:
         """For a person."""
         return f"{self.controller}, {self.gains.rstrip('/').rpartition('/')[2]}"
+
+
+def short_names(laws: Sequence[str]) -> dict[str, str]:
+    """Return what tables call each law: without its gain set, if all laws have the same."""
+    sets = {Law.parse(law).gains for law in laws}
+    return {law: Law.parse(law).controller if len(sets) == 1 else law for law in laws}
 
 
 class Requirement(StrictModel):

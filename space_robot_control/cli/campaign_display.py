@@ -12,6 +12,7 @@ from ..analysis.tables import Column, Table
 from ..analysis.tables import Verdict as Judged
 from ..analysis.terminal import print_table
 from ..campaign.flown import FlownCampaign
+from ..campaign.study import Requirement, short_names
 from ..flight.ending import COMPLETE
 from ..flight.terminal import say
 
@@ -39,7 +40,8 @@ def as_record(flown: FlownCampaign) -> dict[str, Any]:
 def print_summary(flown: FlownCampaign, console: Console) -> None:
     """Print how many flights came to their end, medians, verdicts, and how to go on."""
     table, folder = flown.table, shlex.quote(str(flown.folder))
-    print_table(_league(table, len(table["run"].unique()), flown.seed), console)
+    names = short_names(flown.study.laws)
+    print_table(_league(table, names, flown.seed), console)
     if found := flown.verdicts:
         print_table(
             Table.of(
@@ -50,7 +52,8 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
                 ),
                 [
                     [
-                        v.requirement, v.law, f"{v.runs - v.failures} of {v.runs}", v.limits.low,
+                        f"{v.requirement}, {v.point}" if v.point else v.requirement,
+                        names[v.law], f"{v.runs - v.failures} of {v.runs}", v.limits.low,
                         Judged("", v.word, TONES[v.word]),
                     ]
                     for v in found
@@ -58,7 +61,7 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
             ),
             console,
         )  # fmt: skip
-    run, law = _worst(table, list(flown.study.require))
+    run, law = _worst(table, flown.study.require)
     say(console, f"space-robot campaign report {folder}")
     say(
         console,
@@ -66,11 +69,11 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
     )
 
 
-def _league(table: DataFrame, runs: int, seed: int) -> Table:
+def _league(table: DataFrame, names: dict[str, str], seed: int) -> Table:
     shown = [name for name in SHOWN if f"metric.{name}" in table]
     rows = [
         [
-            law, f"{(own['outcome'] == COMPLETE).sum()} of {len(own)}",
+            names[law], f"{(own['outcome'] == COMPLETE).sum()} of {len(own)}",
             *(_median(own[f"metric.{name}"]) for name in shown),
         ]
         for law, own in _laws(table).items()
@@ -79,7 +82,7 @@ def _league(table: DataFrame, runs: int, seed: int) -> Table:
         Column("law", is_label=True), Column("complete"),
         *(Column(name, spec=".3g") for name in shown),
     )  # fmt: skip
-    return Table.of(f"{runs} runs, seed {seed}: medians", columns, rows)
+    return Table.of(f"{table['run'].nunique()} runs, seed {seed}: medians", columns, rows)
 
 
 def _median(column: Any) -> float | None:
@@ -92,9 +95,11 @@ def _laws(table: DataFrame) -> dict[str, DataFrame]:
     return {law: table[table["law"] == law] for law in table["law"].unique()}
 
 
-def _worst(table: DataFrame, require: list[str]) -> tuple[int, str]:
-    """Find a row that failed, or else has the largest attitude error or required metric."""
+def _worst(table: DataFrame, require: dict[str, Requirement]) -> tuple[int, str]:
+    """Find a row that failed, or else the worst by the first requirement, or the first metric."""
     failed = table[table["outcome"] != COMPLETE]
-    column = f"require.{require[0]}" if require else table.filter(like="metric.").columns[0]
-    row = table.loc[failed.index[0] if len(failed) else table[column].idxmax()]
+    name, first = next(iter(require.items()), ("", None))
+    values = table[f"require.{name}"] if first else table.filter(like="metric.").iloc[:, 0]
+    worst = values.idxmin() if first and first.above is not None else values.idxmax()
+    row = table.loc[failed.index[0] if len(failed) else worst]
     return int(row["run"]), str(row["law"])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..study import short_names
 from ..verdicts.design import (
     SALTELLI,
     grid_names,
@@ -50,6 +51,11 @@ class Findings:
         """Those that can be taken for independent draws; all, unless the design is for indices."""
         self.parts: list[Part] = parts(self.rows, self.grid)
         self.laws = laws_of(subject.table)
+
+    @cached_property
+    def names(self) -> dict[str, str]:
+        """Return what tables call each law."""
+        return short_names(self.laws)
 
     @property
     def whole(self) -> Part:

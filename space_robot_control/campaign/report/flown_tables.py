@@ -33,7 +33,7 @@ def outcome_table(findings: Findings) -> Table:
     outcomes.sort(key=lambda outcome: (outcome != "complete", outcome))
     counts = table.groupby(["law", "outcome"]).size()
     rows = [
-        [law, *(str(int(counts.get((law, outcome), 0))) for outcome in outcomes)]
+        [findings.names[law], *(str(int(counts.get((law, outcome), 0))) for outcome in outcomes)]
         for law in findings.laws
     ]
     columns = [Column("law", is_label=True), *map(Column, outcomes)]

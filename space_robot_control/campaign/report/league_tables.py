@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 
 from ...analysis.tables import Column, Group, Table, Verdict
 from ..verdicts.league import League, Standing
@@ -46,15 +46,15 @@ def league_table(findings: Findings) -> Table:
         Column("99 %"), Column("interval"), Column("failed"),
     ]  # fmt: skip
     groups = [
-        Group([_standing(s) for s in found.standings], metric.label)
+        Group([_standing(s, findings.names[s.law]) for s in found.standings], metric.label)
         for _, metric, found in findings.leagues
     ]
     return Table("Laws, by metrics of which less is better", columns, groups, [RANKS])
 
 
-def _standing(s: Standing) -> list[str]:
+def _standing(s: Standing, name: str) -> list[str]:
     return [
-        s.law, str(s.rank), number(s.median.value), span(s.median), number(s.tail.value),
+        name, str(s.rank), number(s.median.value), span(s.median), number(s.tail.value),
         span(s.tail), f"{s.failures} of {s.runs}",
     ]  # fmt: skip
 
@@ -67,7 +67,7 @@ def pair_table(findings: Findings) -> Table:
         Column("p of failures"), Column("is", is_label=True),
     ]  # fmt: skip
     groups = [
-        Group([_pair(c) for c in found.comparisons], metric.label, part.point)
+        Group([_pair(c, findings.names) for c in found.comparisons], metric.label, part.point)
         for part, metric, found in findings.leagues
     ]
     note = (
@@ -78,18 +78,13 @@ def pair_table(findings: Findings) -> Table:
     return Table("Laws by pairs, over the same draws", columns, groups, [note])
 
 
-def _pair(c: Comparison) -> list[str | Verdict]:
+def _pair(c: Comparison, names: Mapping[str, str]) -> list[str | Verdict]:
     return [
-        c.law, c.other, f"{c.better} of {c.runs}", number(c.ratio.value), span(c.ratio),
+        names[c.law], names[c.other],
+        f"{c.better} of {c.runs}", number(c.ratio.value), span(c.ratio),
         f"{c.p_better:.2g}", f"{c.failed}, other {c.other_failed}", f"{c.p_failed:.2g}",
         Verdict("", WORDS[c.finding], TONES[c.finding]),
     ]  # fmt: skip
-
-
-def headings(laws: Sequence[str]) -> list[str]:
-    """Return the laws' names for columns, without their gain set if all have the same."""
-    sets = {law.partition("=")[2] for law in laws}
-    return [law.partition("=")[0] for law in laws] if len(sets) == 1 else list(laws)
 
 
 def choice_tables(findings: Findings) -> list[Table]:
@@ -102,13 +97,13 @@ def choice_tables(findings: Findings) -> list[Table]:
 
 def _choices(findings: Findings, metric: Quantity) -> Table:
     rows = [
-        [*part.values, *_medians(findings, found), Verdict("", best(found, findings.laws), "good")]
+        [*part.values, *_medians(findings, found), Verdict("", best(found, findings.names), "good")]
         for part, quantity, found in findings.leagues
         if quantity is metric
     ]
     columns = [
         *(Column(name.removeprefix("scenario."), is_label=True) for name in findings.grid),
-        *map(Column, headings(findings.laws)),
+        *map(Column, findings.names.values()),
         Column("to fly", is_label=True),
     ]
     note = (
@@ -130,10 +125,9 @@ def _medians(findings: Findings, found: League) -> list[str]:
     return texts
 
 
-def best(found: League, laws: Sequence[str]) -> str:
+def best(found: League, names: Mapping[str, str]) -> str:
     """Name the laws of rank 1 that did not fail in every flight, unless these are all laws."""
-    named = dict(zip(laws, headings(laws), strict=True))
-    names = [named[s.law] for s in found.standings if s.rank == 1 and s.failures < s.runs]
-    if len(names) == len(found.standings) > 1:
+    first = [names[s.law] for s in found.standings if s.rank == 1 and s.failures < s.runs]
+    if len(first) == len(found.standings) > 1:
         return "not told apart"
-    return ", ".join(names) or "-"
+    return ", ".join(first) or "-"

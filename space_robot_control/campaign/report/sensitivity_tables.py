@@ -15,16 +15,24 @@ SHOWN = 10
 
 
 def sensitivity_table(findings: Findings, shown: int = SHOWN) -> Table:
-    """Tabulate the strongest influences under each law, a group for every law and quantity."""
+    """Tabulate the strongest influences under each law, a group for every law and quantity.
+
+    Only influences that are shown to be there are in it; a note says where none is.
+    """
     columns = [
         Column("variable", is_label=True), Column("rank corr."), Column("partial"),
         Column("interval"), Column("spread"), Column("p"),
     ]  # fmt: skip
-    groups = []
+    groups, without = [], []
     for part, quantity, found in findings.sensitivities:
         explained = "" if found.explained is None else f"{found.explained:.0%} explained by all"
-        name = ", ".join(text for text in (found.law, quantity.heading, part.point) if text)
-        groups.append(Group([_row(i) for i in found.influences[:shown]], name, explained))
+        law = findings.names[found.law]
+        name = ", ".join(text for text in (law, quantity.heading, part.point) if text)
+        rows = [_row(i) for i in found.influences[:shown] if i.p < 1.0 - CONFIDENCE]
+        if rows:
+            groups.append(Group(rows, name, explained))
+        else:
+            without.append(name)
     note = (
         "Rank correlation (Spearman): positive if more of the variable makes it worse; partial: "
         "with the other numbers held fixed, and its interval (the plain one's if there is none). "
@@ -32,7 +40,8 @@ def sensitivity_table(findings: Findings, shown: int = SHOWN) -> Table:
         "the shape (Kruskal and Wallis); p of no influence at all, corrected after Holm. Intervals "
         f"are of {CONFIDENCE:.0%}. Failed flights rank worst."
     )
-    return Table("What drives it", columns, groups, [note])
+    notes = [f"No variable is shown to drive: {'; '.join(without)}."] if without else []
+    return Table("What drives it", columns, groups, [note, *notes] if groups else notes)
 
 
 def _row(influence: Influence) -> list[str]:

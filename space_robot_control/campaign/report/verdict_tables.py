@@ -9,7 +9,7 @@ from ...analysis.tables import Column, Group, Table, Verdict
 from ..verdicts import requirements
 from ..verdicts.values import Part
 from .findings import Findings
-from .league_tables import headings, number
+from .league_tables import number
 from .quantities import Quantity
 
 TONES = {"met": "good", "not met": "bad", "undecided": "open"}
@@ -25,7 +25,7 @@ def verdict_table(findings: Findings) -> Table:
     for quantity in findings.required:
         for part in findings.parts:
             rows = [
-                _row(v) for v in findings.verdicts
+                _row(v, findings.names[v.law]) for v in findings.verdicts
                 if (v.requirement, v.point) == (quantity.name, part.point)
             ]  # fmt: skip
             name = f"{quantity.name}, {part.point}" if part.point else quantity.name
@@ -58,9 +58,9 @@ def notes(findings: Findings) -> list[str]:
     ]
 
 
-def _row(v: requirements.Verdict) -> list[str | Verdict]:
+def _row(v: requirements.Verdict, name: str) -> list[str | Verdict]:
     return [
-        v.law, Verdict("", v.word, TONES[v.word]), f"{v.failures} of {v.runs}",
+        name, Verdict("", v.word, TONES[v.word]), f"{v.failures} of {v.runs}",
         f"{100.0 * v.limits.low:.4g} %", f"{100.0 * v.limits.high:.4g} %",
         "-" if v.bound is None else number(v.bound), _more(v),
     ]  # fmt: skip
@@ -87,7 +87,7 @@ def verdict_grid(findings: Findings, quantity: Quantity) -> Table:
         rows.append([*part.values, *cells])
     columns = [
         *(Column(name.removeprefix("scenario."), is_label=True) for name in findings.grid),
-        *map(Column, headings(findings.laws)),
+        *map(Column, findings.names.values()),
     ]
     note = "Runs that miss it, and the verdict."
     return Table(f"{quantity.name}: {demanded(quantity)}", columns, [Group(rows)], [note])

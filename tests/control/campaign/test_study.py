@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from space_robot_control.campaign.draws import Draws
-from space_robot_control.campaign.study import Law, Requirement, Study, read_study
+from space_robot_control.campaign.study import Law, Requirement, Study, read_study, short_names
 from space_robot_msgs_py.errors import InputError
 
 MASS = "robot.links[*].mass"
@@ -158,3 +158,9 @@ def test_what_was_read_reads_again() -> None:
 def test_names_of_shipped_campaigns_are_told() -> None:
     with pytest.raises(InputError, match=r"unknown campaign 'frist': choose one of .*first"):
         read_study("frist")
+
+
+def test_tables_leave_out_the_gain_set_that_all_laws_have() -> None:
+    assert list(short_names(["ctc=robust", "tde_stc=robust"]).values()) == ["ctc", "tde_stc"]
+    assert list(short_names(["ctc", "tde_stc"]).values()) == ["ctc", "tde_stc"]
+    assert list(short_names(["ctc", "ctc=robust"]).values()) == ["ctc", "ctc=robust"]

@@ -16,7 +16,6 @@ from rich.console import Console
 from space_robot_control.campaign.report.console import markdown, print_report
 from space_robot_control.campaign.report.figures import summary_figure
 from space_robot_control.campaign.report.findings import Findings
-from space_robot_control.campaign.report.league_tables import headings
 from space_robot_control.campaign.report.page import lean, render
 from space_robot_control.campaign.report.record import record
 from space_robot_control.campaign.report.subject import Subject
@@ -177,12 +176,6 @@ def test_a_grid_has_a_row_a_point() -> None:
     assert "at every point of the grid" in render(findings)
     names = {i.variable for _, _, s in findings.sensitivities for i in s.influences}
     assert "scenario.sensors" not in names
-
-
-def test_columns_leave_out_the_gain_set_that_all_have() -> None:
-    assert headings(["ctc=robust", "tde_stc=robust"]) == ["ctc", "tde_stc"]
-    assert headings(["ctc", "tde_stc"]) == ["ctc", "tde_stc"]
-    assert headings(["ctc", "ctc=robust"]) == ["ctc", "ctc=robust"]
 
 
 def test_the_metrics_asked_for_are_shown_and_others_refused() -> None:
