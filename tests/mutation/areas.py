@@ -57,6 +57,7 @@ AREAS = {
     ),
     "controller": _rooms(CONTROL, "controller", further=CLOSED_LOOP),
     "mission": _rooms(CONTROL, "mission", further=CLOSED_LOOP),
+    "elementary": _rooms(SIM, "elementary"),
     "dynamics": _rooms(
         SIM, "dynamics",
         further=("tests/sim/robot/test_*.py", "tests/sim/plant/test_conservation.py",
