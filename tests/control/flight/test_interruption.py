@@ -36,7 +36,7 @@ def _reproducing(folder: Path) -> Iterator[tuple[subprocess.Popen[str], list[psu
             assert process.poll() is None, process.communicate()
             time.sleep(0.05)
             workers = [
-                child for child in psutil.Process(process.pid).children()
+                child for child in psutil.Process(process.pid).children(recursive=True)
                 if "run_module" not in " ".join(child.cmdline())  # what compiles, before
             ]  # fmt: skip
         yield process, workers
