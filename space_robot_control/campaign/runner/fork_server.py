@@ -96,6 +96,8 @@ def _serve(
     """Fork and end workers as asked, until the asking process closes its end or is gone."""
     other.close()
     end.settimeout(CHECK_S)
+    for number in SIGNALS:  # the starter ends this process, which then leaves no worker behind
+        signal.signal(number, signal.SIG_IGN)
     workers: set[int] = set()
     while os.getppid() == starter:
         try:

@@ -68,7 +68,7 @@ def test_workers_end_with_a_killed_reproduction(tmp_path: Path) -> None:
         gone, alive = psutil.wait_procs(workers, timeout=60)
         for worker in alive:
             worker.kill()
-        assert len(gone) == 2
+        assert len(gone) == len(workers) >= 2  # and what forks them
 
 
 def test_signals_are_raised_once_and_put_back() -> None:
