@@ -12,6 +12,7 @@ from ..analysis.tables import Column, Table
 from ..analysis.tables import Verdict as Judged
 from ..analysis.terminal import print_table
 from ..campaign.flown import FlownCampaign
+from ..campaign.report.verdict_tables import TONES
 from ..campaign.study import Requirement, short_names
 from ..flight.ending import COMPLETE
 from ..flight.terminal import say
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 SHOWN = ("attitude_rms", "joints_4_6_rms", "ripple_base_torque")
 """Metrics whose medians are shown, of those that there are."""
-TONES = {"met": "good", "not met": "bad", "undecided": "open"}
 
 
 def as_record(flown: FlownCampaign) -> dict[str, Any]:
