@@ -2,22 +2,24 @@
 
 from space_robot_control import Scenario
 flight = Scenario(controller="tde_stc", case="3", sensors="fine").fly()
+Campaign.load("my.yaml").run(runs=1000, seed=7, out="campaigns/a").verdicts
 """
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .campaign.flown import Campaign, FlownCampaign
     from .scenario import Bench, FlownFlight, Scenario
 
-__all__ = ["Bench", "FlownFlight", "Scenario"]
+__all__ = ["Bench", "Campaign", "FlownCampaign", "FlownFlight", "Scenario"]
 
 
 def __getattr__(name: str) -> Any:
     """Import what is asked for only then: commands that need none of it start sooner."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from . import scenario
-
-    return getattr(scenario, name)
+    room = ".campaign.flown" if "Campaign" in name else ".scenario"
+    return getattr(import_module(room, __name__), name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -75,7 +76,9 @@ def marks(where: str, fixtures: Iterable[str]) -> Iterator[str]:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Tell of the marks."""
+    """Tell of the marks, and heed SIGINT: what is started in a shell's background does not."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     config.addinivalue_line("markers", "ros: starts ROS processes; given by fixture and folder")
     config.addinivalue_line("markers", "slow: takes seconds; given by folder, or by the test")
     if not config.pluginmanager.hasplugin("timeout"):  # where `colcon test` runs, perhaps

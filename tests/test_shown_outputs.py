@@ -118,6 +118,12 @@ def test_the_first_difference_of_the_page_on_replay_is_that_of_the_two_gains(
     ]
 
 
+SWEPT = (
+    "attitude_rms", "joints_1_3_rms", "joints_4_6_rms", "ripple_base_torque", "ripple_torque_4_6",
+)  # fmt: skip
+"""Metrics of the pages' tables of sweeps."""
+
+
 def test_the_page_on_real_spacecraft_has_what_its_commands_give(tmp_path: Path) -> None:
     """Two laws' rows of the first table, by its two commands."""
     three = tmp_path / "three"
@@ -127,19 +133,17 @@ def test_the_page_on_real_spacecraft_has_what_its_commands_give(tmp_path: Path) 
     laws = ("ctc", "tde_stc")
     report = json.loads(run(*sweep.split(), *(f"--law={law}={three}" for law in laws)))
     page = (ROOT / "docs/explanation/real_spacecraft.md").read_text("utf-8")
-    names = ("attitude", "joints_1_3", "joints_4_6", "ripple_base_torque", "ripple_torque_4_6")
     for cell in report["cells"]:
         row = re.search(rf"^\| fine \| {cell['controller']} \|(.*)\|$", page, re.MULTILINE)
         assert row is not None
         shown = [float(text) for text in row.group(1).split("|")]
-        found = [cell["metrics"][name]["median"] for name in names]
+        found = [cell["metrics"][name]["median"] for name in SWEPT]
         np.testing.assert_allclose(shown, found, rtol=0.06)
 
 
 def test_the_page_on_bases_has_what_its_commands_give() -> None:
     """Two laws' rows on three bases, and the row of `robust` gains on thrusters."""
     page = (ROOT / "docs/explanation/base_actuators.md").read_text("utf-8")
-    names = ("attitude", "joints_1_3", "joints_4_6", "ripple_base_torque", "ripple_torque_4_6")
     sets = [f"--actuators={name}" for name in ("wheels", "small_wheels", "none")]
     studies = {
         "": (*sets, "--law=ctc_smc", "--law=tde_stc"),
@@ -150,7 +154,7 @@ def test_the_page_on_bases_has_what_its_commands_give() -> None:
             title = re.escape(f"{cell['actuators']}{suffix}")
             row = re.search(rf"^\| {title} \| {cell['controller']} \|(.*)\|$", page, re.MULTILINE)
             assert row is not None
-            for name, text in zip(names, row.group(1).split("|"), strict=True):
+            for name, text in zip(SWEPT, row.group(1).split("|"), strict=True):
                 if name in cell["metrics"]:
                     found = cell["metrics"][name]["median"]
                     assert float(text) == pytest.approx(found, rel=0.06)

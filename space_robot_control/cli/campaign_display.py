@@ -12,8 +12,9 @@ from ..analysis.tables import Column, Table
 from ..analysis.tables import Verdict as Judged
 from ..analysis.terminal import print_table
 from ..campaign.flown import FlownCampaign
-from ..campaign.report.verdict_tables import TONES
-from ..campaign.study import Requirement, short_names
+from ..campaign.report.findings import Findings
+from ..campaign.report.subject import subject_of
+from ..campaign.report.verdict_tables import TONES, command
 from ..flight.ending import COMPLETE
 from ..flight.terminal import say
 
@@ -39,10 +40,10 @@ def as_record(flown: FlownCampaign) -> dict[str, Any]:
 
 def print_summary(flown: FlownCampaign, console: Console) -> None:
     """Print how many flights came to their end, medians, verdicts, and how to go on."""
-    table, folder = flown.table, shlex.quote(str(flown.folder))
-    names = short_names(flown.study.laws)
-    print_table(_league(table, names, flown.seed), console)
-    if found := flown.verdicts:
+    findings = Findings(subject_of(flown))
+    names = findings.names
+    print_table(_league(flown.table, names, flown.seed), console)
+    if found := findings.verdicts:
         print_table(
             Table.of(
                 "Requirements",
@@ -61,12 +62,11 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
             ),
             console,
         )  # fmt: skip
-    run, law = _worst(table, flown.study.require)
-    say(console, f"space-robot campaign report {folder}")
-    say(
-        console,
-        f"space-robot campaign rerun {folder} {run} --law {shlex.quote(law)}    # the worst",
-    )
+    say(console, shlex.join(["space-robot", "campaign", "report", str(flown.folder)]))
+    for quantity in findings.driven[:1]:
+        worst = findings.worst(findings.whole, quantity, 1).iloc[0]
+        again = command(flown.folder, int(worst["run"]), worst["law"])
+        say(console, f"{again}    # the worst")
 
 
 def _league(table: DataFrame, names: dict[str, str], seed: int) -> Table:
@@ -93,13 +93,3 @@ def _median(column: Any) -> float | None:
 def _laws(table: DataFrame) -> dict[str, DataFrame]:
     """Return the rows of each law."""
     return {law: table[table["law"] == law] for law in table["law"].unique()}
-
-
-def _worst(table: DataFrame, require: dict[str, Requirement]) -> tuple[int, str]:
-    """Find a row that failed, or else the worst by the first requirement, or the first metric."""
-    failed = table[table["outcome"] != COMPLETE]
-    name, first = next(iter(require.items()), ("", None))
-    values = table[f"require.{name}"] if first else table.filter(like="metric.").iloc[:, 0]
-    worst = values.idxmin() if first and first.above is not None else values.idxmax()
-    row = table.loc[failed.index[0] if len(failed) else worst]
-    return int(row["run"]), str(row["law"])

@@ -77,39 +77,34 @@ def sweep(
       space-robot sweep --draws 15 --spread 0.2 --out sweep --json
       space-robot sweep --actuators ideal --actuators wheels --actuators thrusters --actuators none
     """
-    from space_robot_msgs_py.config.validation import validate
-
     from ..analysis.figures.style import save_figure
     from ..analysis.files import check_writable, make_folder, whole_file
     from ..analysis.tables import Column, Table, as_csv, as_markdown
     from ..analysis.terminal import print_table
     from ..campaign.runner import cores
-    from ..campaign.sweep import Law, Sweep
     from ..campaign.sweep import sweep as run
-    from ..campaign.sweep.summary import as_records, cells, figure, summary_table
-    from ..flight.compilation import compile_kernels
+    from ..campaign.sweep import sweep_study
+    from ..campaign.sweep.summary import as_records, cells, figure, row_record, summary_table
     from ..flight.progress import counting_progress
     from ..flight.terminal import terminal
     from ..laws import laws as all_laws
 
-    given = {
-        "laws": [Law.parse(text) for text in dict.fromkeys(laws or sorted(all_laws()))],
-        "sensors": list(dict.fromkeys(sensors or (("ideal",) if actuators else GRADES))),
-        "actuators": list(dict.fromkeys(actuators or ("ideal",))),
-        "draws": draws, "spread": spread, "seed": seed, "common": common,
-    }  # fmt: skip
-    study = validate(Sweep, given, "options")
+    study = sweep_study(
+        list(dict.fromkeys(laws or sorted(all_laws()))),
+        list(dict.fromkeys(sensors or (("ideal",) if actuators else GRADES))),
+        list(dict.fromkeys(actuators or ("ideal",))),
+        draws, spread, common,
+    )  # fmt: skip
     if out:
         make_folder(out)
         for name in ("table.csv", "summary.md", "sweep.png", "sweep.svg"):
             check_writable(out / name)
-    compile_kernels(not {"ideal", "none"}.issuperset(study.actuators))
     with counting_progress("flights") as progress:
-        rows = run(study, jobs or cores(), progress)
+        rows = run(study, seed, jobs or cores(), progress)
     found = cells(rows)
     table = summary_table(found)
     if out:
-        records = [row.as_record() for row in rows]
+        records = [row_record(row) for row in rows]
         names = list(dict.fromkeys(name for record in records for name in record))
         flights = Table.of(
             "", [Column(name) for name in names], [[r.get(n) for n in names] for r in records]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 
@@ -17,6 +18,9 @@ from rich.progress import (
 from rich.text import Text
 
 from .terminal import say, terminal
+
+LINE_S = 60.0
+"""Time between two lines where no line can be redrawn."""
 
 
 class FlightProgress:
@@ -61,17 +65,23 @@ def rated_progress(what: str) -> Iterator[Callable[[int, int, str], None]]:
     """A progress line with rate and time left, for many things of which some may be done before.
 
     It begins when it is first called: with how many are done, how many there are, and a remark.
+    In a file, as of a cluster's job, it is a line every `LINE_S`.
     """
     with ExitStack() as stack:
         progress: Progress | None = None
+        console, told_at = terminal(stderr=True), time.monotonic()
 
         def show(done: int, total: int, remark: str) -> None:
-            nonlocal progress
+            nonlocal progress, told_at
+            if not console.is_terminal and time.monotonic() >= told_at + LINE_S:
+                told_at = time.monotonic()
+                told = f"{what} {done}/{total}"
+                say(console, f"{told}, {remark}" if remark else told)
             if progress is None:
-                told = TextColumn("{task.fields[remark]}", markup=False)
+                remarks = TextColumn("{task.fields[remark]}", markup=False)
                 counts = "{task.completed:.0f}/{task.total:.0f}"
                 progress = stack.enter_context(
-                    _bar(counts, _Rate(), TimeRemainingColumn(compact=True), told)
+                    _bar(counts, _Rate(), TimeRemainingColumn(compact=True), remarks)
                 )
                 progress.add_task(what, completed=done, total=total, remark=remark)
             else:

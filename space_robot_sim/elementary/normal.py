@@ -12,6 +12,7 @@ from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from .exponential import exp, log
 
 Array = NDArray[np.float64]
+Pair = tuple[float, float]
 
 ROOT_TWO_PI = 2.5066282746310007
 SERIES_LIMIT = 3.0
@@ -20,6 +21,38 @@ CENTRE = 0.425
 """So near to 1/2, Wichura's first pair of polynomials holds."""
 TAIL = 5.0
 """Up to this root of the negative logarithm his second, beyond it his third."""
+
+# Wichura's coefficients, above and below the line, of the highest power first.
+CENTRAL: tuple[Pair, ...] = (
+    (2509.0809287301226727, 5226.4952788528545610),
+    (33430.575583588128105, 28729.085735721942674),
+    (67265.770927008700853, 39307.895800092710610),
+    (45921.953931549871457, 21213.794301586595867),
+    (13731.693765509461125, 5394.1960214247511077),
+    (1971.5909503065514427, 687.18700749205790830),
+    (133.14166789178437745, 42.313330701600911252),
+    (3.3871328727963666080, 1.0),
+)
+MIDDLE: tuple[Pair, ...] = (
+    (7.74545014278341407640e-4, 1.05075007164441684324e-9),
+    (2.27238449892691845833e-2, 5.47593808499534494600e-4),
+    (2.41780725177450611770e-1, 1.51986665636164571966e-2),
+    (1.27045825245236838258, 1.48103976427480074590e-1),
+    (3.64784832476320460504, 6.89767334985100004550e-1),
+    (5.76949722146069140550, 1.67638483018380384940),
+    (4.63033784615654529590, 2.05319162663775882187),
+    (1.42343711074968357734, 1.0),
+)
+OUTER: tuple[Pair, ...] = (
+    (2.01033439929228813265e-7, 2.04426310338993978564e-15),
+    (2.71155556874348757815e-5, 1.42151175831644588870e-7),
+    (1.24266094738807843860e-3, 1.84631831751005468180e-5),
+    (2.65321895265761230930e-2, 7.86869131145613259100e-4),
+    (2.96560571828504891230e-1, 1.48753612908506148525e-2),
+    (1.78482653991729133580, 1.36929880922735805310e-1),
+    (5.46378491116411436990, 5.99832206555887937690e-1),
+    (6.65790464350110377720, 1.0),
+)
 
 
 def normal_quantile(share: ArrayLike) -> Array:
@@ -59,63 +92,22 @@ def quantile(share: float) -> float:
     """
     q = share - 0.5
     if abs(q) <= CENTRE:
-        return q * _central(CENTRE * CENTRE - q * q)
+        return q * _ratio(CENTRAL, CENTRE * CENTRE - q * q)
     small = share if q < 0.0 else 1.0 - share
     if not small > 0.0:
         return math.copysign(math.inf, q) if small == 0.0 else math.nan
     r = math.sqrt(-log(small))
-    found = _middle(r - 1.6) if r <= TAIL else _outer(r - TAIL)
+    found = _ratio(MIDDLE, r - 1.6) if r <= TAIL else _ratio(OUTER, r - TAIL)
     return -found if q < 0.0 else found
 
 
 @subroutine
-def _central(r: float) -> float:
-    above = 67265.770927008700853 + r * (33430.575583588128105 + r * 2509.0809287301226727)
-    above = 1971.5909503065514427 + r * (
-        13731.693765509461125 + r * (45921.953931549871457 + r * above)
-    )
-    above = 3.3871328727963666080 + r * (133.14166789178437745 + r * above)
-    below = 39307.895800092710610 + r * (28729.085735721942674 + r * 5226.4952788528545610)
-    below = 687.18700749205790830 + r * (
-        5394.1960214247511077 + r * (21213.794301586595867 + r * below)
-    )
-    return above / (1.0 + r * (42.313330701600911252 + r * below))
-
-
-@subroutine
-def _middle(r: float) -> float:
-    above = 2.41780725177450611770e-1 + r * (
-        2.27238449892691845833e-2 + r * 7.74545014278341407640e-4
-    )
-    above = 5.76949722146069140550 + r * (
-        3.64784832476320460504 + r * (1.27045825245236838258 + r * above)
-    )
-    above = 1.42343711074968357734 + r * (4.63033784615654529590 + r * above)
-    below = 1.51986665636164571966e-2 + r * (
-        5.47593808499534494600e-4 + r * 1.05075007164441684324e-9
-    )
-    below = 1.67638483018380384940 + r * (
-        6.89767334985100004550e-1 + r * (1.48103976427480074590e-1 + r * below)
-    )
-    return above / (1.0 + r * (2.05319162663775882187 + r * below))
-
-
-@subroutine
-def _outer(r: float) -> float:
-    above = 1.24266094738807843860e-3 + r * (
-        2.71155556874348757815e-5 + r * 2.01033439929228813265e-7
-    )
-    above = 1.78482653991729133580 + r * (
-        2.96560571828504891230e-1 + r * (2.65321895265761230930e-2 + r * above)
-    )
-    above = 6.65790464350110377720 + r * (5.46378491116411436990 + r * above)
-    below = 1.84631831751005468180e-5 + r * (
-        1.42151175831644588870e-7 + r * 2.04426310338993978564e-15
-    )
-    below = 1.36929880922735805310e-1 + r * (
-        1.48753612908506148525e-2 + r * (7.86869131145613259100e-4 + r * below)
-    )
-    return above / (1.0 + r * (5.99832206555887937690e-1 + r * below))
+def _ratio(polynomials: tuple[Pair, ...], r: float) -> float:
+    """Divide two polynomials in ``r`` by one another, of the coefficients of each power."""
+    above, below = polynomials[0]
+    for k in range(1, len(polynomials)):
+        above, below = polynomials[k][0] + r * above, polynomials[k][1] + r * below
+    return above / below
 
 
 @kernel

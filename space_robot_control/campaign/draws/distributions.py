@@ -164,7 +164,9 @@ class Listed(Distribution):
         return list(dict.fromkeys(self.values))
 
     @model_validator(mode="after")
-    def _are_numbers_if_need_be(self) -> Self:
+    def _are_alike(self) -> Self:
+        if len({isinstance(value, (str, bool)) for value in self.values}) > 1:
+            raise ValueError("numbers and texts are mixed: put the numbers in quotes")
         if (self.relative or self.offset) and not self.is_number:
             raise ValueError("only numbers can be relative to the nominal value, or an offset")
         return self

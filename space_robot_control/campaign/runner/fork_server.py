@@ -23,6 +23,7 @@ from typing import Any
 
 from space_robot_msgs_py.errors import SpaceRobotError
 
+from ...flight.interruption import SIGNALS
 from .worker import work
 
 PATIENCE_S = 60.0
@@ -31,7 +32,6 @@ CHECK_S = 5.0
 """Time between two looks of the server whether the process that it serves is still there."""
 UNKNOWN = b"?"
 """The exit code of a worker that another server had forked."""
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class ForkServer:

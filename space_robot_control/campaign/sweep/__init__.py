@@ -1,7 +1,6 @@
-"""Laws beside one another over sensors and actuators, each under the same random robots."""
+"""Laws beside one another over sensors and actuators: a campaign over a grid, summed up."""
 
-from ..study import Law
 from .run import sweep
-from .scenario import Sweep
+from .study import sweep_study
 
-__all__ = ["Law", "Sweep", "sweep"]
+__all__ = ["sweep", "sweep_study"]

@@ -8,15 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...analysis.figures.overlay import words
 from ...analysis.figures.style import Look, grid, house_style, legend_above, page, plain
-from ...analysis.metrics import unit_of
 from ...analysis.tables import Column, Group, Table
+from ..report.quantities import ERRORS, FAST, RIPPLE, of_metric
+from ..row.row import Row
 from ..study import Law
-from .run import Row
+from .study import ACTUATORS, SENSORS
 
-ERRORS, RIPPLE, FAST = ("attitude", "joints_"), "ripple_", "fast_ripple_base_torque"
-"""Beginnings of the names of metrics that tables show."""
+FAST_OF_BASE = f"{FAST}base_torque"
 
 
 class Cell(NamedTuple):
@@ -31,46 +30,51 @@ class Cell(NamedTuple):
     """5 %, 50 % and 95 % of those that did not fail, by name; none if all did."""
 
 
-def shown(found: Sequence[Cell]) -> dict[str, tuple[str, str]]:
-    """Return heading and unit of the metrics that tables show, by name: errors, then ripple."""
+def shown(found: Sequence[Cell]) -> list[str]:
+    """Return the metrics that tables show: RMS errors, then ripple."""
     names = list(dict.fromkeys(name for cell in found for name in cell.metrics))
-    errors = [name for name in names if name.startswith(ERRORS)]
-    ripples = [name for name in names if name.startswith(RIPPLE) or name == FAST]
-    if FAST in ripples:  # beside what it is a share of
-        ripples.remove(FAST)
-        ripples.insert(1, FAST)
-    return {
-        **{name: (words(name), unit_of(name).strip("-")) for name in errors},
-        **{name: (_ripple_of(name), unit_of(name.split(RIPPLE)[1])) for name in ripples},
-    }
+    ripples = [name for name in names if name.startswith(RIPPLE)]
+    if FAST_OF_BASE in names:  # beside what it is a share of
+        ripples.insert(1, FAST_OF_BASE)
+    return _errors(names) + ripples
 
 
 def drawn(found: Sequence[Cell]) -> list[str]:
     """Return the metrics that a figure shows: of the base, then of the outermost joints."""
-    names = list(shown(found))
-    errors = [name for name in names if name.startswith(ERRORS)]
-    ripples = [name for name in names if name.startswith(RIPPLE)]
+    names = shown(found)
+    errors, ripples = _errors(names), [name for name in names if name.startswith(RIPPLE)]
     return list(dict.fromkeys([*errors[:1], *ripples[:1], *errors[-1:], *ripples[-1:]]))
 
 
-def _ripple_of(name: str) -> str:
-    if name == FAST:
-        return "> 25 Hz"
-    column = name.removeprefix(RIPPLE)
-    return "base ripple" if column == "base_torque" else f"ripple {words(column).split(' ')[1]}"
+def _errors(names: Sequence[str]) -> list[str]:
+    return [name for name in names if name.startswith(ERRORS) and name.endswith("_rms")]
 
 
 def cells(rows: Sequence[Row]) -> list[Cell]:
     """Sum up the rows by hardware and law, in their order."""
     found: dict[tuple[Law, str, str], list[Row]] = {}
     for row in rows:
-        law, sensors, _, actuators = row.draw
+        law, (sensors, actuators) = Law.parse(row.task.law), hardware_of(row)
         found.setdefault((law, sensors, actuators), []).append(row)
     return [_cell(*key, own) for key, own in found.items()]
 
 
+def hardware_of(row: Row) -> tuple[str, str]:
+    """Return sensors and actuators of a flight."""
+    return str(row.vary[SENSORS]), str(row.vary[ACTUATORS])
+
+
+def row_record(row: Row) -> dict[str, Any]:
+    """Return a flight and what came of it as a flat dictionary."""
+    law, (sensors, actuators) = Law.parse(row.task.law), hardware_of(row)
+    return {
+        "run": row.task.run, "controller": law.controller, "gains": law.gains, "sensors": sensors,
+        "actuators": actuators, "failure": row.reason, **row.metrics,
+    }  # fmt: skip
+
+
 def _cell(law: Law, sensors: str, actuators: str, rows: Sequence[Row]) -> Cell:
-    flown = [row.metrics for row in rows if not row.failure]
+    flown = [row.metrics for row in rows if row.is_complete]
     metrics = {}
     for name in flown[0] if flown else ():
         low, middle, high = np.quantile([m[name] for m in flown], (0.05, 0.5, 0.95)).tolist()
@@ -90,15 +94,15 @@ def hardware(found: Sequence[Cell]) -> dict[str, list[str]]:
 
 def summary_table(found: Sequence[Cell]) -> Table:
     """Tabulate the medians, a group for every hardware."""
-    flown_with, told = hardware(found), shown(found)
+    flown_with, told = hardware(found), [of_metric(name) for name in shown(found)]
     columns = (
         Column("law", is_label=True), Column("gains", is_label=True),
-        *(Column(name, unit, ".2g") for name, unit in told.values()),
+        *(Column(metric.heading, metric.unit, ".2g") for metric in told),
         Column("failed"),
     )  # fmt: skip
     groups: dict[tuple[str, ...], list[list[Any]]] = {}
     for cell, *names in zip(found, *flown_with.values(), strict=True):
-        middles = [cell.metrics[name][1] if name in cell.metrics else None for name in told]
+        middles = [cell.metrics[m.name][1] if m.name in cell.metrics else None for m in told]
         row = [cell.law.controller, cell.law.gains, *middles, f"{cell.failed} of {cell.flights}"]
         groups.setdefault(tuple(names), []).append([*names, *row])
     return Table(
@@ -129,8 +133,7 @@ def figure(found: Sequence[Cell]) -> Figure:
     titles = [", ".join(map(plain, names)) for names in zip(*hardware(found).values(), strict=True)]
     kinds = list(dict.fromkeys(titles))
     laws = list(dict.fromkeys(cell.law for cell in found))
-    told, names = shown(found), drawn(found)
-    if not names:
+    if not (names := drawn(found)):
         return page(12.0, "None of these flights came to its end.")
     sheet = page(130.0)
     legend_above(sheet, [law.title for law in laws], dashed=False)
@@ -148,9 +151,8 @@ def figure(found: Sequence[Cell]) -> Figure:
                 places, middle, yerr=(middle - low, high - middle), color=look.colour,
                 marker=look.marker, linestyle="none", markersize=4,
             )  # fmt: skip
-        heading, unit = told[name]
         axes.set_yscale("log")
-        axes.set_ylabel(f"{heading} ({unit})" if unit else f"{heading} error")
+        axes.set_ylabel(of_metric(name).label)
         axes.set_xticks(range(len(kinds)), kinds)
         axes.set_xlim(-0.5, len(kinds) - 0.5)
     return sheet

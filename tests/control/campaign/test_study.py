@@ -86,6 +86,7 @@ WRONG_VARIABLES: list[tuple[str, Any, str]] = [
     ("robot.base.inertia", {"uniform": [100, 200]}, "needs relative: true"),
     ("scenario.cse", {"choice": [1, 3]}, "unknown option 'cse'"),
     ("scenario.case", {"choice": [1, 9]}, "scenario.case can be 9: "),
+    ("scenario.case", {"choice": [1, "4-1"]}, "numbers and texts are mixed: put the numbers in"),
     ("scenario.command_latency_ticks", {"uniform": [0, 2]}, "valid integer"),
     ("scenario.duration", {"uniform": [0.9, 1.1], "offset": True, "low": 1}, "low: unknown key"),
     ("plant.friction.columb", 0.1, "unknown parameter of the plant"),

@@ -27,6 +27,7 @@ def _reproducing(folder: Path) -> Iterator[tuple[subprocess.Popen[str], list[psu
         [*COMMAND, "reproduce", *LONG, "--out", str(folder / "out")], stdout=subprocess.PIPE,
         stderr=subprocess.PIPE, text=True, start_new_session=True,
         env={**os.environ, "TMPDIR": str(folder)},
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # as not under nohup
     )  # fmt: skip
     workers: list[psutil.Process] = []
     try:

@@ -54,10 +54,15 @@ def test_bounds_hold(u: float) -> None:
 
 
 def test_choices_have_their_weights_and_their_types() -> None:
-    choice = read_distribution({"choice": ["a", 2, 2.5, True], "weights": [1, 2, 0, 1]}, "here")
-    drawn = [choice.quantile((number + 0.5) / 400.0) for number in range(400)]
-    assert [drawn.count(value) for value in ("a", 2, 2.5)] == [100, 200, 0]
-    assert [type(value) for value in (drawn[0], drawn[200], drawn[-1])] == [str, int, bool]
+    def drawn(values: list[Any]) -> list[Any]:
+        choice = read_distribution({"choice": values, "weights": [1, 2, 0, 1]}, "here")
+        return [choice.quantile((number + 0.5) / 400.0) for number in range(400)]
+
+    texts, numbers = drawn(["a", "b", "c", True]), drawn([1.5, 2, 2.5, 4])
+    assert [texts.count(value) for value in ("a", "b", "c", True)] == [100, 200, 0, 100]
+    assert [numbers.count(value) for value in (1.5, 2, 2.5, 4)] == [100, 200, 0, 100]
+    assert type(texts[-1]) is bool
+    assert type(numbers[200]) is int
     assert read_distribution("coarse", "here").quantile(0.3) == "coarse"
 
 
