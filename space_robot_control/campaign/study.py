@@ -74,12 +74,21 @@ class Requirement(StrictModel):
             raise ValueError(f"to_s must be later than from_s ({self.from_s:g} s)")
         return self
 
+    @property
+    def bound(self) -> float:
+        """What the metric must be below or above."""
+        bound = self.above if self.below is None else self.below
+        assert bound is not None
+        return bound
+
+    @property
+    def sign(self) -> float:
+        """1 if more of the metric is worse, -1 if less is."""
+        return 1.0 if self.above is None else -1.0
+
     def is_met(self, value: float) -> bool:
-        """Return whether a flight's value meets the bound; NaN does not."""
-        if self.below is not None:
-            return value < self.below
-        assert self.above is not None
-        return value > self.above
+        """Tell whether a flight's value meets the bound; NaN does not."""
+        return self.sign * value < self.sign * self.bound
 
 
 class Keep(StrictModel):

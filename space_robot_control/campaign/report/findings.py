@@ -20,7 +20,7 @@ from ..verdicts.league import League, league
 from ..verdicts.requirements import Verdict, verdicts
 from ..verdicts.sensitivity import Sensitivity, sensitivity
 from ..verdicts.sobol import SobolIndices, sobol_indices
-from ..verdicts.values import Part, ended, is_known, laws_of, measured, parts
+from ..verdicts.values import Part, ended, is_known, laws_of, measured, parts, turned
 from .quantities import Quantity, chosen, of_requirement
 from .subject import Subject
 
@@ -89,7 +89,7 @@ class Findings:
         found = []
         for quantity in self.driven:
             for part in self.parts:
-                rows = self.worse_is_larger(part.table, quantity)
+                rows = turned(part.table, quantity.column, quantity.sign)
                 for law in laws_of(rows):
                     if result := sensitivity(rows, law, quantity.column, CONFIDENCE):
                         found.append((part, quantity, result))
@@ -104,19 +104,12 @@ class Findings:
             count: rows at most.
             law: of which law; of all if empty.
         """
-        rows = self.worse_is_larger(part.table, quantity)
+        rows = turned(part.table, quantity.column, quantity.sign)
         if law:
             rows = rows[rows["law"] == law]
         times = rows["ended_at_s"].to_numpy(np.float64, na_value=0.0)
         order = np.lexsort((rows["run"], times, -measured(rows, quantity.column)))
         return part.table.loc[rows.index[order[:count]]]
-
-    @staticmethod
-    def worse_is_larger(rows: DataFrame, quantity: Quantity) -> DataFrame:
-        """Return the rows with the quantity's sign such that more of it is worse."""
-        if quantity.sign > 0:
-            return rows
-        return rows.assign(**{quantity.column: -rows[quantity.column].astype(float)})
 
     @cached_property
     def sobol(self) -> list[SobolIndices]:

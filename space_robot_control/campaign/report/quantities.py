@@ -43,15 +43,12 @@ class Quantity(NamedTuple):
     @property
     def sign(self) -> float:
         """Return 1 if more is worse, -1 if less is."""
-        return -1.0 if self.requirement and self.requirement.above is not None else 1.0
+        return self.requirement.sign if self.requirement else 1.0
 
     @property
     def limit(self) -> float | None:
         """Return the requirement's, if it is one."""
-        if self.requirement is None:
-            return None
-        below = self.requirement.below
-        return self.requirement.above if below is None else below
+        return self.requirement.bound if self.requirement else None
 
 
 def of_metric(name: str) -> Quantity:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .design import grid_names, independent_rows
 from .order_statistics import Outlook, bound_rank, is_met, is_missed, outlook, runs_needed
 from .shares import Interval, share_limits
-from .values import NOT_OF_THE_LAW, ended, laws_of, measured, of_law, parts
+from .values import NOT_OF_THE_LAW, ended, laws_of, measured, of_law, parts, turned
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -84,8 +84,9 @@ def verdict(
         law: for the verdict.
         point: for the verdict.
     """
-    badness = worse_is_larger(demand, rows, name)
-    runs, failures = len(badness), int(np.sum(~(badness < _limit(demand))))
+    sign, column = demand.sign, f"require.{name}"
+    badness = measured(turned(rows, column, sign), column)
+    runs, failures = len(badness), int(np.sum(~(badness < sign * demand.bound)))
     share, confidence = demand.share, demand.confidence
     word: Word = "undecided"
     if runs and is_met(failures, runs, share, confidence):
@@ -94,9 +95,7 @@ def verdict(
         word = "not met"
     needed = runs_needed(failures, share, confidence)
     rank = bound_rank(runs, share, confidence) if runs else None
-    bound = None if rank is None else float(np.sort(badness)[rank - 1])
-    if bound is not None and demand.above is not None:
-        bound = -bound
+    bound = None if rank is None else sign * float(np.sort(badness)[rank - 1])
     return Verdict(
         name, law, point, word, runs, failures,
         int(np.sum(~ended(rows))), int(rows["outcome"].isin(NOT_OF_THE_LAW).sum()),
@@ -104,23 +103,3 @@ def verdict(
         None if needed is None else max(0, needed - runs),
         outlook(failures, runs, share, confidence) if runs and word == "undecided" else None,
     )  # fmt: skip
-
-
-def worse_is_larger(demand: Requirement, rows: DataFrame, name: str) -> Array:
-    """Return a requirement's metric of each run, turned so that more is worse, infinite if failed.
-
-    Args:
-        demand: the requirement.
-        rows: one a run.
-        name: of the requirement.
-    """
-    column = f"require.{name}"
-    if demand.above is None:
-        return measured(rows, column)
-    return measured(rows.assign(**{column: -rows[column].astype(float)}), column)
-
-
-def _limit(demand: Requirement) -> float:
-    if demand.above is not None:
-        return -demand.above
-    return np.inf if demand.below is None else demand.below

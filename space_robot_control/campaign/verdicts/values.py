@@ -79,6 +79,11 @@ def measured(table: DataFrame, column: str) -> Array:
     return found
 
 
+def turned(table: DataFrame, column: str, sign: float) -> DataFrame:
+    """Return a table in which more of a column's numbers is worse: times -1 if ``sign`` is."""
+    return table if sign > 0.0 else table.assign(**{column: -table[column].astype(float)})
+
+
 def is_known(table: DataFrame, column: str) -> bool:
     """Tell whether any flight of the table has a number in that column."""
     return column in table and bool(np.isfinite(measured(table, column)).any())
