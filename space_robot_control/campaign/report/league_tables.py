@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 from ...analysis.tables import Column, Group, Table, Verdict
 from ..verdicts.league import League, Standing
@@ -90,9 +91,14 @@ def _pair(c: Comparison, names: Mapping[str, str]) -> list[str | Verdict]:
 def choice_tables(findings: Findings) -> list[Table]:
     """Tabulate which law to fly at each point of the grid, a table for every metric.
 
-    The grid's variables and the laws are columns, points are rows.
+    The grid's variables and the laws are columns, points are rows. The last explains all of them.
     """
-    return [_choices(findings, metric) for metric in findings.metrics]
+    tables = [_choices(findings, metric) for metric in findings.metrics]
+    note = (
+        "Medians; in brackets the flights that failed, in %. To fly: the laws than which none is "
+        f"shown to be better, with {CONFIDENCE:.0%} confidence at each point."
+    )
+    return [*tables[:-1], *(replace(table, notes=[note]) for table in tables[-1:])]
 
 
 def _choices(findings: Findings, metric: Quantity) -> Table:
@@ -106,11 +112,7 @@ def _choices(findings: Findings, metric: Quantity) -> Table:
         *map(Column, findings.names.values()),
         Column("to fly", is_label=True),
     ]
-    note = (
-        "Medians; in brackets the flights that failed, in %. To fly: the laws than which none is "
-        f"shown to be better, with {CONFIDENCE:.0%} confidence at each point."
-    )
-    return Table(metric.label, columns, [Group(rows)], [note])
+    return Table(metric.label, columns, [Group(rows)])
 
 
 def _medians(findings: Findings, found: League) -> list[str]:

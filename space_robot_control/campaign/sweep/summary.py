@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from ...analysis.figures.style import Look, grid, house_style, legend_above, page, plain
 from ...analysis.tables import Column, Group, Table
-from ..report.quantities import ERRORS, FAST, RIPPLE, of_metric
+from ..report.quantities import ERRORS, FAST, RIPPLE, Quantity, of_metric
 from ..row.row import Row
 from ..study import Law
 from .study import ACTUATORS, SENSORS
@@ -97,7 +97,7 @@ def summary_table(found: Sequence[Cell]) -> Table:
     flown_with, told = hardware(found), [of_metric(name) for name in shown(found)]
     columns = (
         Column("law", is_label=True), Column("gains", is_label=True),
-        *(Column(metric.heading, metric.unit, ".2g") for metric in told),
+        *(Column(_short(metric), metric.unit, ".2g") for metric in told),
         Column("failed"),
     )  # fmt: skip
     groups: dict[tuple[str, ...], list[list[Any]]] = {}
@@ -110,6 +110,14 @@ def summary_table(found: Sequence[Cell]) -> Table:
         (*(Column(name, is_label=True) for name in flown_with), *columns),
         [Group(rows) for rows in groups.values()],
     )
+
+
+def _short(metric: Quantity) -> str:
+    """Shorten a heading, for there are many columns."""
+    if metric.name == FAST_OF_BASE:
+        return "> 25 Hz"
+    kind, _, column = metric.heading.partition(", ")
+    return kind if column == "RMS" else f"{kind} {column.removeprefix('torque ')}"
 
 
 def as_records(found: Sequence[Cell]) -> list[dict[str, Any]]:
