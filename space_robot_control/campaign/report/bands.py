@@ -22,6 +22,7 @@ from ...analysis.figures.style import (
     plain,
 )
 from ...analysis.metrics import unit_of
+from ..study import short_names
 from ..verdicts.values import Part, laws_of, of_law
 from .axes import number_log_axis
 
@@ -112,7 +113,7 @@ def band_figure(parts: Sequence[Part], laws: Sequence[str], series: str, time_s:
     if per_law:
         _name_bands(figure)
     else:
-        legend_above(figure, list(laws), dashed=True)
+        legend_above(figure, list(short_names(laws).values()), dashed=True)
     return figure
 
 

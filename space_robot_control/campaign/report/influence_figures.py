@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...analysis.figures.style import COLOURS, Look, house_style, legend_above, page, plain
+from ..study import short_names
 from ..verdicts.sensitivity import Sensitivity
 from ..verdicts.sobol import SobolIndices
 from ..verdicts.values import Part, laws_of, measured, of_law
@@ -139,5 +140,5 @@ def grid_figure(
     panels[-1].set_xlim(-0.5, len(parts) - 0.5)
     panels[-1].set_xlabel(", ".join(plain(name.removeprefix("scenario.")) for name in names))
     figure.align_ylabels()
-    legend_above(figure, list(laws), dashed=False)
+    legend_above(figure, list(short_names(laws).values()), dashed=False)
     return figure
