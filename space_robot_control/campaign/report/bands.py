@@ -87,7 +87,7 @@ def band_figure(parts: Sequence[Part], laws: Sequence[str], series: str, time_s:
     if not found:
         return page(12.0, "No flight has a series over time.")
     per_law = len(shown) == 1
-    titles = list(laws) if per_law else [part.point for part in shown]
+    titles = list(short_names(laws).values()) if per_law else [part.point for part in shown]
     columns = columns_of(len(titles))
     figure = page(16.0 + 42.0 * -(-len(titles) // columns))
     panels = grid(figure, len(titles), columns)

@@ -43,6 +43,7 @@ def influence_figure(found: Sequence[Sensitivity]) -> Figure:
     names = sorted(strength, key=lambda name: -strength[name])[:SHOWN]
     figure = page(22.0 + 5.0 * len(names))
     panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
+    laws = short_names([each.law for each in shown])
     for axes, each in zip(panels, shown, strict=True):
         by_name = {i.variable: i for i in each.influences}
         for place, name in enumerate(names):
@@ -56,7 +57,7 @@ def influence_figure(found: Sequence[Sensitivity]) -> Figure:
                     marker="o", markersize=3.0,
                 )  # fmt: skip
         axes.axvline(0.0, color=COLOURS[0], linewidth=0.6)
-        axes.set(xlim=(-1.0, 1.0), xticks=(-1.0, 0.0, 1.0), title=plain(each.law))
+        axes.set(xlim=(-1.0, 1.0), xticks=(-1.0, 0.0, 1.0), title=plain(laws[each.law]))
         axes.xaxis.set_major_formatter("{x:g}")
     panels[0].set_yticks(range(len(names)), [plain(_short(name)) for name in names])
     panels[0].invert_yaxis()
@@ -75,6 +76,7 @@ def sobol_figure(found: Sequence[SobolIndices]) -> Figure:
     names = sorted(largest, key=lambda name: -largest[name])[:SHOWN]
     figure = page(24.0 + 6.0 * len(names))
     panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
+    laws = short_names([each.law for each in shown])
     for axes, each in zip(panels, shown, strict=True):
         by_name = {i.variable: i for i in each.indices}
         for kind, shift in (("first", -0.2), ("total", 0.2)):
@@ -86,7 +88,7 @@ def sobol_figure(found: Sequence[SobolIndices]) -> Figure:
                     value, place + shift, xerr=error, color=look.colour, marker=look.marker
                 )
         axes.axvline(0.0, color=COLOURS[0], linewidth=0.6)
-        axes.set(xlim=(-0.1, 1.1), title=plain(each.law))
+        axes.set(xlim=(-0.1, 1.1), title=plain(laws[each.law]))
     panels[0].set_yticks(range(len(names)), [plain(_short(name)) for name in names])
     panels[0].invert_yaxis()
     figure.supxlabel("Sobol index")

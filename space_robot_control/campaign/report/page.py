@@ -60,7 +60,11 @@ def _summaries(findings: Findings) -> list[tuple[str, list[tuple[str, str]]]]:
         own = [v for v in findings.verdicts if v.requirement == quantity.name]
         words = []
         for word in TONES:
-            named = [f"{v.law} ({v.point})" if v.point else v.law for v in own if v.word == word]
+            named = [
+                f"{findings.names[v.law]} ({v.point})" if v.point else findings.names[v.law]
+                for v in own
+                if v.word == word
+            ]
             if named:
                 words.append((f"{word} {_counted(named)}", TONES[word]))
         found.append((f"{quantity.name}, {demanded(quantity)}", words))
