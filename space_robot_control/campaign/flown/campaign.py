@@ -14,7 +14,7 @@ import yaml
 
 from space_robot_msgs_py.config.yaml_text import read_file
 
-from ..runner import cores
+from ..runner import check_scheduler, cores
 from ..store.folder import JOURNAL, begin_or_resume, held_folder
 from ..store.journal import Journal
 from ..store.table import check_tables
@@ -74,6 +74,8 @@ class Campaign:
             InputError: something cannot be flown; the folder holds something else; disk full.
         """
         check_tables()
+        if scheduler is not None:  # before there is a folder
+            check_scheduler(scheduler)
         asked = Preparation.of(self.study, seed, runs)
         manifest = asked.manifest
         temporary = None if out is not None else TemporaryDirectory(prefix="space-robot-campaign-")

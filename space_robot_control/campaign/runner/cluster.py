@@ -53,6 +53,16 @@ def on_cluster(
         yield from _Job(client, address, function, timeout_s, attempts).run(items)
 
 
+def check_scheduler(address: str) -> None:
+    """See that there is a scheduler at an address.
+
+    Raises:
+        InputError: there is none, or no client here.
+    """
+    with _connected(address):
+        pass
+
+
 class _Job:
     """A run of many on a cluster."""
 

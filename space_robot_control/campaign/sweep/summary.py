@@ -117,7 +117,7 @@ def _short(metric: Quantity) -> str:
     if metric.name == FAST_OF_BASE:
         return "> 25 Hz"
     kind, _, column = metric.heading.partition(", ")
-    return kind if column == "RMS" else f"{kind} {column.removeprefix('torque ')}"
+    return kind if column == "RMS" else f"{kind} {column.replace('torque', '').strip()}"
 
 
 def as_records(found: Sequence[Cell]) -> list[dict[str, Any]]:

@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from space_robot_control.campaign.flown import FlownCampaign
+from space_robot_control.campaign.runner import cluster
 from space_robot_control.cli.main import cli
 from space_robot_msgs_py.errors import InputError
 
@@ -95,15 +96,28 @@ def test_rerun_says_that_the_digest_is_the_same_or_fails(flown: Path, tmp_path: 
         (("run", "FILE"), "--out: the folder of the campaign is missing"),
         (("run", "FILE", "--out", "x"), "my.yaml: runs: missing"),
         (("run", "nothing", "--out", "x"), "unknown campaign 'nothing': choose one of"),
+        (
+            ("run", "FILE", "--runs", "2", "--out", "x", "--scheduler", "tcp://127.0.0.1:9"),
+            "scheduler 'tcp://127.0.0.1:9': ",
+        ),
         (("rerun", "nowhere", "1"), "nowhere: is no campaign's folder"),
     ],
 )
-def test_what_cannot_be_is_one_line(file: Path, arguments: tuple[str, ...], said: str) -> None:
+def test_what_cannot_be_is_one_line_and_leaves_nothing(
+    file: Path,
+    arguments: tuple[str, ...],
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cluster, "CONNECT_S", 0.5)
     given = [str(file) if word == "FILE" else word for word in arguments]
     error = CliRunner().invoke(cli, ["campaign", *given]).exception
     assert isinstance(error, InputError)
     assert said in str(error)
     assert "\n" not in str(error)
+    assert not (tmp_path / "x").exists()
 
 
 def test_ctrl_c_says_how_to_go_on(file: Path, tmp_path: Path) -> None:
