@@ -44,6 +44,7 @@ def work(function: Callable[[Any], Any], connection: Connection, starter: int) -
         except (EOFError, OSError):
             return
         connection.send_bytes(answer(function, item))
+        gc.collect(0)  # cycles that an item leaves, which may hold much memory, are in its youngest
 
 
 def answer(function: Callable[[Any], Any], item: bytes) -> bytes:

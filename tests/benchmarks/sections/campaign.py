@@ -23,7 +23,7 @@ LAW, SEED = "tde_stc", 7
 DURATIONS_S = (5.0, 30.0)
 FLIGHTS = {5.0: 24, 30.0: 6}
 """Of a batch."""
-MANY = 1000
+MANY = 4000
 """Flights over which the memory is looked at."""
 ITEMS = 5000
 OVERHEAD = Target(1.0 / 1.1, of="ratio")

@@ -119,6 +119,19 @@ def end_somehow(how: str) -> str:
     return how
 
 
+def with_a_circle(_: int) -> int:
+    """Leave a megabyte that only the collector of cycles frees; return the process's pages."""
+    circle: list[object] = [bytearray(b"1" * 2**20)]
+    circle.append(circle)
+    return int(Path("/proc/self/statm").read_text().split()[1])
+
+
+def test_the_memory_of_workers_does_not_grow_with_items() -> None:
+    pages = [done.value() for done in run_many(with_a_circle, range(60), workers=1)]
+    grown = (max(pages) - pages[5]) * os.sysconf("SC_PAGESIZE")
+    assert grown < 5 * 2**20
+
+
 def test_workers_that_die_are_replaced() -> None:
     items = ["a", "exit", "b", "kill", "segfault", "c", "system exit", *"defg"]
     done = {d.item: d for d in run_many(end_somehow, items, workers=2, attempts=2)}
