@@ -163,6 +163,15 @@ def test_a_bad_option_is_refused_before_anything_flies() -> None:
         sweep(sweep_study(["pid"], ["ideal"]))
 
 
+def test_the_command_says_why_flights_failed() -> None:
+    arguments = ["sweep", "--law", "ctc", "--law", "tde_smc", "--sensors", "ideal"]
+    arguments += ["--duration", "0.1", "--set", "plant.echo_scale=[3]"]
+    result = CliRunner().invoke(cli, arguments, catch_exceptions=False)
+    assert result.exit_code == 0
+    told = "1 of 2 flights failed, the first, run 0 under tde_smc: the flight diverged at tick 2"
+    assert told in result.stderr
+
+
 def test_the_command_writes_tables_and_a_figure(tmp_path: Path) -> None:
     out = tmp_path / "study"
     arguments = ["sweep", "--law", "tde_stc", "--sensors", "ideal", "--sensors", "white_l1"]
