@@ -87,7 +87,7 @@ $(VENV)/.flies: setup.py pyproject.toml | $(VENV)/.made
 
 $(VENV)/.tests: setup.py pyproject.toml | $(VENV)/.made
 	@echo "installing space_robot, ROS 2 and the tests' tools into $(VENV): some minutes, once"
-	@$(PIP_INSTALL) --editable '.[ros,test]'
+	@$(PIP_INSTALL) --no-compile --editable '.[ros,test]'  # most modules are never imported
 	@touch $(VENV)/.flies $@
 
 $(VENV)/.made:

@@ -23,10 +23,11 @@ def clock(options: Options) -> list[Result]:
     """
     duration = 1.0 if options.short else DURATION_S
     count = 1 if options.short else options.batches(usual=3)
-    runs: dict[str, list[GraphRun]] = {"usual": [], "FIFO": []}
+    priorities = {"FIFO": FIFO_PRIORITY} if options.short else {"usual": 0, "FIFO": FIFO_PRIORITY}
+    runs: dict[str, list[GraphRun]] = {name: [] for name in priorities}
     flights = {
         name: Flight(FlightPlan(duration=duration, realtime=True, fifo_priority=priority))
-        for name, priority in (("usual", 0), ("FIFO", FIFO_PRIORITY))
+        for name, priority in priorities.items()
     }
     for k in range(count):
         for name, flight in flights.items():
