@@ -19,9 +19,10 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")
-SECONDS = 5
-"""Long enough after the swap for the pilot to ask for the law, on a busy machine, too."""
-SWAP_S = 3.5
+SWAP_S = 6.0
+"""Late enough for the pilot to have changed everything before, on a busy machine, too."""
+SECONDS = 7.5
+"""Long enough after the swap for the pilot to ask for the law."""
 
 
 class Pilot:

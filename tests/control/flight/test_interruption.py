@@ -20,6 +20,22 @@ COMMAND = [sys.executable, "-m", "space_robot_control.cli.main"]
 LONG = ["--duration", "60", "--jobs", "2"]
 
 
+def _workers(pid: int) -> list[psutil.Process]:
+    """The processes that a reproduction has started, but for the one that compiles, before."""
+    found = []
+    for child in psutil.Process(pid).children(recursive=True):
+        with contextlib.suppress(psutil.NoSuchProcess):  # it has just ended
+            if "run_module" not in " ".join(child.cmdline()):
+                found.append(child)
+    return found
+
+
+def _processor_s(process: psutil.Process) -> float:
+    with contextlib.suppress(psutil.NoSuchProcess):
+        return float(process.cpu_times().user)
+    return 0.0
+
+
 @contextlib.contextmanager
 def _reproducing(folder: Path) -> Iterator[tuple[subprocess.Popen[str], list[psutil.Process]]]:
     """A reproduction at work, and its two workers."""
@@ -32,14 +48,11 @@ def _reproducing(folder: Path) -> Iterator[tuple[subprocess.Popen[str], list[psu
     workers: list[psutil.Process] = []
     try:
         until = time.monotonic() + 120.0
-        while sum(worker.cpu_times().user > 0.2 for worker in workers) < 2:
+        while sum(_processor_s(worker) > 0.2 for worker in workers) < 2:
             assert time.monotonic() < until
             assert process.poll() is None, process.communicate()
             time.sleep(0.05)
-            workers = [
-                child for child in psutil.Process(process.pid).children(recursive=True)
-                if "run_module" not in " ".join(child.cmdline())  # what compiles, before
-            ]  # fmt: skip
+            workers = _workers(process.pid)
         yield process, workers
     finally:
         for survivor in [psutil.Process(process.pid), *workers] if process.poll() is None else []:
