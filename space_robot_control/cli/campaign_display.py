@@ -15,7 +15,7 @@ from ..campaign.flown import FlownCampaign
 from ..campaign.report.findings import Findings
 from ..campaign.report.subject import subject_of
 from ..campaign.report.verdict_tables import TONES, command
-from ..flight.ending import COMPLETE
+from ..campaign.verdicts.values import ended, laws_of, of_law
 from ..flight.terminal import say
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def as_record(flown: FlownCampaign) -> dict[str, Any]:
         "folder": str(flown.folder), "seed": flown.seed, "flights": len(table),
         "runs": int(table["run"].nunique()), "runs_asked": flown.runs, "kept": flown.kept,
         "outcomes": {
-            law: rows["outcome"].value_counts().to_dict() for law, rows in _laws(table).items()
+            law: of_law(table, law)["outcome"].value_counts().to_dict() for law in laws_of(table)
         },
         "verdicts": [asdict(verdict) for verdict in flown.verdicts],
     }  # fmt: skip
@@ -63,21 +63,20 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
             console,
         )  # fmt: skip
     say(console, shlex.join(["space-robot", "campaign", "report", str(flown.folder)]))
-    for quantity in findings.driven[:1]:
-        worst = findings.worst(findings.whole, quantity, 1).iloc[0]
-        again = command(flown.folder, int(worst["run"]), worst["law"])
-        say(console, f"{again}    # the worst")
+    # where no flight has a number all failed, and the first is as bad as any
+    driven = findings.driven
+    rows = findings.worst(findings.whole, driven[0], 1) if driven else flown.table
+    again = command(flown.folder, int(rows["run"].iloc[0]), rows["law"].iloc[0])
+    say(console, f"{again}    # the worst")
 
 
 def _league(table: DataFrame, names: dict[str, str], seed: int) -> Table:
     shown = [name for name in SHOWN if f"metric.{name}" in table]
-    rows = [
-        [
-            names[law], f"{(own['outcome'] == COMPLETE).sum()} of {len(own)}",
-            *(_median(own[f"metric.{name}"]) for name in shown),
-        ]
-        for law, own in _laws(table).items()
-    ]  # fmt: skip
+    rows = []
+    for law in laws_of(table):
+        own = of_law(table, law)
+        medians = (_median(own[f"metric.{name}"]) for name in shown)
+        rows.append([names[law], f"{ended(own).sum()} of {len(own)}", *medians])
     columns = (
         Column("law", is_label=True), Column("complete"),
         *(Column(name, spec=".3g") for name in shown),
@@ -88,8 +87,3 @@ def _league(table: DataFrame, names: dict[str, str], seed: int) -> Table:
 def _median(column: Any) -> float | None:
     known = column.dropna()
     return None if known.empty else float(known.median())
-
-
-def _laws(table: DataFrame) -> dict[str, DataFrame]:
-    """Return the rows of each law."""
-    return {law: table[table["law"] == law] for law in table["law"].unique()}

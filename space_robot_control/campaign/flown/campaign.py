@@ -15,7 +15,7 @@ import yaml
 from space_robot_msgs_py.config.yaml_text import read_file
 
 from ..runner import check_scheduler, cores
-from ..store.folder import JOURNAL, begin_or_resume, held_folder
+from ..store.folder import JOURNAL, MANIFEST, begin_or_resume, held_folder
 from ..store.journal import Journal
 from ..store.table import check_tables
 from ..study import Study, read_study
@@ -74,12 +74,12 @@ class Campaign:
             InputError: something cannot be flown; the folder holds something else; disk full.
         """
         check_tables()
-        if scheduler is not None:  # before there is a folder
-            check_scheduler(scheduler)
         asked = Preparation.of(self.study, seed, runs)
         manifest = asked.manifest
         temporary = None if out is not None else TemporaryDirectory(prefix="space-robot-campaign-")
         folder = Path(temporary.name if temporary else str(out))
+        if scheduler is not None and not (folder / MANIFEST).exists():
+            check_scheduler(scheduler)  # else the folder would be begun for nothing
         with held_folder(folder):
             begin_or_resume(folder, manifest, self._text or as_yaml(self.study))
             with Journal(folder / JOURNAL, self.study.laws) as journal:

@@ -23,11 +23,10 @@ def clock(options: Options) -> list[Result]:
     """
     duration = 1.0 if options.short else DURATION_S
     count = 1 if options.short else options.batches(usual=3)
-    priorities = {"FIFO": FIFO_PRIORITY} if options.short else {"usual": 0, "FIFO": FIFO_PRIORITY}
-    runs: dict[str, list[GraphRun]] = {name: [] for name in priorities}
+    runs: dict[str, list[GraphRun]] = {"usual": [], "FIFO": []}
     flights = {
         name: Flight(FlightPlan(duration=duration, realtime=True, fifo_priority=priority))
-        for name, priority in priorities.items()
+        for name, priority in (("usual", 0), ("FIFO", FIFO_PRIORITY))
     }
     for k in range(count):
         for name, flight in flights.items():

@@ -82,6 +82,7 @@ def test_masses_are_off_within_the_spread_and_no_law_is_told() -> None:
     flown = flight(study(spread=0.2), 0)
     assert flown.controller_settings.robot == "paper"
     nominal = flight(study(), 0).robot
+    assert nominal.mass.tolist() == [750.0, 20.0, 35.0, 20.0, 10.0, 20.0, 5.0]
     for name in ("mass", "inertia"):
         of_flown, of_nominal = getattr(flown.robot, name), getattr(nominal, name)
         is_there = of_nominal != 0.0

@@ -51,7 +51,8 @@ def test_every_law_flies_with_fine_sensors(law: str) -> None:
     _, errors, torque = flown(controller=law, sensors="fine", navigation="filtered", duration=3.0)
     assert np.abs(errors[5:, :3]).max() < 4e-5
     assert np.abs(errors[5:, 3:]).max() < 5e-5
-    assert np.abs(torque[2000:]).max() < 30.0  # the noisiest, CTC: 14 to 21 with seeds 0 to 5
+    # CTC, with 100 rad/s the loudest: 14 to 21 N m with seeds 0 to 5
+    assert np.abs(torque[2000:]).max() < (30.0 if law == "ctc" else 15.0)
 
 
 @pytest.mark.parametrize("sensors", ["tactical", "coarse"])
