@@ -26,4 +26,4 @@ class Health:
     """The mode in a word or two, then why: ``nominal``, ``safe: no state for 0.5 s``."""
     level: Level = Level.OK
     values: Mapping[str, float | int | str] = field(default_factory=dict)
-    """FieldReader, by name with unit; ``tick`` is the last one dealt with."""
+    """Readings, by name with unit; ``tick`` is the last one dealt with."""

@@ -19,13 +19,13 @@ from flights import Start, space_robot_here
 
 from space_robot_control.flight.graph.listeners import wait_for
 from space_robot_control.flight.graph.monitor import Monitor
+from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")
 
-SURVIVES_S = 1.0
-"""What is older than this survives a kill."""
-KILLED_AFTER_S = 2.3
+RECORDER = "recorder_node"
+REPORTS_IN_FLIGHT = 4
 PERIOD_S = 0.002
 PATIENCE_S = 60.0
 READY = "[controller_node, mission_node, recorder_node]"
@@ -71,28 +71,30 @@ def _only_error_line(output: str) -> str:
 def test_killed_recorder_has_kept_all_but_the_last_moment(
     start: Start, domain: int, tmp_path: Path
 ) -> None:
-    """With a pace that leaves the recorder its share of the processor."""
+    """What had come at one of its reports is in the file for good before the next one is heard.
+
+    That lies a second later by the recorder's own clock, however busy the machine is.
+    """
     bag = tmp_path / "bag"
     nodes = _start_graph(start, bag, ticks=200_000, realtime=True, period=PERIOD_S)
     monitor = Monitor(domain)
-    seen: list[tuple[float, float]] = []
-    start_up, begin = time.monotonic(), None
+    received: list[int] = []
+    heard_at, until = 0.0, time.monotonic() + PATIENCE_S
     try:
-        while begin is None or time.monotonic() < begin + KILLED_AFTER_S:
+        while len(received) < REPORTS_IN_FLIGHT:
             monitor.poll()
-            seen.append((time.monotonic(), monitor.simulated_s))
-            if begin is None and monitor.simulated_s > 0.0:
-                begin = time.monotonic()
-            assert begin or time.monotonic() < start_up + PATIENCE_S
+            if monitor.has_begun and monitor.heard_at.get(RECORDER, 0.0) > heard_at:
+                heard_at = monitor.heard_at[RECORDER]
+                received.append(int(monitor.values[RECORDER]["received"]))
+            assert time.monotonic() < until
             time.sleep(0.01)
         nodes["recorder"].kill()
-        killed = time.monotonic()
     finally:
         monitor.close()
     assert nodes["plant"].poll() is None
-    sent_s = max(simulated for at, simulated in seen if at < killed - SURVIVES_S)
+    assert received[0] < received[-2] <= sum(open_bag(bag).counts().values())
     log = read_flight(bag)
-    assert (log.ticks - 1) * log.timebase.period >= sent_s > 0.0
+    assert log.ticks > 1
     assert not any(log.lost.values())
     result = space_robot_here("analyze", str(bag), "--json")
     assert json.loads(result.stdout)["unfinished"] == log.unfinished
