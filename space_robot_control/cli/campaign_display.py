@@ -13,9 +13,11 @@ from ..analysis.tables import Verdict as Judged
 from ..analysis.terminal import print_table
 from ..campaign.flown import FlownCampaign
 from ..campaign.report.findings import Findings
+from ..campaign.report.league_tables import number
 from ..campaign.report.subject import subject_of
 from ..campaign.report.verdict_tables import TONES, command
-from ..campaign.verdicts.values import ended, laws_of, of_law
+from ..campaign.verdicts.quantiles import quantile
+from ..campaign.verdicts.values import ended, is_known, laws_of, measured, of_law
 from ..flight.terminal import say
 
 if TYPE_CHECKING:
@@ -42,7 +44,7 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
     """Print how many flights came to their end, medians, verdicts, and how to go on."""
     findings = Findings(subject_of(flown))
     names = findings.names
-    print_table(_league(flown.table, names, flown.seed), console)
+    print_table(medians(flown.table, names, flown.seed), console)
     if found := findings.verdicts:
         print_table(
             Table.of(
@@ -70,20 +72,13 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
     say(console, f"{again}    # the worst")
 
 
-def _league(table: DataFrame, names: dict[str, str], seed: int) -> Table:
-    shown = [name for name in SHOWN if f"metric.{name}" in table]
+def medians(table: DataFrame, names: dict[str, str], seed: int) -> Table:
+    """Tabulate each law's medians; a flight that failed counts as worse than any number."""
+    shown = [name for name in SHOWN if is_known(table, f"metric.{name}")]
     rows = []
     for law in laws_of(table):
         own = of_law(table, law)
-        medians = (_median(own[f"metric.{name}"]) for name in shown)
-        rows.append([names[law], f"{ended(own).sum()} of {len(own)}", *medians])
-    columns = (
-        Column("law", is_label=True), Column("complete"),
-        *(Column(name, spec=".3g") for name in shown),
-    )  # fmt: skip
+        middle = (quantile(measured(own, f"metric.{name}"), 0.5).value for name in shown)
+        rows.append([names[law], f"{ended(own).sum()} of {len(own)}", *map(number, middle)])
+    columns = (Column("law", is_label=True), Column("complete"), *map(Column, shown))
     return Table.of(f"{table['run'].nunique()} runs, seed {seed}: medians", columns, rows)
-
-
-def _median(column: Any) -> float | None:
-    known = column.dropna()
-    return None if known.empty else float(known.median())
