@@ -1,11 +1,16 @@
-"""Numbers along logarithmic axes."""
+"""Numbers along logarithmic axes, and the laws' legend above them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import log10
 
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator, NullFormatter
+
+from ...analysis.figures.style import legend_above
+from ..study import short_names
 
 NARROW = 1.6
 """Decades below which numbers stand between powers of ten, too."""
@@ -19,3 +24,8 @@ def number_log_axis(axes: Axes, name: str) -> None:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter(LogFormatterSciNotation(minor_thresholds=(10.0, 10.0)))
     axis.set_minor_formatter(NullFormatter())
+
+
+def law_legend(figure: Figure, laws: Sequence[str], dashed: bool = True) -> None:
+    """Name the laws above a figure, as short as they can be told apart."""
+    legend_above(figure, list(short_names(laws).values()), dashed=dashed)

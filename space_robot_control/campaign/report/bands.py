@@ -17,14 +17,13 @@ from ...analysis.figures.style import (
     Look,
     grid,
     house_style,
-    legend_above,
     page,
     plain,
 )
 from ...analysis.metrics import unit_of
 from ..study import short_names
 from ..verdicts.values import Part, laws_of, of_law
-from .axes import number_log_axis
+from .axes import law_legend, number_log_axis
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -113,7 +112,7 @@ def band_figure(parts: Sequence[Part], laws: Sequence[str], series: str, time_s:
     if per_law:
         _name_bands(figure)
     else:
-        legend_above(figure, list(short_names(laws).values()), dashed=True)
+        law_legend(figure, laws)
     return figure
 
 

@@ -10,10 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ...analysis.figures.style import GREY, Look, grid, house_style, legend_above, page, plain
-from ..study import short_names
+from ...analysis.figures.style import GREY, Look, grid, house_style, page, plain
 from ..verdicts.values import Part, laws_of, measured, of_law
-from .axes import number_log_axis
+from .axes import law_legend, number_log_axis
 from .bands import MOST_PANELS, columns_of
 from .quantities import Quantity
 
@@ -55,7 +54,7 @@ def distribution_figure(parts: Sequence[Part], laws: Sequence[str], quantity: Qu
         panels[number].set_ylabel("share of the runs")
     for axes in panels[-columns:]:
         axes.set_xlabel(quantity.label)
-    legend_above(figure, list(short_names(laws).values()), dashed=True)
+    law_legend(figure, laws)
     return figure
 
 
@@ -75,7 +74,7 @@ def _with_tail(table: DataFrame, laws: Sequence[str], quantity: Quantity) -> Fig
     number_log_axis(below, "x")
     for axes in (below, above):
         axes.set_xlabel(quantity.label)
-    legend_above(figure, list(short_names(laws).values()), dashed=True)
+    law_legend(figure, laws)
     return figure
 
 

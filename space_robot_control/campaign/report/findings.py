@@ -20,7 +20,7 @@ from ..verdicts.league import League, league
 from ..verdicts.requirements import Verdict, verdicts
 from ..verdicts.sensitivity import Sensitivity, sensitivity
 from ..verdicts.sobol import SobolIndices, sobol_indices
-from ..verdicts.values import Part, ended, is_known, laws_of, measured, parts, turned
+from ..verdicts.values import Part, ended, is_known, laws_of, measured, of_law, parts, turned
 from .quantities import Quantity, chosen, of_requirement
 from .subject import Subject
 
@@ -106,7 +106,7 @@ class Findings:
         """
         rows = turned(part.table, quantity.column, quantity.sign)
         if law:
-            rows = rows[rows["law"] == law]
+            rows = of_law(rows, law)
         times = rows["ended_at_s"].to_numpy(np.float64, na_value=0.0)
         order = np.lexsort((rows["run"], times, -measured(rows, quantity.column)))
         return part.table.loc[rows.index[order[:count]]]

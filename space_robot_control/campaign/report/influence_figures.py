@@ -12,7 +12,7 @@ from ..study import short_names
 from ..verdicts.sensitivity import Sensitivity
 from ..verdicts.sobol import SobolIndices
 from ..verdicts.values import Part, laws_of, measured, of_law
-from .axes import number_log_axis
+from .axes import law_legend, number_log_axis
 from .quantities import Quantity
 
 SHOWN = 10
@@ -142,5 +142,5 @@ def grid_figure(
     panels[-1].set_xlim(-0.5, len(parts) - 0.5)
     panels[-1].set_xlabel(", ".join(plain(name.removeprefix("scenario.")) for name in names))
     figure.align_ylabels()
-    legend_above(figure, list(short_names(laws).values()), dashed=False)
+    law_legend(figure, laws, dashed=False)
     return figure

@@ -28,7 +28,6 @@ RECORDER = "recorder_node"
 REPORTS_IN_FLIGHT = 4
 PERIOD_S = 0.002
 PATIENCE_S = 60.0
-READY = "[controller_node, mission_node, recorder_node]"
 REFERENCE, IN_FLIGHT = 20_000, 1_000_000
 """Bytes of a bag with some of the reference, and with more than what is sent in advance."""
 
