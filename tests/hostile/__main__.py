@@ -31,7 +31,7 @@ def hostile(groups: tuple[str, ...], only: str, every: int, as_list: bool) -> No
     Examples:
       python tests/hostile
       python tests/hostile deaths --only recorder
-      python tests/hostile strangers --every 5
+      python tests/hostile foreign --every 5
     """
     chosen = [
         (name, attack)

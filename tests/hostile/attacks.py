@@ -7,8 +7,8 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 
+from foreign_publisher import KINDS
 from restarts import restarted
-from stranger import KINDS
 from trial import NODES, Trial, Verdict
 
 from space_robot_msgs_py import topics
@@ -16,11 +16,13 @@ from space_robot_msgs_py import topics
 Attack = Callable[[int], list[Verdict]]
 """Carries one out in a domain."""
 FLOOD_HZ = 2000.0
+IN_FLIGHT = 1_000_000
+"""Bytes of a bag with more than the reference that is sent in advance."""
 PHASES = ("starting", "configuring", "flying", "landing")
 SIGNALS = {"kill": signal.SIGKILL, "end": signal.SIGTERM, "interrupt": signal.SIGINT}
 
 
-def strangers() -> Iterator[tuple[str, Attack]]:
+def foreign_publishers() -> Iterator[tuple[str, Attack]]:
     """On every topic every kind of message, in flight."""
     for topic in topics.ALL:
         for kind in KINDS:
@@ -31,7 +33,7 @@ def strangers() -> Iterator[tuple[str, Attack]]:
                 )
 
 
-def early_strangers() -> Iterator[tuple[str, Attack]]:
+def early_publishers() -> Iterator[tuple[str, Attack]]:
     """Somebody who publishes before the flight begins: it must not begin."""
     for topic in topics.ALL:
         yield f"{topic.full_name} taken before", _early(topic.full_name)
@@ -59,8 +61,8 @@ def restarts() -> Iterator[tuple[str, Attack]]:
 
 
 GROUPS: dict[str, Callable[[], Iterator[tuple[str, Attack]]]] = {
-    "strangers": strangers,
-    "early": early_strangers,
+    "foreign": foreign_publishers,
+    "early": early_publishers,
     "deaths": deaths,
     "pairs": pairs,
     "restarts": restarts,
@@ -68,14 +70,14 @@ GROUPS: dict[str, Callable[[], Iterator[tuple[str, Attack]]]] = {
 
 
 def _flies(trial: Trial) -> bool:
-    return trial.recorded_bytes() > 500_000
+    return trial.recorded_bytes() > IN_FLIGHT
 
 
 def _intrusion(topic: str, kind: str, rate_hz: float) -> Attack:
     def attack(domain: int) -> list[Verdict]:
         trial = Trial(f"{kind} on {topic} at {rate_hz:g} Hz", domain, duration=6.0).start()
         if trial.wait(lambda: _flies(trial)):
-            trial.stranger(topic, kind, rate_hz)
+            trial.publish_foreign(topic, kind, rate_hz)
         return [trial.end(must_fly=rate_hz < FLOOD_HZ)]
 
     return attack
@@ -84,7 +86,7 @@ def _intrusion(topic: str, kind: str, rate_hz: float) -> Attack:
 def _early(topic: str) -> Attack:
     def attack(domain: int) -> list[Verdict]:
         trial = Trial(f"{topic} taken before", domain)
-        trial.stranger(topic, "malformed", 10.0)
+        trial.publish_foreign(topic, "malformed", 10.0)
         verdict = trial.start().end()
         if verdict.exit_code == 0:
             verdict.wrong.append("flew although the topic was taken")

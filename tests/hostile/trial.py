@@ -69,9 +69,9 @@ class Trial:
             stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         )  # fmt: skip
 
-    def stranger(self, topic: str, kind: str, rate_hz: float) -> None:
+    def publish_foreign(self, topic: str, kind: str, rate_hz: float) -> None:
         """Let somebody else publish on a topic, from now to the trial's end."""
-        process = self.run(str(FOLDER / "stranger.py"), topic, kind, str(rate_hz))
+        process = self.run(str(FOLDER / "foreign_publisher.py"), topic, kind, str(rate_hz))
         assert process.stdout is not None
         process.stdout.readline()
         self._others.append(process)

@@ -112,7 +112,7 @@ def test_remapped_topics_and_other_topics_do_not_meet(
         claim.release()
 
 
-def test_strangers_are_named_and_own_publishers_are_not(
+def test_foreign_publishers_are_named_and_own_publishers_are_not(
     controller: subprocess.Popen[str], make_node: Callable[..., rclpy.node.Node]
 ) -> None:
     from std_msgs.msg import String

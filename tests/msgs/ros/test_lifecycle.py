@@ -106,7 +106,9 @@ def test_a_second_node_of_a_kind_is_refused_by_name(
     assert first.poll() is None
 
 
-def test_a_stranger_on_its_topic_keeps_a_node_from_flying(start: Start, ground: Ground) -> None:
+def test_a_foreign_publisher_on_its_topic_keeps_a_node_from_flying(
+    start: Start, ground: Ground
+) -> None:
     RawPublisher(ground.node, topics.COMMAND)
     controller = start("controller", autostart="false")
     assert ground.change("controller", "configure")

@@ -239,7 +239,7 @@ def test_what_is_cut_short_or_big_endian_is_no_message_of_the_layout() -> None:
 
 @given(st.sampled_from(topics.ALL), st.binary(max_size=200))
 def test_garbage_has_a_tick_or_is_refused(topic: topics.Topic, garbage: bytes) -> None:
-    """Whatever a stranger sends: the recorder asks every message for its tick."""
+    """Whatever a foreign publisher sends: the recorder asks every message for its tick."""
     for data in (garbage, ENCAPSULATION + garbage):
         with contextlib.suppress(MessageError):
             assert message_tick(topic, data, Timebase(500_000)) >= 0

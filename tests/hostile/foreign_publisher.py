@@ -1,6 +1,7 @@
 """A process that does not belong to the flight, publishing on one of its topics.
 
-It hears what others send there and sends it again, spoiled: ``stranger.py TOPIC KIND RATE_HZ``.
+It hears what others send there and sends it again, spoiled.
+Use: ``foreign_publisher.py TOPIC KIND RATE_HZ``.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ def main() -> None:
     """Publish until told to end."""
     name, kind, rate = sys.argv[1], sys.argv[2], float(sys.argv[3])
     rclpy.init(args=[])
-    node = rclpy.create_node("stranger")
+    node = rclpy.create_node("foreign_publisher")
     topic = topics.BY_NAME[name]
     out, heard = (
         RawPublisher(node, topic),
