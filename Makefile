@@ -20,7 +20,7 @@ export PYTHONPYCACHEPREFIX := $(CURDIR)/$(VENV)/pycache
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
 
-.PHONY: help setup fly test quick coverage hooks lint kernels bench mutation clean
+.PHONY: help setup fly test quick coverage hooks lint kernels bench mutation notebooks clean
 
 help:
 	@echo "make setup               .venv with the package and ROS 2 Jazzy"
@@ -33,6 +33,7 @@ help:
 	@echo "make kernels             compile the dynamics and the laws, once"
 	@echo "make bench [ARGS=...]    how fast it is, e.g. make bench ARGS='plant laws'; --help tells more"
 	@echo "make mutation [ARGS=...] small faults put in, one at a time: do the tests notice?"
+	@echo "make notebooks           run docs/notebooks and keep what they show"
 	@echo "make clean               delete .venv and what was built or cached here"
 	@echo "PYTHON=python3.12 chooses the Python (3.10 to 3.13) of a new .venv."
 
@@ -74,6 +75,9 @@ bench: $(VENV)/.tests
 mutation: $(VENV)/.tests
 	@$(PIP_INSTALL) --editable '.[ros,test,mutation]'
 	$(VENV)/bin/python tests/mutation $(ARGS)
+
+notebooks: $(VENV)/.tests
+	$(VENV)/bin/python docs/notebooks/execute.py
 
 clean:
 	rm -rf $(VENV) build install log *.egg-info .coverage .coverage.* .hypothesis .mypy_cache .pytest_cache .ruff_cache

@@ -56,6 +56,7 @@ setup(
         "dask": ["distributed>=2024.1"],  # `campaign run --scheduler`
         "gym": ["gymnasium>=1.0"],  # space_robot_control.scenario.gymnasium_env
         "mutation": ["cosmic-ray"],  # tests/mutation
+        "notebooks": ["ipykernel", "pandas>=2.1", "pyarrow>=14"],  # docs/notebooks
         "parquet": ["pyarrow>=14"],  # `analyze --parquet`
         # ROS 2 Jazzy from wheels; never a requirement, for apt's ROS must stay untouched
         "ros": [
@@ -69,8 +70,10 @@ setup(
             "distributed>=2024.1",
             "gymnasium>=1.0",
             "hypothesis",
+            "ipykernel",
             "mujoco",
             "mypy",
+            "nbclient",
             "pandas>=2.1",
             "pin",
             "pre-commit",

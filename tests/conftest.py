@@ -34,7 +34,10 @@ if TYPE_CHECKING:
 
 ROBOTS = CONFIG / "robots"
 
-TOOLS = ("cvxpy", "gymnasium", "hypothesis", "mujoco", "pandas", "pinocchio", "psutil", "pyarrow")
+TOOLS = (
+    "cvxpy", "gymnasium", "hypothesis", "mujoco", "nbclient", "nbformat", "pandas", "pinocchio",
+    "psutil", "pyarrow",
+)  # fmt: skip
 """Of the tests only. Where `colcon test` finds one missing, the modules that use it are skipped,
 whichever of their helpers imports it."""
 
@@ -57,7 +60,7 @@ SLOW = (
     "benchmarks/", "control/campaign/", "control/paper/", "control/cli/test_output.py",
     "control/cli/test_stability_command.py", "control/flight/test_interruption.py",
     "control/flight/test_long_flights.py", "control/flight/test_shipped_robots.py",
-    "msgs/bag/test_bag_fuzz.py",
+    "msgs/bag/test_bag_fuzz.py", "test_notebooks.py",
     "msgs/bag/test_description_fuzz.py", "test_packaging.py", "test_shown_outputs.py",
 )  # fmt: skip
 """Folders and files whose tests take seconds each."""
