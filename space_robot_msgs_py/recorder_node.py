@@ -13,6 +13,7 @@ from typing import NoReturn
 from . import topics
 from .bag.recorder import BagRecorder
 from .bag.recorder_settings import RecorderNodeSettings
+from .bag.set_aside import set_aside
 from .errors import InputError, MessageError
 from .ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription
 from .ros.exclusive import GraphPublishers
@@ -69,6 +70,8 @@ class RecorderLoop:
         except json.JSONDecodeError as error:
             raise InputError(f"recorder parameters: flight: not JSON ({error})") from None
         path = Path(settings.bag or time.strftime("bag_%Y%m%d-%H%M%S"))
+        if node.times_configured and settings.bag:  # reset: a bag is one flight from its start
+            node.log(f"the bag of before the reset is now {set_aside(path)}")
         group, namespace = PolledCallbackGroup(), node.get_namespace()
         self._inputs = [RawSubscription(node, topic, group, QUEUE_DEPTH) for topic in topics.ALL]
         self._recorder = BagRecorder(

@@ -85,3 +85,8 @@ BY_NAME = {topic.full_name: topic for topic in ALL}
 """By their full names in the root namespace."""
 # One for all robots of a domain, as ROS has it: each status tells its node's name.
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100)
+SIMULATION_PAUSED = Topic(
+    "simulation/paused", "std_msgs/msg/Bool", 1,
+    transient_local=True, is_event=True, has_stamp=False,
+)  # fmt: skip
+"""True while the plant is held: not recorded, for a bag tells nothing of the wall clock's time."""

@@ -19,6 +19,9 @@ from .options import OPTIONS, flight_options, plan_flight, remarks_on
 )
 @click.option("--realtime", is_flag=True, help="Pace by the wall clock instead of lockstep.")
 @click.option(
+    "--paused", is_flag=True, help="Begin paused: `space-robot sim` lets the plant go on, or step."
+)
+@click.option(
     "--fifo-priority",
     type=click.IntRange(0, 98),
     default=0,

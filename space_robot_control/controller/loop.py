@@ -11,6 +11,7 @@ from space_robot_msgs_py.ros.endpoints import RawPublisher, flush
 from space_robot_msgs_py.ros.health import Health, Level
 from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
+from space_robot_msgs_py.ros.paused import PausedInput
 from space_robot_sim.robot.find import find_robot
 
 from .allocation.believed_actuators import believed_actuators
@@ -66,6 +67,7 @@ class ControllerLoop:
         self._unanswered = -1
         """A state's tick whose reference has not come yet; -1: none."""
         self._state_at = time.monotonic()
+        self._paused = PausedInput(node)
         self._look_ahead_at = 0.0
 
     @property
@@ -130,7 +132,7 @@ class ControllerLoop:
         """Tell the mode, the law, and what was rejected."""
         supervisor, references = self._answering.supervisor, self._references
         rejected = self._states.rejected + references.rejected + supervisor.rejected
-        silence = time.monotonic() - self._state_at
+        silence = time.monotonic() - max(self._state_at, self._paused.running_since)
         allocation = self._controller.allocation
         values: dict[str, float | int | str] = {
             "tick": self._answering.answered,

@@ -29,6 +29,8 @@ _WAITING = "a flight's nodes wait for one another as they must"
 NOT_TO_BE_SET = {
     "plant.ticks": "use --duration",
     "plant.wait_for": _WAITING,
+    "plant.reset_with": "all nodes of a flight are reset",
+    "plant.paused": "use --paused",
     "controller.wait_for": _WAITING,
     "controller.listener_timeout": _WAITING,
     "recorder.bag": "use --bag",

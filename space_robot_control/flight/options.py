@@ -62,6 +62,8 @@ class FlightPlan(StrictModel):
     command_latency_ticks: int = 0
     friction: bool = True
     realtime: bool = False
+    paused: bool = False
+    """Begin paused, until a service call lets the plant go on."""
     fifo_priority: int = 0
     faults: list[str] = Field(default_factory=list)
     """The faults, each as ``KIND@T[-END][:ARGUMENT]``, see `space_robot_control.flight.faults`."""
@@ -119,6 +121,7 @@ class FlightPlan(StrictModel):
                 **errors,
                 **hardware,
                 "realtime": self.realtime,
+                **({"paused": True} if self.paused else {}),
                 "command_latency_ticks": self.command_latency_ticks,
                 "fifo_priority": self.fifo_priority,
                 "faults": self.faults_of(PLANT_KINDS),

@@ -149,6 +149,8 @@ class Flight:
             asked = f"faults {[str(fault) for fault in self.orchestrator_faults]}"
         elif self.plant_settings.realtime:
             asked = "realtime"
+        elif self.plant_settings.paused:
+            asked = "paused"
         elif self.plant_settings.fifo_priority or self.controller_settings.fifo_priority:
             asked = "fifo_priority"
         else:

@@ -48,6 +48,8 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         self.loop: Loop | None = None
         self.is_active = False
         self.is_shut_down = False
+        self.times_configured = 0
+        """So many times it has been configured with success."""
         self.let_others_work: Callable[[], None] = lambda: time.sleep(PAUSE_S)
         """To be called by a loop that stands down while it waits for what another node does."""
         self._topics: list[str] = []
@@ -118,6 +120,15 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         time.sleep(DISCOVERY_S)  # to see who else is there
         self._insist(self.trigger_activate())
 
+    def stop(self) -> None:
+        """Deactivate and clean up; the opposite of `start`.
+
+        Raises:
+            SpaceRobotError: it cannot be.
+        """
+        self._insist(self.trigger_deactivate())
+        self._insist(self.trigger_cleanup())
+
     def _insist(self, outcome: TransitionCallbackReturn) -> None:
         if outcome is not TransitionCallbackReturn.SUCCESS:
             raise self.error or SpaceRobotError(f"{self.get_name()} cannot be started")
@@ -134,6 +145,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             if self.loop is not None and self.is_active:
                 self._diagnostics.report(self._health(), now_or_never=True)
             self.trigger_shutdown()
+        self.calls.finish()
         if self.error:
             raise self.error
 
@@ -148,6 +160,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             refuse_unknown(self)
             self._topics = [output.topic.name for output in self.loop.outputs]
             self._claim = Claim(self, self._topics)
+            self.times_configured += 1
 
         return self._try(configure, undo=self._release)
 

@@ -40,10 +40,14 @@ class NodeKind(NamedTuple, Generic[Schema]):
     make_loop: Callable[[ManagedNode[Schema], Schema], Loop]
     changeable: tuple[str, ...] = ()
     """Names of the parameters that may be changed in flight."""
+    offer_services: Callable[[ManagedNode[Schema]], None] = lambda node: None
+    """Makes services that the node has in all states of its lifecycle."""
 
     def make_node(self) -> ManagedNode[Schema]:
         """Join the graph, unconfigured."""
-        return ManagedNode(self.schema, self.make_loop, self.changeable)
+        node = ManagedNode(self.schema, self.make_loop, self.changeable)
+        self.offer_services(node)
+        return node
 
 
 class NodeHost:

@@ -28,6 +28,8 @@ class ServiceCalls(SingleThreadedExecutor):
         """Calls run so far."""
         self.is_overloaded = False
         """True if calls come faster than they are run; beyond 1000 of a kind they are lost."""
+        self._unfinished: list[Any] = []
+        """Calls whose callback waits for something that the node's loop does."""
         self._busy_since: float | None = None
         """When the first of the calls ended after each of which another one waited."""
 
@@ -45,14 +47,27 @@ class ServiceCalls(SingleThreadedExecutor):
         since = self._busy_since
         self.is_overloaded = since is not None and time.monotonic() - since > OVERLOADED_S
         callback()
+        if not callback.done():  # it will be run again
+            self._unfinished = [*self._waiting(), callback]
+            return True
         self._busy_since = self._busy_since or time.monotonic()
         if error := callback.exception():
             raise error
         self.count += 1
         return True
 
+    def finish(self) -> None:
+        """Run the callbacks that still wait, now that what they wait for has ended."""
+        for callback in self._waiting():
+            callback()
+
+    def _waiting(self) -> list[Any]:
+        return [callback for callback in self._unfinished if not callback.done()]
+
     def _is_worth_a_look(self) -> bool:
         """Tell whether a request waits, or whether it is time for a full look, which is slow."""
+        if self._unfinished and self._waiting():
+            return True
         if (now := time.monotonic()) < self._full_look_at:
             return self._requests.is_called()
         self._full_look_at = now + FULL_LOOK_S

@@ -19,6 +19,7 @@ from space_robot_msgs_py.ros.endpoints import (
 from space_robot_msgs_py.ros.health import Health, Level
 from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
+from space_robot_msgs_py.ros.paused import PausedOutput
 from space_robot_msgs_py.samples import Command
 from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
@@ -28,6 +29,7 @@ from .actuator_health import ActuatorHealth
 from .command_guard import CommandGuard
 from .exchange import NONE, SentState, exchange_of
 from .plant import Plant
+from .run_control import PAUSED, RunControl
 from .settings import PlantNodeSettings
 from .truth_output import TruthOutput
 from .wall_clock import WallClock
@@ -38,6 +40,8 @@ ASK_AGAIN_S = 0.2
 this plant for silent, and soon enough for one that believes a new time only after some states."""
 SPIN_BEFORE_DEADLINE_S = 100e-6
 GIVE_WAY = Wait(100e-6, is_for_others=True)
+HELD = Wait(0.02)
+"""The wait of a paused plant: only a service call ends the pause, and those have their own time."""
 FLUSH_S = 5.0
 """How long a flight's end waits for its listeners: one may be stopped, or dead."""
 STOPPED_FLUSH_S = 1.0
@@ -79,6 +83,9 @@ class PlantLoop:
         self.outputs = (*self._state_out, self._clock_out, *self._truth.outputs)
         self.wait_for = settings.wait_for
         self.is_complete = False
+        self.control = RunControl(settings.paused)
+        """For pausing and stepping; each change is to be told by `tell_paused`."""
+        self._paused_out = PausedOutput(node)
         self._wall_clock = WallClock(settings.period)
         self._silence_s = settings.silence_timeout or math.inf
         self._controller_silent = False
@@ -109,6 +116,12 @@ class PlantLoop:
         self._unsent.clear()
         self._began_at, self._first_tick = time.monotonic(), self._plant.tick
         self._wall_clock.start(self._plant.tick)
+        self.tell_paused()
+
+    def tell_paused(self) -> None:
+        """Tell the other nodes whether time stands still."""
+        self._paused_out.tell(self.control.is_paused)
+        self._node.report()
 
     def step(self) -> Wait | None:
         """Send a state, or take its answer and step the plant."""
@@ -126,6 +139,8 @@ class PlantLoop:
             self._awaits = False
         if self._unsent:
             self._send_next()
+        elif self.control.holds():
+            return HELD
         else:
             self._end_tick()
         return None
@@ -161,6 +176,8 @@ class PlantLoop:
         if self._answers:
             values["latency_mean_ms"] = 1e3 * self._latency_s / self._answers
             values["latency_max_ms"] = 1e3 * self._latency_max_s
+        if self.control.is_paused:
+            return Health(PAUSED, values=values)
         if guard.answered < 0:
             return Health("waiting for the first command", values=values)
         if guard.is_safe:
@@ -174,6 +191,7 @@ class PlantLoop:
     def _begin_tick(self) -> None:
         tick = self._plant.tick
         self._is_under_way = True
+        self.control.begin(tick)
         self._by_the_clock = self._controller_silent or (self._settings.realtime and tick > 0)
         self._must_give_way = self._by_the_clock and self._wall_clock.left(tick) <= 0.0
         self._heard_before = self._heard
@@ -224,6 +242,8 @@ class PlantLoop:
             inputs = () if self._heard == self._answered_by else (self._command_in,)
             return Wait(left - SPIN_BEFORE_DEADLINE_S, inputs)
         if left <= 0.0:
+            if self.control.holds():
+                return HELD
             if self._controller_silent and self._heard > self._heard_before:
                 self._node.log("the controller answers again")
                 self._controller_silent = False
@@ -235,6 +255,8 @@ class PlantLoop:
         plant, guard, clock = self._plant, self._guard, self._wall_clock
         tick = plant.tick
         self._exchange.end(tick)
+        if self.control.is_at_rest:  # a pause is no lost time
+            clock.start(tick + 1)
         if tick == 0:
             clock.start(0)  # time begins when the loop is closed
         elif self._by_the_clock and clock.slip(tick) and (remark := clock.remark()):

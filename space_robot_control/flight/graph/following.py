@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 from space_robot_msgs_py.errors import FlightError
+from space_robot_sim.plant.run_control import PAUSED
 
 from ..faults import NODE_OF
 from ..interruption import exit_code
@@ -155,11 +156,15 @@ class _Follower:
 
     def _show_progress(self, show: FlightProgress) -> None:
         monitor, now = self._monitor, time.monotonic()
-        if monitor.simulated_s > self._last_s or (not self._begun_at and monitor.has_begun):
+        is_paused = monitor.modes.get("plant_node") == PAUSED
+        if monitor.simulated_s != self._last_s or (not self._begun_at and monitor.has_begun):
             self._begun_at = self._begun_at or now
             self._last_s, self._moved_at = monitor.simulated_s, now
             wall_s = now - self._begun_at
             show(self._last_s, _remark(monitor.errors, self._last_s, wall_s, self._unit))
+        elif is_paused:
+            self._moved_at = now
+            show(self._last_s, PAUSED)
         elif now - self._moved_at > STALL_TIMEOUT_S:
             output = "\n".join(f"{n}:\n{p.output_tail()}" for n, p in self._graph.nodes.items())
             why = "".join(f"{node}: {mode}\n" for node, mode in monitor.complaints.items())

@@ -26,6 +26,9 @@ LISTENERS = {
 }
 """Nodes of the graph that subscribe to each topic."""
 
+RESET_WITH = ["recorder_node", "mission_node", "controller_node"]
+"""Parameter ``reset_with`` of the plant in a whole graph: the others as they are activated."""
+
 
 def wait_for(node: str, absent: Collection[str] = ()) -> list[str]:
     """Return the parameter ``wait_for`` of the plant or the controller in a whole graph.

@@ -27,7 +27,7 @@ from ..plan import Flight
 from .composed import NAME, composed_command
 from .domain import ros_domain
 from .following import follow
-from .listeners import wait_for
+from .listeners import RESET_WITH, wait_for
 from .processes import Graph, node_command, node_environment
 
 COMPOSED_DRAIN_S = 0.002
@@ -142,7 +142,9 @@ def require_ros() -> None:
 def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
     """The parameters of every node of a flight that is recorded to ``bag``."""
     parameters = {node: dict(given) for node, given in flight.parameters.items()}
-    parameters["plant"] |= {"ticks": flight.ticks, "wait_for": wait_for("plant")}
+    parameters["plant"] |= {
+        "ticks": flight.ticks, "wait_for": wait_for("plant"), "reset_with": RESET_WITH,
+    }  # fmt: skip
     parameters["controller"] |= {"wait_for": wait_for("controller")}
     parameters["recorder"] |= {
         "bag": str(bag.absolute()),
