@@ -35,6 +35,7 @@ def cli() -> None:
       space-robot gains tune -o my_gains            a set for a robot and a mission, by a method
       space-robot analyze flights/<bag>...          metrics of recorded flights
       space-robot replay flights/<bag>              its states to a live controller, compared
+      space-robot sim step --ticks 10               a graph that flies, paused and stepped
       space-robot sweep --navigation filtered       laws over grades of sensors
       space-robot campaign run FILE --runs 1000     all is dispersed: verdicts with confidence
       space-robot reproduce                         the paper's Table V and figures, flown again

@@ -43,30 +43,38 @@ class ServiceCalls(SingleThreadedExecutor):
         if callback is None:
             self._busy_since, self.is_overloaded = None, False
             return False
+        if callback in self._unfinished:
+            return self._go_on(callback)
         # judged here, not later: one slow call, as a transition, or a loop that starts is no storm
         since = self._busy_since
         self.is_overloaded = since is not None and time.monotonic() - since > OVERLOADED_S
         callback()
-        if not callback.done():  # it will be run again
-            self._unfinished = [*self._waiting(), callback]
-            return True
         self._busy_since = self._busy_since or time.monotonic()
-        if error := callback.exception():
-            raise error
         self.count += 1
+        if not callback.done():
+            self._unfinished.append(callback)
+        elif error := callback.exception():
+            raise error
+        return True
+
+    def _go_on(self, callback: Any) -> bool:
+        """Run a call again that waits for something; several looks for one call are no storm."""
+        self.forget_waiting()
+        callback()
+        if callback.done():
+            self._unfinished.remove(callback)
+            if error := callback.exception():
+                raise error
         return True
 
     def finish(self) -> None:
         """Run the callbacks that still wait, now that what they wait for has ended."""
-        for callback in self._waiting():
+        for callback in self._unfinished:
             callback()
-
-    def _waiting(self) -> list[Any]:
-        return [callback for callback in self._unfinished if not callback.done()]
 
     def _is_worth_a_look(self) -> bool:
         """Tell whether a request waits, or whether it is time for a full look, which is slow."""
-        if self._unfinished and self._waiting():
+        if self._unfinished:
             return True
         if (now := time.monotonic()) < self._full_look_at:
             return self._requests.is_called()

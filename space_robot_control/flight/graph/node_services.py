@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -41,7 +42,7 @@ def change_state(node: Any, names: Sequence[str], transition: str, check: Check)
 
 
 def set_parameters(
-    node: Any, name: str, parameters: Mapping[str, str | list[float]], check: Check
+    node: Any, name: str, parameters: Mapping[str, str | int | list[float]], check: Check
 ) -> None:
     """Set parameters of a live node, all of them or none; return when it has done so.
 
@@ -67,7 +68,24 @@ def set_parameters(
         raise FlightError(f"{name} refused to change its parameters: {answer.result.reason}")
 
 
-def _call(node: Any, kind: Any, services: Sequence[str], request: Any, check: Check) -> list[Any]:
+def call_trigger(node: Any, service: str, check: Check) -> tuple[bool, str]:
+    """Call a service of std_srvs/Trigger, however long it takes; return its success and message.
+
+    Args:
+        node: the rclpy node to call from.
+        service: its name, in the namespace of that one.
+        check: see `Check`.
+    """
+    from std_srvs.srv import Trigger
+
+    (answer,) = _call(node, Trigger, [service], Trigger.Request(), check, math.inf)
+    return answer.success, answer.message
+
+
+def _call(
+    node: Any, kind: Any, services: Sequence[str], request: Any, check: Check,
+    timeout_s: float = TIMEOUT_S,
+) -> list[Any]:  # fmt: skip
     """Call services of one kind at the same time; return their answers."""
     from rclpy.executors import SingleThreadedExecutor
 
@@ -75,7 +93,7 @@ def _call(node: Any, kind: Any, services: Sequence[str], request: Any, check: Ch
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
     answers: dict[str, Any] = {}
-    until = time.monotonic() + TIMEOUT_S
+    until = time.monotonic() + timeout_s
     try:
         while len(answers) < len(clients) or not all(a.done() for a in answers.values()):
             check()
@@ -84,7 +102,7 @@ def _call(node: Any, kind: Any, services: Sequence[str], request: Any, check: Ch
                     answers[service] = client.call_async(request)
             if time.monotonic() > until:
                 silent = [s for s in services if s not in answers or not answers[s].done()]
-                raise FlightError(f"no answer of {', '.join(silent)} for {TIMEOUT_S:.0f} s")
+                raise FlightError(f"no answer of {', '.join(silent)} for {timeout_s:.0f} s")
             executor.spin_once(timeout_sec=POLL_S)
         return [answers[service].result() for service in services]
     finally:

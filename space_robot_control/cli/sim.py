@@ -1,0 +1,79 @@
+"""``space-robot sim``: pause, step and reset of a running graph."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from .options import Decorator
+
+
+@click.group()
+def sim() -> None:
+    """Pause, step, resume or reset a graph of nodes that flies.
+
+    The services of its plant do it, which `ros2 service call` reaches as well; this is for those
+    without the ros2 command.
+
+    \b
+    Examples:
+      space-robot fly --paused --domain 7
+      space-robot sim step --ticks 10 --domain 7
+      space-robot sim resume --domain 7
+    """
+
+
+def where(function: Any) -> Any:
+    """Give a command the options that say which graph is meant."""
+    options: list[Decorator] = [
+        click.option(
+            "--domain", type=click.IntRange(0, 232),
+            help="ROS domain [default: ROS_DOMAIN_ID, or that of the only plant here].",
+        ),
+        click.option("--namespace", default="", metavar="NS", help="Of the robot, as /sat1."),
+    ]  # fmt: skip
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
+@sim.command()
+@where
+def pause(**options: Any) -> None:
+    """Hold the plant at its present tick; no watchdog takes that for silence."""
+    _call("pause", **options)
+
+
+@sim.command()
+@where
+def resume(**options: Any) -> None:
+    """Let a paused plant go on."""
+    _call("resume", **options)
+
+
+@sim.command()
+@click.option("--ticks", type=int, default=1, show_default=True, help="Ticks to go on.")
+@where
+def step(**options: Any) -> None:
+    """Let a paused plant go some ticks on; return when it is paused again."""
+    _call("step", **options)
+
+
+@sim.command()
+@where
+def reset(**options: Any) -> None:
+    """Take the whole graph back to its start; what is paused stays paused.
+
+    Plant, controller, mission and recorder are made anew. The recorder closes its bag and renames
+    it to BAG_before_reset_1; the flight that begins is recorded to BAG, from tick 0.
+    """
+    _call("reset", **options)
+
+
+def _call(action: str, **options: Any) -> None:
+    from ..flight.graph.orchestrator import require_ros
+    from ..flight.graph.simulation_calls import call_simulation
+
+    require_ros()
+    click.echo(call_simulation(action, **options))

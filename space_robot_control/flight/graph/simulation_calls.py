@@ -1,0 +1,83 @@
+"""Calls that pause, step and reset a running graph, from outside."""
+
+from __future__ import annotations
+
+import os
+import time
+from typing import Any
+
+from space_robot_msgs_py.config.namespace import full_namespace
+from space_robot_msgs_py.errors import FlightError, InputError
+from space_robot_msgs_py.ros.locks import look, node_lock
+
+from .domain import DOMAINS
+from .node_services import call_trigger, set_parameters
+from .temporary_node import TemporaryNode
+
+PLANT = "plant_node"
+FIND_S = 5.0
+"""A node that is there is discovered in 0.1 to 1.8 s."""
+LOOK_S = 0.02
+
+
+def call_simulation(action: str, domain: int | None, namespace: str, ticks: int = 1) -> str:
+    """Have a plant ``pause``, ``resume``, ``step`` or ``reset``; return what it says once it has.
+
+    Args:
+        action: one of these.
+        domain: its ROS domain (None: ROS_DOMAIN_ID, or that of the only plant on this machine).
+        namespace: its namespace.
+        ticks: of a step.
+
+    Raises:
+        InputError: no plant is there, or ``ticks`` cannot be.
+        FlightError: the plant refuses.
+    """
+    if ticks < 1:
+        raise InputError(f"--ticks {ticks}: 1 or more were expected")
+    namespace = full_namespace(namespace)
+    domain = domain_of_plant(namespace) if domain is None else domain
+    visitor = TemporaryNode("simulation_call", domain, namespace)
+    try:
+        service = f"{PLANT}/{action}"
+        _wait_for(visitor.node, service, domain)
+
+        def check() -> None:
+            if not visitor.node.count_services(service):
+                raise FlightError(f"{PLANT} has gone")
+
+        if action == "step":
+            set_parameters(visitor.node, PLANT, {"step_ticks": ticks}, check)
+        success, text = call_trigger(visitor.node, service, check)
+    finally:
+        visitor.leave()
+    if not success:
+        raise FlightError(f"{PLANT} cannot {action}: {text}")
+    return text
+
+
+def domain_of_plant(namespace: str) -> int:
+    """Return ROS_DOMAIN_ID, or the domain of the only plant of a ``namespace`` on this machine.
+
+    Raises:
+        InputError: there is none, or more than one.
+    """
+    if (of_user := os.environ.get("ROS_DOMAIN_ID", "")).isdecimal():
+        return int(of_user)
+    name = f"{namespace.rstrip('/')}/{PLANT}"
+    locks = {domain: node_lock(domain, name) for domain in (0, *DOMAINS)}
+    found = [domain for domain, lock in locks.items() if lock.exists() and look(lock)[0]]
+    if len(found) != 1:
+        there = f"in ROS domains {', '.join(map(str, found))}" if found else "on this machine"
+        number = "several" if found else "no"
+        raise InputError(f"{number} {name} {there}: name one's ROS domain with --domain")
+    return found[0]
+
+
+def _wait_for(node: Any, service: str, domain: int) -> None:
+    until = time.monotonic() + FIND_S
+    while not node.count_services(service):
+        if time.monotonic() > until:
+            name = node.resolve_service_name(service)
+            raise InputError(f"no service {name} in ROS domain {domain}: is a graph flying there?")
+        time.sleep(LOOK_S)
