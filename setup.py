@@ -14,6 +14,8 @@ CONFIG = [
     (f"share/{NAME}/{path.parent}", [str(path)]) for path in sorted(Path("config").rglob("*.yaml"))
 ]
 
+LAUNCH = [str(path) for path in sorted(Path("launch").glob("*.launch.py"))]
+
 setup(
     name=NAME,
     version="0.6.0",
@@ -95,6 +97,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/launch", LAUNCH),
         (f"lib/{NAME}", EXECUTABLES),
         (f"share/{NAME}/docs/explanation", ["docs/explanation/errata.md"]),  # `reproduce` shows it
         *CONFIG,

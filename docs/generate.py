@@ -23,7 +23,7 @@ from space_robot_msgs_py.config.settings import NodeSettings, leaves
 from space_robot_msgs_py.config.trees import flatten
 from space_robot_sim.faults.grammar import Kind
 from space_robot_sim.plant.faults import PLANT_KINDS
-from space_robot_sim.plant.settings import PlantNodeSettings
+from space_robot_sim.plant.settings import MOST_TICKS, PlantNodeSettings
 
 REFERENCE = Path(__file__).parent / "reference"
 MADE = "Made by `python docs/generate.py`: change the code, not this page."
@@ -68,7 +68,8 @@ def parameters() -> str:
     for node, schema in NODES.items():
         own = {name: field for name, field in leaves(schema) if name not in shared}
         defaults = dict(flatten(schema.resolve({}).model_dump()))
-        parts += [f"## {node}_node", table(HEAD, _rows(own, defaults))]
+        rows = [*_rows(own, defaults), *([STEP_TICKS] if node == "plant" else [])]
+        parts += [f"## {node}_node", table(HEAD, iter(rows))]
         if node == "controller":
             parts += [
                 "A list for each gain `<law>.<gain>`, one value an axis or one for all; the set"
@@ -81,6 +82,10 @@ def parameters() -> str:
 HEAD = ("parameter", "type", "default", "range", "description")
 AUTOSTART = (
     "`autostart`", "bool", "true", "", "configure and activate by itself; false: wait to be told",
+)  # fmt: skip
+STEP_TICKS = (
+    "`step_ticks`", "integer", "1", f"from 1 to {MOST_TICKS:g}",
+    "ticks of a step of the paused plant (service ~/step); changes in flight",
 )  # fmt: skip
 
 

@@ -8,9 +8,9 @@ from space_robot_msgs_py.ros.node_host import NodeKind, run_nodes
 
 from .plant.loop import PlantLoop
 from .plant.settings import PlantNodeSettings
-from .plant.simulation_services import STEP_TICKS, offer_services
+from .plant.simulation_services import offer_services
 
-NODE = NodeKind(PlantNodeSettings, PlantLoop, (STEP_TICKS,), offer_services)
+NODE = NodeKind(PlantNodeSettings, PlantLoop, offer_services=offer_services)
 
 
 def main() -> NoReturn:

@@ -7,34 +7,18 @@ from typing import Any
 
 import click
 
-from .options import OPTIONS, flight_options, plan_flight, remarks_on
+from .options import GRAPH_OPTIONS, OPTIONS, flight_options, plan_flight, remarks_on
 
 
 @click.command()
-@flight_options(*OPTIONS)
+@flight_options(*OPTIONS, *GRAPH_OPTIONS)
 @click.option(
     "--composed",
     is_flag=True,
     help="All nodes in one process: faster, and no node can be killed or stopped alone.",
 )
-@click.option("--realtime", is_flag=True, help="Pace by the wall clock instead of lockstep.")
-@click.option(
-    "--paused", is_flag=True, help="Begin paused: `space-robot sim` lets the plant go on, or step."
-)
-@click.option(
-    "--fifo-priority",
-    type=click.IntRange(0, 98),
-    default=0,
-    help="Ask for SCHED_FIFO for plant and controller; for machines with cores to spare.",
-)
 @click.option("--restart-controller", is_flag=True, help="Start a dead or hung controller again.")
 @click.option("--domain", type=int, help="ROS domain [default: ROS_DOMAIN_ID, or a free one].")
-@click.option(
-    "--namespace",
-    default="",
-    metavar="NS",
-    help="ROS namespace of the nodes and their topics, as /sat1: one for each robot of a domain.",
-)
 def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     """Fly a mission on a ROS 2 graph, record it, and print the RMS table.
 

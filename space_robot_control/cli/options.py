@@ -271,13 +271,29 @@ OPTIONS: dict[str, Decorator] = {
         "--json", "as_json", is_flag=True, help="Print the report as JSON."),
 }  # fmt: skip
 
+GRAPH_OPTIONS: dict[str, Decorator] = {
+    "realtime": click.option(
+        "--realtime", is_flag=True, help="Pace by the wall clock instead of lockstep."),
+    "paused": click.option(
+        "--paused", is_flag=True,
+        help="Begin paused: `space-robot sim` lets the plant go on, or step."),
+    "fifo_priority": click.option(
+        "--fifo-priority", type=click.IntRange(0, 98), default=0,
+        help="Ask for SCHED_FIFO for plant and controller; for machines with cores to spare."),
+    "namespace": click.option(
+        "--namespace", default="", metavar="NS",
+        help="ROS namespace of the nodes and their topics, as /sat1: one for each robot of a "
+        "domain."),
+}  # fmt: skip
+"""What only a graph of nodes has; its nodes may be started by `fly` or by a launch file."""
+
 
 def flight_options(*names: str) -> Decorator:
     """Give a command the named options, in that order."""
 
     def decorate(function: Any) -> Any:
         for name in reversed(names):
-            function = OPTIONS[name](function)
+            function = {**OPTIONS, **GRAPH_OPTIONS}[name](function)
         return function
 
     return decorate

@@ -41,6 +41,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         schema: type[Schema],
         make_loop: Callable[[ManagedNode[Schema], Schema], Loop],
         changeable: tuple[str, ...] = (),
+        offer_services: Callable[[ManagedNode[Schema]], None] = lambda node: None,
     ) -> None:
         super().__init__(schema.ros_name())
         self._schema, self._make_loop, self._changeable = schema, make_loop, changeable
@@ -65,6 +66,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         )
         self.autostart = bool(self.declare_parameter(AUTOSTART, True, description).value)
         self._diagnostics = Diagnostics(self)
+        offer_services(self)
         self._own = self._entities()
         self.calls = ServiceCalls(self)
         guard_change_state(self, self._refuse_transition)

@@ -41,13 +41,11 @@ class NodeKind(NamedTuple, Generic[Schema]):
     changeable: tuple[str, ...] = ()
     """Names of the parameters that may be changed in flight."""
     offer_services: Callable[[ManagedNode[Schema]], None] = lambda node: None
-    """Makes services that the node has in all states of its lifecycle."""
+    """Makes services, and their parameters, that the node has in all states of its lifecycle."""
 
     def make_node(self) -> ManagedNode[Schema]:
         """Join the graph, unconfigured."""
-        node = ManagedNode(self.schema, self.make_loop, self.changeable)
-        self.offer_services(node)
-        return node
+        return ManagedNode(self.schema, self.make_loop, self.changeable, self.offer_services)
 
 
 class NodeHost:

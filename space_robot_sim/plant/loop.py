@@ -191,7 +191,6 @@ class PlantLoop:
     def _begin_tick(self) -> None:
         tick = self._plant.tick
         self._is_under_way = True
-        self.control.begin(tick)
         self._by_the_clock = self._controller_silent or (self._settings.realtime and tick > 0)
         self._must_give_way = self._by_the_clock and self._wall_clock.left(tick) <= 0.0
         self._heard_before = self._heard
@@ -267,6 +266,7 @@ class PlantLoop:
         if guard.is_safe is not was_safe:
             self._node.report()
         plant.step(command)
+        self.control.begin(plant.tick)
         self._is_under_way = self._awaits = False
         ticks = self._settings.ticks
         self.is_complete = bool(ticks) and plant.tick >= ticks

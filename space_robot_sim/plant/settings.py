@@ -51,9 +51,6 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
         description="names of the nodes that are reset with the plant (service ~/reset), in the "
         "order in which they are activated",
     )
-    step_ticks: Annotated[int, Field(ge=1, le=MOST_TICKS)] = Field(
-        1, description="ticks of a step of the paused plant (service ~/step)"
-    )
     clock_decimation: Annotated[int, Field(ge=1, le=10**6)] = Field(
         20, description="ticks between two messages on /clock"
     )

@@ -10,13 +10,14 @@ from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import Any
 
+from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 from rclpy.callback_groups import ReentrantCallbackGroup
 from std_srvs.srv import Trigger
 
 from space_robot_msgs_py.errors import SpaceRobotError
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 
-from .settings import PlantNodeSettings
+from .settings import MOST_TICKS, PlantNodeSettings
 from .simulation import Simulation
 from .standard_services import standard_services
 
@@ -26,6 +27,11 @@ STEP_TICKS = "step_ticks"
 def offer_services(node: ManagedNode[PlantNodeSettings]) -> None:
     """Offer the services, in all states of the node's lifecycle."""
     simulation = Simulation(node)
+    descriptor = ParameterDescriptor(
+        description="ticks of a step of the paused plant (service ~/step)",
+        integer_range=[IntegerRange(from_value=1, to_value=MOST_TICKS)],
+    )
+    node.declare_parameter(STEP_TICKS, 1, descriptor)
     group = ReentrantCallbackGroup()  # a step is served for as long as it takes, others meanwhile
 
     async def pause() -> str:
@@ -35,8 +41,7 @@ def offer_services(node: ManagedNode[PlantNodeSettings]) -> None:
         return simulation.resume()
 
     async def step() -> str:
-        given = node.has_parameter(STEP_TICKS) and node.get_parameter(STEP_TICKS).value
-        return await simulation.step(int(given or 1))
+        return await simulation.step(int(node.get_parameter(STEP_TICKS).value))
 
     for act in (pause, resume, step, simulation.reset):
         node.create_service(

@@ -66,9 +66,7 @@ class StandardServices:
     async def set_state(self, request: Any, response: Any) -> Any:
         """Play, pause, or stop, which is a reset that stays paused."""
         simulation, kind = self._simulation, self._srv.SetSimulationState.Response
-        wanted = {number: state for state, number in self._numbers.items()}.get(
-            request.state.state
-        )
+        wanted = {number: state for state, number in self._numbers.items()}.get(request.state.state)
         if wanted is None:
             text = "a simulation can be told to play, to pause and to stop"
             return self._end(response, self._result.RESULT_FEATURE_UNSUPPORTED, text)

@@ -26,13 +26,19 @@ def composed_command(
     They are written to a file in ``folder``: on a command line, ROS takes a parameter for a node
     that is named for one in the root namespace.
     """
+    file = write_parameters(parameters, folder)
+    arguments = ros_arguments({}, namespace) or ["--ros-args"]
+    return [*module_command(__name__), *arguments, "--params-file", str(file)]
+
+
+def write_parameters(parameters: Mapping[str, Mapping[str, Any]], folder: Path) -> Path:
+    """Write the parameters of each node to a ROS parameter file in ``folder``; return that."""
     content = {
         f"/**/{node}_node": {"ros__parameters": values} for node, values in parameters.items()
     }
     file = folder / "parameters.yaml"
     file.write_text(json.dumps(content), encoding="utf-8")  # JSON is YAML, which ROS reads
-    arguments = ros_arguments({}, namespace) or ["--ros-args"]
-    return [*module_command(__name__), *arguments, "--params-file", str(file)]
+    return file
 
 
 def main() -> NoReturn:

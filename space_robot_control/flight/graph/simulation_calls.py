@@ -9,6 +9,7 @@ from typing import Any
 from space_robot_msgs_py.config.namespace import full_namespace
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.ros.locks import look, node_lock
+from space_robot_sim.plant.settings import MOST_TICKS
 
 from .domain import DOMAINS
 from .node_services import call_trigger, set_parameters
@@ -33,8 +34,8 @@ def call_simulation(action: str, domain: int | None, namespace: str, ticks: int 
         InputError: no plant is there, or ``ticks`` cannot be.
         FlightError: the plant refuses.
     """
-    if ticks < 1:
-        raise InputError(f"--ticks {ticks}: 1 or more were expected")
+    if not 1 <= ticks <= MOST_TICKS:
+        raise InputError(f"--ticks {ticks}: 1 to {MOST_TICKS} were expected")
     namespace = full_namespace(namespace)
     domain = domain_of_plant(namespace) if domain is None else domain
     visitor = TemporaryNode("simulation_call", domain, namespace)

@@ -1,0 +1,122 @@
+"""The arguments of launch/fly.launch.py: the options of `space-robot fly`, under ROS's names.
+
+`--command-latency-ticks 2` is `command_latency_ticks:=2`. So a launched flight is checked,
+described in its bag, and the same to the last bit as one of the command.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import click
+
+from space_robot_msgs_py.errors import InputError
+
+from ..flight.plan import Flight
+from .options import GRAPH_OPTIONS, OPTIONS, flight_options, plan_flight
+
+NOT_LAUNCHED = ("json",)
+"""Options of `fly` that are about its report."""
+PARAMS_FILE = "params_file"
+"""Not an option of `fly`, but what launch files call a ROS parameter file."""
+_TRUTH = {"true": True, "false": False}
+
+
+class LaunchArgument(NamedTuple):
+    """An argument as launch declares it."""
+
+    name: str
+    description: str
+    choices: tuple[str, ...] = ()
+    """Empty: any text."""
+
+
+class LaunchedFlight(NamedTuple):
+    """What is to be launched."""
+
+    flight: Flight
+    bag: Path
+
+
+@click.command()
+@flight_options(*(name for name in OPTIONS if name not in NOT_LAUNCHED), *GRAPH_OPTIONS)
+def _plan(bag: Path | None, **options: Any) -> LaunchedFlight:
+    from ..flight.bag_path import default_bag
+
+    flight = plan_flight(**options)
+    return LaunchedFlight(flight, bag or default_bag(flight))
+
+
+def launch_arguments() -> list[LaunchArgument]:
+    """Return the arguments; each may be left empty, for the option's default."""
+    options = [option for option in _plan.params if isinstance(option, click.Option)]
+    of_file = LaunchArgument(PARAMS_FILE, "ROS parameter file for the nodes, over all the rest.")
+    return [*(_argument(option) for option in options), of_file]
+
+
+def _argument(option: click.Option) -> LaunchArgument:
+    help_ = " ".join((option.help or "").split())
+    if option.multiple:
+        help_ += " Several are parted by blanks."
+    if option.show_default:
+        help_ += f" [default: {str(option.default).lower() if option.is_flag else option.default}]"
+    choices = tuple(option.type.choices) if isinstance(option.type, click.Choice) else ()
+    if option.is_flag:
+        choices = tuple(_TRUTH)
+    return LaunchArgument(_name(option), help_, ("", *choices) if choices else ())
+
+
+def _name(option: click.Option) -> str:
+    return max(option.opts, key=len).lstrip("-").replace("-", "_")
+
+
+def launched_flight(values: Mapping[str, str]) -> LaunchedFlight:
+    """Return the flight that a launch file's arguments ask for, checked as `fly` does.
+
+    Args:
+        values: of each argument, by name; empty for its default.
+
+    Raises:
+        InputError: they do not fit together, name what there is not, or need `space-robot fly`.
+    """
+    words = []
+    for option in _plan.params:
+        if isinstance(option, click.Option) and (given := values.get(_name(option), "")):
+            words += _words(option, given)
+    if file := values.get(PARAMS_FILE, ""):
+        words += _words_of_file(Path(file))
+    try:
+        launched: LaunchedFlight = _plan.main(words, "fly.launch.py", standalone_mode=False)
+    except click.ClickException as error:
+        raise InputError(error.format_message()) from None
+    if faults := launched.flight.orchestrator_faults:
+        raise InputError(f"fault {faults[0]}: that needs `space-robot fly`")
+    return launched
+
+
+def _words(option: click.Option, given: str) -> list[str]:
+    if option.is_flag:
+        if _TRUTH[given.lower()]:
+            return option.opts[:1]
+        return option.secondary_opts[:1]
+    texts = shlex.split(given) if option.multiple else [given]
+    return [f"{max(option.opts, key=len)}={text}" for text in texts]
+
+
+def _words_of_file(file: Path) -> list[str]:
+    """Return a ROS parameter file as options ``--set``."""
+    import json
+
+    from space_robot_msgs_py.config.files import node_parameters
+    from space_robot_msgs_py.config.trees import flatten
+
+    from .options import NODES
+
+    return [
+        f"--set={node}.{name}={json.dumps(value)}"
+        for node in NODES
+        for name, value in flatten(node_parameters(file, node))
+    ]

@@ -1,0 +1,36 @@
+"""A flight whose nodes a launch file starts: the parameters that `fly` would give them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..bag_path import check_bag_path
+from ..compilation import compile_kernels
+from ..plan import Flight
+from .composed import write_parameters
+from .following import NODE_NAMES
+from .orchestrator import flight_parameters
+
+NODES = NODE_NAMES
+"""Names of nodes and executables, in the order of their activation."""
+
+
+def launched_parameters(flight: Flight, bag: Path, autostart: bool, folder: Path) -> Path:
+    """Write a ROS parameter file for the nodes of a flight to ``folder``; return that.
+
+    With all kernels compiled: else the nodes would do that side by side.
+
+    Args:
+        flight: a checked plan.
+        bag: the folder to record to.
+        autostart: whether the nodes configure and activate themselves; they wait for one another.
+        folder: for the file.
+
+    Raises:
+        InputError: the bag cannot be made.
+    """
+    check_bag_path(bag)
+    compile_kernels(bool(flight.plant.names.actuators))
+    parameters = flight_parameters(flight, bag)
+    told = {node: {**values, "autostart": autostart} for node, values in parameters.items()}
+    return write_parameters(told, folder)
