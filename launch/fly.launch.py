@@ -3,7 +3,7 @@
     ros2 launch space_robot fly.launch.py controller:=tde_tsmc case:=4-2
     ros2 launch space_robot fly.launch.py --show-args
 
-The arguments are the options of `space-robot fly`. It ends when the plant has flown to its end, with
+The arguments are the options of `space-robot fly`. It ends when the plant has come to its end, with
 exit code 0, or when any node ends before, with exit code 1.
 """
 

@@ -6,7 +6,6 @@ import math
 
 from space_robot_msgs_py.errors import InputError
 
-
 PAUSED = "paused"
 """The mode of a paused plant in its diagnostics."""
 

@@ -1,4 +1,4 @@
-"""A graph that is paused, stepped and reset while it flies: its bag is that of a flight that is not.
+"""A graph that is paused, stepped and reset in flight: its bag is that of an undisturbed flight.
 
 By the services of the plant's node, through `space-robot sim`.
 """

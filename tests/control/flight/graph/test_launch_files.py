@@ -1,0 +1,134 @@
+"""launch/fly.launch.py, run by launch itself, where ROS has it: no wheel carries it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from flights import Flown, ros_environment
+from paths import ROOT
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.reader import read_flight
+
+pytest.importorskip("launch_ros")  # not "launch": this repository's folder would do for that
+
+RUN = """
+import sys
+from launch import LaunchDescription, LaunchService
+from launch.actions import IncludeLaunchDescription
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+arguments = [tuple(word.split(":=", 1)) for word in sys.argv[2:]]
+source = PythonLaunchDescriptionSource(sys.argv[1])
+service = LaunchService(argv=sys.argv[2:])
+service.include_launch_description(
+    LaunchDescription([IncludeLaunchDescription(source, launch_arguments=arguments)])
+)
+sys.exit(service.run())
+"""
+"""`ros2 launch FILE NAME:=VALUE...`, which no wheel carries either."""
+SHORT = ("duration:=0.2",)
+
+
+@pytest.fixture
+def prefix(tmp_path: Path) -> Path:
+    """The package as ament finds it: installed, as far as launch needs that."""
+    prefix = tmp_path / "prefix"
+    marker = prefix / "share/ament_index/resource_index/packages/space_robot"
+    marker.parent.mkdir(parents=True)
+    marker.touch()
+    (prefix / "share/space_robot").mkdir()
+    for name in ("launch", "config"):
+        (prefix / "share/space_robot" / name).symlink_to(ROOT / name)
+    (prefix / "bin").mkdir()
+    command = prefix / "bin/space-robot"
+    command.write_text(f'#!/bin/sh\nexec {sys.executable} -m space_robot_control.cli.main "$@"\n')
+    command.chmod(0o755)
+    (prefix / "lib").mkdir()
+    (prefix / "lib/space_robot").symlink_to(ROOT / "resource/executables")
+    return prefix
+
+
+@pytest.fixture
+def launch(prefix: Path, free_domain: int) -> Callable[..., subprocess.Popen[str]]:
+    """Launch a flight in a domain of its own."""
+
+    def start(*words: str) -> subprocess.Popen[str]:
+        found = [str(prefix), *filter(None, [os.environ.get("AMENT_PREFIX_PATH", "")])]
+        environment = {
+            **ros_environment(), "ROS_DOMAIN_ID": str(free_domain),
+            "AMENT_PREFIX_PATH": os.pathsep.join(found), "ROS_LOG_DIR": str(prefix / "log"),
+        }  # fmt: skip
+        return subprocess.Popen(
+            [sys.executable, "-c", RUN, str(ROOT / "launch/fly.launch.py"), *words], text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=environment, cwd=prefix,
+        )  # fmt: skip
+
+    return start
+
+
+def test_it_is_the_flight_of_fly(
+    launch: Callable[..., subprocess.Popen[str]], fly: Callable[..., Flown], tmp_path: Path
+) -> None:
+    bag = tmp_path / "bag"
+    process = launch(*SHORT, "controller:=tde_tsmc", f"bag:={bag}")
+    output, _ = process.communicate(timeout=120)
+    assert process.returncode == 0, output
+    other = fly("--duration", "0.2", "--controller", "tde_tsmc", "--composed").bag
+    for topic in (topics.JOINT_STATES, topics.BASE_STATE, topics.COMMAND):
+        here, there = ([data for _, data in open_bag(b).messages(topic)] for b in (bag, other))
+        assert here == there, topic.full_name
+    log = read_flight(bag)
+    assert log.ticks == 400
+    assert not any(log.lost.values())
+
+
+def test_bad_arguments_start_no_node(launch: Callable[..., subprocess.Popen[str]]) -> None:
+    process = launch("controller:=pid")
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert "unknown controller 'pid'" in output
+    assert "process started" not in output
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_with_a_whole_bag(
+    launch: Callable[..., subprocess.Popen[str]], tmp_path: Path, number: signal.Signals
+) -> None:
+    bag = tmp_path / "bag"
+    process = launch(f"bag:={bag}")
+    file, until = bag / "bag_0.mcap", time.monotonic() + 100.0
+    while not (file.exists() and file.stat().st_size > 500_000):
+        assert process.poll() is None
+        assert time.monotonic() < until
+        time.sleep(0.05)
+    process.send_signal(number)
+    output, _ = process.communicate(timeout=60)
+    log = read_flight(bag)
+    assert log.ticks > 100, output
+    assert not any(log.lost.values()), output
+
+
+def test_a_node_that_dies_ends_it_with_an_error(
+    launch: Callable[..., subprocess.Popen[str]], tmp_path: Path
+) -> None:
+    process = launch(f"bag:={tmp_path / 'bag'}")
+    assert process.stdout is not None
+    lines = []
+    for line in process.stdout:
+        lines.append(line)
+        if "[mission_node-2]: process started with pid" in line:
+            pid = int(line.split("[")[-1].strip("]\n"))
+        if "[plant_node]: nominal" in line:
+            os.kill(pid, signal.SIGKILL)
+            break
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 1, output
+    assert "mission_node ended with exit code -9" in output
