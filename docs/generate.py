@@ -162,12 +162,12 @@ def topic_page() -> str:
             "transient local" if topic.transient_local else "volatile",
             _occasion(topic),
         )
-        for topic in (*topics.ALL, topics.DIAGNOSTICS)
+        for topic in (*topics.ALL, topics.DIAGNOSTICS, topics.SIMULATION_PAUSED)
     )  # fmt: skip
     return "\n\n".join([
         "# Topics", MADE,
         "All are reliable and keep the last messages. Fields, units, frames and rates are in"
-        " [bags](../manual/bags.md#topics). Every topic but `/diagnostics` is recorded. These are"
+        " [bags](../manual/bags.md#topics). Every topic but the last two is recorded. These are"
         " the names of nodes without a namespace; in one, as `/sat1`, all but `/diagnostics` begin"
         " with it: `/sat1/joint_states`.",
         table(("topic", "type", "history", "durability", "a message"), rows),

@@ -1,4 +1,4 @@
-"""The arguments of launch/fly.launch.py: those of `space-robot fly`, and the same flight from them."""
+"""The arguments of launch/fly.launch.py: those of `fly`, and the same flight from them."""
 
 from __future__ import annotations
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -51,8 +52,7 @@ def prefix(tmp_path: Path) -> Path:
     command = prefix / "bin/space-robot"
     command.write_text(f'#!/bin/sh\nexec {sys.executable} -m space_robot_control.cli.main "$@"\n')
     command.chmod(0o755)
-    (prefix / "lib").mkdir()
-    (prefix / "lib/space_robot").symlink_to(ROOT / "resource/executables")
+    shutil.copytree(ROOT / "resource/executables", prefix / "lib/space_robot")
     return prefix
 
 
@@ -128,7 +128,7 @@ def test_a_node_that_dies_ends_it_with_an_error(
             pid = int(line.split("[")[-1].strip("]\n"))
         if "[plant_node]: nominal" in line:
             os.kill(pid, signal.SIGKILL)
-            break
-    output, _ = process.communicate(timeout=60)
+    output = "".join(lines)
+    process.wait(timeout=60)
     assert process.returncode == 1, output
     assert "mission_node ended with exit code -9" in output
