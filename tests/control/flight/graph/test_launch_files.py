@@ -15,6 +15,7 @@ import pytest
 from flights import Flown, ros_environment
 from paths import ROOT
 
+from space_robot_control.cli.launch_arguments import launch_arguments
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
@@ -132,3 +133,20 @@ def test_a_node_that_dies_ends_it_with_an_error(
     process.wait(timeout=60)
     assert process.returncode == 1, output
     assert "mission_node ended with exit code -9" in output
+
+
+@pytest.mark.parametrize(
+    "file", sorted((ROOT / "launch").glob("*.launch.py")), ids=lambda p: p.name
+)
+def test_launch_reads_the_files(file: Path) -> None:
+    """With every argument declared, each with a description and a default: none must be given."""
+    from launch.launch_description_sources import get_launch_description_from_python_launch_file
+
+    description = get_launch_description_from_python_launch_file(str(file))
+    declared = {argument.name: argument for argument in description.get_launch_arguments()}
+    assert declared
+    for name, argument in declared.items():
+        assert argument.default_value is not None, name
+        assert len(argument.description) > 10, name
+    if file.name == "fly.launch.py":
+        assert {a.name for a in launch_arguments()} == set(declared) - {"autostart"}
