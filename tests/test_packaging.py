@@ -31,6 +31,8 @@ OF_EXTRAS = {
     "pyarrow": "parquet", "xacro": "xacro",
 }  # fmt: skip
 """Packages that one command needs, and their extra."""
+OF_ROS = {"simulation_interfaces"}
+"""Packages of ROS that are used where they are installed."""
 ROSDEP = {"pyyaml": "yaml"}
 """Names of rosdep's keys, behind python3-, where they are not the package's."""
 
@@ -89,7 +91,7 @@ def test_setup_py_and_the_imports_name_the_same_packages() -> None:
     """What is imported is required, or of an extra and looked for before; nothing else is."""
     found = third_party_imports()
     required = packages(setup_keyword("install_requires"))
-    assert found - set(OF_EXTRAS) - dependencies("exec_depend") == required
+    assert found - set(OF_EXTRAS) - OF_ROS - dependencies("exec_depend") == required
     extras = setup_keyword("extras_require")
     for name, extra in OF_EXTRAS.items():
         assert name in found

@@ -67,7 +67,7 @@ def domain_of_plant(namespace: str) -> int:
         return int(of_user)
     name = f"{namespace.rstrip('/')}/{PLANT}"
     locks = {domain: node_lock(domain, name) for domain in (0, *DOMAINS)}
-    found = [domain for domain, lock in locks.items() if lock.exists() and look(lock)[0]]
+    found: list[int] = [domain for domain, lock in locks.items() if lock.exists() and look(lock)[0]]
     if len(found) != 1:
         there = f"in ROS domains {', '.join(map(str, found))}" if found else "on this machine"
         number = "several" if found else "no"
