@@ -224,6 +224,12 @@ def test_the_command_is_where_colcon_extends_the_path(prefix: Path) -> None:
     assert os.access(prefix / "bin/space-robot", os.X_OK)
 
 
+def test_launch_files_are_where_ros_looks_for_them(prefix: Path) -> None:
+    installed = {path.name for path in (prefix / "share/space_robot/launch").iterdir()}
+    assert installed == {path.name for path in (ROOT / "launch").iterdir()}
+    assert "fly.launch.py" in installed
+
+
 HIDE = """
 import importlib.machinery as machinery
 find = machinery.PathFinder.find_spec

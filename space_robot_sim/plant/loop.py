@@ -178,7 +178,7 @@ class PlantLoop:
             values["latency_max_ms"] = 1e3 * self._latency_max_s
         if self.control.is_paused:
             return Health(PAUSED, values=values)
-        if guard.answered < 0:
+        if guard.answered < 0 or tick == 0:  # nothing acts before the first tick ends
             return Health("waiting for the first command", values=values)
         if guard.is_safe:
             return Health("safe: no good command, the torque is zero", Level.ERROR, values)
