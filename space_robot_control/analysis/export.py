@@ -1,10 +1,11 @@
-"""A flight as a CSV or Parquet file: whole or not at all, and never over another one."""
+"""A flight as a table of pandas; as a CSV or Parquet file, whole or not at all, over no other."""
 
 from __future__ import annotations
 
 import json
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,8 +15,28 @@ from space_robot_msgs_py.errors import InputError
 from .columns import batches, column_names, metadata
 from .files import csv_rows, csv_writer, whole_file
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
 METADATA_KEY = b"space_robot"
 """The key of the flight's description, as JSON, in the metadata of a Parquet file's schema."""
+
+
+def dataframe(log: FlightLog) -> DataFrame:
+    """Return the columns of `analysis.columns`, a row a tick; NaN is a number that is not known.
+
+    Raises:
+        InputError: pandas is not installed.
+    """
+    try:
+        import pandas as pd
+    except ImportError:
+        raise InputError("tables need pandas: pip install 'space_robot[campaign]'") from None
+    tick, *others = column_names(log)
+    parts = list(batches(log))
+    table = pd.DataFrame(np.vstack([numbers for _, numbers in parts]), columns=others)
+    table.insert(0, tick, np.concatenate([ticks for ticks, _ in parts]))
+    return table
 
 
 def check_parquet() -> None:

@@ -22,6 +22,7 @@ from .report import flight_report
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
     from ..analysis.figures.figure_set import FigureSet
 
@@ -99,6 +100,17 @@ class FlownFlight:
         """
         report = self._report
         return {**report["rms"]["mean_axis"], **report} if report else {}
+
+    @cached_property
+    def table(self) -> DataFrame:
+        """What was flown as a table of pandas, with the columns of ``analyze --csv``.
+
+        Raises:
+            InputError: no log was kept, or pandas is not installed.
+        """
+        from ..analysis.export import dataframe  # slow to import
+
+        return dataframe(self.log)
 
     def report(self) -> dict[str, Any]:
         """Return what ``space-robot simulate --json`` prints: metrics, outcome, reason, end."""

@@ -6,12 +6,14 @@ found.table, found.verdicts, found.rerun(4711).log
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import yaml
 
+from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.config.yaml_text import read_file
 
 from ..runner import check_scheduler, cores
@@ -44,6 +46,15 @@ class Campaign:
         found = cls(read_study(path))
         found._text = read_file(Path(found.study.where))
         return found
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any]) -> Campaign:
+        """Take what would be in a campaign's file: ``{"laws": ["ctc"], "vary": {...}}``.
+
+        Raises:
+            InputError: in one line, naming the key.
+        """
+        return cls(validate(Study, dict(content), "campaign"))
 
     def run(
         self,

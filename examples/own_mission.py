@@ -1,0 +1,50 @@
+"""Your own mission: the same motion, slow and fast, and what speed costs.
+
+A segment from rest to rest runs along a fifth-order polynomial. In half the time velocities double
+and accelerations are four times as high. So are the torques, for forces of inertia go with
+accelerations and with squares of velocities. The momentum that the base has to take up goes with
+velocities, and doubles. Friction, which would not follow that, is left out.
+
+    python examples/own_mission.py
+
+prints:
+
+    20 s: base torque  2.84 N m, momentum 14.0 N m s
+    10 s: base torque 11.34 N m, momentum 28.1 N m s
+    in half the time: torque x 4.00, momentum x 2.00
+"""
+
+from __future__ import annotations
+
+from space_robot_control import FlownFlight, Scenario
+
+FOLDED = [0.0, 120.0, 220.0, 0.0, -10.0, 0.0]
+REACHED_OUT = [30.0, 100.0, 150.0, 90.0, 30.0, -50.0]
+"""Angles of the paper's six joints, deg."""
+
+
+def fly_in(seconds: float) -> FlownFlight:
+    """Fly from one posture to the other in so many seconds."""
+    mission = {"waypoint_times": [0.0, seconds], "waypoints_deg": FOLDED + REACHED_OUT}
+    return Scenario(mission=mission, friction=False).fly().check()
+
+
+def main() -> None:
+    """Fly the motion twice and compare what it asks of the base."""
+    torques, momenta = [], []
+    for seconds in (20.0, 10.0):
+        metrics = fly_in(seconds).metrics
+        torques.append(metrics["maxima"]["base_torque"])
+        momenta.append(metrics["sizing"]["peak_momentum_n_m_s"])
+        print(
+            f"{seconds:.0f} s: base torque {torques[-1]:5.2f} N m, "
+            f"momentum {momenta[-1]:4.1f} N m s"
+        )
+    print(
+        f"in half the time: torque x {torques[1] / torques[0]:.2f}, "
+        f"momentum x {momenta[1] / momenta[0]:.2f}"
+    )
+
+
+if __name__ == "__main__":
+    main()

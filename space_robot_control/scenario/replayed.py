@@ -1,0 +1,32 @@
+"""A recorded flight played to a live controller: what ``space-robot replay`` does, from Python."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from space_robot_msgs_py.config.validation import one_of
+
+from ..flight.replay.outcome import Options, Replay
+from ..flight.replay.run import replay as run
+
+
+def replay(bag: str | Path, **options: Any) -> Replay:
+    """Play a bag to a controller node of its own, and compare commands to the last bit.
+
+    ``has_passed`` of what is returned is the verdict, ``report()`` what ``replay --json`` prints.
+
+    Args:
+        bag: folder of the recorded flight.
+        options: those of `Options`: ``controller``, ``gains``, ``parameters`` of the controller,
+            ``start_s``, ``end_s``, ...
+
+    Raises:
+        InputError: bag or options cannot be used; nothing was started.
+        FlightError: the controller did not start.
+    """
+    allowed = [field.name for field in fields(Options) if field.name != "bag"]
+    for name in options:
+        one_of(name, allowed, "option", " of replay")
+    return run(Options(Path(bag), **options))
