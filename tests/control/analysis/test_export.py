@@ -12,7 +12,7 @@ from pyarrow import csv, parquet
 
 from space_robot_control.analysis import excerpt, tracking_error
 from space_robot_control.analysis.columns import BATCH, batches, column_names
-from space_robot_control.analysis.export import METADATA_KEY, write_csv, write_parquet
+from space_robot_control.analysis.export import METADATA_KEY, dataframe, write_csv, write_parquet
 from space_robot_control.analysis.files import whole_file
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
@@ -156,3 +156,13 @@ def test_every_wheel_and_thruster_has_its_columns(tmp_path: Path) -> None:
     }.items():
         np.testing.assert_array_equal(column(table, name), expected, err_msg=name)
     assert not any("wheel_velocity_3" in name for name in table.column_names)
+
+
+def test_a_table_of_pandas_has_the_columns_of_the_files(log: FlightLog, tmp_path: Path) -> None:
+    """Of a part of a flight, too, whose first tick is not 0."""
+    for part in (log, log.rows(50, 80)):
+        table = dataframe(part)
+        assert_same(pa.Table.from_pandas(table), part)
+        assert [*table.columns] == column_names(part)
+        assert table["tick"].dtype == np.int64
+        assert [*table["tick"]] == [*range(part.first_tick, part.first_tick + part.ticks)]

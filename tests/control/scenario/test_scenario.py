@@ -227,3 +227,20 @@ def test_a_robot_without_files_needs_a_mission_and_gains(paper_mission: dict[str
         Scenario(robot=own).check()
     with pytest.raises(InputError, match="no gains of its own: give some"):
         Scenario(robot=own, mission=paper_mission).check()
+
+
+def test_a_flight_is_a_table_a_row_a_tick() -> None:
+    pytest.importorskip("pandas")
+    flight = Scenario(duration=0.01).fly()
+    assert len(flight.table) == flight.log.ticks == 20
+    assert [*flight.table["q_w"]] == [*flight.log.quaternion[:, 0]]
+
+
+def test_a_replay_has_the_options_of_the_command(tmp_path: Path) -> None:
+    pytest.importorskip("rclpy")
+    from space_robot_control import replay
+
+    with pytest.raises(InputError, match=r"option.* of replay.*controller, gains"):
+        replay(tmp_path, law="ctc")
+    with pytest.raises(InputError, match=str(tmp_path / "none")):
+        replay(str(tmp_path / "none"))

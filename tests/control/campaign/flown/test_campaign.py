@@ -218,3 +218,13 @@ def test_what_cannot_be_flown_is_told_before_anything_is_made(
     with pytest.raises(InputError, match=said):
         Campaign(study(**other)).run(2, out=tmp_path / "a")
     assert not (tmp_path / "a").exists()
+
+
+def test_a_mapping_is_as_good_as_a_file(tmp_path: Path) -> None:
+    """The folder has it as a file, from which a row flies again."""
+    content = study().model_dump(by_alias=True)
+    found = Campaign.of(content).run(1, 7, tmp_path / "a", workers=0)
+    assert found.study.model_dump() == study().model_dump()
+    assert found.rerun(0).is_same
+    with pytest.raises(InputError, match="campaign: .*laws"):
+        Campaign.of({"runs": 3})
