@@ -226,5 +226,5 @@ def test_a_mapping_is_as_good_as_a_file(tmp_path: Path) -> None:
     found = Campaign.of(content).run(1, 7, tmp_path / "a", workers=0)
     assert found.study.model_dump() == study().model_dump()
     assert found.rerun(0).is_same
-    with pytest.raises(InputError, match="campaign: .*laws"):
+    with pytest.raises(InputError, match=r"campaign: .*laws"):
         Campaign.of({"runs": 3})
