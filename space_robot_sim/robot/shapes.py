@@ -1,0 +1,89 @@
+"""The shapes that show a robot: those of its file, or drawn from its kinematics and masses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from .robot import Robot
+from .tree import Visual
+
+Array = NDArray[np.float64]
+Colour = tuple[float, float, float, float]
+
+BASE_COLOUR: Colour = (0.80, 0.66, 0.30, 1.0)
+LINK_COLOUR: Colour = (0.82, 0.83, 0.86, 1.0)
+JOINT_COLOUR: Colour = (0.25, 0.28, 0.33, 1.0)
+PANEL_COLOUR: Colour = (0.13, 0.23, 0.48, 1.0)
+THINNEST = 0.02
+"""m; of a box's edge and of a tube's radius."""
+SLENDER = 0.018
+"""Radius of a tube by the length of all links."""
+
+
+def shapes_of(robot: Robot) -> tuple[Visual, ...]:
+    """Return the visuals of a robot's file; if it has none, some that show where its bodies are.
+
+    The base and what has springs for a motor are boxes of even density with the body's mass and
+    inertia; other bodies are tubes from their joint to the next ones and to the tools, with a hub
+    about each joint's axis.
+    """
+    return robot.visuals or tuple(_drawn(robot))
+
+
+def _drawn(robot: Robot) -> Iterator[Visual]:
+    ends = _ends(robot)
+    lengths = sum(float(np.linalg.norm(end)) for body in ends[1:] for end in body)
+    radius = max(THINNEST, SLENDER * lengths)
+    for body, own in enumerate(ends):
+        is_base, is_panel = body == 0, body > robot.n
+        start = np.zeros(3)
+        if is_base or is_panel:
+            box = even_box(robot, body, BASE_COLOUR if is_base else PANEL_COLOUR)
+            yield box
+        else:
+            hub = (1.5 * radius, 3.2 * radius)
+            yield Visual("cylinder", hub, np.eye(3), start, colour=JOINT_COLOUR, body=body)
+        for end in own if not is_panel else ():
+            if is_base:  # from where it leaves the box
+                half = 0.5 * np.array(box.size)
+                start = box.rotation @ np.clip(box.rotation.T @ end, -half, half)
+            yield from _tube(start, end, radius, body)
+
+
+def even_box(robot: Robot, body: int, colour: Colour) -> Visual:
+    """Return the box of even density that has a body's mass, centre and inertia."""
+    inertia = robot.inertia[body]
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    moments, axes = np.linalg.eigh(second)
+    edges = np.sqrt(12.0 * np.maximum(moments, 0.0) / robot.mass[body])
+    if np.linalg.det(axes) < 0.0:
+        axes[:, 0] *= -1.0
+    size = tuple(np.maximum(edges, THINNEST).tolist())
+    return Visual("box", size, axes, robot.com[body], colour=colour, body=body)
+
+
+def _ends(robot: Robot) -> list[list[Array]]:
+    """Return for each body the places, on its axes, of the joints and tools that it carries."""
+    found: list[list[Array]] = [[] for _ in robot.body_names]
+    for joint in robot.order:
+        turn = robot.rotation[joint]
+        found[robot.parent[joint]].append(turn @ robot.offset[joint])
+    for tool in robot.tools:
+        found[tool.body].append(tool.position)
+    return found
+
+
+def _tube(start: Array, end: Array, radius: float, body: int) -> Iterator[Visual]:
+    along = end - start
+    length = float(np.linalg.norm(along))
+    if length < THINNEST:
+        return
+    turn, _ = Rotation.align_vectors([along / length], [[0.0, 0.0, 1.0]])
+    yield Visual(
+        "cylinder", (radius, length), turn.as_matrix(), 0.5 * (start + end), colour=LINK_COLOUR,
+        body=body,
+    )  # fmt: skip

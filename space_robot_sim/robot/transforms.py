@@ -1,0 +1,68 @@
+"""The robot as a tree of transforms: each body against its parent, tick by tick, as tf has them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from .robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class Transform(NamedTuple):
+    """The pose of a body's frame on that of its parent, at T ticks."""
+
+    parent: str
+    child: str
+    position: Array
+    """(T, 3) m, or (1, 3) if it never changes."""
+    quaternion: Array
+    """(T, 4) ``[w, x, y, z]`` from the child's axes to the parent's, or (1, 4)."""
+
+
+def joint_transforms(robot: Robot, joint_positions: Array) -> list[Transform]:
+    """Return the transform of every joint, a parent's before its children's.
+
+    Args:
+        robot: whose bodies' names are the frames'.
+        joint_positions: (T, N) of all joints, the passive ones behind; rad, or m of prismatic ones.
+    """
+    found = []
+    for joint in robot.order:
+        turn, offset = robot.rotation[joint], robot.offset[joint]
+        at_zero, moved = wxyz(turn)[np.newaxis], joint_positions[:, joint]
+        if robot.is_prismatic[joint]:
+            along = offset + np.outer(moved, (0.0, 0.0, 1.0))
+            position, quaternion = along @ turn.T, at_zero
+        else:
+            # q0 (cos theta/2, 0, 0, sin theta/2)
+            c, s = np.cos(0.5 * moved), np.sin(0.5 * moved)
+            w, x, y, z = at_zero[0]
+            quaternion = np.column_stack(
+                [w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s]
+            )
+            position = (turn @ offset)[np.newaxis]
+        names = robot.body_names
+        found.append(Transform(names[robot.parent[joint]], names[joint + 1], position, quaternion))
+    return found
+
+
+def tool_transforms(robot: Robot) -> list[Transform]:
+    """Return the fixed transforms of the tools."""
+    return [
+        Transform(
+            robot.body_names[tool.body], tool.name, tool.position[np.newaxis],
+            wxyz(tool.rotation)[np.newaxis],
+        )
+        for tool in robot.tools
+    ]  # fmt: skip
+
+
+def wxyz(rotation: Array) -> Array:
+    """Return the unit quaternion ``[w, x, y, z]`` of a rotation matrix (3, 3)."""
+    x, y, z, w = Rotation.from_matrix(rotation).as_quat()
+    return np.array([w, x, y, z])
