@@ -1,0 +1,89 @@
+"""The plots beside the scene: errors and torques of one flight, or of several beside one another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.bag.flight_log import FlightLog
+
+from ..analysis.attitude_drift import controls_base
+from ..analysis.figures.overlay import words
+from ..analysis.metrics import error_columns, torque_columns, tracking_error, unit_of
+from ..analysis.plot_series import tick_times
+from .page import Plot, Series
+
+Array = NDArray[np.float64]
+
+STRETCHES = 600
+"""Of a flight; of each the lowest and the highest value is drawn, so that no chatter is lost."""
+AXES = "xyz"
+
+
+def plots_of(flights: Mapping[str, FlightLog], colours: Sequence[str]) -> list[Plot]:
+    """Return the plots of some flights.
+
+    Of one flight each axis is drawn, of several the size of each column of Table V.
+
+    Args:
+        flights: by name.
+        colours: of the flights; of one flight those of the axes.
+    """
+    logs = list(flights.values())
+    edges = np.linspace(
+        min(float(tick_times(log)[0]) for log in logs),
+        max(float(tick_times(log)[-1]) for log in logs),
+        STRETCHES + 1,
+    )
+    time = np.repeat(edges[:-1], 2)
+    time[1::2] += 0.5 * (edges[1] - edges[0])
+    by_name = [dict(_columns(log)) for log in logs]
+    found = []
+    for name in dict.fromkeys(name for columns in by_name for name in columns):
+        series = []
+        for flight, log, columns, colour in zip(flights, logs, by_name, colours, strict=False):
+            if name not in columns:
+                continue
+            values = columns[name]
+            if len(logs) > 1:
+                size = np.linalg.norm(values, axis=1)
+                series.append(Series(flight, colour, _extremes(log, size, edges)))
+                continue
+            for axis, label in zip(values.T, _labels(name, values.shape[1]), strict=True):
+                drawn = _extremes(log, axis, edges)
+                series.append(Series(label, colours[len(series) % len(colours)], drawn))
+        found.append(Plot(words(name), unit_of(name).strip("-"), time, series))
+    return found
+
+
+def _columns(log: FlightLog) -> Iterator[tuple[str, Array]]:
+    error, of_base = tracking_error(log), controls_base(log)
+    for columns, values in (
+        (error_columns(log.axes, of_base, log.prismatic), error),
+        (torque_columns(log.axes, of_base, log.prismatic), log.applied_torque),
+    ):
+        for name, axes in columns.items():
+            yield name, values[:, axes]
+
+
+def _labels(name: str, count: int) -> Sequence[str]:
+    if name in ("attitude", "base_torque"):
+        return AXES
+    first = name.rsplit("_", 2)[-2]
+    start = int(first) if first.isdigit() else 1
+    return [str(start + k) for k in range(count)]
+
+
+def _extremes(log: FlightLog, values: Array, edges: Array) -> Array:
+    """Return the lowest and the highest of the values in each stretch, in turn, (2 K,); or NaN."""
+    starts = np.searchsorted(tick_times(log), edges[:-1])
+    found = np.full((len(starts), 2), np.nan)
+    inside = np.flatnonzero(np.diff(np.append(starts, len(values))) > 0)
+    if len(inside):
+        finite = np.where(np.isfinite(values), values, np.nan)
+        low = np.minimum.reduceat(finite, starts[inside])
+        high = np.maximum.reduceat(finite, starts[inside])
+        found[inside] = np.column_stack([low, high])
+    return found.ravel()
