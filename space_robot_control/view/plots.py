@@ -1,4 +1,4 @@
-"""The plots beside the scene: errors and torques of one flight, or of several beside one another."""
+"""Errors and torques beside the scene, of one flight or of several together."""
 
 from __future__ import annotations
 
