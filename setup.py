@@ -29,6 +29,7 @@ setup(
         "space_robot_control.analysis.figures": ["*.mplstyle"],
         "space_robot_control.campaign.report": ["templates/*.j2"],
         "space_robot_control.paper.reproduction": ["templates/*.j2"],
+        "space_robot_control.view": ["templates/*"],
         "space_robot_msgs_py.ros": ["*.xml"],
     },
     python_requires=">=3.10,<3.14",
@@ -89,8 +90,10 @@ setup(
             "scipy-stubs",
             "types-PyYAML",
             "types-psutil",
+            "viser>=1.1",
             "xacro",
         ],
+        "view": ["viser>=1.1"],  # `view`
         "xacro": ["xacro"],  # robots in files that end in .xacro
     },
     entry_points={"console_scripts": ["space-robot = space_robot_control.cli.main:main"]},

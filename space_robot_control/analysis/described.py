@@ -62,12 +62,21 @@ def robot_of(log: FlightLog) -> Robot:
         robot = find_robot(str(name))
     else:
         raise NotDescribedError("the bag does not say which robot was flown")
+    check_joints(robot, log)
+    return robot
+
+
+def check_joints(robot: Robot, log: FlightLog) -> None:
+    """See that a robot has the joints of a bag.
+
+    Raises:
+        NotDescribedError: it has others.
+    """
     if (robot.joint_names, robot.passive_names) != (log.joint_names, log.passive_names):
         raise NotDescribedError(
             f"robot {robot.name!r} has the joints {', '.join(robot.all_joint_names)}, "
             f"the bag {', '.join((*log.joint_names, *log.passive_names))}"
         )
-    return robot
 
 
 def torque_limits(log: FlightLog) -> TorqueLimits:

@@ -88,7 +88,7 @@ def analyze(
 
     if parquet:
         check_parquet()
-    names = _names(bags)
+    names = bag_names(bags)
     exports = [
         (write, dict(zip(names, _files(where, names, suffix), strict=True)))
         for write, where, suffix in ((write_csv, csv, ".csv"), (write_parquet, parquet, ".parquet"))
@@ -169,7 +169,7 @@ def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
             print_table(table, console)
 
 
-def _names(bags: Sequence[Path]) -> list[str]:
+def bag_names(bags: Sequence[Path]) -> list[str]:
     """Name the bags: by their folders' names, with as much before them as tells apart."""
     paths = [Path(printable(str(bag.absolute()))) for bag in bags]
     if len(set(paths)) < len(paths):

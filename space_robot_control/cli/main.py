@@ -34,6 +34,7 @@ def cli() -> None:
       space-robot gains check                       what margin and noise gain a gain set has
       space-robot gains tune -o my_gains            a set for a robot and a mission, by a method
       space-robot analyze flights/<bag>...          metrics of recorded flights
+      space-robot view flights/<bag>                the robot in 3-D with plots, as one page
       space-robot replay flights/<bag>              its states to a live controller, compared
       space-robot sim step --ticks 10               a graph that flies, paused and stepped
       space-robot sweep --navigation filtered       laws over grades of sensors

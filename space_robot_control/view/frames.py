@@ -1,63 +1,127 @@
-"""What a page shows of a flight: the poses of all bodies at so many times a second."""
+"""The motion of a robot as its page shows it: the poses of all bodies, so many times a second."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import InputError
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.tool import tool_pose
 from space_robot_sim.robot.transforms import Transform, joint_transforms
 
+from ..analysis.attitude_drift import controls_base
 from ..analysis.plot_series import tick_times
 
 Array = NDArray[np.float64]
 
 RATE_HZ = 30.0
-"""Of a flight that is not long."""
-MOST_FRAMES = 1500
-"""Of a flight, so that its page stays below 3 MB."""
+"""Of a page nobody asked another one of."""
+MOST_FRAMES = 3000
+"""Of a page, shared by its flights, so that it stays below 3 MB."""
+STEP = 2.0**-30
+"""What poses are rounded to, m: a billionth, far below what can be seen, and half the page."""
 
 
 @dataclass(frozen=True)
 class Frames:
-    """The motion of a robot at K ticks of its flight."""
+    """The motion of a robot at K times."""
 
     time: Array
     """(K,) s."""
-    rows: NDArray[np.intp]
-    """(K,) of the log."""
     base_position: Array
     """(K, 3) m, inertial frame."""
     base_quaternion: Array
     """(K, 4) ``[w, x, y, z]``."""
+    joint_positions: Array
+    """(K, N) of all joints, rad, or m of prismatic ones."""
     joints: list[Transform]
     """Of every joint, a parent's before its children's."""
-    tool: Array
-    """(K, 3) m, the tool's place, inertial frame."""
+    tools: dict[str, Array]
+    """(K, 3) m, place of each tool, inertial frame."""
+    desired: Array | None
+    """(K, 3) m, where the first tool was wanted, the base at its true place; None: not known."""
 
     @classmethod
-    def of(cls, log: FlightLog, robot: Robot) -> Frames:
-        """Take them from a flight.
+    def of(cls, log: FlightLog, robot: Robot, times: Array) -> Frames:
+        """Take them from a flight; between ticks the last one holds, as after the flight's end.
 
         Args:
             log: the flight, as it truly was.
             robot: that flew.
+            times: (K,) s.
+
+        Raises:
+            InputError: no tick of the flight has a whole state.
         """
-        rows = shown_rows(log)
-        angles = np.hstack([log.joint_positions, log.passive_positions])[rows]
-        position, quaternion = log.base_position[rows], log.quaternion[rows]
+        known = np.flatnonzero(log.finite(("base_position", "quaternion", "joint_positions",
+                                           "passive_positions")))  # fmt: skip
+        if not len(known):
+            raise InputError("no tick of the bag has the whole state of the robot: nothing to show")
+        # a time is a tick's to half a tick: times are counted from ticks with rounding
+        due = times + 0.5 * log.timebase.period
+        at = np.searchsorted(tick_times(log)[known], due, side="right") - 1
+        rows = known[np.maximum(at, 0)]
+        position, quaternion = log.base_position[rows], _unit(log.quaternion[rows])
+        angles = log.all_positions[rows]
+        tools = {
+            tool.name: position + tool_pose(replace(robot, tools=(tool,)), quaternion, angles)[1]
+            for tool in robot.tools
+        }
+        joints = [
+            t._replace(position=_rounded(t.position), quaternion=_rounded(t.quaternion))
+            for t in joint_transforms(robot, angles)
+        ]
         return cls(
-            tick_times(log)[rows], rows, position, quaternion, joint_transforms(robot, angles),
-            position + tool_pose(robot, quaternion, angles)[1],
+            times, _rounded(position), _rounded(quaternion), angles, joints, tools,
+            _desired(log, robot, rows),
         )  # fmt: skip
 
+    def move_to(self, k: int) -> tuple[Array, Array, list[Transform], int]:
+        """Return what `RobotScene.move` takes at the k-th time."""
+        return self.base_position[k], self.base_quaternion[k], self.joints, k
 
-def shown_rows(log: FlightLog) -> NDArray[np.intp]:
-    """Return the rows of a log that are shown, evenly spaced, the last one among them."""
-    length = log.ticks * log.timebase.period
-    count = int(min(MOST_FRAMES, max(2.0, RATE_HZ * length), log.ticks))
-    return np.unique(np.linspace(0, log.ticks - 1, count).round().astype(np.intp))
+
+def shown_times(logs: Sequence[FlightLog], rate: float) -> Array:
+    """Return the times, s, that are shown of some flights: at ticks of the first one.
+
+    Args:
+        logs: of the flights, none of them empty.
+        rate: so many a second, or fewer where that were too many.
+    """
+    start = min(float(tick_times(log)[0]) for log in logs)
+    end = max(float(tick_times(log)[-1]) for log in logs)
+    period = logs[0].timebase.period
+    ticks = max(1, round((end - start) / period))
+    frames = min((end - start) * rate, MOST_FRAMES / len(logs), ticks)
+    every = np.unique(np.linspace(0, ticks, max(2, round(frames) + 1)).round())
+    times: Array = start + every * period
+    return times
+
+
+def _desired(log: FlightLog, robot: Robot, rows: NDArray[np.intp]) -> Array | None:
+    """Return the first tool's places by the reference; joints without motors rest."""
+    if not controls_base(log):
+        return None
+    reference, joints = log.reference_base[rows, :4], log.reference_joints[rows, 0]
+    rest = np.broadcast_to(
+        [spring.rest for spring in robot.springs], (len(rows), len(robot.springs))
+    )
+    if not (np.isfinite(reference).all() and np.isfinite(joints).all()):
+        return None
+    return (
+        log.base_position[rows] + tool_pose(robot, _unit(reference), np.hstack([joints, rest]))[1]
+    )
+
+
+def _rounded(values: Array) -> Array:
+    return np.round(values / STEP) * STEP
+
+
+def _unit(quaternion: Array) -> Array:
+    unit: Array = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+    return unit

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from importlib.resources import files
 from typing import Any, NamedTuple
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.template import template
+from .marks import Mark
 
 Array = NDArray[np.float64]
 
@@ -22,7 +24,6 @@ class Series(NamedTuple):
     colour: str
     values: Array
     """(K,)"""
-    dash: tuple[int, ...] = ()
 
 
 class Plot(NamedTuple):
@@ -33,6 +34,7 @@ class Plot(NamedTuple):
     time: Array
     """(K,) s."""
     series: Sequence[Series]
+    is_logarithmic: bool = False
 
 
 class Shown(NamedTuple):
@@ -48,7 +50,9 @@ def render(
     scene: str,
     bags: Sequence[Shown],
     plots: Sequence[Plot],
-    events: Sequence[tuple[float, str]],
+    marks: Sequence[Mark],
+    start: float,
+    dark: bool,
 ) -> str:
     """Render the page, without references to anything outside itself.
 
@@ -57,29 +61,38 @@ def render(
         scene: viser's own page of the scene.
         bags: that are shown.
         plots: in their order.
-        events: time, s, and words.
+        marks: what happened.
+        start: time at which the scene begins, s.
+        dark: whether the page is light on dark.
     """
     folder = files(__package__).joinpath("templates")
     data = {
         "plots": [
             {
-                "title": plot.title, "unit": plot.unit, "time": _short(plot.time, 4),
+                "title": plot.title, "unit": plot.unit, "logarithmic": plot.is_logarithmic,
+                "time": _short(plot.time, 4),
                 "series": [
                     {
-                        "label": s.label, "colour": s.colour, "values": _digits(s.values),
-                        "dash": list(s.dash),
+                        "label": s.label, "colour": s.colour,
+                        "values": _digits(s.values, plot.is_logarithmic),
                     }
                     for s in plot.series
                 ],
             }
             for plot in plots
         ],
-        "events": [{"t": time, "text": text} for time, text in events],
+        "marks": [
+            {"start": m.start, "stop": m.stop if math.isfinite(m.stop) else None, "text": m.text,
+             "kind": m.kind}
+            for m in marks
+        ],
+        "start": start, "dark": dark,
     }  # fmt: skip
     return template("space_robot_control.view", "view.html.j2").render(
-        title=title, scene=scene, bags=bags,
+        title=title, scene=scene, bags=bags, dark=dark,
         uplot=folder.joinpath("uPlot.iife.min.js").read_text("utf-8"),
         uplot_css=folder.joinpath("uPlot.min.css").read_text("utf-8"),
+        css=folder.joinpath("view.css").read_text("utf-8"),
         script=folder.joinpath("view.js").read_text("utf-8"),
         data=json.dumps(data, separators=(",", ":")).replace("</", "<\\/"),
     )  # fmt: skip
@@ -89,5 +102,6 @@ def _short(values: Array, decimals: int) -> list[float]:
     return [float(x) for x in np.round(values, decimals)]
 
 
-def _digits(values: Array) -> list[Any]:
-    return [float(f"{x:.4g}") if np.isfinite(x) else None for x in values]
+def _digits(values: Array, is_logarithmic: bool) -> list[Any]:
+    known = np.isfinite(values) & ~(is_logarithmic & (values <= 0.0))
+    return [float(f"{x:.4g}") if k else None for x, k in zip(values, known, strict=True)]

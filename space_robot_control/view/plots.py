@@ -11,7 +11,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from ..analysis.attitude_drift import controls_base
 from ..analysis.figures.overlay import words
-from ..analysis.metrics import error_columns, torque_columns, tracking_error, unit_of
+from ..analysis.metrics import AxisIndex, error_columns, torque_columns, tracking_error, unit_of
 from ..analysis.plot_series import tick_times
 from .page import Plot, Series
 
@@ -40,6 +40,7 @@ def plots_of(flights: Mapping[str, FlightLog], colours: Sequence[str]) -> list[P
     time = np.repeat(edges[:-1], 2)
     time[1::2] += 0.5 * (edges[1] - edges[0])
     by_name = [dict(_columns(log)) for log in logs]
+    errors = {name for log in logs for name in _error_columns(log)}
     found = []
     for name in dict.fromkeys(name for columns in by_name for name in columns):
         series = []
@@ -54,18 +55,27 @@ def plots_of(flights: Mapping[str, FlightLog], colours: Sequence[str]) -> list[P
             for axis, label in zip(values.T, _labels(name, values.shape[1]), strict=True):
                 drawn = _extremes(log, axis, edges)
                 series.append(Series(label, colours[len(series) % len(colours)], drawn))
-        found.append(Plot(words(name), unit_of(name).strip("-"), time, series))
+        is_error = name in errors
+        found.append(
+            Plot(
+                f"{words(name)} error" if is_error else words(name), unit_of(name).strip("-"), time,
+                series, is_error and len(logs) > 1,
+            )
+        )  # fmt: skip
     return found
 
 
 def _columns(log: FlightLog) -> Iterator[tuple[str, Array]]:
-    error, of_base = tracking_error(log), controls_base(log)
+    torques = torque_columns(log.axes, controls_base(log), log.prismatic)
     for columns, values in (
-        (error_columns(log.axes, of_base, log.prismatic), error),
-        (torque_columns(log.axes, of_base, log.prismatic), log.applied_torque),
-    ):
+        (_error_columns(log), tracking_error(log)), (torques, log.applied_torque),
+    ):  # fmt: skip
         for name, axes in columns.items():
             yield name, values[:, axes]
+
+
+def _error_columns(log: FlightLog) -> Mapping[str, AxisIndex]:
+    return error_columns(log.axes, controls_base(log), log.prismatic)
 
 
 def _labels(name: str, count: int) -> Sequence[str]:

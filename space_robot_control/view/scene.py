@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,47 +11,72 @@ from numpy.typing import NDArray
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.shapes import shapes_of
 from space_robot_sim.robot.transforms import Transform, joint_transforms, tool_transforms, wxyz
+from space_robot_sim.robot.tree import Visual
 
 if TYPE_CHECKING:
-    from viser import FrameHandle, SceneApi
+    from viser import FrameHandle, SceneApi, SceneNodeHandle
 
 Array = NDArray[np.float64]
+
+AXES = 0.12
+"""Length of a tool's axes by that of all links."""
+
+
+class Look(NamedTuple):
+    """How the shapes of a robot are drawn."""
+
+    tint: str = ""
+    """Colour of all shapes, as ``#E69F00``; empty: their own."""
+    opacity: float = 1.0
+    growth: float = 0.0
+    """m, by which a shape is thicker than it is: so that one drawn over another is not in it."""
 
 
 class RobotScene:
     """A robot below a name of its own, as ``/tde_stc/base/joint1``: frames as tf has them."""
 
-    def __init__(
-        self, scene: SceneApi, root: str, robot: Robot, tint: tuple[int, int, int] | None = None,
-        opacity: float = 1.0,
-    ) -> None:  # fmt: skip
+    def __init__(self, scene: SceneApi, root: str, robot: Robot, look: Look | None = None) -> None:
         """Add the robot; it stands at zero.
 
         Args:
             scene: of a server.
             root: name of the robot in the scene, beginning with a slash.
             robot: its numbers.
-            tint: colour of all shapes; None: their own.
-            opacity: of all shapes.
+            look: of its shapes.
         """
-        self._robot, base = robot, robot.body_names[0]
-        self._path = {base: f"{root}/{base}"}
-        self.base: FrameHandle = scene.add_frame(self._path[base], show_axes=False)
+        self._scene, self._robot, self._look = scene, robot, look or Look()
+        base = robot.body_names[0]
+        self._paths = {base: f"{root}/{_part(base)}"}
+        self.base: FrameHandle = scene.add_frame(self._paths[base], show_axes=False)
         self._frames: dict[str, FrameHandle] = {}
-        for transform in joint_transforms(robot, np.zeros((1, robot.joint_count))):
-            self._frames[transform.child] = self._add(scene, transform)
-        for transform in tool_transforms(robot):
-            self._add(scene, transform, show_axes=True)
+        links = joint_transforms(robot, np.zeros((1, robot.joint_count)))
+        axes = AXES * sum(float(np.linalg.norm(link.position)) for link in links)
+        for link in links:
+            self._frames[link.child] = self._add_frame(link)
+        for tool in tool_transforms(robot):
+            self._add_frame(tool, axes)
         for number, shape in enumerate(shapes_of(robot)):
-            name = f"{self._path[robot.body_names[shape.body]]}/shape_{number}"
-            _add_shape(scene, name, shape, tint, opacity)
+            self.add_shape(f"shape_{number}", shape)
 
-    def _add(self, scene: SceneApi, transform: Transform, show_axes: bool = False) -> FrameHandle:
-        path = self._path[transform.child] = f"{self._path[transform.parent]}/{transform.child}"
-        return scene.add_frame(
-            path, show_axes=show_axes, axes_length=0.3, axes_radius=0.015,
-            position=transform.position[0], wxyz=transform.quaternion[0],
+    def _add_frame(self, link: Transform, axes: float = 0.0) -> FrameHandle:
+        path = f"{self._paths[link.parent]}/{_part(link.child)}"
+        while path in self._paths.values():  # a tool may be called as a body is
+            path += "_"
+        self._paths.setdefault(link.child, path)
+        return self._scene.add_frame(
+            path, show_axes=axes > 0.0, axes_length=axes, axes_radius=0.04 * axes,
+            position=link.position[0], wxyz=link.quaternion[0],
         )  # fmt: skip
+
+    def add_shape(self, name: str, shape: Visual) -> SceneNodeHandle:
+        """Draw a shape on its body.
+
+        Args:
+            name: of the shape among those of the body.
+            shape: what it is.
+        """
+        path = f"{self._paths[self._robot.body_names[shape.body]]}/{name}"
+        return _add_shape(self._scene, path, shape, self._look)
 
     def move(self, position: Array, quaternion: Array, moved: Sequence[Transform], k: int) -> None:
         """Move base and joints.
@@ -63,24 +88,46 @@ class RobotScene:
             k: which of their rows.
         """
         self.base.position, self.base.wxyz = position, quaternion
-        for transform in moved:
-            frame = self._frames[transform.child]
-            if len(transform.quaternion) > 1:
-                frame.wxyz = transform.quaternion[k]
-            if len(transform.position) > 1:
-                frame.position = transform.position[k]
+        for link in moved:
+            frame = self._frames[link.child]
+            if len(link.quaternion) > 1:
+                frame.wxyz = link.quaternion[k]
+            if len(link.position) > 1:
+                frame.position = link.position[k]
 
 
-def _add_shape(scene, name, shape, tint, opacity):  # type: ignore[no-untyped-def]
-    colour = shape.colour or (0.7, 0.7, 0.7, 1.0)
-    rgb = tint or tuple(round(255 * c) for c in colour[:3])
-    common = {
-        "color": rgb, "position": shape.position, "wxyz": wxyz(shape.rotation),
-        "opacity": opacity if opacity < 1.0 else None,
-    }  # fmt: skip
+def _add_shape(scene: SceneApi, path: str, shape: Visual, look: Look) -> SceneNodeHandle:
+    *own, alpha = shape.colour or (0.7, 0.7, 0.7, 1.0)
+    colour = (
+        rgb(look.tint)
+        if look.tint
+        else (round(255 * own[0]), round(255 * own[1]), round(255 * own[2]))
+    )
+    opacity = alpha * look.opacity if alpha * look.opacity < 1.0 else None
+    position, turn, more = shape.position, wxyz(shape.rotation), look.growth
     if shape.shape == "box":
-        scene.add_box(name, dimensions=shape.size, **common)
-    elif shape.shape == "cylinder":
-        scene.add_cylinder(name, radius=shape.size[0], height=shape.size[1], **common)
-    elif shape.shape == "sphere":
-        scene.add_icosphere(name, radius=shape.size[0], **common)
+        x, y, z = (edge + 2.0 * more for edge in shape.size)
+        return scene.add_box(
+            path, colour, (x, y, z), opacity=opacity, position=position, wxyz=turn
+        )  # fmt: skip
+    if shape.shape == "cylinder":
+        radius, length = shape.size[0] + more, shape.size[1] + 2.0 * more
+        return scene.add_cylinder(
+            path, radius, length, colour, opacity=opacity, position=position, wxyz=turn
+        )  # fmt: skip
+    if shape.shape == "sphere":
+        return scene.add_icosphere(
+            path, shape.size[0] + more, colour, opacity=opacity, position=position, wxyz=turn
+        )  # fmt: skip
+    raise NotImplementedError(shape.shape)
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Return red, green and blue, from 0 to 255, of a colour as ``#E69F00``."""
+    red, green, blue = bytes.fromhex(colour.removeprefix("#"))
+    return red, green, blue
+
+
+def _part(name: str) -> str:
+    """Return a name as one part of a path in the scene."""
+    return name.replace("/", "_") or "_"

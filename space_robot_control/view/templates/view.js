@@ -1,77 +1,157 @@
 // Plots beside the scene: they follow its time, and a click on one sends the scene there.
-const { plots, events } = JSON.parse(document.getElementById("data").textContent);
+const { plots, marks, start, dark } = JSON.parse(document.getElementById("data").textContent);
 const frame = document.getElementById("scene");
-let time = 0;
+const ink = getComputedStyle(document.documentElement);
+const colourOf = (name) => ink.getPropertyValue(`--${name}`);
+let time = start;
+
+const slider = () => frame.contentDocument?.querySelector("[role=slider]");
+const stopOf = (mark) => mark.stop ?? Infinity;
 
 function seek(seconds) {
   const input = frame.contentDocument.querySelector("input");
   const set = Object.getOwnPropertyDescriptor(frame.contentWindow.HTMLInputElement.prototype, "value").set;
-  set.call(input, seconds.toFixed(3)); // the player hears of it as of a typed number
+  const end = Number(slider().getAttribute("aria-valuemax"));
+  set.call(input, Math.min(Math.max(seconds - start, 0), end).toFixed(4)); // the player hears of it as of a typed number
   input.dispatchEvent(new frame.contentWindow.Event("input", { bubbles: true }));
 }
 
-function lines(u) {
+function number(value) {
+  if (value == null || value === 0) return value === 0 ? "0" : "";
+  const size = Math.abs(value);
+  return size >= 1e-3 && size < 1e5 ? String(Number(value.toPrecision(3))) : value.toExponential(1);
+}
+
+// Marks behind the curves, the scene's time in front of them.
+function stretch(u, from, to) {
+  const { left, width } = u.bbox;
+  const at = (t) => Math.min(Math.max(Math.round(u.valToPos(t, "x", true)), left), left + width);
+  const seen = to >= u.scales.x.min && from <= u.scales.x.max;
+  return seen ? [at(from), at(Math.min(to, u.scales.x.max))] : null;
+}
+
+function drawMarks(u) {
   const { ctx, bbox } = u;
-  const line = (t, colour, dash) => {
-    const x = Math.round(u.valToPos(t, "x", true));
-    if (x < bbox.left || x > bbox.left + bbox.width) return;
-    ctx.save();
-    ctx.strokeStyle = colour;
-    ctx.setLineDash(dash);
-    ctx.beginPath();
-    ctx.moveTo(x, bbox.top);
-    ctx.lineTo(x, bbox.top + bbox.height);
-    ctx.stroke();
-    ctx.restore();
-  };
-  for (const event of events) line(event.t, "#D55E00", [4, 4]);
-  line(time, "#111", []);
+  ctx.save();
+  for (const mark of marks) {
+    const place = stretch(u, mark.start, stopOf(mark));
+    if (!place) continue;
+    ctx.fillStyle = colourOf(mark.kind);
+    ctx.globalAlpha = 0.13;
+    ctx.fillRect(place[0], bbox.top, place[1] - place[0], bbox.height);
+    ctx.globalAlpha = 0.9;
+    for (let y = 0; y < bbox.height; y += 8) ctx.fillRect(place[0], bbox.top + y, 1, 4);
+  }
+  ctx.restore();
+}
+
+function drawTime(u) {
+  const place = stretch(u, time, time);
+  if (!place) return;
+  u.ctx.fillStyle = colourOf("ink");
+  u.ctx.fillRect(place[0], u.bbox.top, devicePixelRatio, u.bbox.height);
 }
 
 const sync = uPlot.sync("flight");
+const place = document.getElementById("plots");
+const axis = { stroke: colourOf("faint"), grid: { stroke: colourOf("line"), width: 1 }, ticks: { stroke: colourOf("line") } };
+let zooming = false;
 const drawn = plots.map((plot) => {
   const heading = document.createElement("h2");
   heading.textContent = plot.unit ? `${plot.title} (${plot.unit})` : plot.title;
-  const place = document.getElementById("plots");
   place.append(heading);
+  const zoomed = (u, scale) => {
+    if (scale !== "x" || zooming) return;
+    zooming = true; // all plots show the same stretch
+    for (const other of drawn ?? []) if (other !== u) other.setScale("x", { min: u.scales.x.min, max: u.scales.x.max });
+    zooming = false;
+  };
   const u = new uPlot(
     {
-      width: 430, height: 165, scales: { x: { time: false } },
+      width: place.clientWidth, height: 150,
+      scales: { x: { time: false }, y: { distr: plot.logarithmic ? 3 : 1 } },
       cursor: { sync: { key: sync.key } },
-      axes: [{ size: 26 }, { size: 62, values: (_, v) => v.map((x) => x.toPrecision(2)) }],
-      series: [{ label: "s" }, ...plot.series.map((s) => ({
-        label: s.label, stroke: s.colour, width: 1, dash: s.dash,
-        value: (_, v) => (v == null ? "" : v.toPrecision(3)),
-      }))],
-      hooks: { draw: [lines] },
+      axes: [
+        { ...axis, size: 24, values: (_, v) => v.map((x) => `${x}`) },
+        { ...axis, size: 58, values: (_, v) => v.map(number) },
+      ],
+      series: [
+        { label: "s", value: (_, v) => number(v) },
+        ...plot.series.map((s) => ({ label: s.label, stroke: s.colour, width: 1, value: (_, v) => number(v) })),
+      ],
+      hooks: { drawAxes: [drawMarks], draw: [drawTime], setScale: [zoomed] },
     },
     [plot.time, ...plot.series.map((s) => s.values)],
     place,
   );
-  u.over.addEventListener("click", () => seek(u.posToVal(u.cursor.left, "x")));
+  let pressed = 0;
+  u.over.addEventListener("mousedown", (event) => (pressed = event.clientX));
+  u.over.addEventListener("click", (event) => {
+    if (Math.abs(event.clientX - pressed) < 3) seek(u.posToVal(u.cursor.left, "x"));
+  });
   return u;
 });
+new ResizeObserver(() => drawn.forEach((u) => u.setSize({ width: place.clientWidth, height: 150 }))).observe(place);
 
-document.getElementById("events").replaceChildren(
-  ...events.map((event) => {
-    const link = document.createElement("a");
-    link.href = "#";
-    link.textContent = `${event.t.toFixed(2)} s ${event.text}  `;
-    link.onclick = () => (seek(event.t), false);
-    return link;
-  }),
-);
+function buttonOf(mark) {
+  const button = document.createElement("button");
+  const until = mark.stop === mark.start ? "" : mark.stop === null ? " on" : ` to ${mark.stop}`;
+  const dot = document.createElement("span");
+  dot.className = mark.kind;
+  dot.textContent = "\u25b2 ";
+  button.append(dot, `${mark.start}${until} s: ${mark.text}`);
+  button.addEventListener("click", () => seek(mark.start));
+  return button;
+}
+document.getElementById("marks").replaceChildren(...marks.map(buttonOf));
+
+// What goes on now, over the scene; what takes no time is told for a second.
+function tell() {
+  const words = document.createElement("b");
+  words.textContent = `${time.toFixed(2)} s`;
+  const going = marks.filter((m) => m.start <= time && time < Math.max(stopOf(m), m.start + 1));
+  const lines = going.map((mark) => {
+    const line = document.createElement("div");
+    line.className = mark.kind;
+    line.textContent = mark.text;
+    return line;
+  });
+  document.getElementById("now").replaceChildren(words, ...lines);
+}
+
+// A tick on the player's own time line for each mark.
+function markTimeline(thumb) {
+  const end = Number(thumb.getAttribute("aria-valuemax"));
+  for (const mark of marks) {
+    const tick = frame.contentDocument.createElement("div");
+    tick.className = "flight-mark";
+    tick.title = mark.text;
+    const from = Math.max(mark.start - start, 0) / end;
+    const to = Math.min(stopOf(mark) - start, end) / end;
+    tick.style.cssText =
+      `position:absolute;top:-5px;height:4px;min-width:3px;pointer-events:none;left:${100 * from}%;` +
+      `width:${100 * (to - from)}%;background:${colourOf(mark.kind)}`;
+    thumb.parentElement.append(tick);
+  }
+}
 
 // The scene's slider tells its time to screen readers, and so to us.
 function follow() {
-  const slider = frame.contentDocument?.querySelector("[role=slider]");
-  if (!slider) return setTimeout(follow, 100);
+  const thumb = slider();
+  if (!thumb) return setTimeout(follow, 100);
+  markTimeline(thumb);
   const moved = () => {
-    time = Number(slider.getAttribute("aria-valuenow"));
+    time = start + Number(thumb.getAttribute("aria-valuenow"));
+    tell();
     drawn.forEach((u) => u.redraw(false));
   };
-  new MutationObserver(moved).observe(slider, { attributes: true, attributeFilter: ["aria-valuenow"] });
+  new MutationObserver(moved).observe(thumb, { attributes: true, attributeFilter: ["aria-valuenow"] });
   moved();
 }
 follow();
+addEventListener("keydown", (event) => {
+  if (event.code !== "Space") return;
+  event.preventDefault();
+  frame.contentWindow.dispatchEvent(new frame.contentWindow.KeyboardEvent("keydown", { code: "Space" }));
+});
 window.spaceRobot = { seek, time: () => time };

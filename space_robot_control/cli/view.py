@@ -1,0 +1,80 @@
+"""``space-robot view``: flights in 3-D with plots that follow, as one page."""
+
+from __future__ import annotations
+
+import webbrowser
+from pathlib import Path
+
+import click
+
+from .options import NAMESPACE, REMAP, TRUST, file_option
+
+
+@click.command()
+@click.argument("bags", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="BAG...")
+@file_option(
+    "--out", help="Page to write; an older one is replaced [default: <BAG>_view.html, here]."
+)
+@click.option("--open/--no-open", "opens", default=True, help="Open the page in a browser.")
+@click.option(
+    "--side-by-side", is_flag=True,
+    help="A place for each robot [default: of one and the same robot all flights in one place].",
+)  # fmt: skip
+@click.option(
+    "--rate", type=click.FloatRange(0.0, 1e3, min_open=True), default=30.0, metavar="HZ",
+    help="Poses a second of flight [default: 30]; fewer where the page grew beyond 3 MB.",
+)  # fmt: skip
+@click.option("--from", "from_s", type=float, metavar="T", help="Begin at T simulated seconds.")
+@click.option("--to", "to_s", type=float, metavar="T", help="End before T simulated seconds.")
+@click.option(
+    "--robot", default="", metavar="NAME-or-FILE",
+    help="The robot that flew, where the bag does not tell; of a URDF its shapes, too.",
+)  # fmt: skip
+@click.option("--title", default="", help="Of the page [default: the bags' names].")
+@click.option("--light", is_flag=True, help="Dark on white, to print.")
+@REMAP
+@NAMESPACE
+@TRUST
+def view(
+    bags: tuple[Path, ...], out: Path | None, opens: bool, side_by_side: bool, rate: float,
+    from_s: float | None, to_s: float | None, robot: str, title: str, light: bool,
+    remap: dict[str, str], namespace: str | None, trust: bool,
+) -> None:  # fmt: skip
+    """Show recorded flights: the robot in 3-D, with plots that follow it, on one HTML page.
+
+    The page needs nothing but a browser, no network: send it to a colleague. Play, scrub, click a
+    plot or a mark to go there. Several bags are drawn over one another, or side by side.
+
+    \b
+    Examples:
+      space-robot view flights/one
+      space-robot view flights/tde_stc flights/ctc --out laws.html
+      space-robot view flights/one flights/two --side-by-side --no-open
+      space-robot view flights/mine --robot my.urdf --from 10 --to 12 --rate 200
+    """
+    from space_robot_msgs_py.bag.reader import read_flight
+
+    from ..analysis import excerpt
+    from ..analysis.files import check_writable, whole_file
+    from ..flight.progress import counting_progress
+    from ..view.flights import Options, flights_page, missing_shapes
+    from .analyze import bag_names
+
+    names = bag_names(bags)
+    page = out or Path(f"{'_'.join(names)}_view.html")
+    check_writable(page)
+    logs = {
+        name: excerpt(read_flight(bag, remap, trust, namespace), from_s, to_s)
+        for name, bag in zip(names, bags, strict=True)
+    }
+    if file := not robot and next(filter(None, map(missing_shapes, logs.values())), ""):
+        click.echo(
+            f"no bag has a robot's shapes: --robot {file} draws those of that file", err=True
+        )
+    with counting_progress("drawing") as advance:
+        text = flights_page(logs, Options(side_by_side, rate, robot, title, not light), advance)
+    with whole_file(page, replace=True) as file:
+        file.write(text.encode())
+    click.echo(f"wrote {page} ({page.stat().st_size / 1e6:.1f} MB)", err=True)
+    if opens and not webbrowser.open(page.absolute().as_uri()):
+        click.echo("no browser was found here: open the page in one", err=True)

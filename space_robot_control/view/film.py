@@ -1,0 +1,132 @@
+"""Flights in one scene, moved from frame to frame, as the page that viser makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_sim.robot import Robot
+
+from .frames import Frames
+from .scene import Look, RobotScene, rgb
+from .stage import extent, set_stage, silent_server
+
+if TYPE_CHECKING:
+    from viser import SceneApi
+
+Array = NDArray[np.float64]
+
+POSES = 12
+"""Of a flight that the first camera must see."""
+GAP = 0.15
+"""Between robots side by side, by their width."""
+GHOST = 0.4
+"""Opacity of robots that are drawn over another one."""
+PIECES = 60
+"""Of a tool's trail, which appear one after the other."""
+
+
+class Flown(NamedTuple):
+    """A flight to be shown."""
+
+    name: str
+    log: FlightLog
+    robot: Robot
+    law: str
+    colour: str
+    """That tells it from the others, as ``#E69F00``."""
+
+
+def film(
+    flights: Sequence[Flown], times: Array, side_by_side: bool, dark: bool,
+    advance: Callable[[int], Callable[[], None]],
+) -> str:  # fmt: skip
+    """Return the page of a scene with the flights, from the first time on.
+
+    Args:
+        flights: to be shown.
+        times: (K,) s, of the frames.
+        side_by_side: whether each robot has a place of its own; else they are drawn over another.
+        dark: whether the page is.
+        advance: told how many frames there will be, then called after each.
+
+    Raises:
+        InputError: viser is not installed, or a flight has no state.
+    """
+    frames = [Frames.of(flight.log, flight.robot, times) for flight in flights]
+    seen = [_seen(flight.robot, of) for flight, of in zip(flights, frames, strict=True)]
+    places = _places(seen) if side_by_side else [np.zeros(3)] * len(flights)
+    with silent_server() as server:
+        scene = server.scene
+        set_stage(server, np.concatenate([s + p for s, p in zip(seen, places, strict=True)]), dark)
+        moves: list[Callable[[int], None]] = []
+        for index, (flight, of, place) in enumerate(zip(flights, frames, places, strict=True)):
+            root = f"/{flight.name.replace('/', '_')}"
+            scene.add_frame(root, show_axes=False, position=place)
+            over = index > 0 and not side_by_side
+            size = float(np.ptp(seen[index], axis=0).max())
+            look = Look(flight.colour, GHOST, 0.004 * size * index) if over else Look()
+            robot = RobotScene(scene, root, flight.robot, look)
+            moves.append(lambda k, robot=robot, of=of: robot.move(*of.move_to(k)))
+            moves += _trails(scene, root, of, rgb(flight.colour), 0.0035 * size)
+        recorder, done = server.get_scene_serializer(), advance(len(times))
+        for k, time in enumerate(times):
+            if k:
+                recorder.insert_sleep(float(time - times[k - 1]))
+            for move in moves:
+                move(k)
+            done()
+        return str(recorder.as_html(dark_mode=dark))
+
+
+def _seen(robot: Robot, frames: Frames) -> Array:
+    rows = np.linspace(0, len(frames.time) - 1, POSES).round().astype(int)
+    return extent(
+        robot,
+        frames.base_position[rows],
+        frames.base_quaternion[rows],
+        frames.joint_positions[rows],
+    )
+
+
+def _places(seen: Sequence[Array]) -> list[Array]:
+    """Return where robots stand side by side along x, the first one where it flew."""
+    found, end = [np.zeros(3)], float(seen[0][:, 0].max())
+    for before, points in zip(seen, seen[1:], strict=False):
+        width = max(float(np.ptp(points[:, 0])), float(np.ptp(before[:, 0])))
+        x = end + GAP * width - float(points[:, 0].min())
+        found.append(np.array([x, 0.0, 0.0]))
+        end = x + float(points[:, 0].max())
+    return found
+
+
+def _trails(
+    scene: SceneApi, root: str, frames: Frames, colour: tuple[int, int, int], width: float
+) -> list[Callable[[int], None]]:
+    """Draw the tools' ways, piece by piece as they are flown, and the one that was desired."""
+    edges = np.unique(np.linspace(0, len(frames.time) - 1, PIECES + 1).round().astype(int))
+    shown: list[Callable[[int], None]] = []
+    for tool, places in frames.tools.items():
+        for piece, (start, stop) in enumerate(zip(edges, edges[1:], strict=False)):
+            way = places[start : stop + 1]
+            handle = scene.add_line_segments(
+                f"{root}/trail of {tool}/{piece}", np.stack([way[:-1], way[1:]], 1), colour,
+                thickness=width, visible=False,
+            )  # fmt: skip
+
+            def show(k: int, at: int = int(stop), handle: object = handle) -> None:
+                if k == at:
+                    handle.visible = True  # type: ignore[attr-defined]
+
+            shown.append(show)
+    if frames.desired is not None:
+        way = frames.desired
+        scene.add_line_segments(
+            f"{root}/desired", np.stack([way[:-1], way[1:]], 1), (128, 128, 128),
+            thickness=0.3 * width,
+        )  # fmt: skip
+    return shown

@@ -1,0 +1,98 @@
+"""The page of some flights: which robot each was flown with, then scene, plots and marks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.law_history import as_data, in_words, laws_of
+from space_robot_sim.robot import Robot
+from space_robot_sim.robot.find import find_robot, robot_as_path
+
+from ..analysis.described import check_joints, robot_of
+from .film import Flown, film
+from .frames import RATE_HZ, shown_times
+from .marks import shared_marks
+from .page import Shown, render
+from .plots import plots_of
+
+ON_DARK = ("#56B4E9", "#E98FC0", "#2CC295", "#E69F00", "#F0E442", "#FF7F41")
+ON_WHITE = ("#0072B2", "#CC79A7", "#009E73", "#E69F00", "#8A7F00", "#D55E00")
+"""Okabe's and Ito's colours, brighter or darker where the page asks for it."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What may be asked of a page."""
+
+    side_by_side: bool = False
+    """A place for each robot, even if all are the same."""
+    rate: float = RATE_HZ
+    """Poses a second of flight."""
+    robot: str = ""
+    """The robot that flew, by name or file; empty: what the bag tells."""
+    title: str = ""
+    """Empty: the flights' names."""
+    dark: bool = True
+    """Light on dark."""
+
+
+def flights_page(
+    logs: Mapping[str, FlightLog], options: Options, advance: Callable[[int], Callable[[], None]]
+) -> str:
+    """Return the page of some flights, complete in itself.
+
+    Args:
+        logs: by name, at least one.
+        options: what is asked of it.
+        advance: told how many frames there will be, then called after each.
+
+    Raises:
+        InputError: a robot is not known or not that of the bag, viser is not installed, or a
+            flight has no state.
+    """
+    colours = ON_DARK if options.dark else ON_WHITE
+    flights = [
+        Flown(name, log, shown_robot(log, options.robot), _law(log), colours[k % len(colours)])
+        for k, (name, log) in enumerate(logs.items())
+    ]
+    of_one = len({(flight.robot.name, flight.robot.body_names) for flight in flights}) == 1
+    times = shown_times(list(logs.values()), options.rate)
+    scene = film(flights, times, options.side_by_side or not of_one, options.dark, advance)
+    return render(
+        options.title or ", ".join(logs), scene,
+        [Shown(flight.name, flight.colour, _told(flight)) for flight in flights],
+        plots_of(logs, colours), shared_marks(logs), float(times[0]), options.dark,
+    )  # fmt: skip
+
+
+def shown_robot(log: FlightLog, given: str = "") -> Robot:
+    """Return the robot of a flight: the one given, or the one that the bag tells.
+
+    Raises:
+        InputError: it is not there, not told, or has other joints than the bag.
+    """
+    if not given:
+        return robot_of(log)
+    robot = find_robot(robot_as_path(given))
+    check_joints(robot, log)
+    return robot
+
+
+def missing_shapes(log: FlightLog) -> str:
+    """Return the file with the shapes of a flight's robot, which no bag has; empty: none is known."""
+    parameters = log.flight.get("parameters")
+    plant = parameters.get("plant") if isinstance(parameters, dict) else None
+    name = str(plant.get("robot", "")) if isinstance(plant, dict) else ""
+    return name if ".urdf" in name or ".xacro" in name else ""
+
+
+def _law(log: FlightLog) -> str:
+    return in_words(as_data(laws_of(log), log.timebase)) or str(log.flight.get("controller", ""))
+
+
+def _told(flight: Flown) -> str:
+    case = flight.log.flight.get("case")
+    words = [flight.law, flight.robot.name, f"case {case}" if case else ""]
+    return ", ".join(filter(None, words))

@@ -1,0 +1,113 @@
+"""What stands about the robots in a scene: the floor's grid, the light, the first camera."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.errors import InputError
+from space_robot_sim.robot import Robot
+from space_robot_sim.robot.base_axes import base_axes
+from space_robot_sim.robot.frames import body_frames
+from space_robot_sim.robot.shapes import shapes_of
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+Array = NDArray[np.float64]
+
+FIELD_OF_VIEW = np.radians(35.0)
+DIRECTION = np.array([0.62, -1.0, 0.42])
+"""From what is looked at to the first camera; robots stand side by side along x."""
+CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+
+
+@contextmanager
+def silent_server() -> Iterator[ViserServer]:
+    """Start a server of viser for this process alone, without a word on standard output.
+
+    Raises:
+        InputError: viser is not installed; says how to install it.
+    """
+    try:
+        from viser import ViserServer
+    except ImportError:
+        raise InputError("view needs viser: pip install 'space_robot[view]'") from None
+    from rich import get_console
+
+    console = get_console()
+    was_quiet, console.quiet = console.quiet, True
+    try:
+        server = ViserServer(host="127.0.0.1", port=0, verbose=False)
+        try:
+            yield server
+        finally:
+            server.stop()
+    finally:
+        console.quiet = was_quiet
+
+
+def set_stage(server: ViserServer, points: Array, dark: bool) -> None:
+    """Put grid, light and camera about some points.
+
+    Args:
+        server: whose scene is set.
+        points: (K, 3) m, what must be seen, inertial frame.
+        dark: whether the page is.
+    """
+    scene, camera = server.scene, server.initial_camera
+    scene.set_up_direction("+z")
+    scene.world_axes.visible = False
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, size = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 0.1)
+    cell = 10.0 ** np.floor(np.log10(0.5 * size))
+    shades = ((42, 46, 56), (64, 70, 84)) if dark else ((226, 228, 232), (196, 200, 208))
+    scene.add_grid(
+        "/grid", infinite_grid=True, cell_size=cell, section_size=5.0 * cell,
+        cell_color=shades[0], section_color=shades[1], fade_distance=4.0 * size, fade_from="origin",
+        position=(middle[0], middle[1], low[2] - 0.08 * size), shadow_opacity=0.2,
+    )  # fmt: skip
+    camera.fov, camera.near, camera.far = float(FIELD_OF_VIEW), 0.01 * size, 100.0 * size
+    back = DIRECTION / np.linalg.norm(DIRECTION)
+    camera.look_at = middle
+    camera.position = middle + _distance(points - middle, back) * back
+
+
+def _distance(points: Array, back: Array) -> float:
+    """Return how far from the origin a camera sees all points, in a picture higher than wide."""
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    up = np.cross(back, right)
+    slope = np.tan(0.5 * FIELD_OF_VIEW)
+    aside = np.maximum(np.abs(points @ right) / 1.1, np.abs(points @ up))
+    return 1.12 * float(np.max(points @ back + aside / slope))
+
+
+def extent(robot: Robot, position: Array, quaternion: Array, joint_positions: Array) -> Array:
+    """Return where a robot's shapes reach to, (K, 3) m, inertial frame.
+
+    Args:
+        robot: its numbers and visuals; of a mesh, which may have any size, the place alone counts.
+        position: (T, 3) m of the base.
+        quaternion: (T, 4) of the base.
+        joint_positions: (T, N) of all joints.
+    """
+    axes = base_axes(quaternion.T)
+    frames = {f.body: f for f in body_frames(robot, tuple(axes), joint_positions.T)}
+    found = []
+    for shape in shapes_of(robot):
+        half = {
+            "box": lambda size: 0.5 * np.array(size),
+            "cylinder": lambda size: np.array([size[0], size[0], 0.5 * size[1]]),
+            "sphere": lambda size: np.full(3, size[0]),
+            "mesh": lambda size: np.zeros(3),
+        }[shape.shape](shape.size)
+        frame = frames[shape.body]
+        for corner in CORNERS * half:
+            place = frame.on_outer_axes(shape.position + shape.rotation @ corner)
+            found.append(position + (frame.origin + place).T)
+    return np.concatenate(found)
