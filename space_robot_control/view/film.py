@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,8 @@ from space_robot_sim.robot import Robot
 from .frames import Frames
 from .scene import Look, RobotScene, rgb
 from .stage import extent, set_stage, silent_server
-
-if TYPE_CHECKING:
-    from viser import SceneApi
+from .targets import held_targets
+from .trails import Move, trails
 
 Array = NDArray[np.float64]
 
@@ -26,8 +26,6 @@ GAP = 0.15
 """Between robots side by side, by their width."""
 GHOST = 0.4
 """Opacity of robots that are drawn over another one."""
-PIECES = 60
-"""Of a tool's trail, which appear one after the other."""
 
 
 class Flown(NamedTuple):
@@ -63,7 +61,7 @@ def film(
     with silent_server() as server:
         scene = server.scene
         set_stage(server, np.concatenate([s + p for s, p in zip(seen, places, strict=True)]), dark)
-        moves: list[Callable[[int], None]] = []
+        moves: list[Move] = []
         for index, (flight, of, place) in enumerate(zip(flights, frames, places, strict=True)):
             root = f"/{flight.name.replace('/', '_')}"
             scene.add_frame(root, show_axes=False, position=place)
@@ -71,8 +69,9 @@ def film(
             size = float(np.ptp(seen[index], axis=0).max())
             look = Look(flight.colour, GHOST, 0.004 * size * index) if over else Look()
             robot = RobotScene(scene, root, flight.robot, look)
-            moves.append(lambda k, robot=robot, of=of: robot.move(*of.move_to(k)))
-            moves += _trails(scene, root, of, rgb(flight.colour), 0.0035 * size)
+            moves.append(_moving(robot, of))
+            moves += trails(scene, root, of, rgb(flight.colour), 0.0035 * size)
+            moves += held_targets(robot, flight.log, flight.robot, times)
         recorder, done = server.get_scene_serializer(), advance(len(times))
         for k, time in enumerate(times):
             if k:
@@ -81,6 +80,10 @@ def film(
                 move(k)
             done()
         return str(recorder.as_html(dark_mode=dark))
+
+
+def _moving(robot: RobotScene, frames: Frames) -> Move:
+    return lambda k: robot.move(*frames.move_to(k))
 
 
 def _seen(robot: Robot, frames: Frames) -> Array:
@@ -96,37 +99,9 @@ def _seen(robot: Robot, frames: Frames) -> Array:
 def _places(seen: Sequence[Array]) -> list[Array]:
     """Return where robots stand side by side along x, the first one where it flew."""
     found, end = [np.zeros(3)], float(seen[0][:, 0].max())
-    for before, points in zip(seen, seen[1:], strict=False):
+    for before, points in pairwise(seen):
         width = max(float(np.ptp(points[:, 0])), float(np.ptp(before[:, 0])))
         x = end + GAP * width - float(points[:, 0].min())
         found.append(np.array([x, 0.0, 0.0]))
         end = x + float(points[:, 0].max())
     return found
-
-
-def _trails(
-    scene: SceneApi, root: str, frames: Frames, colour: tuple[int, int, int], width: float
-) -> list[Callable[[int], None]]:
-    """Draw the tools' ways, piece by piece as they are flown, and the one that was desired."""
-    edges = np.unique(np.linspace(0, len(frames.time) - 1, PIECES + 1).round().astype(int))
-    shown: list[Callable[[int], None]] = []
-    for tool, places in frames.tools.items():
-        for piece, (start, stop) in enumerate(zip(edges, edges[1:], strict=False)):
-            way = places[start : stop + 1]
-            handle = scene.add_line_segments(
-                f"{root}/trail of {tool}/{piece}", np.stack([way[:-1], way[1:]], 1), colour,
-                thickness=width, visible=False,
-            )  # fmt: skip
-
-            def show(k: int, at: int = int(stop), handle: object = handle) -> None:
-                if k == at:
-                    handle.visible = True  # type: ignore[attr-defined]
-
-            shown.append(show)
-    if frames.desired is not None:
-        way = frames.desired
-        scene.add_line_segments(
-            f"{root}/desired", np.stack([way[:-1], way[1:]], 1), (128, 128, 128),
-            thickness=0.3 * width,
-        )  # fmt: skip
-    return shown

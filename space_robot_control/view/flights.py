@@ -81,7 +81,7 @@ def shown_robot(log: FlightLog, given: str = "") -> Robot:
 
 
 def missing_shapes(log: FlightLog) -> str:
-    """Return the file with the shapes of a flight's robot, which no bag has; empty: none is known."""
+    """Return the URDF of a flight's robot, whose shapes no bag has; empty: it had none."""
     parameters = log.flight.get("parameters")
     plant = parameters.get("plant") if isinstance(parameters, dict) else None
     name = str(plant.get("robot", "")) if isinstance(plant, dict) else ""

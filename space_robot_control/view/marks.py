@@ -9,7 +9,7 @@ from typing import NamedTuple
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import LawChange, laws_of
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.environment.events import Event
+from space_robot_sim.environment.events import Capture, Event
 from space_robot_sim.faults.grammar import Fault, parse_fault
 
 from ..analysis.described import events_of
@@ -34,10 +34,7 @@ def marks_of(log: FlightLog) -> list[Mark]:
     start = log.first_tick * period
     end = start + log.ticks * period
     found = [_of_event(event) for event in _events(log)]
-    found += [
-        Mark(fault.start_s, fault.stop_s if fault.kind.lasts else fault.start_s, _words(fault), "fault")
-        for fault in _faults(log)
-    ]  # fmt: skip
+    found += [_of_fault(fault) for fault in _faults(log)]
     found += [
         Mark(law.tick * period, law.tick * period, str(LawChange(before, law)), "law")
         for before, law in pairwise(laws_of(log))
@@ -59,9 +56,8 @@ def shared_marks(flights: Mapping[str, FlightLog]) -> list[Mark]:
 
 
 def _of_event(event: Event) -> Mark:
-    words = event.label.replace("@", " ").split(":", 1)
-    target = f" {words[1]}" if len(words) > 1 else ""
-    return Mark(event.time_s, event.time_s, words[0].split(" ")[0] + target, "event")
+    text = f"capture {event.target.name}" if isinstance(event, Capture) else "release"
+    return Mark(event.time_s, event.time_s, text, "event")
 
 
 def _events(log: FlightLog) -> list[Event]:
@@ -81,5 +77,6 @@ def _faults(log: FlightLog) -> list[Fault]:
     return found
 
 
-def _words(fault: Fault) -> str:
-    return f"{fault.kind.name} {fault.argument}".strip()
+def _of_fault(fault: Fault) -> Mark:
+    stop = fault.stop_s if fault.kind.lasts else fault.start_s
+    return Mark(fault.start_s, stop, f"{fault.kind.name} {fault.argument}".strip(), "fault")

@@ -14,6 +14,7 @@ from space_robot_sim.robot import Robot
 from space_robot_sim.robot.base_axes import base_axes
 from space_robot_sim.robot.frames import body_frames
 from space_robot_sim.robot.shapes import shapes_of
+from space_robot_sim.robot.tree import Visual
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -100,14 +101,17 @@ def extent(robot: Robot, position: Array, quaternion: Array, joint_positions: Ar
     frames = {f.body: f for f in body_frames(robot, tuple(axes), joint_positions.T)}
     found = []
     for shape in shapes_of(robot):
-        half = {
-            "box": lambda size: 0.5 * np.array(size),
-            "cylinder": lambda size: np.array([size[0], size[0], 0.5 * size[1]]),
-            "sphere": lambda size: np.full(3, size[0]),
-            "mesh": lambda size: np.zeros(3),
-        }[shape.shape](shape.size)
         frame = frames[shape.body]
-        for corner in CORNERS * half:
+        for corner in CORNERS * _half_size(shape):
             place = frame.on_outer_axes(shape.position + shape.rotation @ corner)
             found.append(position + (frame.origin + place).T)
     return np.concatenate(found)
+
+
+def _half_size(shape: Visual) -> Array:
+    size = shape.size
+    if shape.shape == "box":
+        return 0.5 * np.array(size)
+    if shape.shape == "cylinder":
+        return np.array([size[0], size[0], 0.5 * size[1]])
+    return np.full(3, size[0]) if shape.shape == "sphere" else np.zeros(3)

@@ -42,7 +42,10 @@ def _drawn(robot: Robot) -> Iterator[Visual]:
         is_base, is_panel = body == 0, body > robot.n
         start = np.zeros(3)
         if is_base or is_panel:
-            box = even_box(robot, body, BASE_COLOUR if is_base else PANEL_COLOUR)
+            box = even_box(
+                float(robot.mass[body]), robot.inertia[body], robot.com[body], body,
+                BASE_COLOUR if is_base else PANEL_COLOUR,
+            )  # fmt: skip
             yield box
         else:
             hub = (1.5 * radius, 3.2 * radius)
@@ -54,16 +57,23 @@ def _drawn(robot: Robot) -> Iterator[Visual]:
             yield from _tube(start, end, radius, body)
 
 
-def even_box(robot: Robot, body: int, colour: Colour) -> Visual:
-    """Return the box of even density that has a body's mass, centre and inertia."""
-    inertia = robot.inertia[body]
+def even_box(mass: float, inertia: Array, com: Array, body: int, colour: Colour) -> Visual:
+    """Return the box of even density that has this mass, centre and inertia.
+
+    Args:
+        mass: kg.
+        inertia: (3, 3) kg m2 about the centre of mass, on the axes of a body.
+        com: (3,) m, centre of mass, on these axes.
+        body: number of that body.
+        colour: of the box.
+    """
     second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     moments, axes = np.linalg.eigh(second)
-    edges = np.sqrt(12.0 * np.maximum(moments, 0.0) / robot.mass[body])
+    edges = np.sqrt(12.0 * np.maximum(moments, 0.0) / mass)
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] *= -1.0
     size = tuple(np.maximum(edges, THINNEST).tolist())
-    return Visual("box", size, axes, robot.com[body], colour=colour, body=body)
+    return Visual("box", size, axes, com, colour=colour, body=body)
 
 
 def _ends(robot: Robot) -> list[list[Array]]:

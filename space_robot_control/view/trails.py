@@ -1,0 +1,68 @@
+"""The ways of the tools through a scene: they grow as they are flown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .frames import Frames
+
+if TYPE_CHECKING:
+    from viser import LineSegmentsHandle, SceneApi
+
+Array = NDArray[np.float64]
+Move = Callable[[int], None]
+"""Brings a part of a scene to the k-th frame; called for each k in turn."""
+
+PIECES = 60
+"""Of a trail, which appear one after the other."""
+DESIRED = (128, 128, 128)
+"""Colour of the desired way."""
+
+
+def trails(
+    scene: SceneApi, root: str, frames: Frames, colour: tuple[int, int, int], width: float
+) -> list[Move]:
+    """Draw the ways of a robot's tools, and thinner the one that was desired of the first.
+
+    Args:
+        scene: of a server.
+        root: name of the robot in the scene.
+        frames: of its flight.
+        colour: of the flown ways.
+        width: of them, m.
+    """
+    edges = np.unique(np.linspace(0, len(frames.time) - 1, PIECES + 1).round().astype(int))
+    found: list[Move] = []
+    for tool, places in frames.tools.items():
+        pieces = {
+            int(stop): _line(
+                scene, f"{root}/trail_{tool.replace('/', '_')}/{start}", places[start : stop + 1],
+                colour, width, False,
+            )
+            for start, stop in pairwise(edges)
+        }  # fmt: skip
+        found.append(_appearing(pieces))
+    if frames.desired is not None:
+        _line(scene, f"{root}/desired", frames.desired, DESIRED, 0.3 * width, True)
+    return found
+
+
+def _line(
+    scene: SceneApi, path: str, places: Array, colour: tuple[int, int, int], width: float,
+    visible: bool,
+) -> LineSegmentsHandle:  # fmt: skip
+    points = np.stack([places[:-1], places[1:]], axis=1)
+    return scene.add_line_segments(path, points, colour, thickness=width, visible=visible)
+
+
+def _appearing(pieces: dict[int, LineSegmentsHandle]) -> Move:
+    def appear(k: int) -> None:
+        if k in pieces:
+            pieces[k].visible = True
+
+    return appear
