@@ -57,9 +57,11 @@ def view(
     from ..analysis import excerpt
     from ..analysis.files import check_writable, whole_file
     from ..flight.progress import counting_progress
-    from ..view.flights import Options, flights_page, missing_shapes
+    from ..view.flights import Options, flights_page, remarks_on, shown_robot
+    from ..view.stage import check_viser
     from .analyze import bag_names
 
+    check_viser()
     names = bag_names(bags)
     page = out or Path(f"{'_'.join(names)}_view.html")
     check_writable(page)
@@ -67,14 +69,14 @@ def view(
         name: excerpt(read_flight(bag, remap, trust, namespace), from_s, to_s)
         for name, bag in zip(names, bags, strict=True)
     }
-    if file := not robot and next(filter(None, map(missing_shapes, logs.values())), ""):
-        click.echo(
-            f"no bag has a robot's shapes: --robot {file} draws those of that file", err=True
-        )
+    robots = {name: shown_robot(log, robot) for name, log in logs.items()}
+    for line in remarks_on(logs, robots):
+        click.echo(line, err=True)
+    options = Options(side_by_side, rate, title, not light)
     with counting_progress("drawing") as advance:
-        text = flights_page(logs, Options(side_by_side, rate, robot, title, not light), advance)
-    with whole_file(page, replace=True) as file:
-        file.write(text.encode())
+        text = flights_page(logs, robots, options, advance)
+    with whole_file(page, replace=True) as written:
+        written.write(text.encode())
     click.echo(f"wrote {page} ({page.stat().st_size / 1e6:.1f} MB)", err=True)
     if opens and not webbrowser.open(page.absolute().as_uri()):
         click.echo("no browser was found here: open the page in one", err=True)

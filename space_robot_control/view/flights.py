@@ -8,12 +8,15 @@ from dataclasses import dataclass
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, in_words, laws_of
 from space_robot_sim.robot import Robot
+from space_robot_sim.robot.choice import split_choice
 from space_robot_sim.robot.find import find_robot, robot_as_path
+from space_robot_sim.robot.source import URDF
 
 from ..analysis.described import check_joints, robot_of
 from .film import Flown, film
 from .frames import RATE_HZ, shown_times
 from .marks import shared_marks
+from .meshes import shown_shapes
 from .page import Shown, render
 from .plots import plots_of
 
@@ -30,8 +33,6 @@ class Options:
     """A place for each robot, even if all are the same."""
     rate: float = RATE_HZ
     """Poses a second of flight."""
-    robot: str = ""
-    """The robot that flew, by name or file; empty: what the bag tells."""
     title: str = ""
     """Empty: the flights' names."""
     dark: bool = True
@@ -39,22 +40,23 @@ class Options:
 
 
 def flights_page(
-    logs: Mapping[str, FlightLog], options: Options, advance: Callable[[int], Callable[[], None]]
-) -> str:
+    logs: Mapping[str, FlightLog], robots: Mapping[str, Robot], options: Options,
+    advance: Callable[[int], Callable[[], None]],
+) -> str:  # fmt: skip
     """Return the page of some flights, complete in itself.
 
     Args:
         logs: by name, at least one.
+        robots: that flew, by the same names.
         options: what is asked of it.
         advance: told how many frames there will be, then called after each.
 
     Raises:
-        InputError: a robot is not known or not that of the bag, viser is not installed, or a
-            flight has no state.
+        InputError: viser is not installed, or a flight has no state.
     """
     colours = ON_DARK if options.dark else ON_WHITE
     flights = [
-        Flown(name, log, shown_robot(log, options.robot), _law(log), colours[k % len(colours)])
+        Flown(name, log, robots[name], _law(log), colours[k % len(colours)])
         for k, (name, log) in enumerate(logs.items())
     ]
     of_one = len({(flight.robot.name, flight.robot.body_names) for flight in flights}) == 1
@@ -80,12 +82,21 @@ def shown_robot(log: FlightLog, given: str = "") -> Robot:
     return robot
 
 
-def missing_shapes(log: FlightLog) -> str:
-    """Return the URDF of a flight's robot, whose shapes no bag has; empty: it had none."""
+def remarks_on(logs: Mapping[str, FlightLog], robots: Mapping[str, Robot]) -> list[str]:
+    """Return what there is to say of the shapes of some flights' robots, a line each."""
+    found = [line for robot in robots.values() for line in shown_shapes(robot).remarks]
+    for name, log in logs.items():
+        if (urdf := _urdf_of(log)) and not robots[name].visuals:
+            found.append(f"a bag has no robot's shapes: --robot {urdf} draws those of that file")
+    return list(dict.fromkeys(found))
+
+
+def _urdf_of(log: FlightLog) -> str:
+    """Return the URDF that a flight's robot was read from; empty: it was none."""
     parameters = log.flight.get("parameters")
     plant = parameters.get("plant") if isinstance(parameters, dict) else None
-    name = str(plant.get("robot", "")) if isinstance(plant, dict) else ""
-    return name if ".urdf" in name or ".xacro" in name else ""
+    name = split_choice(str(plant.get("robot", ""))).name if isinstance(plant, dict) else ""
+    return name if name.endswith(URDF) else ""
 
 
 def _law(log: FlightLog) -> str:

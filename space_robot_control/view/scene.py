@@ -9,17 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_sim.robot import Robot
-from space_robot_sim.robot.shapes import shapes_of
 from space_robot_sim.robot.transforms import Transform, joint_transforms, tool_transforms, wxyz
 from space_robot_sim.robot.tree import Visual
+
+from .meshes import Mesh, shown_shapes
 
 if TYPE_CHECKING:
     from viser import FrameHandle, SceneApi, SceneNodeHandle
 
 Array = NDArray[np.float64]
 
-AXES = 0.12
+AXES = 0.08
 """Length of a tool's axes by that of all links."""
+GREY = (0.7, 0.7, 0.7, 1.0)
+"""Of shapes without a colour."""
 
 
 class Look(NamedTuple):
@@ -55,8 +58,9 @@ class RobotScene:
             self._frames[link.child] = self._add_frame(link)
         for tool in tool_transforms(robot):
             self._add_frame(tool, axes)
-        for number, shape in enumerate(shapes_of(robot)):
-            self.add_shape(f"shape_{number}", shape)
+        drawn = shown_shapes(robot)
+        for number, shape in enumerate(drawn.shapes):
+            self.add_shape(f"shape_{number}", shape, drawn.meshes.get(shape.mesh))
 
     def _add_frame(self, link: Transform, axes: float = 0.0) -> FrameHandle:
         path = f"{self._paths[link.parent]}/{_part(link.child)}"
@@ -68,15 +72,16 @@ class RobotScene:
             position=link.position[0], wxyz=link.quaternion[0],
         )  # fmt: skip
 
-    def add_shape(self, name: str, shape: Visual) -> SceneNodeHandle:
+    def add_shape(self, name: str, shape: Visual, mesh: Mesh | None = None) -> SceneNodeHandle:
         """Draw a shape on its body.
 
         Args:
             name: of the shape among those of the body.
             shape: what it is.
+            mesh: of a shape that is one.
         """
         path = f"{self._paths[self._robot.body_names[shape.body]]}/{name}"
-        return _add_shape(self._scene, path, shape, self._look)
+        return _add_shape(self._scene, path, shape, self._look, mesh)
 
     def move(self, position: Array, quaternion: Array, moved: Sequence[Transform], k: int) -> None:
         """Move base and joints.
@@ -96,15 +101,21 @@ class RobotScene:
                 frame.position = link.position[k]
 
 
-def _add_shape(scene: SceneApi, path: str, shape: Visual, look: Look) -> SceneNodeHandle:
-    *own, alpha = shape.colour or (0.7, 0.7, 0.7, 1.0)
-    colour = (
-        rgb(look.tint)
-        if look.tint
-        else (round(255 * own[0]), round(255 * own[1]), round(255 * own[2]))
-    )
+def _add_shape(
+    scene: SceneApi, path: str, shape: Visual, look: Look, mesh: Mesh | None
+) -> SceneNodeHandle:
+    *own, alpha = shape.colour or GREY
+    red, green, blue = (round(255 * value) for value in own)
+    colour = rgb(look.tint) if look.tint else (red, green, blue)
     opacity = alpha * look.opacity if alpha * look.opacity < 1.0 else None
     position, turn, more = shape.position, wxyz(shape.rotation), look.growth
+    if mesh is not None:
+        vertices = mesh.vertices * shape.size
+        flips = np.prod(shape.size) < 0.0  # mirrored: what was outside is inside
+        return scene.add_mesh_simple(
+            path, vertices, mesh.faces[:, ::-1] if flips else mesh.faces, color=colour,
+            opacity=opacity, flat_shading=True, position=position, wxyz=turn,
+        )  # fmt: skip
     if shape.shape == "box":
         x, y, z = (edge + 2.0 * more for edge in shape.size)
         return scene.add_box(
@@ -115,11 +126,9 @@ def _add_shape(scene: SceneApi, path: str, shape: Visual, look: Look) -> SceneNo
         return scene.add_cylinder(
             path, radius, length, colour, opacity=opacity, position=position, wxyz=turn
         )  # fmt: skip
-    if shape.shape == "sphere":
-        return scene.add_icosphere(
-            path, shape.size[0] + more, colour, opacity=opacity, position=position, wxyz=turn
-        )  # fmt: skip
-    raise NotImplementedError(shape.shape)
+    return scene.add_icosphere(
+        path, shape.size[0] + more, colour, opacity=opacity, position=position, wxyz=turn
+    )  # fmt: skip
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +14,9 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.base_axes import base_axes
 from space_robot_sim.robot.frames import body_frames
-from space_robot_sim.robot.shapes import shapes_of
 from space_robot_sim.robot.tree import Visual
+
+from .meshes import Mesh, shown_shapes
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -27,18 +29,21 @@ DIRECTION = np.array([0.62, -1.0, 0.42])
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 
 
-@contextmanager
-def silent_server() -> Iterator[ViserServer]:
-    """Start a server of viser for this process alone, without a word on standard output.
+def check_viser() -> None:
+    """See that viser is installed.
 
     Raises:
-        InputError: viser is not installed; says how to install it.
+        InputError: it is not; says how to install it.
     """
-    try:
-        from viser import ViserServer
-    except ImportError:
-        raise InputError("view needs viser: pip install 'space_robot[view]'") from None
+    if find_spec("viser") is None:
+        raise InputError("view needs viser: pip install 'space_robot[view]'")
+
+
+@contextmanager
+def silent_server() -> Iterator[ViserServer]:
+    """Start a server of viser that only this machine hears, and nothing on standard output."""
     from rich import get_console
+    from viser import ViserServer
 
     console = get_console()
     was_quiet, console.quiet = console.quiet, True
@@ -92,7 +97,7 @@ def extent(robot: Robot, position: Array, quaternion: Array, joint_positions: Ar
     """Return where a robot's shapes reach to, (K, 3) m, inertial frame.
 
     Args:
-        robot: its numbers and visuals; of a mesh, which may have any size, the place alone counts.
+        robot: its numbers and visuals.
         position: (T, 3) m of the base.
         quaternion: (T, 4) of the base.
         joint_positions: (T, N) of all joints.
@@ -100,18 +105,23 @@ def extent(robot: Robot, position: Array, quaternion: Array, joint_positions: Ar
     axes = base_axes(quaternion.T)
     frames = {f.body: f for f in body_frames(robot, tuple(axes), joint_positions.T)}
     found = []
-    for shape in shapes_of(robot):
+    drawn = shown_shapes(robot)
+    for shape in drawn.shapes:
         frame = frames[shape.body]
-        for corner in CORNERS * _half_size(shape):
+        for corner in _corners(shape, drawn.meshes.get(shape.mesh)):
             place = frame.on_outer_axes(shape.position + shape.rotation @ corner)
             found.append(position + (frame.origin + place).T)
     return np.concatenate(found)
 
 
-def _half_size(shape: Visual) -> Array:
+def _corners(shape: Visual, mesh: Mesh | None) -> Array:
+    """Return the corners of a box about a shape, (8, 3) m, on the shape's axes."""
     size = shape.size
+    if mesh is not None:
+        low, high = mesh.vertices.min(axis=0) * size, mesh.vertices.max(axis=0) * size
+        return 0.5 * (low + high) + CORNERS * 0.5 * (high - low)
     if shape.shape == "box":
-        return 0.5 * np.array(size)
+        return CORNERS * 0.5 * np.array(size)
     if shape.shape == "cylinder":
-        return np.array([size[0], size[0], 0.5 * size[1]])
-    return np.full(3, size[0]) if shape.shape == "sphere" else np.zeros(3)
+        return CORNERS * np.array([size[0], size[0], 0.5 * size[1]])
+    return CORNERS * size[0]

@@ -31,10 +31,11 @@ def shapes_of(robot: Robot) -> tuple[Visual, ...]:
     inertia; other bodies are tubes from their joint to the next ones and to the tools, with a hub
     about each joint's axis.
     """
-    return robot.visuals or tuple(_drawn(robot))
+    return robot.visuals or tuple(drawn_shapes(robot))
 
 
-def _drawn(robot: Robot) -> Iterator[Visual]:
+def drawn_shapes(robot: Robot) -> Iterator[Visual]:
+    """Yield the shapes that `shapes_of` draws, whatever visuals the robot has."""
     ends = _ends(robot)
     lengths = sum(float(np.linalg.norm(end)) for body in ends[1:] for end in body)
     radius = max(THINNEST, SLENDER * lengths)

@@ -19,7 +19,14 @@ function seek(seconds) {
 function number(value) {
   if (value == null || value === 0) return value === 0 ? "0" : "";
   const size = Math.abs(value);
-  return size >= 1e-3 && size < 1e5 ? String(Number(value.toPrecision(3))) : value.toExponential(1);
+  return size >= 1e-3 && size < 1e5 ? String(Number(value.toPrecision(3))) : value.toExponential(1).replace(".0e", "e");
+}
+
+// Powers of ten, four lines at most.
+function decades(u, _, low, high) {
+  const [from, to] = [Math.ceil(Math.log10(low) - 1e-9), Math.floor(Math.log10(high) + 1e-9)];
+  const every = Math.max(1, Math.ceil((to - from) / 3));
+  return Array.from({ length: Math.max(0, Math.floor((to - from) / every) + 1) }, (_, k) => 10 ** (from + k * every));
 }
 
 // Marks behind the curves, the scene's time in front of them.
@@ -55,6 +62,7 @@ function drawTime(u) {
 const sync = uPlot.sync("flight");
 const place = document.getElementById("plots");
 const axis = { stroke: colourOf("faint"), grid: { stroke: colourOf("line"), width: 1 }, ticks: { stroke: colourOf("line") } };
+const vertical = { ...axis, size: 58, values: (_, v) => v.map(number) };
 let zooming = false;
 const drawn = plots.map((plot) => {
   const heading = document.createElement("h2");
@@ -73,7 +81,7 @@ const drawn = plots.map((plot) => {
       cursor: { sync: { key: sync.key } },
       axes: [
         { ...axis, size: 24, values: (_, v) => v.map((x) => `${x}`) },
-        { ...axis, size: 58, values: (_, v) => v.map(number) },
+        plot.logarithmic ? { ...vertical, splits: decades, filter: (_, v) => v } : vertical,
       ],
       series: [
         { label: "s", value: (_, v) => number(v) },
