@@ -77,7 +77,7 @@ def read_mesh(file: str) -> Mesh:
     import trimesh
 
     try:
-        read = trimesh.load(file, force="mesh")
+        read = trimesh.load_mesh(file)
         vertices, faces = np.asarray(read.vertices, dtype=np.float64), np.asarray(read.faces)
     except Exception as error:  # of as many kinds as there are formats
         why = str(error).strip().split("\n")[0] or type(error).__name__

@@ -116,12 +116,16 @@ def extent(robot: Robot, position: Array, quaternion: Array, joint_positions: Ar
 
 def _corners(shape: Visual, mesh: Mesh | None) -> Array:
     """Return the corners of a box about a shape, (8, 3) m, on the shape's axes."""
-    size = shape.size
+    size = np.array(shape.size)
+    middle = np.zeros(3)
     if mesh is not None:
         low, high = mesh.vertices.min(axis=0) * size, mesh.vertices.max(axis=0) * size
-        return 0.5 * (low + high) + CORNERS * 0.5 * (high - low)
-    if shape.shape == "box":
-        return CORNERS * 0.5 * np.array(size)
-    if shape.shape == "cylinder":
-        return CORNERS * np.array([size[0], size[0], 0.5 * size[1]])
-    return CORNERS * size[0]
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    elif shape.shape == "box":
+        half = 0.5 * size
+    elif shape.shape == "cylinder":
+        half = np.array([size[0], size[0], 0.5 * size[1]])
+    else:
+        half = np.full(3, size[0])
+    corners: Array = middle + CORNERS * half
+    return corners

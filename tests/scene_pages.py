@@ -1,0 +1,85 @@
+"""What a page made by `space-robot view` shows, read from the page alone."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import re
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+import zstandard
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+Array = NDArray[np.float64]
+Message = dict[str, Any]
+
+
+class Pose(NamedTuple):
+    """Axes, as columns, and place on those of the scene."""
+
+    rotation: Array
+    position: Array
+
+
+class Scene:
+    """The nodes of a page's scene at a time, as its player has them."""
+
+    def __init__(self, page: str) -> None:
+        document = re.search(r'srcdoc="([^"]*)"', page)
+        assert document
+        data = re.search(r'__VISER_EMBED_DATA__="([^"]*)"', html.unescape(document[1]))
+        assert data
+        raw = zstandard.ZstdDecompressor().decompressobj().decompress(base64.b64decode(data[1])[8:])
+        length = int.from_bytes(raw[:8], "little")
+        content = msgspec.msgpack.decode(raw[8 : 8 + length], strict=False)
+        self.duration: float = content["durationSeconds"]
+        self.messages: list[tuple[float, Message]] = content["messages"]
+
+    def times(self) -> list[float]:
+        """The times at which something moves."""
+        return sorted({time for time, _ in self.messages})
+
+    def names(self) -> set[str]:
+        """All nodes."""
+        return {message["name"] for _, message in self.messages if "props" in message}
+
+    def poses(self, time: float) -> dict[str, Pose]:
+        """All nodes' poses once the player has come to ``time``."""
+        position: dict[str, Array] = {}
+        rotation: dict[str, Array] = {}
+        for at, message in self.messages:
+            if at > time:
+                break
+            if message["type"] == "SetPositionMessage":
+                position[message["name"]] = np.array(message["position"])
+            elif message["type"] == "SetOrientationMessage":
+                w, x, y, z = message["wxyz"]
+                rotation[message["name"]] = Rotation.from_quat([x, y, z, w]).as_matrix()
+        found = {"": Pose(np.eye(3), np.zeros(3))}
+        for name in sorted(self.names(), key=lambda name: name.count("/")):
+            parent = found.get(name.rpartition("/")[0], found[""])
+            turn, place = rotation.get(name, np.eye(3)), position.get(name, np.zeros(3))
+            found[name] = Pose(
+                parent.rotation @ turn, parent.position + parent.rotation @ place
+            )  # fmt: skip
+        return found
+
+    def visible(self, time: float) -> dict[str, bool]:
+        """Of the nodes whose visibility was ever told, whether they are seen."""
+        return {
+            message["name"]: message["visible"]
+            for at, message in self.messages
+            if at <= time and message["type"] == "SetSceneNodeVisibilityMessage"
+        }
+
+
+def plot_data(page: str) -> dict[str, Any]:
+    """What the page's plots and marks are made of."""
+    found = re.search(r'<script id="data" type="application/json">(.*?)</script>', page, re.DOTALL)
+    assert found
+    content: dict[str, Any] = json.loads(found[1])
+    return content
