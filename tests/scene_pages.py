@@ -29,15 +29,21 @@ class Scene:
     """The nodes of a page's scene at a time, as its player has them."""
 
     def __init__(self, page: str) -> None:
-        document = re.search(r'srcdoc="([^"]*)"', page)
-        assert document
-        data = re.search(r'__VISER_EMBED_DATA__="([^"]*)"', html.unescape(document[1]))
+        """Read a page of this project, or one of viser alone."""
+        framed = re.search(r'srcdoc="([^"]*)"', page)
+        document = html.unescape(framed[1]) if framed else page
+        data = re.search(r'__VISER_EMBED_DATA__="([^"]*)"', document)
         assert data
         raw = zstandard.ZstdDecompressor().decompressobj().decompress(base64.b64decode(data[1])[8:])
-        length = int.from_bytes(raw[:8], "little")
-        content = msgspec.msgpack.decode(raw[8 : 8 + length], strict=False)
+        end = 8 + int.from_bytes(raw[:8], "little")
+        content = msgspec.msgpack.decode(raw[8:end])
         self.duration: float = content["durationSeconds"]
         self.messages: list[tuple[float, Message]] = content["messages"]
+        self._buffers: list[bytes] = []
+        for length in content["binaryBufferLengths"]:
+            start = end + -end % 8
+            end = start + length
+            self._buffers.append(raw[start:end])
 
     def times(self) -> list[float]:
         """The times at which something moves."""
@@ -67,6 +73,18 @@ class Scene:
                 parent.rotation @ turn, parent.position + parent.rotation @ place
             )  # fmt: skip
         return found
+
+    def mesh(self, name: str) -> tuple[Array, NDArray[np.uint32]]:
+        """Vertices and faces of a node that is a mesh."""
+        props = next(
+            message["props"] for _, message in self.messages
+            if message["type"] == "MeshMessage" and message["name"] == name
+        )  # fmt: skip
+        vertices, faces = (
+            np.frombuffer(self._buffers[held["__binary_index"]], held["dtype"]).reshape(-1, 3)
+            for held in (props["vertices"], props["faces"])
+        )
+        return vertices.astype(np.float64), faces
 
     def visible(self, time: float) -> dict[str, bool]:
         """Of the nodes whose visibility was ever told, whether they are seen."""

@@ -55,7 +55,7 @@ def view(
     from space_robot_msgs_py.bag.reader import read_flight
 
     from ..analysis import excerpt
-    from ..analysis.files import check_writable, whole_file
+    from ..analysis.files import check_writable, make_folder, whole_file
     from ..flight.progress import counting_progress
     from ..view.flights import Options, flights_page, remarks_on, shown_robot
     from ..view.stage import check_viser
@@ -64,6 +64,7 @@ def view(
     check_viser()
     names = bag_names(bags)
     page = out or Path(f"{'_'.join(names)}_view.html")
+    make_folder(page.parent)
     check_writable(page)
     logs = {
         name: excerpt(read_flight(bag, remap, trust, namespace), from_s, to_s)

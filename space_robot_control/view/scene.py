@@ -92,13 +92,25 @@ class RobotScene:
             moved: of `joint_transforms`.
             k: which of their rows.
         """
-        self.base.position, self.base.wxyz = position, quaternion
+        _place(self.base, "position", position)
+        _place(self.base, "wxyz", quaternion)
         for link in moved:
             frame = self._frames[link.child]
             if len(link.quaternion) > 1:
-                frame.wxyz = link.quaternion[k]
+                _place(frame, "wxyz", link.quaternion[k])
             if len(link.position) > 1:
-                frame.position = link.position[k]
+                _place(frame, "position", link.position[k])
+
+
+def _place(frame: FrameHandle, what: str, value: Array) -> None:
+    """Set a frame's pose to the last bit.
+
+    viser takes what is close by `numpy.allclose`, 1e-5 of it, for no change and leaves it out.
+    """
+    held = getattr(frame, what)
+    if not np.array_equal(held, value):
+        held[:] = np.nan
+        setattr(frame, what, value)
 
 
 def _add_shape(
