@@ -88,12 +88,13 @@ setup(
             "pytest-xdist",
             "ruff",
             "scipy-stubs",
+            "trimesh>=4",
             "types-PyYAML",
             "types-psutil",
             "viser>=1.1",
             "xacro",
         ],
-        "view": ["viser>=1.1"],  # `view`
+        "view": ["trimesh>=4", "viser>=1.1"],  # `view`
         "xacro": ["xacro"],  # robots in files that end in .xacro
     },
     entry_points={"console_scripts": ["space-robot = space_robot_control.cli.main:main"]},

@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 ROBOTS = CONFIG / "robots"
 
 TOOLS = (
-    "cvxpy", "gymnasium", "hypothesis", "mujoco", "nbclient", "nbformat", "pandas", "pinocchio",
-    "psutil", "pyarrow",
+    "cvxpy", "gymnasium", "hypothesis", "msgspec", "mujoco", "nbclient", "nbformat", "pandas",
+    "pinocchio", "psutil", "pyarrow", "trimesh", "viser",
 )  # fmt: skip
 """Of the tests only. Where `colcon test` finds one missing, the modules that use it are skipped,
 whichever of their helpers imports it."""
@@ -58,6 +58,7 @@ OF_ROS = {"domain", "free_domain", "fly", "start", "ground"}
 WITH_ROS = ("control/flight/graph/", "control/flight/replay/", "test_examples.py")
 SLOW = (
     "benchmarks/", "control/campaign/", "control/paper/", "control/cli/test_output.py",
+    "control/cli/test_view_command.py", "control/view/test_in_browser.py",
     "control/cli/test_stability_command.py", "control/flight/test_interruption.py",
     "control/flight/test_long_flights.py", "control/flight/test_shipped_robots.py",
     "msgs/bag/test_bag_fuzz.py", "test_notebooks.py", "test_examples.py", "test_tutorial.py",

@@ -28,7 +28,7 @@ PYPI = {"yaml": "pyyaml", "typing_extensions": "typing-extensions", "pinocchio":
 """Names on PyPI of modules that are not called as their package."""
 OF_EXTRAS = {
     "distributed": "dask", "gymnasium": "gym", "pandas": "campaign", "psutil": "soak",
-    "pyarrow": "parquet", "xacro": "xacro",
+    "pyarrow": "parquet", "trimesh": "view", "viser": "view", "xacro": "xacro",
 }  # fmt: skip
 """Packages that one command needs, and their extra."""
 OF_ROS = {"simulation_interfaces"}

@@ -79,6 +79,7 @@ AREAS = {
          "tests/sim/plant/test_command_guard.py"),
     ),
     "metrics": _rooms(CONTROL, "analysis"),
+    "view": _rooms(CONTROL, "view"),
     "flight": Area(
         (f"{CONTROL}/flight/*.py",), ("tests/control/flight/test_*.py",),
     ),

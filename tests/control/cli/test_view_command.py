@@ -11,9 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-
-pytest.importorskip("viser")
-trimesh = pytest.importorskip("trimesh")
+import trimesh
 from paths import DATA
 from scene_pages import Scene, plot_data
 
@@ -205,7 +203,7 @@ def test_a_bag_has_no_shapes_of_a_urdf_until_it_is_named(view: View, tmp_path: P
     urdf.write_bytes((DATA / "arm.urdf").read_bytes())
     trimesh.creation.cone(0.1, 0.4).export(urdf.parent / "fore.stl")
     urdf.write_text(urdf.read_text().replace("package://arm/", ""))
-    gains, mission = urdf.with_name("gains.yaml"), urdf.with_name("mission.yaml")
+    gains, mission = urdf.with_name("ctc.yaml"), urdf.with_name("mission.yaml")
     gains.write_text("controller_node: {ros__parameters: {ctc: {k_p: [1e4], k_d: [200.0]}}}\n")
     mission.write_text(
         "mission_node: {ros__parameters: {waypoint_times: [0.0, 1.0],"

@@ -10,10 +10,8 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 from random_trees import random_bodies
-from tree_oracle import pinocchio_tree
-
-pytest.importorskip("viser")
 from scene_pages import Scene
+from tree_oracle import pinocchio_tree
 
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate

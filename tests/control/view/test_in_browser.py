@@ -9,9 +9,6 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("viser")
-playwright = pytest.importorskip("playwright.sync_api")
-
 from space_robot_control.cli.main import main
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
@@ -58,7 +55,7 @@ class Seen:
             const lit = new Array(width).fill(0);
             for (let x = 0; x < width; x++) for (let y = 0; y < height; y++) {
                 const at = 4 * (y * width + x);
-                if (Math.min(rgba[at], rgba[at + 1], rgba[at + 2]) > 220 && rgba[at + 3] > 250) lit[x]++;
+                if (Math.min(...rgba.slice(at, at + 4)) > 220) lit[x]++;
             }
             return lit.indexOf(Math.max(...lit));
         })"""
@@ -68,6 +65,8 @@ class Seen:
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Seen]:
+    playwright = pytest.importorskip("playwright.sync_api")
+    pytest.importorskip("viser")
     folder = tmp_path_factory.mktemp("page")
     plan = FlightPlan(duration=4.0, faults=["drive_scale@2-3:all=0.9"])
     simulate(Flight(plan), folder / "bag")
