@@ -9,23 +9,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.base_axes import base_axes
 from space_robot_sim.robot.frames import body_frames
+from space_robot_sim.robot.transforms import wxyz
 from space_robot_sim.robot.tree import Visual
 
 from .meshes import Mesh, shown_shapes
 
 if TYPE_CHECKING:
-    from viser import ViserServer
+    from viser import SceneApi, ViserServer
 
 Array = NDArray[np.float64]
 
 FIELD_OF_VIEW = np.radians(35.0)
 DIRECTION = np.array([0.62, -1.0, 0.42])
 """From what is looked at to the first camera; robots stand side by side along x."""
+SKY = 1.4
+LAMPS = (((0.2, -0.7, 1.0), 2.3), ((-0.8, -0.6, 0.3), 0.6))
+"""From where light comes, and how strong."""
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 
 
@@ -77,10 +82,24 @@ def set_stage(server: ViserServer, points: Array, dark: bool) -> None:
         cell_color=shades[0], section_color=shades[1], fade_distance=4.0 * size, fade_from="origin",
         position=(middle[0], middle[1], low[2] - 0.08 * size), shadow_opacity=0.2,
     )  # fmt: skip
+    _light(scene)
     camera.fov, camera.near, camera.far = float(FIELD_OF_VIEW), 0.01 * size, 100.0 * size
     back = DIRECTION / np.linalg.norm(DIRECTION)
     camera.look_at = middle
     camera.position = middle + _distance(points - middle, back) * back
+
+
+def _light(scene: SceneApi) -> None:
+    """Put lights of our own: viser's map of a city comes late, or not at all."""
+    scene.configure_environment_map(None)
+    scene.configure_default_lights(False)
+    scene.add_light_hemisphere("/sky", (255, 255, 255), (110, 112, 125), intensity=SKY)
+    for number, (direction, strength) in enumerate(LAMPS):
+        turn, _ = Rotation.align_vectors([direction], [[0.0, 0.0, 1.0]])
+        scene.add_light_directional(
+            f"/lamp_{number}", (255, 250, 240), intensity=strength, cast_shadow=number == 0,
+            wxyz=wxyz(turn.as_matrix()), position=direction,
+        )  # fmt: skip
 
 
 def _distance(points: Array, back: Array) -> float:
