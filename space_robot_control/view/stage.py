@@ -93,11 +93,11 @@ def _light(scene: SceneApi) -> None:
     """Put lights of our own: viser's map of a city comes late, or not at all."""
     scene.configure_environment_map(None)
     scene.configure_default_lights(False)
-    scene.add_light_hemisphere("/sky", (255, 255, 255), (110, 112, 125), intensity=SKY)
+    scene.add_light_hemisphere("/sky", ground_color=(110, 112, 125), intensity=SKY)
     for number, (direction, strength) in enumerate(LAMPS):
         turn, _ = Rotation.align_vectors([direction], [[0.0, 0.0, 1.0]])
         scene.add_light_directional(
-            f"/lamp_{number}", (255, 250, 240), intensity=strength, cast_shadow=number == 0,
+            f"/lamp_{number}", color=(255, 250, 240), intensity=strength, cast_shadow=number == 0,
             wxyz=wxyz(turn.as_matrix()), position=direction,
         )  # fmt: skip
 
