@@ -51,6 +51,8 @@ def drawn_shapes(robot: Robot) -> Iterator[Visual]:
         else:
             hub = (1.5 * radius, 3.2 * radius)
             yield Visual("cylinder", hub, np.eye(3), start, colour=JOINT_COLOUR, body=body)
+            if reach := _reach(robot, body - 1):
+                yield from _tube(np.array([0.0, 0.0, -reach]), start, 0.7 * radius, body)
         for end in own if not is_panel else ():
             if is_base:  # from where it leaves the box
                 half = 0.5 * np.array(box.size)
@@ -75,6 +77,14 @@ def even_box(mass: float, inertia: Array, com: Array, body: int, colour: Colour)
         axes[:, 0] *= -1.0
     size = tuple(np.maximum(edges, THINNEST).tolist())
     return Visual("box", size, axes, com, colour=colour, body=body)
+
+
+def _reach(robot: Robot, joint: int) -> float:
+    """Return how far a body slides out, m: so much of it stays within its parent; else 0."""
+    if not robot.is_prismatic[joint] or joint >= robot.n:
+        return 0.0
+    upper = robot.limits[joint].upper
+    return upper if 0.0 < upper < np.inf else 0.0
 
 
 def _ends(robot: Robot) -> list[list[Array]]:

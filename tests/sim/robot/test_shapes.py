@@ -74,6 +74,14 @@ def _reach(tube: Visual, towards: np.ndarray) -> np.ndarray:
     return np.array([middle - half, middle + half])
 
 
+def test_what_slides_out_is_still_joined_to_where_it_came_from() -> None:
+    robot = find_robot("boom")
+    for joint in np.flatnonzero(robot.is_prismatic[: robot.n]):
+        tubes = [s for s in shapes_of(robot) if s.body == joint + 1 and s.shape == "cylinder"]
+        back = min(t.position[2] - 0.5 * t.size[1] * abs(t.rotation[2, 2]) for t in tubes)
+        assert back == pytest.approx(-robot.limits[joint].upper)
+
+
 def test_what_a_file_tells_is_drawn_instead(paper_robot: Robot) -> None:
     told = (Visual("sphere", (0.4,), np.eye(3), np.zeros(3), body=2),)
     assert shapes_of(replace(paper_robot, visuals=told)) == told
