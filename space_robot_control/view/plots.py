@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import cycle
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,17 +45,18 @@ def plots_of(flights: Mapping[str, FlightLog], colours: Sequence[str]) -> list[P
     found = []
     for name in dict.fromkeys(name for columns in by_name for name in columns):
         series = []
-        for flight, log, columns, colour in zip(flights, logs, by_name, colours, strict=False):
+        for flight, log, columns, colour in zip(
+            flights, logs, by_name, cycle(colours), strict=False
+        ):
             if name not in columns:
                 continue
-            values = columns[name]
+            labels, values = columns[name]
             if len(logs) > 1:
                 size = np.linalg.norm(values, axis=1)
                 series.append(Series(flight, colour, _extremes(log, size, edges)))
                 continue
-            for axis, label in zip(values.T, _labels(name, values.shape[1]), strict=True):
-                drawn = _extremes(log, axis, edges)
-                series.append(Series(label, colours[len(series) % len(colours)], drawn))
+            for axis, label, its in zip(values.T, labels, cycle(colours), strict=False):
+                series.append(Series(label, its, _extremes(log, axis, edges)))
         is_error = name in errors
         found.append(
             Plot(
@@ -65,25 +67,19 @@ def plots_of(flights: Mapping[str, FlightLog], colours: Sequence[str]) -> list[P
     return found
 
 
-def _columns(log: FlightLog) -> Iterator[tuple[str, Array]]:
+def _columns(log: FlightLog) -> Iterator[tuple[str, tuple[Sequence[str], Array]]]:
+    """Yield the columns of Table V: name, names of the axes, values."""
     torques = torque_columns(log.axes, controls_base(log), log.prismatic)
+    names = np.array([*AXES, *log.joint_names])
     for columns, values in (
         (_error_columns(log), tracking_error(log)), (torques, log.applied_torque),
     ):  # fmt: skip
         for name, axes in columns.items():
-            yield name, values[:, axes]
+            yield name, (names[axes].tolist(), values[:, axes])
 
 
 def _error_columns(log: FlightLog) -> Mapping[str, AxisIndex]:
     return error_columns(log.axes, controls_base(log), log.prismatic)
-
-
-def _labels(name: str, count: int) -> Sequence[str]:
-    if name in ("attitude", "base_torque"):
-        return AXES
-    first = name.rsplit("_", 2)[-2]
-    start = int(first) if first.isdigit() else 1
-    return [str(start + k) for k in range(count)]
 
 
 def _extremes(log: FlightLog, values: Array, edges: Array) -> Array:

@@ -103,7 +103,7 @@ def test_the_plots_are_the_bags_errors(whole: Path, bags: tuple[Path, Path]) -> 
     assert list(by_title)[:3] == ["attitude error", "joints 1-3 error", "joints 4-6 error"]
     error = tracking_error(log)
     for axis, series in enumerate(by_title["joints 4-6 error"]["series"]):
-        assert series["label"] == str(axis + 4)
+        assert series["label"] == f"joint{axis + 4}"
         known = [value for value in series["values"] if value is not None]
         assert max(known) == pytest.approx(np.max(error[:, axis + 6]), rel=1e-3)
         assert min(known) == pytest.approx(np.min(error[:, axis + 6]), rel=1e-3)

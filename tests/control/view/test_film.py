@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 from random_trees import random_bodies
-from scene_pages import Scene
+from scene_pages import Scene, plot_data
 from tree_oracle import pinocchio_tree
 
 from space_robot_control.flight.plan import Flight, FlightPlan
@@ -160,3 +160,11 @@ def test_a_row_without_a_state_shows_the_one_before(flown, tmp_path: Path) -> No
     held, before = scene.poses(0.5)["/one/base/joint1"], expected(robot, log, 899)["joint1"]
     np.testing.assert_allclose(held.position, before.translation, atol=TOLERANCE)
     np.testing.assert_allclose(held.rotation, before.rotation, atol=TOLERANCE)
+
+
+def test_many_flights_all_have_curves(flown) -> None:  # type: ignore[no-untyped-def]
+    log = flown("paper", robot="paper")
+    logs = {f"flight_{k}": log for k in range(8)}
+    page = flights_page(logs, dict.fromkeys(logs, shown_robot(log)), Options(rate=2.0), quiet)
+    for plot in plot_data(page)["plots"]:
+        assert [series["label"] for series in plot["series"]] == list(logs)
