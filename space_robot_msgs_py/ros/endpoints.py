@@ -125,11 +125,23 @@ class RawSubscription:
     """A subscription whose messages the loop takes itself, serialized."""
 
     def __init__(
-        self, node: Node, topic: Topic, group: PolledCallbackGroup, depth: int = 0
-    ) -> None:
-        self.topic = topic
+        self, node: Node, topic: Topic, group: PolledCallbackGroup, depth: int = 0,
+        best_effort: bool = False,
+    ) -> None:  # fmt: skip
+        """Subscribe.
+
+        Args:
+            node: that listens.
+            topic: its name, type and quality of service.
+            group: of subscriptions that no executor takes.
+            depth: messages kept (0: as many as the topic says).
+            best_effort: take what comes, so that the publisher never waits or sends again.
+        """
+        self.topic, self._node = topic, node
         profile = qos(topic)
         profile.depth = depth or topic.depth
+        if best_effort:
+            profile.reliability = ReliabilityPolicy.BEST_EFFORT
         self._subscription = node.create_subscription(
             message_type(topic.type), topic.name, lambda message: None, profile,
             raw=True, callback_group=group,
@@ -140,10 +152,21 @@ class RawSubscription:
         self._type = self._subscription.msg_type
         self._take_serialized = serialized_take()
 
+    def close(self) -> None:
+        """Take no more messages."""
+        self._node.destroy_subscription(self._subscription)
+
     def take(self) -> bytes | None:
         """Take the next message, if there is one."""
         taken = take_serialized(self.handle, self._type)
         return None if taken is None else taken[0]
+
+    def take_newest(self) -> bytes | None:
+        """Take all messages there are; return the last."""
+        newest = None
+        while (data := self.take()) is not None:
+            newest = data
+        return newest
 
     def take_with_source(self) -> Received | None:
         """Take the next message, with when and by whom it was sent."""

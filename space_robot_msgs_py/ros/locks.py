@@ -103,6 +103,26 @@ def nodes_in(domain: int, namespace: str = ROOT) -> list[Holder]:
     return _holders([path for path in found if path.name.count(".") == wanted.name.count(".")])
 
 
+def newest_node(name: str, namespace: str = "") -> tuple[int, str] | None:
+    """Find the living node that has this name without its namespace and began last.
+
+    Args:
+        name: its last part.
+        namespace: its first part; empty: any.
+
+    Returns:
+        Domain and namespace; None if there is none on this machine.
+    """
+    start, end = _path("").stem, f".{name}.lock"
+    files = _path("").parent.glob(f"{start}*@*{end}")
+    for path in sorted(files, key=lambda file: file.stat().st_mtime, reverse=True):
+        domain, _, dotted = path.name.removeprefix(start).removesuffix(end).partition("@")
+        found = dotted.replace(".", "/") or ROOT
+        if domain.isdecimal() and namespace in ("", found) and look(path)[0]:
+            return int(domain), found
+    return None
+
+
 def _holders(paths: Iterable[Path]) -> list[Holder]:
     found = []
     for path in sorted(paths):

@@ -6,6 +6,9 @@ import time
 from contextlib import suppress
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.namespace import relative
 from space_robot_msgs_py.errors import MessageError
@@ -13,6 +16,8 @@ from space_robot_msgs_py.wire.controller_telemetry import SIGNALS, TelemetryCode
 from space_robot_msgs_py.wire.definitions import decode
 
 from .temporary_node import TemporaryNode
+
+Array = NDArray[np.float64]
 
 CLOCK_DEPTH = 1_000
 """All of a plant's messages are needed to tell them from another's."""
@@ -34,15 +39,17 @@ class Event(NamedTuple):
 class Monitor:
     """Simulated time from /clock, errors from telemetry, the nodes' modes from /diagnostics."""
 
-    def __init__(self, domain: int, namespace: str = topics.ROOT) -> None:
-        """Join the graph in the ``namespace`` of a robot; what others report is passed over."""
+    def __init__(
+        self, domain: int, namespace: str = topics.ROOT, name: str = "flight_monitor"
+    ) -> None:
+        """Join the graph as ``name`` in the ``namespace`` of a robot; others are passed over."""
         from space_robot_msgs_py.ros.endpoints import (
             FollowedSubscription,
             PolledCallbackGroup,
             RawSubscription,
         )
 
-        self._visitor = TemporaryNode("flight_monitor", domain, namespace)
+        self._visitor = TemporaryNode(name, domain, namespace)
         self._namespace = namespace
         self.node = self._visitor.node
         group = PolledCallbackGroup()
@@ -52,8 +59,8 @@ class Monitor:
         self.simulated_s = 0.0
         self.has_begun = False
         """True if the plant has sent a tick."""
-        self.errors: tuple[float, float] | None = None
-        """Largest current attitude error (eps) and joint error (rad)."""
+        self.error: Array | None = None
+        """(n+3,) current tracking error as the law sees it: eps, then joints, rad or m."""
         self.modes: dict[str, str] = {}
         """The mode of each node, by its name in the namespace."""
         self._levels: dict[str, int] = {}
@@ -88,8 +95,7 @@ class Monitor:
     def _read_telemetry(self, data: bytes) -> list[Event]:
         _, rows = TelemetryCodec.decode(data)
         if rows.ndim == 2 and len(rows) == len(SIGNALS) and rows.shape[1] > 3:
-            error = abs(rows[SIGNALS.index("e")])
-            self.errors = float(error[:3].max()), float(error[3:].max())
+            self.error = rows[SIGNALS.index("e")]
         return []
 
     def _read_diagnostics(self, data: bytes) -> list[Event]:
@@ -106,6 +112,14 @@ class Monitor:
         level_before, self._levels[name] = self._levels.get(name, 0), status.level
         is_news = before != mode and (status.level > 0 or level_before > 0)
         return [Event(self.simulated_s, name, mode)] if is_news else []
+
+    @property
+    def errors(self) -> tuple[float, float] | None:
+        """Largest current attitude error (eps) and joint error (rad)."""
+        if self.error is None:
+            return None
+        size = abs(self.error)
+        return float(size[:3].max()), float(size[3:].max())
 
     @property
     def complaints(self) -> dict[str, str]:

@@ -68,6 +68,27 @@ def set_parameters(
         raise FlightError(f"{name} refused to change its parameters: {answer.result.reason}")
 
 
+def get_parameters(node: Any, name: str, parameters: Sequence[str], check: Check) -> list[Any]:
+    """Return the values of a node's parameters, None of one that it does not have (yet).
+
+    Args:
+        node: the rclpy node to call from.
+        name: name of the node whose parameters they are, in the namespace of that one.
+        parameters: their names.
+        check: see `Check`.
+
+    Raises:
+        FlightError: the node does not answer.
+    """
+    from rcl_interfaces.srv import GetParameters
+    from rclpy.parameter import parameter_value_to_python
+
+    request = GetParameters.Request(names=list(parameters))
+    (answer,) = _call(node, GetParameters, [f"{name}/get_parameters"], request, check)
+    values = [parameter_value_to_python(value) for value in answer.values]
+    return values or [None] * len(parameters)
+
+
 def call_trigger(node: Any, service: str, check: Check) -> tuple[bool, str]:
     """Call a service of std_srvs/Trigger, however long it takes; return its success and message.
 

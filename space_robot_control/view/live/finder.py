@@ -1,0 +1,80 @@
+"""Where a robot flies: the domain and the namespace of a living plant."""
+
+from __future__ import annotations
+
+import os
+from typing import NamedTuple
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.config.namespace import full_namespace
+from space_robot_msgs_py.ros.locks import newest_node, nodes_in
+
+from ...flight.graph.temporary_node import TemporaryNode
+
+PLANT = "plant_node"
+
+
+class Place(NamedTuple):
+    """A namespace of a ROS domain."""
+
+    domain: int
+    namespace: str
+
+    def __str__(self) -> str:
+        where = "" if self.namespace == topics.ROOT else f"namespace {self.namespace} of "
+        return f"{where}ROS domain {self.domain}"
+
+
+class Finder:
+    """Looks for a plant: in a domain if one is given, else on this machine.
+
+    In a domain the topics tell, wherever their nodes run. Without one the locks of this machine's
+    nodes tell, for `fly` takes a free domain unless it is told one.
+    """
+
+    def __init__(self, domain: int | None = None, namespace: str = "") -> None:
+        """Begin to look.
+
+        Args:
+            domain: None: that of ROS_DOMAIN_ID, if it is set.
+            namespace: of the robot; empty: any.
+
+        Raises:
+            InputError: it cannot be a namespace.
+        """
+        self._namespace = full_namespace(namespace) if namespace else ""
+        of_user = os.environ.get("ROS_DOMAIN_ID", "")
+        if domain is None and of_user.isdecimal():
+            domain = int(of_user)
+        self._node = None if domain is None else TemporaryNode("viewer_looks", domain)
+        self._domain = domain
+
+    def find(self) -> Place | None:
+        """Return where a plant is, of several on this machine the one that began last."""
+        if self._domain is not None:
+            found = sorted(self._publishing())
+            return Place(self._domain, found[0]) if found else None
+        newest = newest_node(PLANT, self._namespace)
+        return Place(*newest) if newest else None
+
+    def is_there(self, place: Place) -> bool:
+        """Tell whether a plant that was found still is."""
+        if self._domain is not None:
+            return place.namespace in self._publishing()
+        return any(PLANT in node.name for node in nodes_in(place.domain, place.namespace))
+
+    def _publishing(self) -> set[str]:
+        """Return the namespaces of the domain whose base state is published."""
+        assert self._node is not None
+        node, last = self._node.node, topics.BASE_STATE
+        found = set()
+        for name, types in node.get_topic_names_and_types():
+            if last.type in types and name.endswith(f"/{last.name}"):
+                found.add(name.removesuffix(f"/{last.name}") or topics.ROOT)
+        wanted = {self._namespace} if self._namespace else found
+        return {n for n in found & wanted if node.count_publishers(last.in_namespace(n))}
+
+    def close(self) -> None:
+        """Leave the domain."""
+        if self._node:
+            self._node.leave()
