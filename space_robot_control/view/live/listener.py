@@ -82,6 +82,7 @@ class Listener:
         self._sources: tuple[type[MessageDescription], ...] = ()
         self._heard: set[topics.Topic] = set()
         self._time = 0.0
+        """That of the newest state, s."""
         self.law = ""
         """The law that commands; empty: not told yet."""
 
@@ -97,12 +98,16 @@ class Listener:
                 raise
             raise InputError(f"the plant's robot: {error}; --robot tells which it is") from None
 
-    def poll(self) -> tuple[Sample | None, list[Event]]:
-        """Return the newest sample, if there is a new one, and what has happened since."""
+    def poll(self, with_states: bool) -> tuple[Sample | None, list[Event]]:
+        """Return the newest sample, if there is a new one, and what has happened since.
+
+        Args:
+            with_states: False: nobody looks, so that no state need be sent here.
+        """
         events = self._monitor.poll()
         while (data := self._law.take()) is not None:
             events += self._read_law(data)
-        self._choose_sources()
+        self._choose_sources(with_states)
         is_new = False
         for subscription, describe, codec in self._subscriptions:
             if (data := subscription.take_newest()) is not None:
@@ -116,26 +121,29 @@ class Listener:
             state.applied_torque.copy(), self._monitor.error,
         ), events  # fmt: skip
 
-    def pause(self) -> None:
-        """Listen to no states until the next `poll`: nobody looks."""
-        for subscription, _, _ in self._subscriptions:
-            subscription.close()
-        self._subscriptions, self._sources = [], ()
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self._monitor.simulated_s
 
     @property
     def complaints(self) -> dict[str, str]:
-        """The modes of nodes that are not well, by their names."""
-        return self._monitor.complaints
+        """The modes of nodes that are not well, by their names, and of a plant with faults."""
+        told = self._monitor.values.get(PLANT, {})
+        faults = {PLANT: f"faults: {told['faults']}"} if "faults" in told else {}
+        return {**faults, **self._monitor.complaints}
 
-    def _choose_sources(self) -> None:
+    def _choose_sources(self, with_states: bool) -> None:
         from space_robot_msgs_py.ros.endpoints import RawSubscription
 
         node = self._monitor.node
         sources = TRUE if node.count_publishers(topics.TRUTH_BASE.name) else MEASURED
+        sources = sources if with_states else ()
         if sources == self._sources:
             return
-        self.pause()
-        self._sources, self._heard = sources, set()
+        for subscription, _, _ in self._subscriptions:
+            subscription.close()
+        self._subscriptions, self._sources, self._heard = [], sources, set()
         for kind in sources:
             describe = kind.of_robot(self._names, self._timebase)
             subscription = RawSubscription(
@@ -165,7 +173,7 @@ class Listener:
         except MessageError:
             return []
         is_news = bool(before) and before != self.law
-        return [Event(self._time, "controller_node", f"flies {self.law}")] if is_news else []
+        return [Event(self.time, "controller_node", f"flies {self.law}")] if is_news else []
 
     def close(self) -> None:
         """Leave the graph."""

@@ -1,0 +1,110 @@
+"""The last seconds of some curves, for plots that move with the flight."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis.figures.overlay import words
+from ...analysis.metrics import error_columns, torque_columns, unit_of
+from ..plots import labels
+
+if TYPE_CHECKING:
+    from viser import GuiApi
+
+    from .listener import Sample
+
+Array = NDArray[np.float64]
+
+LENGTH_S = 10.0
+"""Of simulated time."""
+POINTS = 400
+"""Of a curve at most."""
+HEIGHT = 150
+"""px."""
+
+
+class Curves:
+    """Errors and torques over the last seconds, a plot for each column of Table V."""
+
+    def __init__(
+        self, gui: GuiApi, axes: int, prismatic: Sequence[bool], colours: Sequence[str], ink: str
+    ) -> None:
+        """Add the plots, empty.
+
+        Args:
+            gui: of a server.
+            axes: n+3.
+            prismatic: (n,) of the joints.
+            colours: of the curves.
+            ink: colour of axes and words.
+        """
+        self._rows: deque[tuple[float, Array]] = deque(maxlen=2 * POINTS)
+        of_errors, of_torques = (f(axes, True, prismatic) for f in (error_columns, torque_columns))
+        self._plots = [
+            _Plot(gui, name, np.arange(axes)[part], colours, ink)
+            for name, part in of_errors.items()
+        ] + [
+            _Plot(gui, name, axes + np.arange(axes)[part], colours, ink)
+            for name, part in of_torques.items()
+        ]
+
+    def add(self, sample: Sample) -> None:
+        """Take a sample, unless it follows the one before too closely."""
+        rows = self._rows
+        if rows and sample.time < rows[-1][0] + LENGTH_S / POINTS:
+            return
+        error = np.full(len(sample.torque), np.nan) if sample.error is None else sample.error
+        rows.append((sample.time, np.concatenate([error, sample.torque])))
+        while rows[0][0] < sample.time - LENGTH_S:
+            rows.popleft()
+
+    def draw(self) -> None:
+        """Show what was taken."""
+        if self._rows:
+            time = np.array([time for time, _ in self._rows])
+            values = np.array([row for _, row in self._rows])
+            for plot in self._plots:
+                plot.draw(time, values)
+
+    def remove(self) -> None:
+        """Take the plots away."""
+        for plot in self._plots:
+            plot.handle.remove()
+
+
+class _Plot:
+    def __init__(
+        self, gui: GuiApi, name: str, columns: NDArray[np.intp], colours: Sequence[str], ink: str
+    ) -> None:
+        self._columns, self._name, self._exponent = columns, name, 0
+        none = np.zeros(1)
+        axis = {"stroke": ink, "grid": {"stroke": f"{ink}33"}, "ticks": {"stroke": f"{ink}33"}}
+        series: list[Any] = [{"label": "s"}]
+        for k, label in enumerate(labels(name, len(columns))):
+            series.append({"label": label, "stroke": colours[k % len(colours)], "width": 1.5})
+        self.handle = gui.add_uplot(
+            (none, *[none] * len(columns)), tuple(series), title=self._title, height=HEIGHT,
+            axes=(axis, axis), scales={"x": {"time": False}}, legend={"show": False},
+        )  # fmt: skip
+
+    @property
+    def _title(self) -> str:
+        unit = unit_of(self._name).strip("-")
+        scale = f"1e{self._exponent}" if self._exponent else ""
+        return ", ".join(filter(None, (words(self._name), " ".join(filter(None, (scale, unit))))))
+
+    def draw(self, time: Array, values: Array) -> None:
+        shown = values[:, self._columns]
+        largest = np.nanmax(np.abs(shown), initial=0.0)
+        # the plot's own numbers have no exponents: thousandths are written out
+        exponent = 3 * int(np.floor(np.log10(largest) / 3)) if largest > 0.0 else 0
+        if exponent != self._exponent:
+            self._exponent = exponent
+            self.handle.title = self._title
+        scaled = shown / 10.0**exponent
+        self.handle.data = (time, *np.ascontiguousarray(scaled.T))
