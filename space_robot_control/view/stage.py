@@ -45,15 +45,19 @@ def check_viser() -> None:
 
 
 @contextmanager
-def silent_server() -> Iterator[ViserServer]:
-    """Start a server of viser that only this machine hears, and nothing on standard output."""
+def silent_server(port: int = 0) -> Iterator[ViserServer]:
+    """Start a server of viser that only this machine hears, and nothing on standard output.
+
+    Args:
+        port: to listen to; the next free one if it is taken. 0: any.
+    """
     from rich import get_console
     from viser import ViserServer
 
     console = get_console()
     was_quiet, console.quiet = console.quiet, True
     try:
-        server = ViserServer(host="127.0.0.1", port=0, verbose=False)
+        server = ViserServer(host="127.0.0.1", port=port, verbose=False)
         try:
             yield server
         finally:

@@ -43,12 +43,11 @@ class LiveView:
             robot: that flies.
             dark: whether the page is light on dark.
         """
-        self._server, self._robot, self._axes = server, robot, robot.n + 3
+        self._server, self._robot, self._dark = server, robot, dark
         colours, ink = (ON_DARK, "#c9d1d9") if dark else (ON_WHITE, "#333333")
-        zero = np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]])
-        seen = extent(robot, *zero, np.zeros((1, robot.joint_count)))
-        set_stage(server, seen, dark)
-        width = TRAIL * float(np.ptp(seen, axis=0).max())
+        self._is_staged = False
+        at_zero = np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]]), np.zeros((1, robot.joint_count))
+        width = TRAIL * float(np.ptp(extent(robot, *at_zero), axis=0).max())
         self._root = server.scene.add_frame(ROOT, show_axes=False)
         self._scene = RobotScene(server.scene, ROOT, robot)
         self._tools = [replace(robot, tools=(tool,)) for tool in robot.tools]
@@ -58,7 +57,7 @@ class LiveView:
         ]  # fmt: skip
         self._words = server.gui.add_html("")
         self._curves = Curves(
-            server.gui, self._axes, robot.is_prismatic[: robot.n], colours, ink
+            server.gui, robot.n + 3, robot.is_prismatic[: robot.n], colours, ink
         )  # fmt: skip
         self._events: deque[Event] = deque(maxlen=MOST_EVENTS)
 
@@ -66,6 +65,10 @@ class LiveView:
         """Move the robot."""
         position, quaternion = sample.base_position, sample.base_quaternion
         unit = quaternion / np.linalg.norm(quaternion)
+        if not self._is_staged:
+            pose = position[np.newaxis], unit[np.newaxis], sample.angles[np.newaxis]
+            set_stage(self._server, extent(self._robot, *pose), self._dark)
+            self._is_staged = True
         # of two rows, since the scene takes what has one for what never moves
         links = joint_transforms(self._robot, np.tile(sample.angles, (2, 1)))
         with self._server.atomic():
