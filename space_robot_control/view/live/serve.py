@@ -66,9 +66,11 @@ def serve(options: LiveOptions, say: Callable[[str], None], ready: Callable[[str
         closing(Finder(options.domain, options.namespace)) as finder,
         silent_server(options.port) as server,
     ):
+        # no button to share: that would lead through a server somewhere
         server.gui.configure_theme(
             dark_mode=options.dark, show_logo=False, show_share_button=False, control_width="large"
         )
+        server.gui.main_panel.dock_right()
         ready(f"http://127.0.0.1:{server.get_port()}")
         follower = Follower(server, finder, options)
         while True:
