@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.tool import tool_pose
@@ -26,9 +27,13 @@ if TYPE_CHECKING:
 
     from .listener import Listener, Sample
 
+Array = NDArray[np.float64]
+
 ROOT = "/robot"
 TRAIL = 0.0035
 """Width of a tool's trail by the size of what is seen."""
+ROOM = 1.3
+"""The first camera sees this much more than the robot in its first pose: it will move."""
 MOST_EVENTS = 8
 
 
@@ -66,9 +71,7 @@ class LiveView:
         position, quaternion = sample.base_position, sample.base_quaternion
         unit = quaternion / np.linalg.norm(quaternion)
         if not self._is_staged:
-            pose = position[np.newaxis], unit[np.newaxis], sample.angles[np.newaxis]
-            set_stage(self._server, extent(self._robot, *pose), self._dark)
-            self._is_staged = True
+            self._set_stage(position, unit, sample.angles)
         # of two rows, since the scene takes what has one for what never moves
         links = joint_transforms(self._robot, np.tile(sample.angles, (2, 1)))
         with self._server.atomic():
@@ -77,6 +80,14 @@ class LiveView:
                 _, place = tool_pose(robot, unit[np.newaxis], sample.angles[np.newaxis])
                 trail.add(sample.time, position + place[0])
         self._curves.add(sample)
+
+    def _set_stage(self, position: Array, quaternion: Array, angles: Array) -> None:
+        points = extent(
+            self._robot, position[np.newaxis], quaternion[np.newaxis], angles[np.newaxis]
+        )
+        middle = points.mean(axis=0)
+        set_stage(self._server, middle + ROOM * (points - middle), self._dark)
+        self._is_staged = True
 
     def tell(self, listener: Listener, speed: float, note: str = "") -> None:
         """Write what the panel says, and draw the curves.

@@ -58,17 +58,16 @@ class Curves:
         rows = self._rows
         if rows and sample.time < rows[-1][0] + LENGTH_S / POINTS:
             return
-        error = np.full(len(sample.torque), np.nan) if sample.error is None else sample.error
+        error = np.zeros_like(sample.torque) if sample.error is None else sample.error
         rows.append((sample.time, np.concatenate([error, sample.torque])))
         while rows[0][0] <= sample.time - LENGTH_S:
             rows.popleft()
 
     def draw(self) -> None:
         """Show what was taken."""
-        if self._rows:
-            # from the window's begin, though nothing was known then: all plots keep their length
-            time = np.array([self._rows[-1][0] - LENGTH_S, *(time for time, _ in self._rows)])
-            values = np.array([np.full_like(self._rows[0][1], np.nan), *(r for _, r in self._rows)])
+        if len(self._rows) > 1:
+            time = np.array([time for time, _ in self._rows])
+            values = np.array([row for _, row in self._rows])
             for plot in self._plots:
                 plot.draw(time, values)
 
@@ -83,13 +82,13 @@ class _Plot:
         self, gui: GuiApi, name: str, columns: NDArray[np.intp], colours: Sequence[str], ink: str
     ) -> None:
         self._columns, self._name, self._exponent = columns, name, 0
-        none = np.full(2, np.nan)
+        nothing = np.zeros(2)
         axis = {"stroke": ink, "grid": {"stroke": f"{ink}33"}, "ticks": {"stroke": f"{ink}33"}}
         series: list[Any] = [{"label": "s"}]
         for k, label in enumerate(labels(name, len(columns))):
             series.append({"label": label, "stroke": colours[k % len(colours)], "width": 1.5})
         self.handle = gui.add_uplot(
-            (np.array([-LENGTH_S, 0.0]), *[none] * len(columns)), tuple(series), title=self._title, height=HEIGHT,
+            (np.array([0.0, LENGTH_S]), *[nothing] * len(columns)), tuple(series), title=self._title, height=HEIGHT,
             axes=(axis, axis), scales={"x": {"time": False}}, legend={"show": False},
         )  # fmt: skip
 
@@ -101,7 +100,7 @@ class _Plot:
 
     def draw(self, time: Array, values: Array) -> None:
         shown = values[:, self._columns]
-        largest = np.nanmax(np.abs(shown), initial=0.0)
+        largest = float(np.max(np.abs(shown)))
         # the plot's own numbers have no exponents: thousandths are written out
         exponent = 3 * int(np.floor(np.log10(largest) / 3)) if largest > 0.0 else 0
         if exponent != self._exponent:
