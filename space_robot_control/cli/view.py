@@ -11,7 +11,7 @@ from .options import NAMESPACE, REMAP, TRUST, file_option
 
 
 @click.command()
-@click.argument("bags", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="BAG...")
+@click.argument("bags", nargs=-1, type=click.Path(path_type=Path), metavar="[BAG...]")
 @file_option(
     "--out", help="Page to write; an older one is replaced [default: <BAG>_view.html, here]."
 )
@@ -35,15 +35,30 @@ from .options import NAMESPACE, REMAP, TRUST, file_option
 @REMAP
 @NAMESPACE
 @TRUST
+@click.option("--live", is_flag=True, help="What flies now: serve the scene until Ctrl-C.")
+@click.option(
+    "--domain", type=int,
+    help="ROS domain of the live graph [default: ROS_DOMAIN_ID, or that of this machine's newest "
+    "flight].",
+)  # fmt: skip
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=8080, show_default=True,
+    help="Of the live scene, on 127.0.0.1; if it is taken, the next one that is free.",
+)  # fmt: skip
+@click.pass_context
 def view(
-    bags: tuple[Path, ...], out: Path | None, opens: bool, side_by_side: bool, rate: float,
-    from_s: float | None, to_s: float | None, robot: str, title: str, light: bool,
-    remap: dict[str, str], namespace: str | None, trust: bool,
+    context: click.Context, bags: tuple[Path, ...], out: Path | None, opens: bool,
+    side_by_side: bool, rate: float, from_s: float | None, to_s: float | None, robot: str,
+    title: str, light: bool,
+    remap: dict[str, str], namespace: str | None, trust: bool, live: bool, domain: int | None,
+    port: int,
 ) -> None:  # fmt: skip
     """Show recorded flights: the robot in 3-D, with plots that follow it, on one HTML page.
 
     The page needs nothing but a browser, no network: send it to a colleague. Play, scrub, click a
     plot or a mark to go there. Several bags are drawn over one another, or side by side.
+
+    With --live and no bag the same scene is served from a running graph, one flight after another.
 
     \b
     Examples:
@@ -51,6 +66,8 @@ def view(
       space-robot view flights/tde_stc flights/ctc --out laws.html
       space-robot view flights/one flights/two --side-by-side --no-open
       space-robot view flights/mine --robot my.urdf --from 10 --to 12 --rate 200
+      space-robot view --live
+      space-robot view --live --domain 7 --namespace /sat1
     """
     from space_robot_msgs_py.bag.reader import read_flight
 
@@ -60,8 +77,13 @@ def view(
     from ..view.flights import Options, flights_page, remarks_on, shown_robot
     from ..view.stage import check_viser
     from .analyze import bag_names
+    from .view_live import check_options, serve_live
 
+    check_options(context, live, bags)
     check_viser()
+    if live:
+        serve_live(domain, namespace, robot, port, light, opens)
+        return
     names = bag_names(bags)
     page = out or Path(f"{'_'.join(names)}_view.html")
     make_folder(page.parent)

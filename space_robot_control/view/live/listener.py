@@ -146,9 +146,7 @@ class Listener:
         self._subscriptions, self._sources, self._heard = [], sources, set()
         for kind in sources:
             describe = kind.of_robot(self._names, self._timebase)
-            subscription = RawSubscription(
-                node, kind.topic, self._group, DEPTH, best_effort=True
-            )
+            subscription = RawSubscription(node, kind.topic, self._group, DEPTH, best_effort=True)
             self._subscriptions.append((subscription, describe, Codec(describe)))
 
     def _read(self, describe: MessageDescription, codec: Codec, data: bytes) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable
 from contextlib import closing
@@ -25,8 +24,6 @@ TELL_S = 0.2
 """How often words and curves are shown anew."""
 LOOK_S = 0.5
 """How often a plant is looked for."""
-NICENESS = 10
-"""The graph comes first: a frame may be late, a tick may not."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +58,6 @@ def serve(options: LiveOptions, say: Callable[[str], None], ready: Callable[[str
         InputError: viser is not installed, or a robot is not to be found.
         Interrupted: the user has ended it.
     """
-    os.nice(NICENESS)
     with (
         closing(Finder(options.domain, options.namespace)) as finder,
         silent_server(options.port) as server,

@@ -53,9 +53,11 @@ class Trail:
         self._count += 1
         self._pieces.append(
             self._scene.add_line_segments(
-                f"{self._name}/{self._count}", np.zeros((1, 2, 3)), self._colour,
+                f"{self._name}/{self._count}",
+                np.zeros((1, 2, 3)),
+                self._colour,
                 thickness=self._width,
-            )  # fmt: skip
+            )
         )
 
     def clear(self) -> None:

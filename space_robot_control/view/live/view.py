@@ -6,6 +6,7 @@ import html
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 ROOT = "/robot"
+UNTURNED = np.array([[1.0, 0.0, 0.0, 0.0]])
 TRAIL = 0.0035
 """Width of a tool's trail by the size of what is seen."""
 ROOM = 1.3
@@ -51,19 +53,18 @@ class LiveView:
         self._server, self._robot, self._dark = server, robot, dark
         colours, ink = (ON_DARK, "#c9d1d9") if dark else (ON_WHITE, "#333333")
         self._is_staged = False
-        at_zero = np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]]), np.zeros((1, robot.joint_count))
-        width = TRAIL * float(np.ptp(extent(robot, *at_zero), axis=0).max())
+        at_zero = extent(robot, np.zeros((1, 3)), UNTURNED, np.zeros((1, robot.joint_count)))
+        width = TRAIL * float(np.ptp(at_zero, axis=0).max())
         self._root = server.scene.add_frame(ROOT, show_axes=False)
         self._scene = RobotScene(server.scene, ROOT, robot)
         self._tools = [replace(robot, tools=(tool,)) for tool in robot.tools]
         self._trails = [
-            Trail(server.scene, f"{ROOT}/trail of {tool.name}", rgb(colours[k % len(colours)]), width)
-            for k, tool in enumerate(robot.tools)
-        ]  # fmt: skip
+            Trail(server.scene, f"{ROOT}/trail of {tool.name}", rgb(colour), width)
+            for tool, colour in zip(robot.tools, cycle(colours), strict=False)
+        ]
         self._words = server.gui.add_html("")
-        self._curves = Curves(
-            server.gui, robot.n + 3, robot.is_prismatic[: robot.n], colours, ink
-        )  # fmt: skip
+        prismatic = robot.is_prismatic[: robot.n].tolist()
+        self._curves = Curves(server.gui, robot.n + 3, prismatic, colours, ink)
         self._events: deque[Event] = deque(maxlen=MOST_EVENTS)
 
     def show(self, sample: Sample) -> None:

@@ -83,13 +83,14 @@ class _Plot:
     ) -> None:
         self._columns, self._name, self._exponent = columns, name, 0
         nothing = np.zeros(2)
-        axis = {"stroke": ink, "grid": {"stroke": f"{ink}33"}, "ticks": {"stroke": f"{ink}33"}}
+        axis: Any = {"stroke": ink, "grid": {"stroke": f"{ink}33"}, "ticks": {"stroke": f"{ink}33"}}
         series: list[Any] = [{"label": "s"}]
         for k, label in enumerate(labels(name, len(columns))):
             series.append({"label": label, "stroke": colours[k % len(colours)], "width": 1.5})
         self.handle = gui.add_uplot(
-            (np.array([0.0, LENGTH_S]), *[nothing] * len(columns)), tuple(series), title=self._title, height=HEIGHT,
-            axes=(axis, axis), scales={"x": {"time": False}}, legend={"show": False},
+            (np.array([0.0, LENGTH_S]), *[nothing] * len(columns)), tuple(series),
+            title=self._title, height=HEIGHT, axes=(axis, axis), scales={"x": {"time": False}},
+            legend={"show": False},
         )  # fmt: skip
 
     @property
