@@ -98,13 +98,14 @@ class Listener:
                 raise
             raise InputError(f"the plant's robot: {error}; --robot tells which it is") from None
 
-    def poll(self, with_states: bool) -> tuple[Sample | None, list[Event]]:
-        """Return the newest sample, if there is a new one, and what has happened since.
+    def poll(self, with_states: bool, events: list[Event]) -> Sample | None:
+        """Return the newest sample, if there is a new one.
 
         Args:
             with_states: False: nobody looks, so that no state need be sent here.
+            events: to which is added what has happened.
         """
-        events = self._monitor.poll()
+        events += self._monitor.poll()
         while (data := self._law.take()) is not None:
             events += self._read_law(data)
         self._choose_sources(with_states)
@@ -113,13 +114,13 @@ class Listener:
             if (data := subscription.take_newest()) is not None:
                 is_new |= self._read(describe, codec, data)
         if not is_new or len(self._heard) < len(self._sources):
-            return None, events
+            return None
         state, passive = self._state, len(self._names.passive)
         angles = np.concatenate([state.joint_positions, state.passive_positions[:passive]])
         return Sample(
             self._time, state.base_position.copy(), state.quaternion.copy(), angles,
             state.applied_torque.copy(), self._monitor.error,
-        ), events  # fmt: skip
+        )  # fmt: skip
 
     @property
     def time(self) -> float:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from space_robot_msgs_py.errors import FlightError
 
+from ...flight.graph.monitor import Event
 from ..stage import silent_server
 from .finder import Finder, Place
 from .listener import Listener
@@ -24,6 +25,7 @@ TELL_S = 0.2
 """How often words and curves are shown anew."""
 LOOK_S = 0.5
 """How often a plant is looked for."""
+WAITING, OVER = "waiting for a flight", "the flight is over"
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ def serve(options: LiveOptions, say: Callable[[str], None], ready: Callable[[str
         ready(f"http://127.0.0.1:{server.get_port()}")
         follower = Follower(server, finder, options)
         while True:
-            say("waiting for a flight")
+            say(WAITING)
             while (place := finder.find()) is None:
                 time.sleep(LOOK_S)
             say(f"following the flight in {place}")
@@ -99,13 +101,19 @@ class Follower:
 
         def check() -> None:
             if not self._finder.is_there(place):
-                raise OverError("the flight is over")
+                raise OverError(OVER)
 
         with closing(Listener(place, self._options.robot, check)) as listener:
-            if self._view:
-                self._view.close()
-            self._view = LiveView(self._server, listener.robot, self._options.dark)
-            self._waiting.visible = False
+            events: list[Event] = []
+            while (sample := listener.poll(self._is_watched, events)) is None:
+                check()
+                time.sleep(TELL_S)
+            with self._server.atomic():
+                if self._view:
+                    self._view.close()
+                self._waiting.visible = False
+                self._view = LiveView(self._server, listener.robot, sample, self._options.dark)
+            self._view.note(events)
             try:
                 self._show(listener, self._view, check)
             except OverError as over:
@@ -113,14 +121,15 @@ class Follower:
                 raise
 
     def _show(self, listener: Listener, view: LiveView, check: Callable[[], None]) -> None:
-        flown, tell_at, look_at = -1.0, 0.0, 0.0
+        flown = tell_at = look_at = 0.0
         told = time.monotonic(), 0.0
         while True:
             began = time.monotonic()
             if began >= look_at:
                 check()
                 look_at = began + LOOK_S
-            sample, events = listener.poll(self._is_watched)
+            events: list[Event] = []
+            sample = listener.poll(self._is_watched, events)
             view.note(events)
             if sample:
                 if sample.time < flown:

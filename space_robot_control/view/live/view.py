@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 ROOT = "/robot"
-UNTURNED = np.array([[1.0, 0.0, 0.0, 0.0]])
 TRAIL = 0.0035
 """Width of a tool's trail by the size of what is seen."""
 ROOM = 1.3
@@ -42,19 +41,23 @@ MOST_EVENTS = 8
 class LiveView:
     """What browsers see of one robot."""
 
-    def __init__(self, server: ViserServer, robot: Robot, dark: bool) -> None:
-        """Put the robot into the empty scene; it stands at zero.
+    def __init__(self, server: ViserServer, robot: Robot, sample: Sample, dark: bool) -> None:
+        """Put the robot into the empty scene.
 
         Args:
             server: that browsers are connected to.
             robot: that flies.
+            sample: its pose.
             dark: whether the page is light on dark.
         """
-        self._server, self._robot, self._dark = server, robot, dark
+        self._server, self._robot = server, robot
         colours, ink = (ON_DARK, "#c9d1d9") if dark else (ON_WHITE, "#333333")
-        self._is_staged = False
-        at_zero = extent(robot, np.zeros((1, 3)), UNTURNED, np.zeros((1, robot.joint_count)))
-        width = TRAIL * float(np.ptp(at_zero, axis=0).max())
+        points = extent(
+            robot, sample.base_position[np.newaxis], _unit(sample), sample.angles[np.newaxis]
+        )
+        middle = points.mean(axis=0)
+        set_stage(server, middle + ROOM * (points - middle), dark)
+        width = TRAIL * float(np.ptp(points, axis=0).max())
         self._root = server.scene.add_frame(ROOT, show_axes=False)
         self._scene = RobotScene(server.scene, ROOT, robot)
         self._tools = [replace(robot, tools=(tool,)) for tool in robot.tools]
@@ -66,29 +69,19 @@ class LiveView:
         prismatic = robot.is_prismatic[: robot.n].tolist()
         self._curves = Curves(server.gui, robot.n + 3, prismatic, colours, ink)
         self._events: deque[Event] = deque(maxlen=MOST_EVENTS)
+        self.show(sample)
 
     def show(self, sample: Sample) -> None:
         """Move the robot."""
-        position, quaternion = sample.base_position, sample.base_quaternion
-        unit = quaternion / np.linalg.norm(quaternion)
-        if not self._is_staged:
-            self._set_stage(position, unit, sample.angles)
+        position, quaternion = sample.base_position, _unit(sample)
         # of two rows, since the scene takes what has one for what never moves
         links = joint_transforms(self._robot, np.tile(sample.angles, (2, 1)))
         with self._server.atomic():
-            self._scene.move(position, unit, links, 0)
+            self._scene.move(position, quaternion[0], links, 0)
             for robot, trail in zip(self._tools, self._trails, strict=True):
-                _, place = tool_pose(robot, unit[np.newaxis], sample.angles[np.newaxis])
+                _, place = tool_pose(robot, quaternion, sample.angles[np.newaxis])
                 trail.add(sample.time, position + place[0])
         self._curves.add(sample)
-
-    def _set_stage(self, position: Array, quaternion: Array, angles: Array) -> None:
-        points = extent(
-            self._robot, position[np.newaxis], quaternion[np.newaxis], angles[np.newaxis]
-        )
-        middle = points.mean(axis=0)
-        set_stage(self._server, middle + ROOM * (points - middle), self._dark)
-        self._is_staged = True
 
     def tell(self, listener: Listener, speed: float, note: str = "") -> None:
         """Write what the panel says, and draw the curves.
@@ -124,3 +117,9 @@ class LiveView:
         self._root.remove()
         self._words.remove()
         self._curves.remove()
+
+
+def _unit(sample: Sample) -> Array:
+    """Return the base's attitude, (1, 4): sensors tell one that is not quite a unit quaternion."""
+    unit: Array = sample.base_quaternion[np.newaxis] / np.linalg.norm(sample.base_quaternion)
+    return unit

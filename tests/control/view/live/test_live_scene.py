@@ -1,0 +1,185 @@
+"""The live scene: what a browser is sent of a graph are the poses that its bag has."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from flights import COMMAND, ros_environment
+from numpy.typing import NDArray
+
+from space_robot_control.view.live import serve as serving
+from space_robot_control.view.live.serve import LiveOptions, serve
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_sim.robot.find import find_robot
+from space_robot_sim.robot.transforms import joint_transforms
+
+msgspec = pytest.importorskip("msgspec")
+pytest.importorskip("viser")
+zstandard = pytest.importorskip("zstandard")
+websockets = pytest.importorskip("websockets.sync.client")
+
+Array = NDArray[np.float64]
+Poses = dict[str, tuple[float, ...]]
+PATIENCE_S = 120.0
+CLOSE = 3e-5
+"""viser sends no pose again that has changed by less than a hundred-thousandth."""
+UNTURNED = (1.0, 0.0, 0.0, 0.0)
+"""Of a frame whose attitude nobody has sent."""
+CAMERA = {
+    "type": "ViewerCameraMessage", "wxyz": (1.0, 0.0, 0.0, 0.0), "position": (5.0, 5.0, 5.0),
+    "fov": 1.0, "near": 0.1, "far": 100.0, "image_height": 100, "image_width": 100,
+    "look_at": (0.0, 0.0, 0.0), "up_direction": (0.0, 0.0, 1.0),
+}  # fmt: skip
+
+
+class EndedError(Exception):
+    """The test has seen enough."""
+
+
+class Server(threading.Thread):
+    """Serves in a thread until it has waited for flights so many times."""
+
+    def __init__(self, domain: int, flights: int) -> None:
+        super().__init__(daemon=True)
+        self._options, self._left = LiveOptions(domain=domain, port=0), flights + 1
+        self.lines: list[str] = []
+        self.address = ""
+        self.waits = threading.Event()
+        self.error: BaseException | None = None
+
+    def run(self) -> None:
+        try:
+            serve(self._options, self._say, self._set_address)
+        except BaseException as error:
+            self.error = error
+
+    def _say(self, line: str) -> None:
+        self.lines.append(line)
+        if line == serving.WAITING:
+            self._left -= 1
+            self.waits.set()
+            if not self._left:
+                raise EndedError
+
+    def _set_address(self, address: str) -> None:
+        self.address = address
+
+
+def frames(server: Server) -> Iterator[Poses]:
+    """Yield all poses that a browser is shown, by name in the scene, after each change."""
+    import viser
+
+    poses: Poses = {}
+    with websockets.connect(
+        server.address.replace("http", "ws"), subprotocols=[f"viser-v{viser.__version__}"],
+        max_size=None,
+    ) as socket:  # fmt: skip
+        socket.send(msgspec.msgpack.encode(CAMERA))  # a browser without one is none yet
+        while server.is_alive():
+            try:
+                data = socket.recv(timeout=0.2)
+            except TimeoutError:
+                continue
+            except Exception:  # the server is gone
+                return
+            before = dict(poses)
+            for message in messages(data):
+                if message["type"] in ("SetPositionMessage", "SetOrientationMessage"):
+                    value = message.get("position", message.get("wxyz"))
+                    poses[f"{message['type'][3:6]}{message['name']}"] = tuple(value)
+            if poses != before:
+                yield dict(poses)
+
+
+def messages(data: bytes) -> list[dict[str, Any]]:
+    """Decode what viser sends at once."""
+    size = int.from_bytes(data[8:16], "little")
+    inner = zstandard.ZstdDecompressor().decompress(data[16 : 16 + size])
+    found: list[dict[str, Any]] = msgspec.msgpack.decode(inner)["messages"]
+    return found
+
+
+def fly(domain: int, bag: Path, *options: str) -> FlightLog:
+    subprocess.run(
+        [*COMMAND, "fly", "--duration", "1", "--domain", str(domain), "--bag", str(bag), *options],
+        check=True, timeout=PATIENCE_S, capture_output=True, env=ros_environment(),
+    )  # fmt: skip
+    return read_flight(bag)
+
+
+def shown_rows(log: FlightLog, shown: list[Poses]) -> list[int]:
+    """Return the row of the log that each frame shows; fail where there is none."""
+    links = joint_transforms(find_robot("paper"), log.joint_positions)
+    path, rows = "/robot/base", []
+    of_links = np.empty((log.ticks, 0))
+    names = []
+    for link in links:
+        path = f"{path}/{link.child}"
+        names.append(f"Ori{path}")
+        of_links = np.hstack([of_links, link.quaternion])
+    for poses in shown:
+        if names[-1] not in poses:  # a scene without a robot
+            continue
+        seen = np.concatenate([poses.get(name, UNTURNED) for name in names])
+        away = np.abs(of_links - seen).max(axis=1)
+        row = int(away.argmin())
+        assert away[row] < CLOSE
+        base = np.concatenate([poses["Pos/robot/base"], poses.get("Ori/robot/base", UNTURNED)])
+        truth = np.concatenate([log.base_position[row], log.quaternion[row]])
+        np.testing.assert_allclose(base, truth, atol=CLOSE)
+        rows.append(row)
+    return rows
+
+
+def test_two_flights_one_after_the_other(tmp_path: Path, free_domain: int) -> None:
+    # the second one's sensors are so bad that their poses are none of the truth's
+    given = ((), ("--sensors", "coarse"))
+    server = Server(free_domain, len(given))
+    server.start()
+    assert server.waits.wait(PATIENCE_S)
+    shown: list[list[Poses]] = []
+    done = threading.Event()
+
+    def watch() -> None:
+        for poses in frames(server):
+            shown[-1].append(poses)
+        done.set()
+
+    shown.append([])
+    threading.Thread(target=watch, daemon=True).start()
+    for k, options in enumerate(given):
+        log = fly(free_domain, tmp_path / f"bag{k}", *options)
+        seen, _ = shown[-1], shown.append([])
+        rows = shown_rows(log, seen)
+        assert len(set(rows)) > 3
+        assert rows == sorted(rows)
+    server.join(PATIENCE_S)
+    assert isinstance(server.error, EndedError)
+    assert done.wait(PATIENCE_S)
+    following = f"following the flight in ROS domain {free_domain}"
+    assert server.lines == [
+        serving.WAITING, following, serving.OVER, serving.WAITING, following, serving.OVER,
+        serving.WAITING,
+    ]  # fmt: skip
+
+
+def test_ctrl_c_ends_it(free_domain: int) -> None:
+    with subprocess.Popen(
+        [*COMMAND, "view", "--live", "--no-open", "--port", "0", "--domain", str(free_domain)],
+        stderr=subprocess.PIPE, text=True, env=ros_environment(),
+    ) as process:  # fmt: skip
+        assert process.stderr is not None
+        address, waiting = process.stderr.readline(), process.stderr.readline()
+        assert address.startswith("the scene is at http://127.0.0.1:")
+        assert waiting.strip() == serving.WAITING
+        process.send_signal(signal.SIGINT)
+        assert process.stderr.read().strip() == "ended"
+        assert process.wait(PATIENCE_S) == 0
