@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from .scene import Look, RobotScene, rgb
 from .stage import extent, set_stage, silent_server
 from .targets import held_targets
 from .trails import Move, trails
+
+if TYPE_CHECKING:
+    from viser import ViserServer
 
 Array = NDArray[np.float64]
 
@@ -55,23 +58,8 @@ def film(
     Raises:
         InputError: viser is not installed, or a flight has no state.
     """
-    frames = [Frames.of(flight.log, flight.robot, times) for flight in flights]
-    seen = [_seen(flight.robot, of) for flight, of in zip(flights, frames, strict=True)]
-    places = _places(seen) if side_by_side else [np.zeros(3)] * len(flights)
     with silent_server() as server:
-        scene = server.scene
-        set_stage(server, np.concatenate([s + p for s, p in zip(seen, places, strict=True)]), dark)
-        moves: list[Move] = []
-        for index, (flight, of, place) in enumerate(zip(flights, frames, places, strict=True)):
-            root = f"/{flight.name.replace('/', '_')}"
-            scene.add_frame(root, show_axes=False, position=place)
-            over = index > 0 and not side_by_side
-            size = float(np.ptp(seen[index], axis=0).max())
-            look = Look(flight.colour, GHOST, 0.004 * size * index) if over else Look()
-            robot = RobotScene(scene, root, flight.robot, look)
-            moves.append(_moving(robot, of))
-            moves += trails(scene, root, of, rgb(flight.colour), 0.0035 * size)
-            moves += held_targets(robot, flight.log, flight.robot, times)
+        moves = add_flights(server, flights, times, side_by_side, dark)
         recorder, done = server.get_scene_serializer(), advance(len(times))
         for k, time in enumerate(times):
             if k:
@@ -80,6 +68,40 @@ def film(
                 move(k)
             done()
         return str(recorder.as_html(dark_mode=dark))
+
+
+def add_flights(
+    server: ViserServer, flights: Sequence[Flown], times: Array, side_by_side: bool, dark: bool
+) -> list[Move]:
+    """Add robots, trails and targets to a server's empty scene; return what moves them.
+
+    Args:
+        server: whose scene it is.
+        flights: to be shown.
+        times: (K,) s, of the frames.
+        side_by_side: whether each robot has a place of its own.
+        dark: whether the page is.
+
+    Raises:
+        InputError: a flight has no state.
+    """
+    frames = [Frames.of(flight.log, flight.robot, times) for flight in flights]
+    seen = [_seen(flight.robot, of) for flight, of in zip(flights, frames, strict=True)]
+    places = _places(seen) if side_by_side else [np.zeros(3)] * len(flights)
+    scene = server.scene
+    set_stage(server, np.concatenate([s + p for s, p in zip(seen, places, strict=True)]), dark)
+    moves: list[Move] = []
+    for index, (flight, of, place) in enumerate(zip(flights, frames, places, strict=True)):
+        root = f"/{flight.name.replace('/', '_')}"
+        scene.add_frame(root, show_axes=False, position=place)
+        over = index > 0 and not side_by_side
+        size = float(np.ptp(seen[index], axis=0).max())
+        look = Look(flight.colour, GHOST, 0.004 * size * index) if over else Look()
+        robot = RobotScene(scene, root, flight.robot, look)
+        moves.append(_moving(robot, of))
+        moves += trails(scene, root, of, rgb(flight.colour), 0.0035 * size)
+        moves += held_targets(robot, flight.log, flight.robot, times)
+    return moves
 
 
 def _moving(robot: RobotScene, frames: Frames) -> Move:

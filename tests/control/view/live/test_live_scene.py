@@ -140,8 +140,8 @@ def shown_rows(log: FlightLog, shown: list[Poses]) -> list[int]:
 
 
 def test_two_flights_one_after_the_other(tmp_path: Path, free_domain: int) -> None:
-    # the second one's sensors are so bad that their poses are none of the truth's
-    given = ((), ("--sensors", "coarse"))
+    # the second one's sensors are so far off that their poses are none of the truth's
+    given = ((), ("--sensors", "tactical"))
     server = Server(free_domain, len(given))
     server.start()
     assert server.waits.wait(PATIENCE_S)

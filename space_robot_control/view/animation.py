@@ -1,0 +1,163 @@
+"""An animated picture of a flight: the scene, drawn by a browser, with a few curves that grow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .browser import FRAME_TIMEOUT_S, headless_browser
+from .film import Flown, add_flights
+from .page import Plot
+from .stage import silent_server
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+Array = NDArray[np.float64]
+
+FORMATS = (".webp", ".gif", ".png")
+"""Those that browsers animate; PNG as APNG."""
+SIZE = (760, 456)
+"""px, width and height."""
+RATE_HZ = 12.5
+LENGTH_S = 10.0
+"""Of the picture, whatever the flight's length."""
+ASIDE = 0.17
+"""Of the picture's width, by which the robot stands left of the middle: curves are on the right."""
+CLOSER = 0.86
+"""Distance of the camera by that of the page's, whose picture may be higher than wide."""
+INK, FAINT = "#c9d1d9", "#57606a"
+TOP, BOTTOM = (13, 17, 23), (27, 35, 48)
+"""Colours of the background."""
+
+
+def animation_times(start: float, end: float) -> Array:
+    """Return the times, (K,) s, of the frames of a flight that lasts from ``start`` to ``end``."""
+    return np.linspace(start, end, round(LENGTH_S * RATE_HZ))
+
+
+def animate(
+    flight: Flown, times: Array, plots: Sequence[Plot], caption: str,
+    advance: Callable[[int], Callable[[], None]],
+) -> list[Image]:  # fmt: skip
+    """Draw the frames of a flight.
+
+    Args:
+        flight: to be shown.
+        times: (K,) s, of the frames.
+        plots: whose curves grow beside the robot.
+        caption: one line.
+        advance: told how many frames there will be, then called after each.
+
+    Raises:
+        InputError: there is no browser, or the flight has no state.
+        FlightError: the browser did not come up.
+    """
+    from PIL import Image
+
+    width, height = SIZE
+    ground = Image.fromarray(_gradient(width, height))
+    overlay = _Overlay(plots, times, caption)
+    found = []
+    with silent_server() as server:
+        moves = add_flights(server, [flight], times, False, True)
+        pose = _camera(server.initial_camera.position, server.initial_camera.look_at)
+        fov = float(server.initial_camera.fov)
+        with headless_browser(server, width + 100, height + 200) as client:
+            done = advance(len(times))
+            for k in range(len(times)):
+                with server.atomic():
+                    for move in moves:
+                        move(k)
+                drawn = client.get_render(
+                    height, width, wxyz=pose[0], position=pose[1], fov=fov,
+                    transport_format="png", timeout=FRAME_TIMEOUT_S,
+                )  # fmt: skip
+                frame = ground.copy()
+                for layer in (drawn, overlay.draw(k)):
+                    frame.alpha_composite(Image.fromarray(layer))
+                found.append(frame.convert("RGB"))
+                done()
+    return found
+
+
+def save(frames: Sequence[Image], file: Path) -> None:
+    """Write an endless animation in the format of the file's ending, one of `FORMATS`."""
+    first, *others = frames
+    options = {".webp": {"quality": 72, "method": 6}, ".gif": {"optimize": True}, ".png": {}}
+    first.save(
+        file, save_all=True, append_images=others, duration=round(1000 / RATE_HZ), loop=0,
+        **options[file.suffix],
+    )  # fmt: skip
+
+
+def _camera(position: Array, look_at: Array) -> tuple[Array, Array]:
+    """Return attitude ``[w, x, y, z]`` and position of a camera that has the robot on its left."""
+    from scipy.spatial.transform import Rotation
+
+    back = CLOSER * (position - look_at)
+    forward = -back / np.linalg.norm(back)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    aside = ASIDE * np.linalg.norm(back) * right
+    x, y, z, w = Rotation.from_matrix(
+        np.column_stack([right, np.cross(forward, right), forward])
+    ).as_quat()
+    return np.array([w, x, y, z]), look_at + back + aside
+
+
+def _gradient(width: int, height: int) -> NDArray[np.uint8]:
+    rows = np.linspace(TOP, BOTTOM, height)[:, np.newaxis]
+    ground = np.full((height, width, 4), 255, np.uint8)
+    ground[..., :3] = np.broadcast_to(rows, (height, width, 3)).round()
+    return ground
+
+
+class _Overlay:
+    """Caption, time and curves, up to each frame's time."""
+
+    def __init__(self, plots: Sequence[Plot], times: Array, caption: str) -> None:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(SIZE[0] / 100, SIZE[1] / 100), dpi=100, facecolor="none")
+        self._canvas, self._times, self._lines = FigureCanvasAgg(figure), times, []
+        figure.text(0.025, 0.93, caption, color=INK, size=11, weight="bold")
+        self._clock = figure.text(0.025, 0.045, "", color=INK, size=11, family="monospace")
+        share = 0.86 / len(plots)
+        for index, plot in enumerate(plots):
+            axes = figure.add_axes((0.69, 0.95 - share * (index + 1) + 0.05, 0.29, share - 0.10))
+            self._decorate(axes, plot)
+            for series in plot.series:
+                (line,) = axes.plot([], [], color=series.colour, linewidth=1.2)
+                self._lines.append((line, plot.time, series.values))
+        axes.set_xlabel("s", color=FAINT, size=8, labelpad=1)
+
+    def _decorate(self, axes: object, plot: Plot) -> None:
+        from matplotlib.axes import Axes
+
+        assert isinstance(axes, Axes)
+        values = np.array([series.values for series in plot.series])
+        low, high = np.nanmin(values), np.nanmax(values)
+        axes.set(xlim=(self._times[0], self._times[-1]), facecolor="none")
+        axes.set_ylim(low - 0.06 * (high - low), high + 0.06 * (high - low))
+        unit = f", {plot.unit}" if plot.unit else ""
+        axes.set_title(f"{plot.title}{unit}", color=INK, size=9, loc="left", pad=3)
+        axes.tick_params(colors=FAINT, labelsize=7, length=2)
+        axes.yaxis.get_offset_text().set(color=FAINT, size=7)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.spines[["left", "bottom"]].set_color(FAINT)
+
+    def draw(self, k: int) -> NDArray[np.uint8]:
+        """Return the picture (height, width, 4) at the k-th time."""
+        now = self._times[k]
+        for line, time, values in self._lines:
+            flown = time <= now
+            line.set_data(time[flown], values[flown])
+        self._clock.set_text(f"t = {now:4.1f} s")
+        self._canvas.draw()
+        return np.asarray(self._canvas.buffer_rgba())

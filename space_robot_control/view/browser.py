@@ -1,0 +1,73 @@
+"""A browser without a window that draws a scene for this process."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from space_robot_msgs_py.errors import FlightError, InputError
+
+if TYPE_CHECKING:
+    from viser import ClientHandle, ViserServer
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+PATIENCE_S = 60.0
+LOOK_S = 0.1
+FRAME_TIMEOUT_S = 120.0
+"""The first one is slow where there is no graphics card."""
+
+
+def find_browser() -> str:
+    """Return the path of Chromium or Chrome.
+
+    Raises:
+        InputError: there is none.
+    """
+    found = next(filter(None, map(shutil.which, NAMES)), None)
+    if not found:
+        raise InputError(f"a browser is needed, one of {', '.join(NAMES)}: none is here")
+    return found
+
+
+@contextmanager
+def headless_browser(server: ViserServer, width: int, height: int) -> Iterator[ClientHandle]:
+    """Open the scene of a server in a browser of its own, which ends with the context.
+
+    Args:
+        server: of viser.
+        width: px, of its window.
+        height: px.
+
+    Raises:
+        InputError: there is no browser.
+        FlightError: it did not come up.
+    """
+    options = ["--headless=new", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    if os.geteuid() == 0:  # Chromium's sandbox refuses root
+        options.append("--no-sandbox")
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        command = [
+            find_browser(), *options, f"--user-data-dir={profile}",
+            f"--window-size={width},{height}", f"http://127.0.0.1:{server.get_port()}",
+        ]  # fmt: skip
+        silent = subprocess.DEVNULL
+        with subprocess.Popen(command, stdin=silent, stdout=silent, stderr=silent) as process:
+            try:
+                yield _client(server, process)
+            finally:
+                process.terminate()
+
+
+def _client(server: ViserServer, process: subprocess.Popen[bytes]) -> ClientHandle:
+    until = time.monotonic() + PATIENCE_S
+    while not (clients := server.get_clients()):
+        if process.poll() is not None or time.monotonic() > until:
+            raise FlightError(f"{process.args[0]} did not open the scene")  # type: ignore[index]
+        time.sleep(LOOK_S)
+    return next(iter(clients.values()))
