@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.plot_series import tick_times
 from .browser import FRAME_TIMEOUT_S, headless_browser
 from .film import Flown, add_flights
 from .page import Plot
@@ -21,34 +23,27 @@ Array = NDArray[np.float64]
 
 FORMATS = (".webp", ".gif", ".png")
 """Those that browsers animate; PNG as APNG."""
-SIZE = (760, 456)
+SIZE = (760, 500)
 """px, width and height."""
 RATE_HZ = 12.5
 LENGTH_S = 10.0
 """Of the picture, whatever the flight's length."""
 ASIDE = 0.17
 """Of the picture's width, by which the robot stands left of the middle: curves are on the right."""
-CLOSER = 0.86
-"""Distance of the camera by that of the page's, whose picture may be higher than wide."""
+LIGHT_S, MOST_TRIES = 1.0, 30
 INK, FAINT = "#c9d1d9", "#57606a"
 TOP, BOTTOM = (13, 17, 23), (27, 35, 48)
 """Colours of the background."""
 
 
-def animation_times(start: float, end: float) -> Array:
-    """Return the times, (K,) s, of the frames of a flight that lasts from ``start`` to ``end``."""
-    return np.linspace(start, end, round(LENGTH_S * RATE_HZ))
-
-
 def animate(
-    flight: Flown, times: Array, plots: Sequence[Plot], caption: str,
+    flight: Flown, plots: Sequence[Plot], caption: str,
     advance: Callable[[int], Callable[[], None]],
 ) -> list[Image]:  # fmt: skip
     """Draw the frames of a flight.
 
     Args:
         flight: to be shown.
-        times: (K,) s, of the frames.
         plots: whose curves grow beside the robot.
         caption: one line.
         advance: told how many frames there will be, then called after each.
@@ -60,25 +55,32 @@ def animate(
     from PIL import Image
 
     width, height = SIZE
+    start, *_, end = tick_times(flight.log)
+    times = np.linspace(start, end, round(LENGTH_S * RATE_HZ))
     ground = Image.fromarray(_gradient(width, height))
     overlay = _Overlay(plots, times, caption)
     found = []
     with silent_server() as server:
         moves = add_flights(server, [flight], times, False, True)
+        server.scene.configure_default_lights(cast_shadow=False)  # they take five times as long
         pose = _camera(server.initial_camera.position, server.initial_camera.look_at)
         fov = float(server.initial_camera.fov)
-        with headless_browser(server, width + 100, height + 200) as client:
-            done = advance(len(times))
-            for k in range(len(times)):
+        with headless_browser(server) as client:
+
+            def draw(k: int) -> NDArray[np.uint8]:
                 with server.atomic():
                     for move in moves:
                         move(k)
-                drawn = client.get_render(
+                return client.get_render(
                     height, width, wxyz=pose[0], position=pose[1], fov=fov,
                     transport_format="png", timeout=FRAME_TIMEOUT_S,
                 )  # fmt: skip
+
+            done = advance(len(times))
+            _await_light(lambda: draw(0))
+            for k in range(len(times)):
                 frame = ground.copy()
-                for layer in (drawn, overlay.draw(k)):
+                for layer in (draw(k), overlay.draw(k)):
                     frame.alpha_composite(Image.fromarray(layer))
                 found.append(frame.convert("RGB"))
                 done()
@@ -95,11 +97,23 @@ def save(frames: Sequence[Image], file: Path) -> None:
     )  # fmt: skip
 
 
+def _await_light(draw: Callable[[], NDArray[np.uint8]]) -> None:
+    """Draw until the browser has loaded the light from around, without which shade is black."""
+    before = draw()
+    for _ in range(MOST_TRIES):
+        time.sleep(LIGHT_S)
+        now = draw()
+        is_black = (now[..., :3].max(axis=-1) < 8) & (now[..., 3] == 255)
+        if np.mean(is_black) < 0.002 and np.array_equal(now, before):
+            return
+        before = now
+
+
 def _camera(position: Array, look_at: Array) -> tuple[Array, Array]:
     """Return attitude ``[w, x, y, z]`` and position of a camera that has the robot on its left."""
     from scipy.spatial.transform import Rotation
 
-    back = CLOSER * (position - look_at)
+    back = position - look_at
     forward = -back / np.linalg.norm(back)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
@@ -132,9 +146,13 @@ class _Overlay:
         for index, plot in enumerate(plots):
             axes = figure.add_axes((0.69, 0.95 - share * (index + 1) + 0.05, 0.29, share - 0.10))
             self._decorate(axes, plot)
-            for series in plot.series:
+            for place, series in enumerate(reversed(plot.series)):
                 (line,) = axes.plot([], [], color=series.colour, linewidth=1.2)
                 self._lines.append((line, plot.time, series.values))
+                axes.text(
+                    1.0 - 0.06 * place, 1.03, series.label, color=series.colour, size=9, ha="right",
+                    transform=axes.transAxes,
+                )  # fmt: skip
         axes.set_xlabel("s", color=FAINT, size=8, labelpad=1)
 
     def _decorate(self, axes: object, plot: Plot) -> None:

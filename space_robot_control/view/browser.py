@@ -36,13 +36,13 @@ def find_browser() -> str:
 
 
 @contextmanager
-def headless_browser(server: ViserServer, width: int, height: int) -> Iterator[ClientHandle]:
+def headless_browser(server: ViserServer) -> Iterator[ClientHandle]:
     """Open the scene of a server in a browser of its own, which ends with the context.
+
+    Its window, which nobody sees, is small; what it is asked to draw may be larger.
 
     Args:
         server: of viser.
-        width: px, of its window.
-        height: px.
 
     Raises:
         InputError: there is no browser.
@@ -54,7 +54,7 @@ def headless_browser(server: ViserServer, width: int, height: int) -> Iterator[C
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         command = [
             find_browser(), *options, f"--user-data-dir={profile}",
-            f"--window-size={width},{height}", f"http://127.0.0.1:{server.get_port()}",
+            "--window-size=300,200", f"http://127.0.0.1:{server.get_port()}",
         ]  # fmt: skip
         silent = subprocess.DEVNULL
         with subprocess.Popen(command, stdin=silent, stdout=silent, stderr=silent) as process:

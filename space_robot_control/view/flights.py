@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, in_words, laws_of
@@ -13,6 +14,7 @@ from space_robot_sim.robot.find import find_robot, robot_as_path
 from space_robot_sim.robot.source import URDF
 
 from ..analysis.described import check_joints, robot_of
+from .animation import animate
 from .film import Flown, film
 from .frames import RATE_HZ, shown_times
 from .marks import shared_marks
@@ -20,9 +22,15 @@ from .meshes import shown_shapes
 from .page import Shown, render
 from .plots import plots_of
 
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
 ON_DARK = ("#56B4E9", "#E98FC0", "#2CC295", "#E69F00", "#F0E442", "#FF7F41")
 ON_WHITE = ("#0072B2", "#CC79A7", "#009E73", "#E69F00", "#8A7F00", "#D55E00")
 """Okabe's and Ito's colours, brighter or darker where the page asks for it."""
+OF_TRAIL = "#FFB000"
+MOST_PLOTS = 3
+"""Beside an animated picture."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +75,29 @@ def flights_page(
         [Shown(flight.name, flight.colour, _told(flight)) for flight in flights],
         plots_of(logs, colours), shared_marks(logs), float(times[0]), options.dark,
     )  # fmt: skip
+
+
+def flight_frames(
+    name: str, log: FlightLog, robot: Robot, title: str,
+    advance: Callable[[int], Callable[[], None]],
+) -> list[Image]:  # fmt: skip
+    """Return the frames of an animated picture of a flight.
+
+    Args:
+        name: of the flight.
+        log: its log.
+        robot: that flew.
+        title: caption; empty: law, robot and case.
+        advance: told how many frames there will be, then called after each.
+
+    Raises:
+        InputError: there is no browser, or the flight has no state.
+        FlightError: the browser did not come up.
+    """
+    flight = Flown(name, log, robot, _law(log), OF_TRAIL)
+    plots = plots_of({name: log}, ON_DARK)
+    shown = [plot for plot in plots if plot.title.split()[0] in ("attitude", "base", "torque")]
+    return animate(flight, shown[:MOST_PLOTS], title or _told(flight), advance)
 
 
 def shown_robot(log: FlightLog, given: str = "") -> Robot:

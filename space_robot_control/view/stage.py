@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
@@ -54,6 +55,8 @@ def silent_server(port: int = 0) -> Iterator[ViserServer]:
     from rich import get_console
     from viser import ViserServer
 
+    # a browser that opens a connection and does not use it is no error
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
     console = get_console()
     was_quiet, console.quiet = console.quiet, True
     try:
