@@ -13,7 +13,9 @@ from .options import NAMESPACE, REMAP, TRUST, file_option
 @click.command()
 @click.argument("bags", nargs=-1, type=click.Path(path_type=Path), metavar="[BAG...]")
 @file_option(
-    "--out", help="Page to write; an older one is replaced [default: <BAG>_view.html, here]."
+    "--out",
+    help="Page to write, or of one bag an animated picture: .webp, .gif or .png. An older one is "
+    "replaced [default: <BAG>_view.html, here].",
 )
 @click.option("--open/--no-open", "opens", default=True, help="Open the page in a browser.")
 @click.option(
@@ -58,6 +60,7 @@ def view(
     The page needs nothing but a browser, no network: send it to a colleague. Play, scrub, click a
     plot or a mark to go there. Several bags are drawn over one another, or side by side.
 
+    Named .webp, .gif or .png the file is an animated picture, for which Chromium must be here.
     With --live and no bag the same scene is served from a running graph, one flight after another.
 
     \b
@@ -66,6 +69,7 @@ def view(
       space-robot view flights/tde_stc flights/ctc --out laws.html
       space-robot view flights/one flights/two --side-by-side --no-open
       space-robot view flights/mine --robot my.urdf --from 10 --to 12 --rate 200
+      space-robot view flights/one --out one.webp
       space-robot view --live
       space-robot view --live --domain 7 --namespace /sat1
     """
@@ -74,7 +78,8 @@ def view(
     from ..analysis import excerpt
     from ..analysis.files import check_writable, make_folder, whole_file
     from ..flight.progress import counting_progress
-    from ..view.flights import Options, flights_page, remarks_on, shown_robot
+    from ..view.animation import FORMATS
+    from ..view.flights import Options, flights_page, picture_of, remarks_on, shown_robot
     from ..view.stage import check_viser
     from .analyze import bag_names
     from .view_live import check_options, serve_live
@@ -97,9 +102,12 @@ def view(
         click.echo(line, err=True)
     options = Options(side_by_side, rate, title, not light)
     with counting_progress("drawing") as advance:
-        text = flights_page(logs, robots, options, advance)
+        if page.suffix in FORMATS:
+            data = picture_of(logs, robots, title, page, advance)
+        else:
+            data = flights_page(logs, robots, options, advance).encode()
     with whole_file(page, replace=True) as written:
-        written.write(text.encode())
+        written.write(data)
     click.echo(f"wrote {page} ({page.stat().st_size / 1e6:.1f} MB)", err=True)
     if opens and not webbrowser.open(page.absolute().as_uri()):
         click.echo("no browser was found here: open the page in one", err=True)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,14 +88,16 @@ def animate(
     return found
 
 
-def save(frames: Sequence[Image], file: Path) -> None:
-    """Write an endless animation in the format of the file's ending, one of `FORMATS`."""
+def encoded(frames: Sequence[Image], file: Path) -> bytes:
+    """Return an endless animation in the format of a file's ending, one of `FORMATS`."""
     first, *others = frames
-    options = {".webp": {"quality": 72, "method": 6}, ".gif": {"optimize": True}, ".png": {}}
+    options: Any = {".webp": {"quality": 72, "method": 6}, ".gif": {"optimize": True}, ".png": {}}
+    written = io.BytesIO()
     first.save(
-        file, save_all=True, append_images=others, duration=round(1000 / RATE_HZ), loop=0,
-        **options[file.suffix],
+        written, file.suffix[1:], save_all=True, append_images=others,
+        duration=round(1000 / RATE_HZ), loop=0, **options[file.suffix],
     )  # fmt: skip
+    return written.getvalue()
 
 
 def _await_light(draw: Callable[[], NDArray[np.uint8]]) -> None:
@@ -139,7 +142,8 @@ class _Overlay:
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(SIZE[0] / 100, SIZE[1] / 100), dpi=100, facecolor="none")
-        self._canvas, self._times, self._lines = FigureCanvasAgg(figure), times, []
+        self._canvas: Any = FigureCanvasAgg(figure)
+        self._times, self._lines = times, []
         figure.text(0.025, 0.93, caption, color=INK, size=11, weight="bold")
         self._clock = figure.text(0.025, 0.045, "", color=INK, size=11, family="monospace")
         share = 0.86 / len(plots)
@@ -173,9 +177,9 @@ class _Overlay:
     def draw(self, k: int) -> NDArray[np.uint8]:
         """Return the picture (height, width, 4) at the k-th time."""
         now = self._times[k]
-        for line, time, values in self._lines:
-            flown = time <= now
-            line.set_data(time[flown], values[flown])
+        for line, seconds, values in self._lines:
+            flown = seconds <= now
+            line.set_data(seconds[flown], values[flown])
         self._clock.set_text(f"t = {now:4.1f} s")
         self._canvas.draw()
         return np.asarray(self._canvas.buffer_rgba())

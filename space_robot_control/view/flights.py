@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, in_words, laws_of
+from space_robot_msgs_py.errors import InputError
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.choice import split_choice
 from space_robot_sim.robot.find import find_robot, robot_as_path
 from space_robot_sim.robot.source import URDF
 
 from ..analysis.described import check_joints, robot_of
-from .animation import animate
+from .animation import animate, encoded
 from .film import Flown, film
 from .frames import RATE_HZ, shown_times
 from .marks import shared_marks
@@ -22,14 +23,11 @@ from .meshes import shown_shapes
 from .page import Shown, render
 from .plots import plots_of
 
-if TYPE_CHECKING:
-    from PIL.Image import Image
-
 ON_DARK = ("#56B4E9", "#E98FC0", "#2CC295", "#E69F00", "#F0E442", "#FF7F41")
 ON_WHITE = ("#0072B2", "#CC79A7", "#009E73", "#E69F00", "#8A7F00", "#D55E00")
 """Okabe's and Ito's colours, brighter or darker where the page asks for it."""
 OF_TRAIL = "#FFB000"
-MOST_PLOTS = 3
+PICTURED, MOST_PLOTS = ("attitude", "base", "torque"), 3
 """Beside an animated picture."""
 
 
@@ -77,27 +75,29 @@ def flights_page(
     )  # fmt: skip
 
 
-def flight_frames(
-    name: str, log: FlightLog, robot: Robot, title: str,
+def picture_of(
+    logs: Mapping[str, FlightLog], robots: Mapping[str, Robot], title: str, file: Path,
     advance: Callable[[int], Callable[[], None]],
-) -> list[Image]:  # fmt: skip
-    """Return the frames of an animated picture of a flight.
+) -> bytes:  # fmt: skip
+    """Return the animated picture of a flight.
 
     Args:
-        name: of the flight.
-        log: its log.
-        robot: that flew.
+        logs: by name, one.
+        robots: that flew, by the same names.
         title: caption; empty: law, robot and case.
+        file: whose ending tells the format, one of `animation.FORMATS`.
         advance: told how many frames there will be, then called after each.
 
     Raises:
-        InputError: there is no browser, or the flight has no state.
+        InputError: there are several flights, there is no browser, or the flight has no state.
         FlightError: the browser did not come up.
     """
-    flight = Flown(name, log, robot, _law(log), OF_TRAIL)
-    plots = plots_of({name: log}, ON_DARK)
-    shown = [plot for plot in plots if plot.title.split()[0] in ("attitude", "base", "torque")]
-    return animate(flight, shown[:MOST_PLOTS], title or _told(flight), advance)
+    if len(logs) > 1:
+        raise InputError(f"{file}: an animated picture shows one flight, got {len(logs)} bags")
+    ((name, log),) = logs.items()
+    flight = Flown(name, log, robots[name], _law(log), OF_TRAIL)
+    shown = [p for p in plots_of(logs, ON_DARK) if p.title.split()[0] in PICTURED]
+    return encoded(animate(flight, shown[:MOST_PLOTS], title or _told(flight), advance), file)
 
 
 def shown_robot(log: FlightLog, given: str = "") -> Robot:
