@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import shutil
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -55,7 +56,7 @@ def test_the_robot_moves_and_the_curves_grow(
             picture.seek(k)
             frames.append(np.array(picture.convert("RGB"), float))
     width = animation.SIZE[0]
-    for before, after in zip(frames, frames[1:], strict=False):
+    for before, after in pairwise(frames):
         changed = np.abs(after - before).max(axis=2) > 40
         assert changed[:, : width // 2].sum() > 100  # the arm
         assert changed[:, 2 * width // 3 :].sum() > 100  # the curves
