@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,7 +30,6 @@ LENGTH_S = 10.0
 """Of the picture, whatever the flight's length."""
 ASIDE = 0.17
 """Of the picture's width, by which the robot stands left of the middle: curves are on the right."""
-LIGHT_S, MOST_TRIES = 1.0, 30
 INK, FAINT = "#c9d1d9", "#57606a"
 TOP, BOTTOM = (13, 17, 23), (27, 35, 48)
 """Colours of the background."""
@@ -62,8 +60,7 @@ def animate(
     overlay = _Overlay(plots, times, caption)
     found = []
     with silent_server() as server:
-        moves = add_flights(server, [flight], times, False, True)
-        server.scene.configure_default_lights(cast_shadow=False)  # they take five times as long
+        moves = add_flights(server, [flight], times, False, True, shadows=False)
         pose = _camera(server.initial_camera.position, server.initial_camera.look_at)
         fov = float(server.initial_camera.fov)
         with headless_browser(server) as client:
@@ -78,7 +75,7 @@ def animate(
                 )  # fmt: skip
 
             done = advance(len(times))
-            _await_light(lambda: draw(0))
+            draw(0)  # the first one may lack what the browser has yet to make
             for k in range(len(times)):
                 frame = ground.copy()
                 for layer in (draw(k), overlay.draw(k)):
@@ -98,18 +95,6 @@ def encoded(frames: Sequence[Image], file: Path) -> bytes:
         duration=round(1000 / RATE_HZ), loop=0, **options[file.suffix],
     )  # fmt: skip
     return written.getvalue()
-
-
-def _await_light(draw: Callable[[], NDArray[np.uint8]]) -> None:
-    """Draw until the browser has loaded the light from around, without which shade is black."""
-    before = draw()
-    for _ in range(MOST_TRIES):
-        time.sleep(LIGHT_S)
-        now = draw()
-        is_black = (now[..., :3].max(axis=-1) < 8) & (now[..., 3] == 255)
-        if np.mean(is_black) < 0.002 and np.array_equal(now, before):
-            return
-        before = now
 
 
 def _camera(position: Array, look_at: Array) -> tuple[Array, Array]:

@@ -71,8 +71,9 @@ def film(
 
 
 def add_flights(
-    server: ViserServer, flights: Sequence[Flown], times: Array, side_by_side: bool, dark: bool
-) -> list[Move]:
+    server: ViserServer, flights: Sequence[Flown], times: Array, side_by_side: bool, dark: bool,
+    shadows: bool = True,
+) -> list[Move]:  # fmt: skip
     """Add robots, trails and targets to a server's empty scene; return what moves them.
 
     Args:
@@ -81,6 +82,7 @@ def add_flights(
         times: (K,) s, of the frames.
         side_by_side: whether each robot has a place of its own.
         dark: whether the page is.
+        shadows: whether there are any.
 
     Raises:
         InputError: a flight has no state.
@@ -89,7 +91,8 @@ def add_flights(
     seen = [_seen(flight.robot, of) for flight, of in zip(flights, frames, strict=True)]
     places = _places(seen) if side_by_side else [np.zeros(3)] * len(flights)
     scene = server.scene
-    set_stage(server, np.concatenate([s + p for s, p in zip(seen, places, strict=True)]), dark)
+    points = np.concatenate([s + p for s, p in zip(seen, places, strict=True)])
+    set_stage(server, points, dark, shadows)
     moves: list[Move] = []
     for index, (flight, of, place) in enumerate(zip(flights, frames, places, strict=True)):
         root = f"/{flight.name.replace('/', '_')}"

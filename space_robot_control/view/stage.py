@@ -69,13 +69,16 @@ def silent_server(port: int = 0) -> Iterator[ViserServer]:
         console.quiet = was_quiet
 
 
-def set_stage(server: ViserServer, points: Array, dark: bool) -> None:
+def set_stage(
+    server: ViserServer, points: Array, dark: bool, shadows: bool = True
+) -> None:  # fmt: skip
     """Put grid, light and camera about some points.
 
     Args:
         server: whose scene is set.
         points: (K, 3) m, what must be seen, inertial frame.
         dark: whether the page is.
+        shadows: whether there are any; without a graphics card they take five times as long.
     """
     scene, camera = server.scene, server.initial_camera
     scene.set_up_direction("+z")
@@ -89,14 +92,14 @@ def set_stage(server: ViserServer, points: Array, dark: bool) -> None:
         cell_color=shades[0], section_color=shades[1], fade_distance=4.0 * size, fade_from="origin",
         position=(middle[0], middle[1], low[2] - 0.08 * size), shadow_opacity=0.2,
     )  # fmt: skip
-    _light(scene)
+    _light(scene, shadows)
     camera.fov, camera.near, camera.far = float(FIELD_OF_VIEW), 0.01 * size, 100.0 * size
     back = DIRECTION / np.linalg.norm(DIRECTION)
     camera.look_at = middle
     camera.position = middle + _distance(points - middle, back) * back
 
 
-def _light(scene: SceneApi) -> None:
+def _light(scene: SceneApi, shadows: bool) -> None:
     """Put lights of our own: viser's map of a city comes late, or not at all."""
     scene.configure_environment_map(None)
     scene.configure_default_lights(False)
@@ -104,8 +107,8 @@ def _light(scene: SceneApi) -> None:
     for number, (direction, strength) in enumerate(LAMPS):
         turn, _ = Rotation.align_vectors([direction], [[0.0, 0.0, 1.0]])
         scene.add_light_directional(
-            f"/lamp_{number}", color=(255, 250, 240), intensity=strength, cast_shadow=number == 0,
-            wxyz=wxyz(turn.as_matrix()), position=direction,
+            f"/lamp_{number}", color=(255, 250, 240), intensity=strength, position=direction,
+            cast_shadow=shadows and number == 0, wxyz=wxyz(turn.as_matrix()),
         )  # fmt: skip
 
 

@@ -23,6 +23,7 @@ from space_robot_msgs_py.ros.locks import (
     commands_in,
     domain_lock,
     look,
+    newest_node,
     node_lock,
     nodes_in,
     topic_lock,
@@ -117,3 +118,22 @@ def test_every_topic_and_node_of_every_domain_has_its_own_lock(
 ) -> None:
     paths = [kind(domain, "/" + "/".join(name)) for kind, domain, name in (one, other)]
     assert (paths[0] == paths[1]) == (one == other)
+
+
+def test_the_node_that_began_last(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path))
+    assert newest_node("plant_node") is None
+    begun = [(7, "/plant_node"), (12, "/fleet/sat1/plant_node"), (3, "/own_plant_node")]
+    held = []
+    for age, (domain, name) in enumerate(begun):
+        path = node_lock(domain, name)
+        held.append(FileLock(path, "plant_node"))
+        os.utime(path, (0, age))
+    assert newest_node("plant_node") == (12, "/fleet/sat1")
+    assert newest_node("plant_node", "/") == (7, "/")
+    assert newest_node("plant_node", "/sat1") is None
+    held[1].release()
+    assert newest_node("plant_node") == (7, "/")
+    for lock in (held[0], held[2]):
+        lock.release()
+    assert newest_node("plant_node") is None
