@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -135,13 +136,16 @@ class _Overlay:
         for index, plot in enumerate(plots):
             axes = figure.add_axes((0.69, 0.95 - share * (index + 1) + 0.05, 0.29, share - 0.10))
             self._decorate(axes, plot)
-            for place, series in enumerate(reversed(plot.series)):
+            place, common = 1.0, os.path.commonprefix([series.label for series in plot.series])
+            for series in reversed(plot.series):
                 (line,) = axes.plot([], [], color=series.colour, linewidth=1.2)
                 self._lines.append((line, plot.time, series.values))
+                label = series.label.removeprefix(common) or series.label
                 axes.text(
-                    1.0 - 0.06 * place, 1.03, series.label, color=series.colour, size=9, ha="right",
+                    place, 1.03, label, color=series.colour, size=9, ha="right",
                     transform=axes.transAxes,
                 )  # fmt: skip
+                place -= 0.03 + 0.03 * len(label)
         axes.set_xlabel("s", color=FAINT, size=8, labelpad=1)
 
     def _decorate(self, axes: object, plot: Plot) -> None:

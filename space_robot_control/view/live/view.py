@@ -66,8 +66,7 @@ class LiveView:
             for tool, colour in zip(robot.tools, cycle(colours), strict=False)
         ]
         self._words = server.gui.add_html("")
-        prismatic = robot.is_prismatic[: robot.n].tolist()
-        self._curves = Curves(server.gui, robot.n + 3, prismatic, colours, ink)
+        self._curves = Curves(server.gui, robot, colours, ink)
         self._events: deque[Event] = deque(maxlen=MOST_EVENTS)
         self.show(sample)
 

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_sim.robot import Robot
+
 from ...analysis.figures.overlay import words
 from ...analysis.metrics import error_columns, torque_columns, unit_of
-from ..plots import labels
+from ..plots import AXES
 
 if TYPE_CHECKING:
     from viser import GuiApi
@@ -32,26 +35,24 @@ class Curves:
     """Errors and torques over the last seconds, a plot for each column of Table V."""
 
     def __init__(
-        self, gui: GuiApi, axes: int, prismatic: Sequence[bool], colours: Sequence[str], ink: str
-    ) -> None:
+        self, gui: GuiApi, robot: Robot, colours: Sequence[str], ink: str
+    ) -> None:  # fmt: skip
         """Add the plots, empty.
 
         Args:
             gui: of a server.
-            axes: n+3.
-            prismatic: (n,) of the joints.
+            robot: that flies.
             colours: of the curves.
             ink: colour of axes and words.
         """
         self._rows: deque[tuple[float, Array]] = deque(maxlen=2 * POINTS)
-        of_errors, of_torques = (f(axes, True, prismatic) for f in (error_columns, torque_columns))
-        self._plots = [
-            _Plot(gui, name, np.arange(axes)[part], colours, ink)
-            for name, part in of_errors.items()
-        ] + [
-            _Plot(gui, name, axes + np.arange(axes)[part], colours, ink)
-            for name, part in of_torques.items()
-        ]
+        labels, prismatic = [*AXES, *robot.joint_names], robot.is_prismatic[: robot.n].tolist()
+        axes = np.arange(len(labels))
+        self._plots = []
+        for columns, first in ((error_columns, 0), (torque_columns, len(labels))):
+            for name, part in columns(len(labels), True, prismatic).items():
+                shown = {labels[axis]: first + axis for axis in axes[part].tolist()}
+                self._plots.append(_Plot(gui, name, shown, colours, ink))
 
     def add(self, sample: Sample) -> None:
         """Take a sample, unless it follows the one before too closely."""
@@ -79,14 +80,14 @@ class Curves:
 
 class _Plot:
     def __init__(
-        self, gui: GuiApi, name: str, columns: NDArray[np.intp], colours: Sequence[str], ink: str
+        self, gui: GuiApi, name: str, columns: dict[str, int], colours: Sequence[str], ink: str
     ) -> None:
-        self._columns, self._name, self._exponent = columns, name, 0
+        self._columns, self._name, self._exponent = list(columns.values()), name, 0
         nothing = np.zeros(2)
         axis: Any = {"stroke": ink, "grid": {"stroke": f"{ink}33"}, "ticks": {"stroke": f"{ink}33"}}
         series: list[Any] = [{"label": "s"}]
-        for k, label in enumerate(labels(name, len(columns))):
-            series.append({"label": label, "stroke": colours[k % len(colours)], "width": 1.5})
+        for label, colour in zip(columns, cycle(colours), strict=False):
+            series.append({"label": label, "stroke": colour, "width": 1.5})
         self.handle = gui.add_uplot(
             (np.array([0.0, LENGTH_S]), *[nothing] * len(columns)), tuple(series),
             title=self._title, height=HEIGHT, axes=(axis, axis), scales={"x": {"time": False}},
