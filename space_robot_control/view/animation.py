@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -136,11 +135,11 @@ class _Overlay:
         for index, plot in enumerate(plots):
             axes = figure.add_axes((0.69, 0.95 - share * (index + 1) + 0.05, 0.29, share - 0.10))
             self._decorate(axes, plot)
-            place, common = 1.0, os.path.commonprefix([series.label for series in plot.series])
+            place, stem = 1.0, plot.series[0].label.rstrip("0123456789")  # of joint1, joint2
             for series in reversed(plot.series):
                 (line,) = axes.plot([], [], color=series.colour, linewidth=1.2)
                 self._lines.append((line, plot.time, series.values))
-                label = series.label.removeprefix(common) or series.label
+                label = series.label.removeprefix(stem) or series.label
                 axes.text(
                     place, 1.03, label, color=series.colour, size=9, ha="right",
                     transform=axes.transAxes,
