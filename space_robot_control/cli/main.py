@@ -30,6 +30,7 @@ def cli() -> None:
       space-robot fly --controller ctc --case 3     another law, another case
       space-robot simulate --json                   the same flight without ROS
       space-robot robot my.urdf                     what was read of a robot's file
+      space-robot urdf paper                        a robot as a URDF, for RViz and others
       space-robot new my.urdf                       a folder for it: mission, gains, a first flight
       space-robot gains check                       what margin and noise gain a gain set has
       space-robot gains tune -o my_gains            a set for a robot and a mission, by a method

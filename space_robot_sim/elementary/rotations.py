@@ -10,7 +10,7 @@ from .series import plain_sin_cos
 
 Array = NDArray[np.float64]
 
-GIMBAL_LOCK = 1e-7
+GIMBAL_LOCK = 1e-12
 """Cosine of the pitch below which roll and yaw are about one axis."""
 
 
@@ -35,15 +35,18 @@ def rotation_of_rpy(rpy: ArrayLike) -> Array:
 
 
 def rpy_of_rotation(rotation: Array) -> Array:
-    """Invert `rotation_of_rpy`; where roll and yaw turn about one axis, the yaw is 0."""
+    """Invert `rotation_of_rpy`; where roll and yaw turn about one axis, the yaw is 0.
+
+    Yaw comes first and roll of what is left of the turn without it: near that axis both are
+    uncertain, but together they are the rotation to rounding.
+    """
     from .arctangent import arctan2  # slow to import
 
     level = norm(rotation[:2, 0])
-    pitch = arctan2(-rotation[2, 0], level)
-    if level < GIMBAL_LOCK:
-        return np.array([arctan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0])
-    roll = arctan2(rotation[2, 1], rotation[2, 2])
-    return np.array([roll, pitch, arctan2(rotation[1, 0], rotation[0, 0])])
+    yaw = arctan2(rotation[1, 0], rotation[0, 0]) if level > GIMBAL_LOCK else 0.0
+    s, c = exact_sines_cosines(yaw)
+    across = c * rotation[1] - s * rotation[0]
+    return np.array([arctan2(-across[2], across[1]), arctan2(-rotation[2, 0], level), yaw])
 
 
 def _exact(values: Array) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from .frame_names import frame_names
 from .robot import Robot
 
 Array = NDArray[np.float64]
@@ -28,10 +29,10 @@ def joint_transforms(robot: Robot, joint_positions: Array) -> list[Transform]:
     """Return the transform of every joint, a parent's before its children's.
 
     Args:
-        robot: whose bodies' names are the frames'.
+        robot: whose frames have the names of `frame_names`.
         joint_positions: (T, N) of all joints, the passive ones behind; rad, or m of prismatic ones.
     """
-    found = []
+    found, names = [], frame_names(robot).bodies
     for joint in robot.order:
         turn, offset = robot.rotation[joint], robot.offset[joint]
         at_zero, moved = wxyz(turn)[np.newaxis], joint_positions[:, joint]
@@ -46,19 +47,19 @@ def joint_transforms(robot: Robot, joint_positions: Array) -> list[Transform]:
                 [w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s]
             )
             position = (turn @ offset)[np.newaxis]
-        names = robot.body_names
         found.append(Transform(names[robot.parent[joint]], names[joint + 1], position, quaternion))
     return found
 
 
 def tool_transforms(robot: Robot) -> list[Transform]:
     """Return the fixed transforms of the tools."""
+    names = frame_names(robot)
     return [
         Transform(
-            robot.body_names[tool.body], tool.name, tool.position[np.newaxis],
+            names.bodies[tool.body], name, tool.position[np.newaxis],
             wxyz(tool.rotation)[np.newaxis],
         )
-        for tool in robot.tools
+        for tool, name in zip(robot.tools, names.tools, strict=True)
     ]  # fmt: skip
 
 

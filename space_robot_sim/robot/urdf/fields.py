@@ -16,7 +16,9 @@ from .findings import Report
 Array = NDArray[np.float64]
 
 LARGEST = 1e12
-"""Of any number in a file, kg, m, rad, ...: all that is computed of them stays finite."""
+"""Of any number in a file, kg, m, rad, ...: all that is computed of them stays finite.
+
+A limit that is so large is none: other readers of URDF do not know ``inf``."""
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _INFINITE = re.compile(r"([-+]?)inf(?:inity)?", re.IGNORECASE)
 
@@ -52,14 +54,15 @@ class Fields:
         return self._number(element, name, text)
 
     def limit(self, element: Element, name: str) -> float | None:
-        """Return a number that may be infinite; None if it is not there."""
+        """Return a number that may be infinite, as `LARGEST` is here; None if it is not there."""
         text = element.attributes.get(name)
         if text is None:
             return None
         infinite = _INFINITE.fullmatch(text.strip())
         if infinite:
             return -math.inf if infinite[1] == "-" else math.inf
-        return self._number(element, name, text)
+        value = self._number(element, name, text)
+        return math.copysign(math.inf, value) if abs(value) == LARGEST else value
 
     def vector(
         self, element: Element, name: str, default: tuple[float, ...] | None, count: int = 3
