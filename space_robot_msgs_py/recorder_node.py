@@ -73,7 +73,9 @@ class RecorderLoop:
         if node.times_configured and settings.bag:  # reset: a bag is one flight from its start
             node.log(f"the bag of before the reset is now {set_aside(path)}")
         group, namespace = PolledCallbackGroup(), node.get_namespace()
-        self._inputs = [RawSubscription(node, topic, group, QUEUE_DEPTH) for topic in topics.ALL]
+        self._inputs = [
+            RawSubscription(node, topic, group, QUEUE_DEPTH) for topic in topics.RECORDED
+        ]
         self._recorder = BagRecorder(
             path, {"period": settings.period, **flight}, settings.timebase,
             settings.compression, settings.split_size, GraphPublishers(node),

@@ -30,14 +30,30 @@ class Topic(NamedTuple):
     is_event: bool = False
     """A message whenever something happens, so a gap in its stamps is no loss."""
     has_stamp: bool = True
-    """Its messages begin with a stamp; of others the first number is the tick."""
+    """Its messages begin with a stamp; of others the first number is the tick, unless they hold for
+    the whole flight (`is_latched`)."""
     is_optional: bool = False
     """Sent in some flights only, so that silence is no loss."""
+    stamp_at: int = 0
+    """Bytes of a message before its stamp."""
+    carries: Topic | None = None
+    """Its messages are those of this topic as plain bytes (`wire.carrier`), for the recorder: where
+    the type of those is not installed nobody could send them. A bag has them as this topic's."""
 
     @property
     def full_name(self) -> str:
         """Return its name in the root namespace: in words, counts and reports, wherever it is."""
         return self.in_namespace(ROOT)
+
+    @property
+    def is_latched(self) -> bool:
+        """True if its last message holds for the whole flight."""
+        return self.transient_local and self.depth == 1
+
+    @property
+    def recorded(self) -> Topic:
+        """The topic that a bag has its messages under, but for the namespace."""
+        return self.carries or self
 
     def in_namespace(self, namespace: str) -> str:
         """Return its full name in a namespace (``/``, ``/sat1``), without remappings."""
@@ -73,11 +89,29 @@ TRUTH_BASE = Topic(
     "truth/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 1_000, is_optional=True
 )
 
+# What viewers need of the robot. ROS has one /tf for all robots: their frames bear the namespace.
+TF = Topic("/tf", "tf2_msgs/msg/TFMessage", 100, stamp_at=4)
+TF_STATIC = Topic("/tf_static", TF.type, 1, transient_local=True, has_stamp=False)
+CARRIER = "std_msgs/msg/UInt8MultiArray"
+TRANSFORMS = Topic("transforms", CARRIER, 1_000, is_optional=True, carries=TF)
+TRANSFORMS_STATIC = Topic(
+    "transforms/static", CARRIER, 1,
+    transient_local=True, is_event=True, is_optional=True, carries=TF_STATIC,
+)  # fmt: skip
+ROBOT_DESCRIPTION = Topic(
+    "robot_description", "std_msgs/msg/String", 1,
+    transient_local=True, is_event=True, has_stamp=False, is_optional=True,
+)  # fmt: skip
+
 ALL = (
     JOINT_STATES, BASE_STATE, COMMAND, REFERENCE_JOINTS, REFERENCE_BASE, TELEMETRY, LAW, CLOCK,
     TRUTH_JOINTS, TRUTH_BASE, WHEELS_STATE, THRUSTERS_STATE,
 )  # fmt: skip
-"""All that are recorded."""
+"""All that tell of a flight: who reads a bag reads these."""
+SCENE = (TRANSFORMS, TRANSFORMS_STATIC, ROBOT_DESCRIPTION)
+"""What viewers show of it; nobody here reads them again."""
+RECORDED = (*ALL, *SCENE)
+"""All that the recorder listens to."""
 STATES = (JOINT_STATES, BASE_STATE, WHEELS_STATE, THRUSTERS_STATE)
 """The parts of a state."""
 TRUTH = (TRUTH_JOINTS, TRUTH_BASE)

@@ -7,7 +7,7 @@ It is flown in blocks, so that one of any length needs the memory of one block (
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -27,6 +27,7 @@ from space_robot_msgs_py.wire.controller_law import LawCodec
 from space_robot_msgs_py.wire.controller_telemetry import SIGNALS, TelemetryCodec
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 from space_robot_msgs_py.wire.truth_writer import TruthWriter
+from space_robot_sim.plant.scene import SceneWriter
 
 from ..controller.law_changes import LawChanges
 from .closed_loop import close_loop, measured_ticks
@@ -50,6 +51,8 @@ class Messages:
         self._telemetry = TelemetryCodec(names.axes)
         self._clock = ClockCodec()
         self._law = LawCodec(timebase)
+        self._scene = SceneWriter(flight.robot, timebase)
+        self._record_all(self._scene.lasting())
 
     def begin_tick(self, tick: int) -> None:
         """Write what comes now and then: the reference from ``tick`` on, and the clock."""
@@ -64,12 +67,19 @@ class Messages:
 
     def tell_truth(self, state: RobotState) -> None:
         """Write the true state of a tick, with some before it."""
-        for message in self._truth.add(state):
-            self.record(*message)
+        self._record_all(self._truth.add(state))
+
+    def show(self, tick: int, state_of: Callable[[int], RobotState]) -> None:
+        """Write the poses of a tick's true state, if they are told."""
+        if self._scene.is_due(tick):
+            self._record_all(self._scene.poses(state_of(tick)))
 
     def end(self) -> None:
         """Write what is kept back."""
-        for message in self._truth.flush():
+        self._record_all(self._truth.flush())
+
+    def _record_all(self, messages: Iterable[tuple[topics.Topic, bytes]]) -> None:
+        for message in messages:
             self.record(*message)
 
     def stretch(self, log: FlightLog, start: int, stop: int, answered: int) -> None:
@@ -89,6 +99,7 @@ class Messages:
                 record(topic, data)
             if told is not log:
                 self.tell_truth(log.state(tick))
+            self.show(tick, log.state)
             if tick >= answered:
                 continue
             row = tick - log.first_tick
@@ -238,6 +249,7 @@ def _flown_by_messages(
                     if tick % STRETCH_OF_MESSAGES == 0:
                         progress(tick)
                     messages.begin_tick(tick)
+                    messages.show(tick, lambda _: flight.plant.truth)
                     loop.fly_tick()
         except FlightError as error:
             error.log = read_flight(path, trust=True)

@@ -20,9 +20,11 @@ from ..wire.stamp_guard import StampGuard
 
 
 def message_tick(topic: topics.Topic, data: bytes, timebase: Timebase) -> int:
-    """The tick a serialized message is stamped with (of a chunk: its first)."""
+    """The tick a serialized message is stamped with (of a chunk: its first; latched: 0)."""
     if topic.has_stamp:
-        return timebase.tick(header_stamp_ns(data))
+        return timebase.tick(header_stamp_ns(data, topic.stamp_at))
+    if topic.is_latched:
+        return 0
     return TelemetryCodec.decode(data)[0]
 
 

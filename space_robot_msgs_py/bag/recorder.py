@@ -11,6 +11,7 @@ from typing import Any
 from .. import topics
 from ..errors import FlightError, MessageError
 from ..samples import Timebase
+from ..wire.carrier import unwrap
 from .accounts import ACCOUNTS_KEY
 from .mcap_file import Compression
 from .message_accounting import (
@@ -64,8 +65,11 @@ class BagRecorder:
             InputError: the bag exists already, or cannot be written.
         """
         self._excused = topics_with_allowed_gaps(flight)
-        names = names or {topic.name: topic.in_namespace(namespace) for topic in topics.ALL}
-        self._written = {t.name: t._replace(name=names[t.name]) for t in topics.ALL}
+        own = {topic.name: topic.in_namespace(namespace) for topic in topics.RECORDED}
+        names = own | dict(names or {})
+        self._written = {
+            t.name: t.carries or t._replace(name=names[t.name]) for t in topics.RECORDED
+        }
         """The topics under the names that they have in the bag."""
         self._writer = BagWriter(
             path, self._written.values(),
@@ -75,9 +79,10 @@ class BagRecorder:
         self._chunk_bytes = min(CHUNK_BYTES, split_size or CHUNK_BYTES)
         self._most_bytes = min(MOST_CHUNKS * CHUNK_BYTES, split_size or MOST_CHUNKS * CHUNK_BYTES)
         self._timebase = timebase
-        self.accounting = {topic.full_name: MessageAccounting(topic) for topic in topics.ALL}
+        self.accounting = {topic.full_name: MessageAccounting(topic) for topic in topics.RECORDED}
         self.sources = {
-            topic.full_name: Sources(topic.name, publishers or Unknown()) for topic in topics.ALL
+            topic.full_name: Sources(topic.name, publishers or Unknown())
+            for topic in topics.RECORDED
         }
         self.failure = ""
         """The reason why nothing is written any more (empty: all is well)."""
@@ -115,8 +120,9 @@ class BagRecorder:
                 self.accounting[name] = MessageAccounting(topic)
         counted = self.accounting[name]
         invalid = counted.invalid_stamps
+        data = unwrap(data) if topic.carries else data
         try:
-            tick = message_tick(topic, data, self._timebase)
+            tick = message_tick(topic.carries or topic, data, self._timebase)
             is_new = counted.take(tick)
         except MessageError:
             tick, is_new = counted.last, True

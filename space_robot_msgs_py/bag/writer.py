@@ -1,4 +1,7 @@
-"""A rosbag2 bag of one or more MCAP files, as Jazzy's ``ros2 bag record`` writes them."""
+"""A rosbag2 bag of one or more MCAP files, as Jazzy's ``ros2 bag record`` writes them.
+
+Each file stands for itself: the last message of every latched topic is at its beginning again.
+"""
 
 from __future__ import annotations
 
@@ -51,6 +54,12 @@ class BagWriter:
         self._first_records = record_bytes(*self._definitions)
         self._chunk = OpenChunk(self._first_records)
         self._files: list[McapFile] = []
+        self._latched: dict[int, tuple[int, int, bytes] | None] = {
+            self._channels[topic.name]: None for topic in self._topics if topic.is_latched
+        }
+        """Publish time, sequence and bytes of the last message of each latched topic."""
+        self._begins_file = False
+        """True if the open chunk, still empty, is the first of a file."""
         try:
             path.mkdir(parents=True, exist_ok=True)
             if any(path.iterdir()):
@@ -67,8 +76,15 @@ class BagWriter:
         Returns:
             Bytes in the open chunk.
         """
-        chunk = self._chunk
-        chunk.add(self._channels[topic.name], log_ns, publish_ns, sequence & 0xFFFFFFFF, data)
+        chunk, channel, sequence = self._chunk, self._channels[topic.name], sequence & 0xFFFFFFFF
+        if self._begins_file:
+            self._begins_file = False
+            for latched, message in self._latched.items():
+                if message:
+                    chunk.add(latched, log_ns, *message)
+        chunk.add(channel, log_ns, publish_ns, sequence, data)
+        if channel in self._latched:
+            self._latched[channel] = (publish_ns, sequence, data)
         return len(chunk.content)
 
     def flush(self) -> None:
@@ -86,7 +102,8 @@ class BagWriter:
             self._begin_file()
         self._files[-1].add_chunk(self._chunk)
         self._whole_bytes = self._files[-1].size
-        self._chunk = OpenChunk(self._first_records if self._is_full() else b"")
+        self._begins_file = self._is_full()
+        self._chunk = OpenChunk(self._first_records if self._begins_file else b"")
 
     def close(self, custom: Mapping[str, str]) -> None:
         """Finish the last file and write metadata.yaml, after a `flush`.

@@ -75,6 +75,8 @@ class MessageLayout:
             self.pattern[1, BODY + start : BODY + stop] = 0
         self.slots = walk.slots
         """The runs of float64 by their path, as ``transforms[0].translation``."""
+        self.stamps = tuple(walk.stamps)
+        """The places of all Times: bytes from the message's beginning."""
 
     @property
     def data(self) -> bytes:
@@ -91,6 +93,7 @@ class _Walk:
         self.changing: list[tuple[int, int]] = []
         """Numbers, and padding: a foreign writer pads with what it likes."""
         self.slots: dict[str, Slot] = {}
+        self.stamps: list[int] = []
 
     def message(self, type_name: str, content: Any, path: str) -> None:
         """A message, or a message in it."""
@@ -98,6 +101,7 @@ class _Walk:
         values = [_value(content, name) for name, _ in fields]
         if type_name == TIME:
             self._align(4)
+            self.stamps.append(BODY + len(self.body))
             self._change(STAMP.pack(*(value or 0 for value in values)))
         elif all(description == _NUMBER for _, description in fields):
             self._numbers([0.0 if value is None else value for value in values], path)
@@ -158,15 +162,19 @@ def _value(content: Any, name: str) -> Any:
     return content.get(name) if isinstance(content, Mapping) else getattr(content, name)
 
 
-def header_stamp_ns(data: bytes) -> int:
+def header_stamp_ns(data: bytes, at: int = 0) -> int:
     """Stamp of a serialized message that starts with a Header or is a Time, of either order, ns.
+
+    Args:
+        data: the message.
+        at: so many bytes stand before the stamp.
 
     Raises:
         MessageError: the message ends before that.
     """
     try:
         form = _BIG_STAMP if data.startswith(BIG_ENDIAN) else STAMP
-        sec, nanosec = form.unpack_from(data, BODY)
+        sec, nanosec = form.unpack_from(data, BODY + at)
     except struct.error:
         raise MessageError(f"a message of {len(data)} bytes has no stamp") from None
     return int(sec * 1_000_000_000 + nanosec)

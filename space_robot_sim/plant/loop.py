@@ -30,6 +30,7 @@ from .command_guard import CommandGuard
 from .exchange import NONE, SentState, exchange_of
 from .plant import Plant
 from .run_control import PAUSED, RunControl
+from .scene_output import SceneOutput
 from .settings import PlantNodeSettings
 from .truth_output import TruthOutput
 from .wall_clock import WallClock
@@ -80,7 +81,10 @@ class PlantLoop:
         self._command_in = FollowedSubscription(node, topics.COMMAND, PolledCallbackGroup())
         self._for_answer = Wait(PATIENCE_S, (self._command_in,), is_brief=True)
         self._truth = TruthOutput(node, self._plant, timebase)
-        self.outputs = (*self._state_out, self._clock_out, *self._truth.outputs)
+        self._scene = SceneOutput(node, robot, timebase)
+        self.outputs = (
+            *self._state_out, self._clock_out, *self._truth.outputs, *self._scene.outputs,
+        )  # fmt: skip
         self.wait_for = settings.wait_for
         self.is_complete = False
         self.control = RunControl(settings.paused)
@@ -116,6 +120,7 @@ class PlantLoop:
         self._unsent.clear()
         self._began_at, self._first_tick = time.monotonic(), self._plant.tick
         self._wall_clock.start(self._plant.tick)
+        self._scene.begin()
         self.tell_paused()
 
     def tell_paused(self) -> None:
@@ -201,6 +206,7 @@ class PlantLoop:
             self._clock_sent = self._clock.encode(self._timebase.stamp_ns(tick))
             self._clock_out.publish(self._clock_sent)
         self._truth.send(self._plant.truth)
+        self._scene.send(self._plant.truth)
 
     def _send_next(self) -> None:
         self._sent = state = self._unsent.popleft()

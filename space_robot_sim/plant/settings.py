@@ -26,7 +26,7 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
     selectors: ClassVar[tuple[str, ...]] = ("robot", "mission", "case", "sensors", "actuators")
     sends: ClassVar[tuple[topics.Topic, ...]] = (
         topics.JOINT_STATES, topics.BASE_STATE, topics.CLOCK, *topics.TRUTH,
-        topics.WHEELS_STATE, topics.THRUSTERS_STATE,
+        topics.WHEELS_STATE, topics.THRUSTERS_STATE, *topics.SCENE,
     )  # fmt: skip
 
     mission: str = Field(

@@ -1,0 +1,57 @@
+"""What viewers need to show the robot: its description once, its pose now and then. Knows no ROS.
+
+Names of frames are those of the description, in a namespace with that before them (``sat1/base``),
+as robot_state_publisher's ``frame_prefix`` does it. All robots share the inertial frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.samples import RobotState, Timebase
+from space_robot_msgs_py.wire.carrier import wrap
+from space_robot_msgs_py.wire.robot_description import robot_description
+from space_robot_msgs_py.wire.tf import Frame, TransformsCodec
+
+from ..robot import Robot
+from ..robot.poses import RobotPoses, tool_poses
+from ..robot.urdf_text import urdf_text
+
+PERIOD_NS = 10_000_000
+"""Least time between two messages on /tf: 100 Hz."""
+
+Messages = Iterable[tuple[topics.Topic, bytes]]
+
+
+class SceneWriter:
+    """Makes the messages of `topics.SCENE` of a robot from its true state."""
+
+    def __init__(self, robot: Robot, timebase: Timebase, namespace: str = topics.ROOT) -> None:
+        """``namespace``: the robot's."""
+        self._robot, self._prefix = robot, f"{namespace}/".lstrip("/")
+        self._timebase = timebase
+        self._every = -(-PERIOD_NS // timebase.period_ns)
+        self._poses = RobotPoses(robot)
+        self._codec = TransformsCodec(self._named(self._poses.frames), timebase)
+
+    def lasting(self) -> Messages:
+        """Yield what holds for the whole flight."""
+        frames, poses = tool_poses(self._robot)
+        static = TransformsCodec(self._named(frames), self._timebase).encode(0, poses)
+        yield topics.ROBOT_DESCRIPTION, robot_description(urdf_text(self._robot))
+        yield topics.TRANSFORMS_STATIC, wrap(static)
+
+    def is_due(self, tick: int) -> bool:
+        """Tell if the poses of a tick are told."""
+        return tick % self._every == 0
+
+    def poses(self, truth: RobotState) -> Messages:
+        """Yield the poses of a true state."""
+        yield topics.TRANSFORMS, wrap(self._codec.encode(truth.tick, self._poses.at(truth)))
+
+    def _named(self, frames: Sequence[Frame]) -> list[Frame]:
+        return [Frame(self._full(frame.parent), self._full(frame.child)) for frame in frames]
+
+    def _full(self, name: str) -> str:
+        return name if name == topics.INERTIAL_FRAME else self._prefix + name

@@ -1,0 +1,49 @@
+"""The robot for viewers: to the recorder in any case, as /tf where tf2_msgs is installed."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+from rclpy.node import Node
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.ros.endpoints import RawPublisher
+from space_robot_msgs_py.samples import RobotState, Timebase
+from space_robot_msgs_py.wire.carrier import unwrap
+
+from ..robot import Robot
+from .scene import Messages, SceneWriter
+
+
+class SceneOutput:
+    """Sends the description once, the poses of the robot at most 100 times a simulated second."""
+
+    def __init__(self, node: Node, robot: Robot, timebase: Timebase) -> None:
+        """Open the topics."""
+        self._writer = SceneWriter(robot, timebase, node.get_namespace())
+        self._outputs = {topic: RawPublisher(node, topic) for topic in topics.SCENE}
+        self._shared = {
+            topic: RawPublisher(node, topic.carries)
+            for topic in topics.SCENE
+            if topic.carries and find_spec(topic.carries.type.partition("/")[0])
+        }
+        """Topics of all robots, that others may publish, too."""
+        self.outputs = tuple(self._outputs.values())
+        self._has_begun = False
+
+    def begin(self) -> None:
+        """Send what holds for the whole flight, once: who comes later gets it, too."""
+        if not self._has_begun:
+            self._has_begun = True
+            self._publish(self._writer.lasting())
+
+    def send(self, truth: RobotState) -> None:
+        """Send the poses, if they are due; best once the tick's state is being answered."""
+        if self._writer.is_due(truth.tick):
+            self._publish(self._writer.poses(truth))
+
+    def _publish(self, messages: Messages) -> None:
+        for topic, data in messages:
+            self._outputs[topic].publish(data)
+            if topic in self._shared:
+                self._shared[topic].publish(unwrap(data))
