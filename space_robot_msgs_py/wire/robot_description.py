@@ -7,5 +7,6 @@ from .cdr import MessageLayout
 
 
 def robot_description(text: str) -> bytes:
-    """Return the std_msgs/String of a URDF."""
-    return MessageLayout(topics.ROBOT_DESCRIPTION.type, {"data": text}).data
+    """Return the std_msgs/String of a URDF, filled up to whole words as the middleware does it."""
+    data = MessageLayout(topics.ROBOT_DESCRIPTION.type, {"data": text}).data
+    return data + bytes(-len(data) % 4)

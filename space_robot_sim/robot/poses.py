@@ -14,6 +14,7 @@ from space_robot_msgs_py.topics import INERTIAL_FRAME
 from space_robot_msgs_py.wire.tf import POSE, Frame
 
 from ..elementary.sine import sines_cosines
+from .frame_names import frame_names
 from .robot import Robot
 from .transforms import Transform, joint_transforms, tool_transforms
 
@@ -29,7 +30,7 @@ class RobotPoses:
     def __init__(self, robot: Robot) -> None:
         """Compute the poses at zero."""
         joints = joint_transforms(robot, np.zeros((1, robot.joint_count)))
-        self.frames = (Frame(INERTIAL_FRAME, robot.body_names[0]), *map(_frame, joints))
+        self.frames = (Frame(INERTIAL_FRAME, frame_names(robot).bodies[0]), *map(_frame, joints))
         """In the order of the poses."""
         self._poses = np.empty((1 + len(joints), POSE))
         self._poses[1:] = [_pose(transform) for transform in joints]

@@ -67,7 +67,9 @@ class ForeignNodes:
     def _publishers(self) -> list[str]:
         from space_robot_msgs_py.ros.exclusive import foreign_publishers
 
-        found = foreign_publishers(self._node, [topic.name for topic in topics.RECORDED], self._names)
+        found = foreign_publishers(
+            self._node, [topic.name for topic in topics.RECORDED], self._names
+        )
         return [f"{topic} is also published by {', '.join(n)}" for topic, n in found.items()]
 
     def _namesakes(self) -> list[str]:
