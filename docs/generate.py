@@ -158,23 +158,32 @@ def topic_page() -> str:
     """All topics of the graph."""
     rows = (
         (
-            f"`{topic.full_name}`", topic.type, str(topic.depth),
+            f"`{topic.full_name}`", _type(topic), str(topic.depth),
             "transient local" if topic.transient_local else "volatile",
             _occasion(topic),
         )
-        for topic in (*topics.ALL, topics.DIAGNOSTICS, topics.SIMULATION_PAUSED)
+        for topic in (*topics.RECORDED, topics.DIAGNOSTICS, topics.SIMULATION_PAUSED)
     )  # fmt: skip
     return "\n\n".join([
         "# Topics", MADE,
         "All are reliable and keep the last messages. Fields, units, frames and rates are in"
         " [bags](../manual/bags.md#topics). Every topic but the last two is recorded. These are"
         " the names of nodes without a namespace; in one, as `/sat1`, all but `/diagnostics` begin"
-        " with it: `/sat1/joint_states`.",
+        " with it: `/sat1/joint_states`; so do the frames in `/tf`, but for `inertial`. `/tf` and"
+        " `/tf_static` themselves are sent by a plant that finds tf2_msgs installed.",
         table(("topic", "type", "history", "durability", "a message"), rows),
     ]) + "\n"  # fmt: skip
 
 
+def _type(topic: topics.Topic) -> str:
+    return f"{topic.type}, in bags `{topic.carries.name}`" if topic.carries else topic.type
+
+
 def _occasion(topic: topics.Topic) -> str:
+    if topic.is_latched:
+        return "once"
+    if topic.carries:
+        return "every 10 ms, or every tick if that is longer"
     if topic.per_tick and topic.is_optional:
         return "each tick, where there are any"
     if topic.is_optional:

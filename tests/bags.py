@@ -23,6 +23,7 @@ from space_robot_msgs_py.bag.metadata import read_information
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import FLIGHT_KEY, BagRecorder
 from space_robot_msgs_py.samples import STATE_FIELDS, Timebase
+from space_robot_msgs_py.wire.carrier import wrap
 from space_robot_msgs_py.wire.definitions import definition, jazzy
 
 TIMEBASE = Timebase(500_000)
@@ -68,7 +69,13 @@ def messages_of(bag: Path) -> Iterator[tuple[topics.Topic, bytes]]:
     """The messages of one of our bags, by the mcap library."""
     with mcap_file(bag).open("rb") as file:
         for _, channel, message in make_reader(file).iter_messages(log_time_order=False):
-            yield topics.BY_NAME[channel.topic], message.data
+            yield as_sent(channel.topic, message.data)
+
+
+def as_sent(name: str, data: bytes) -> tuple[topics.Topic, bytes]:
+    """A message of our bags as the recorder was given it, by its topic's name in the bag."""
+    (topic,) = (topic for topic in topics.RECORDED if topic.recorded.full_name == name)
+    return topic, wrap(data) if topic.carries else data
 
 
 def chunks_of(bag: Path) -> list[tuple[int, int]]:
@@ -117,7 +124,7 @@ def assert_nothing_is_hidden(log: FlightLog, original: FlightLog) -> None:
 def entries_of(bag: Path) -> list[Entry]:
     """Messages as a recorder on another machine would have them: by its own clock."""
     clock = 1_795_220_105_128_297_452
-    sent = messages_of(bag)
+    sent = ((topic.recorded, data) for topic, data in messages_of(bag) if not topic.carries)
     return [(t.full_name, t.type, clock + 31_000 * i, data) for i, (t, data) in enumerate(sent)]
 
 

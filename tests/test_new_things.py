@@ -89,6 +89,7 @@ def test_a_message_is_one_file_in_wire_and_one_line_in_topics(
     newest = topics.Topic("newest", "sensor_msgs/msg/Temperature", 100, per_tick=True)
     monkeypatch.setattr(topics, "NEWEST", newest, raising=False)
     monkeypatch.setattr(topics, "ALL", (*topics.ALL, newest))
+    monkeypatch.setattr(topics, "RECORDED", (*topics.RECORDED, newest))
     monkeypatch.setitem(topics.BY_NAME, newest.full_name, newest)
     monkeypatch.setattr(room_of_messages, "__path__", [*room_of_messages.__path__, str(tmp_path)])
     (tmp_path / "newest.py").write_text(NEWEST)

@@ -27,7 +27,6 @@ from space_robot_msgs_py.wire.controller_law import LawCodec
 from space_robot_msgs_py.wire.controller_telemetry import SIGNALS, TelemetryCodec
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 from space_robot_msgs_py.wire.truth_writer import TruthWriter
-from space_robot_sim.plant.scene import SceneWriter
 
 from ..controller.law_changes import LawChanges
 from .closed_loop import close_loop, measured_ticks
@@ -51,6 +50,8 @@ class Messages:
         self._telemetry = TelemetryCodec(names.axes)
         self._clock = ClockCodec()
         self._law = LawCodec(timebase)
+        from space_robot_sim.plant.scene import SceneWriter  # of no use without a bag
+
         self._scene = SceneWriter(flight.robot, timebase)
         self._record_all(self._scene.lasting())
 

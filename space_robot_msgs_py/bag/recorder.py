@@ -252,7 +252,7 @@ class BagRecorder:
 
     def _finish(self) -> None:
         counts = {
-            name: {
+            c.topic.recorded.full_name: {
                 "expected": c.received + lost,
                 "received": c.received,
                 "missing": lost,

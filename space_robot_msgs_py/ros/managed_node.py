@@ -161,7 +161,8 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             self.loop = self._make_loop(self, self.settings)
             refuse_unknown(self)
             self._topics = [output.topic.name for output in self.loop.outputs]
-            self._claim = Claim(self, self._topics)
+            own = {*self._topics, *(topic.name for topic in self._schema.sends)}
+            self._claim = Claim(self, sorted(own))  # what it never sends is nobody else's either
             self.times_configured += 1
 
         return self._try(configure, undo=self._release)

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from .robot import Robot
 from .tree import Visual
@@ -103,8 +102,14 @@ def _tube(start: Array, end: Array, radius: float, body: int) -> Iterator[Visual
     length = float(np.linalg.norm(along))
     if length < THINNEST:
         return
-    turn, _ = Rotation.align_vectors([along / length], [[0.0, 0.0, 1.0]])
     yield Visual(
-        "cylinder", (radius, length), turn.as_matrix(), 0.5 * (start + end), colour=LINK_COLOUR,
+        "cylinder", (radius, length), _turn_to(along / length), 0.5 * (start + end), colour=LINK_COLOUR,
         body=body,
     )  # fmt: skip
+
+
+def _turn_to(z: Array) -> Array:
+    """Return a rotation matrix with a unit vector as its third column."""
+    x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
+    x /= np.linalg.norm(x)
+    return np.column_stack((x, np.cross(z, x), z))

@@ -8,6 +8,7 @@ from typing import get_args
 
 import pytest
 import yaml
+from bags import as_sent
 from hypothesis import given
 from hypothesis import strategies as st
 from mcap.data_stream import RecordBuilder
@@ -33,21 +34,28 @@ FLIGHT = {"controller": "tde_stc", "period": 0.0005}
 SPLIT = 65_536
 Messages = list[tuple[topics.Topic, bytes]]
 """What the nodes send."""
+Message = tuple[str, int, bytes]
 
 
 def _files(bag: Path) -> list[Path]:
     return sorted(bag.glob("*.mcap"), key=lambda file: int(file.stem.rpartition("_")[2]))
 
 
-def _read(bag: Path) -> list[tuple[str, int, bytes]]:
+def _read(bag: Path) -> list[Message]:
     """Topic, log time, data of all files, each read on its own by mcap."""
-    found = []
-    for file in _files(bag):
-        with file.open("rb") as stream:
-            reader = make_reader(stream, validate_crcs=True)
-            sent = reader.iter_messages(log_time_order=False)
-            found += [(channel.topic, m.log_time, m.data) for _, channel, m in sent]
-    return found
+    return [message for file in _files(bag) for message in _read_file(file)]
+
+
+def _read_file(file: Path) -> list[Message]:
+    with file.open("rb") as stream:
+        sent = make_reader(stream, validate_crcs=True).iter_messages(log_time_order=False)
+        return [(channel.topic, m.log_time, m.data) for _, channel, m in sent]
+
+
+def _unrepeated(messages: list[Message]) -> list[Message]:
+    """Leave out what the later files of a bag repeat."""
+    latched = {t.recorded.full_name for t in topics.RECORDED if t.recorded.is_latched}
+    return [m for i, m in enumerate(messages) if i < len(latched) or m[0] not in latched]
 
 
 def _metadata(file: Path) -> list[tuple[str, dict[str, str]]]:
@@ -71,7 +79,7 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def messages(plain: Path) -> Messages:
-    return [(topics.BY_NAME[name], data) for name, _, data in _read(plain)]
+    return [as_sent(name, data) for name, _, data in _read(plain)]
 
 
 @pytest.fixture(scope="module")
@@ -148,9 +156,38 @@ def test_splits_hold_every_message_once(split: Path, plain: Path) -> None:
         f"bag_{number}.mcap" for number in range(len(_files(split)))
     ]
     assert len(_files(split)) > 2
-    assert _read(split) == _read(plain)
+    assert _unrepeated(_read(split)) == _read(plain)
     for file in _files(split)[:-1]:
         assert file.stat().st_size >= SPLIT
+
+
+def test_every_split_shows_the_robot(split: Path) -> None:
+    """The messages of latched topics are the first of each file, at the time it begins."""
+    latched = {t.recorded.full_name for t in topics.RECORDED if t.recorded.is_latched}
+    assert latched == {"/tf_static", "/robot_description"}
+    for file in _files(split):
+        sent = _read_file(file)
+        assert {name for name, _, _ in sent[:2]} == latched
+        assert {stamp for _, stamp, _ in sent[:2]} == {min(stamp for _, stamp, _ in sent)}
+        assert not latched & {name for name, _, _ in sent[2:]}
+        assert dict((n, data) for n, _, data in sent[:2]) == {
+            name: data for name, _, data in _read_file(_files(split)[0])[:2]
+        }
+
+
+def test_the_end_makes_no_file_of_repeated_messages(messages: Messages, tmp_path: Path) -> None:
+    """A file that is full when the flight ends is the last one."""
+    bag = tmp_path / "bag"
+    recorder = BagRecorder(bag, FLIGHT, TIMEBASE, split_size=SPLIT)
+    for topic, data in messages:
+        recorder.record(topic, data)
+        if _files(bag)[0].stat().st_size >= SPLIT:
+            break
+    recorder.flush()
+    count = len(_files(bag))
+    recorder.close()
+    assert count == len(_files(bag))
+    assert {name for name, *_ in _read_file(_files(bag)[-1])} > {"/joint_states", "/base/state"}
 
 
 def test_splits_are_in_metadata_with_their_times_and_counts(split: Path) -> None:
@@ -171,7 +208,7 @@ def test_splits_are_in_metadata_with_their_times_and_counts(split: Path) -> None
 
 
 def test_rosbags_and_our_reader_read_splits(split: Path, plain: Path) -> None:
-    count = len(_read(plain))
+    count = len(_read(plain)) + 2 * (len(_files(split)) - 1)
     with Reader(split) as reader:
         assert len(list(reader.messages())) == reader.message_count == count
     with AnyReader([split]) as any_reader:
@@ -246,7 +283,7 @@ def test_bag_without_a_message_is_one(tmp_path: Path) -> None:
     BagRecorder(tmp_path / "bag", FLIGHT, TIMEBASE).close()
     with Reader(tmp_path / "bag") as reader:
         assert reader.message_count == 0
-        assert len(reader.connections) == len(topics.ALL)
+        assert len(reader.connections) == len(topics.RECORDED)
     assert not _read(tmp_path / "bag")
 
 

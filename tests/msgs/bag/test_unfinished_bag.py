@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bags import as_sent
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
@@ -60,7 +61,7 @@ def messages(tmp_path_factory: pytest.TempPathFactory) -> Messages:
     simulate(Flight(FlightPlan(duration=0.1)), bag)
     with _file(bag).open("rb") as file:
         sent = make_reader(file).iter_messages(log_time_order=False)
-        return [(topics.BY_NAME[channel.topic], message.data) for _, channel, message in sent]
+        return [as_sent(channel.topic, message.data) for _, channel, message in sent]
 
 
 @pytest.fixture(scope="module")
