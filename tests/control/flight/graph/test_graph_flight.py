@@ -66,11 +66,13 @@ def test_all_laws_are_swapped_at_the_same_ticks_in_both(
     assert [(law.tick, law.name) for law in log.laws] == [
         (200 * i, name) for i, name in enumerate(in_order)
     ]
-    graph, here = (
-        [data for _, data in open_bag(bag).messages(topics.LAW)]
-        for bag in (flown.bag, tmp_path / "bag")
-    )
-    assert graph == here
+    for topic in (topics.LAW, topics.TF, topics.TF_STATIC, topics.ROBOT_DESCRIPTION):
+        graph, here = (
+            [data for _, data in open_bag(bag).messages(topic)]
+            for bag in (flown.bag, tmp_path / "bag")
+        )
+        assert len(here) == {topics.LAW: 5, topics.TF: 50}.get(topic, 1)
+        assert graph == here, topic
 
 
 def test_nothing_is_lost_and_every_tick_is_in_the_bag(fly: Callable[..., Flown]) -> None:

@@ -91,7 +91,7 @@ def check_report(report: dict[str, Any], namespace: str) -> None:
 
 def check_names(bag: Path, namespace: str) -> None:
     """Of topics, of the node in its messages, and of all joints, with and without motors."""
-    own = {topic.in_namespace(namespace): topic for topic in topics.ALL}
+    own = {topic.recorded.in_namespace(namespace): topic.recorded for topic in topics.RECORDED}
     assert open_bag(bag).topics() == {name: topic.type for name, topic in own.items()}
     assert read_flight(bag).namespace == namespace
     first = {}
@@ -100,8 +100,16 @@ def check_names(bag: Path, namespace: str) -> None:
     law = decode(first[topics.LAW], topics.LAW.type)
     assert law.node == f"{namespace}/controller_node"
     names = decode(first[topics.JOINT_STATES], topics.JOINT_STATES.type).name
+    prefix = namespace.lstrip("/")
+    frames = [(t.header.frame_id, t.child_frame_id) for t in transforms(first[topics.TF])]
+    assert frames[:2] == [("inertial", f"{prefix}/base"), (f"{prefix}/base", f"{prefix}/joint1")]
+    assert transforms(first[topics.TF_STATIC])[0].child_frame_id == f"{prefix}/tool"
     passive = ["panel"] if namespace == "/fleet/sat2" else []
     assert names == [*(f"joint{i}" for i in range(1, 7)), *passive]
+
+
+def transforms(data: bytes) -> list[Any]:
+    return list(decode(data, topics.TF.type).transforms)
 
 
 def test_one_namespace_has_one_robot(free_domain: int) -> None:
