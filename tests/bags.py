@@ -93,7 +93,7 @@ def record(folder: Path, ticks: int = 400, ticks_a_chunk: int = 100) -> Recorded
     simulate(Flight(FlightPlan(duration=ticks * TIMEBASE.period)), flown)
     recorder, states = BagRecorder(folder, FLIGHT, TIMEBASE), 0
     for topic, data in messages_of(flown):
-        if topic is topics.REFERENCE_JOINTS and states % ticks_a_chunk == 0:
+        if topic is topics.REFERENCE_JOINTS and states and states % ticks_a_chunk == 0:
             recorder.flush()
         states += topic is topics.JOINT_STATES
         recorder.record(topic, data)

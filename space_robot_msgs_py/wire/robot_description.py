@@ -7,6 +7,9 @@ from .cdr import MessageLayout
 
 
 def robot_description(text: str) -> bytes:
-    """Return the std_msgs/String of a URDF, filled up to whole words as the middleware does it."""
-    data = MessageLayout(topics.ROBOT_DESCRIPTION.type, {"data": text}).data
-    return data + bytes(-len(data) % 4)
+    """Return the std_msgs/String of a URDF, with ends of lines behind it up to a whole word.
+
+    The middleware would fill that up with zeros: so it is sent as it is written here.
+    """
+    missing = -(len(text.encode()) + 1) % 4
+    return MessageLayout(topics.ROBOT_DESCRIPTION.type, {"data": text + missing * "\n"}).data

@@ -205,7 +205,7 @@ def _differences(ours: Any, theirs: Any, path: str = "") -> Iterator[str]:
 @pytest.fixture(scope="module")
 def ours(tmp_path_factory: pytest.TempPathFactory) -> Path:
     bag = tmp_path_factory.mktemp("bags") / "ours"
-    simulate(Flight(FlightPlan(duration=0.1)), bag)
+    simulate(Flight(FlightPlan(duration=0.08)), bag)  # one chunk
     return bag
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -45,7 +46,7 @@ def _faulty(recorded: Recorded, folder: Path, flight: dict[str, Any] = FAULTY) -
     """The same flight with states kept back and answers missing, in chunks of 100 ticks."""
     recorder, states = BagRecorder(folder, flight, TIMEBASE), 0
     for topic, data in messages_of(recorded.folder):
-        if topic is topics.REFERENCE_JOINTS and states % 100 == 0:
+        if topic is topics.REFERENCE_JOINTS and states and states % 100 == 0:
             recorder.flush()
         states += topic is topics.JOINT_STATES
         tick = header_stamp_ns(data) // TIMEBASE.period_ns
@@ -102,7 +103,7 @@ def test_nothing_is_filled_where_the_recorder_lost_states(
     recorded: Recorded, tmp_path: Path
 ) -> None:
     """By the publisher's count: one that was sent, and none of those that were kept back."""
-    recorder, sent = BagRecorder(tmp_path / "bag", FAULTY, TIMEBASE), dict.fromkeys(topics.ALL, 0)
+    recorder, sent = BagRecorder(tmp_path / "bag", FAULTY, TIMEBASE), Counter[topics.Topic]()
     for topic, data in messages_of(recorded.folder):
         tick = header_stamp_ns(data) // TIMEBASE.period_ns
         is_state = topic in (topics.JOINT_STATES, topics.BASE_STATE)
