@@ -117,6 +117,8 @@ STATES = (JOINT_STATES, BASE_STATE, WHEELS_STATE, THRUSTERS_STATE)
 TRUTH = (TRUTH_JOINTS, TRUTH_BASE)
 BY_NAME = {topic.full_name: topic for topic in ALL}
 """By their full names in the root namespace."""
+# Shapes in the inertial frame, for viewers, while one listens; bags have transforms instead.
+MARKERS = Topic("markers", "visualization_msgs/msg/MarkerArray", 10, is_optional=True)
 # One for all robots of a domain, as ROS has it: each status tells its node's name.
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100)
 SIMULATION_PAUSED = Topic(

@@ -125,7 +125,7 @@ def _add_visual(link: Element, shape: Visual, materials: Materials) -> None:
     _add_origin(visual, shape.rotation, shape.position)
     geometry = SubElement(visual, "geometry")
     if shape.shape == "mesh":
-        SubElement(geometry, "mesh", filename=_address(shape.mesh), scale=_words(shape.size))
+        SubElement(geometry, "mesh", filename=mesh_address(shape.mesh), scale=_words(shape.size))
     elif shape.shape == "box":
         SubElement(geometry, "box", size=_words(shape.size))
     else:
@@ -135,7 +135,7 @@ def _add_visual(link: Element, shape: Visual, materials: Materials) -> None:
         SubElement(visual, "material", name=materials[shape.colour])
 
 
-def _address(mesh: str) -> str:
+def mesh_address(mesh: str) -> str:
     """Return the address of a mesh file; viewers do not know from which folder a path would be."""
     return mesh if "://" in mesh else f"file://{quote(str(Path(mesh).absolute()))}"
 

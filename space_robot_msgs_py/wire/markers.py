@@ -1,0 +1,87 @@
+"""/markers: a robot's shapes in the inertial frame, for viewers that are told no transforms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import topics
+from ..samples import Timebase
+from .cdr import BODY, STAMP, MessageLayout
+from .message import body
+
+Array = NDArray[np.float64]
+
+CUBE, SPHERE, CYLINDER, MESH = 1, 2, 3, 10
+"""Types of visualization_msgs/Marker."""
+DELETE_ALL = 3
+"""One of its actions; to add is 0."""
+POSE = 7
+"""Numbers of a pose: position, m, and orientation x, y, z, w."""
+
+
+class Marker(NamedTuple):
+    """A shape that moves about; its name and number tell it from all others."""
+
+    name: str
+    number: int
+    kind: int
+    """`CUBE`, `SPHERE`, `CYLINDER` or `MESH`."""
+    scale: tuple[float, float, float]
+    """m: the size along x, y, z; of a mesh the factors of its own."""
+    colour: tuple[float, float, float, float]
+    """Red, green, blue, alpha, from 0 to 1."""
+    mesh: str = ""
+    """Address of a mesh."""
+    has_own_colours: bool = False
+    """Whether those of the mesh are shown, times ``colour``."""
+
+
+class MarkersCodec:
+    """Poses of always the same markers as a visualization_msgs/MarkerArray."""
+
+    def __init__(self, markers: Sequence[Marker], timebase: Timebase) -> None:
+        """``markers``: in the order of the poses."""
+        self._timebase = timebase
+        layout = MessageLayout(topics.MARKERS.type, {"markers": [*map(_content, markers)]})
+        self._wire = np.zeros(BODY + layout.pattern.shape[1], np.uint8)[BODY:]
+        self._wire[:] = layout.pattern[0]
+        self._body = body(self._wire)
+        starts = [
+            (layout.slots[f"markers[{i}].pose.position"].offset - BODY) // 8
+            for i in range(len(markers))
+        ]
+        self._at = np.add.outer(starts, np.arange(POSE)).astype(np.intp)
+        self._stamps = layout.stamps
+
+    def encode(self, tick: int, poses: Array) -> bytes:
+        """Return the message of a tick, from the markers' poses (M, 7) in the inertial frame."""
+        self._body[self._at] = poses
+        stamp = divmod(self._timebase.stamp_ns(tick), 1_000_000_000)
+        for place in self._stamps:
+            STAMP.pack_into(self._wire.data, place, *stamp)
+        return self._wire.tobytes()
+
+
+def no_markers() -> bytes:
+    """Return the message that takes all markers away: those of a flight before."""
+    marker = {"header": {"frame_id": topics.INERTIAL_FRAME}, "action": DELETE_ALL}
+    return MessageLayout(topics.MARKERS.type, {"markers": [marker]}).data
+
+
+def _content(marker: Marker) -> Mapping[str, Any]:
+    """Return its fields; without a lifetime it stays in sight when a flight is paused or over."""
+    red, green, blue, alpha = marker.colour
+    return {
+        "header": {"frame_id": topics.INERTIAL_FRAME},
+        "ns": marker.name,
+        "id": marker.number,
+        "type": marker.kind,
+        "scale": dict(zip("xyz", marker.scale, strict=True)),
+        "color": {"r": red, "g": green, "b": blue, "a": alpha},
+        "mesh_resource": marker.mesh,
+        "mesh_use_embedded_materials": marker.has_own_colours,
+    }

@@ -1,0 +1,36 @@
+"""Markers for viewers, while one listens."""
+
+from __future__ import annotations
+
+from rclpy.node import Node
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.ros.endpoints import RawPublisher
+from space_robot_msgs_py.samples import RobotState, Timebase
+from space_robot_msgs_py.wire.markers import no_markers
+
+from ..robot import Robot
+from ..robot.markers import RobotMarkers
+
+PERIOD_NS = 33_333_333
+"""Least simulated time between two messages: 30 Hz."""
+
+
+class MarkerOutput:
+    """Sends the robot's shapes at most 30 times a simulated second, nothing if nobody listens."""
+
+    def __init__(self, node: Node, robot: Robot, timebase: Timebase) -> None:
+        """Open the topic."""
+        prefix = f"{node.get_namespace()}/".lstrip("/")
+        self._markers = RobotMarkers(robot, timebase, prefix)
+        self._every = -(-PERIOD_NS // timebase.period_ns)
+        self._output = RawPublisher(node, topics.MARKERS)
+        self.outputs = (self._output,)
+
+    def send(self, truth: RobotState) -> None:
+        """Send the shapes of a true state, if they are due."""
+        if truth.tick % self._every or not self._output.listener_count:
+            return
+        if not self._output.sent:  # those of the flight before may have other names
+            self._output.publish(no_markers())
+        self._output.publish(self._markers.encode(truth))
