@@ -5,22 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from .. import topics
 from ..samples import Timebase
-from .cdr import BODY, STAMP, MessageLayout
-from .message import body
-
-Array = NDArray[np.float64]
+from .cdr import MessageLayout
+from .poses import PosesCodec
 
 CUBE, SPHERE, CYLINDER, MESH = 1, 2, 3, 10
 """Types of visualization_msgs/Marker."""
 DELETE_ALL = 3
 """One of its actions; to add is 0."""
-POSE = 7
-"""Numbers of a pose: position, m, and orientation x, y, z, w."""
 
 
 class Marker(NamedTuple):
@@ -40,30 +33,14 @@ class Marker(NamedTuple):
     """Whether those of the mesh are shown, times ``colour``."""
 
 
-class MarkersCodec:
-    """Poses of always the same markers as a visualization_msgs/MarkerArray."""
+class MarkersCodec(PosesCodec):
+    """Poses of always the same markers in the inertial frame, as a MarkerArray."""
 
     def __init__(self, markers: Sequence[Marker], timebase: Timebase) -> None:
         """``markers``: in the order of the poses."""
-        self._timebase = timebase
-        layout = MessageLayout(topics.MARKERS.type, {"markers": [*map(_content, markers)]})
-        self._wire = np.zeros(BODY + layout.pattern.shape[1], np.uint8)[BODY:]
-        self._wire[:] = layout.pattern[0]
-        self._body = body(self._wire)
-        starts = [
-            (layout.slots[f"markers[{i}].pose.position"].offset - BODY) // 8
-            for i in range(len(markers))
-        ]
-        self._at = np.add.outer(starts, np.arange(POSE)).astype(np.intp)
-        self._stamps = layout.stamps
-
-    def encode(self, tick: int, poses: Array) -> bytes:
-        """Return the message of a tick, from the markers' poses (M, 7) in the inertial frame."""
-        self._body[self._at] = poses
-        stamp = divmod(self._timebase.stamp_ns(tick), 1_000_000_000)
-        for place in self._stamps:
-            STAMP.pack_into(self._wire.data, place, *stamp)
-        return self._wire.tobytes()
+        content = {"markers": [*map(_content, markers)]}
+        paths = [f"markers[{i}].pose.position" for i in range(len(markers))]
+        super().__init__(topics.MARKERS.type, content, paths, timebase)
 
 
 def no_markers() -> bytes:

@@ -11,6 +11,7 @@ from space_robot_msgs_py.wire.markers import no_markers
 
 from ..robot import Robot
 from ..robot.markers import RobotMarkers
+from ..robot.poses import RobotPoses
 
 PERIOD_NS = 33_333_333
 """Least simulated time between two messages: 30 Hz."""
@@ -22,10 +23,9 @@ class MarkerOutput:
     def __init__(self, node: Node, robot: Robot, timebase: Timebase) -> None:
         """Open the topic."""
         prefix = f"{node.get_namespace()}/".lstrip("/")
-        self._markers = RobotMarkers(robot, timebase, prefix)
+        self._poses, self._markers = RobotPoses(robot), RobotMarkers(robot, timebase, prefix)
         self._every = -(-PERIOD_NS // timebase.period_ns)
         self._output = RawPublisher(node, topics.MARKERS)
-        self.outputs = (self._output,)
 
     def send(self, truth: RobotState) -> None:
         """Send the shapes of a true state, if they are due."""
@@ -33,4 +33,4 @@ class MarkerOutput:
             return
         if not self._output.sent:  # those of the flight before may have other names
             self._output.publish(no_markers())
-        self._output.publish(self._markers.encode(truth))
+        self._output.publish(self._markers.encode(truth.tick, self._poses.at(truth)))

@@ -1,4 +1,4 @@
-"""The robot for viewers: to the recorder in any case, as /tf where tf2_msgs is installed."""
+"""The robot for viewers: to the recorder always; as /tf and markers where these are installed."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from space_robot_msgs_py.samples import RobotState, Timebase
 from space_robot_msgs_py.wire.carrier import unwrap
 
 from ..robot import Robot
+from .marker_output import MarkerOutput
 from .scene import Messages, SceneWriter
 
 
@@ -29,6 +30,9 @@ class SceneOutput:
         }
         """Topics of all robots, that others may publish, too."""
         self.outputs = tuple(self._outputs.values())
+        self._markers = None
+        if find_spec(topics.MARKERS.type.partition("/")[0]):
+            self._markers = MarkerOutput(node, robot, timebase)
         self._has_begun = False
 
     def begin(self) -> None:
@@ -41,6 +45,8 @@ class SceneOutput:
         """Send the poses, if they are due; best once the tick's state is being answered."""
         if self._writer.is_due(truth.tick):
             self._publish(self._writer.poses(truth))
+        if self._markers:
+            self._markers.send(truth)
 
     def _publish(self, messages: Messages) -> None:
         for topic, data in messages:

@@ -4,28 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from space_robot_msgs_py.samples import RobotState, Timebase
-from space_robot_msgs_py.wire.markers import (
-    CUBE,
-    CYLINDER,
-    MESH,
-    POSE,
-    SPHERE,
-    Marker,
-    MarkersCodec,
-)
+from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.wire.markers import CUBE, CYLINDER, MESH, SPHERE, Marker, MarkersCodec
 
-from .base_axes import base_axes
 from .frame_names import frame_names
-from .frames import body_frames
 from .robot import Robot
 from .shapes import LINK_COLOUR, shapes_of
+from .transforms import wxyz
 from .tree import Visual
 from .urdf_text import mesh_address
 
 Array = NDArray[np.float64]
+Pose = tuple[float, float, float, float, float, float, float]
+"""Position x, y, z, m, and orientation x, y, z, w."""
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
 """With this a mesh shows its own colours as they are."""
@@ -37,36 +29,57 @@ class RobotMarkers:
 
     def __init__(self, robot: Robot, timebase: Timebase, prefix: str = "") -> None:
         """``prefix``: before the names, as ``sat1/``."""
-        self._robot, shapes = robot, shapes_of(robot)
-        names = [prefix + name for name in frame_names(robot).bodies]
-        self._bodies = np.array([shape.body for shape in shapes])
-        self._turns = np.array([shape.rotation for shape in shapes])
-        self._places = np.array([shape.position for shape in shapes])[..., np.newaxis]
-        numbers = [int(np.sum(self._bodies[:i] == body)) for i, body in enumerate(self._bodies)]
-        markers = [
-            _marker(shape, names[shape.body], number)
-            for shape, number in zip(shapes, numbers, strict=True)
-        ]
-        self._codec = MarkersCodec(markers, timebase)
+        shapes, names = shapes_of(robot), frame_names(robot).bodies
+        bodies = [shape.body for shape in shapes]
+        self._codec = MarkersCodec(
+            [
+                _marker(shape, prefix + names[shape.body], bodies[:i].count(shape.body))
+                for i, shape in enumerate(shapes)
+            ],
+            timebase,
+        )
+        row = {0: 0} | {joint + 1: i + 1 for i, joint in enumerate(robot.order)}
+        self._parents = [row[int(robot.parent[joint])] for joint in robot.order]
+        self._shapes = [(row[shape.body], _pose(shape)) for shape in shapes]
 
-    def encode(self, state: RobotState) -> bytes:
-        """Return the message of a state."""
-        return self._codec.encode(state.tick, self.poses(state))
+    def encode(self, tick: int, poses: Array) -> bytes:
+        """Return the message of a tick, from the poses of `space_robot_sim.robot.poses`."""
+        return self._codec.encode(tick, self.poses(poses))
 
-    def poses(self, state: RobotState) -> Array:
-        """Return (M, 7) position, m, and orientation x, y, z, w of all in the inertial frame."""
-        robot = self._robot
-        x, y, z = base_axes(state.quaternion[:, np.newaxis])
-        joints = np.append(state.joint_positions, state.passive_positions)[: robot.joint_count]
-        axes, origins = np.empty((2, robot.joint_count + 1, 3, 3))
-        for frame in body_frames(robot, (x, y, z), joints[:, np.newaxis]):
-            axes[frame.body] = np.hstack((frame.x, frame.y, frame.z))
-            origins[frame.body] = frame.origin
-        axes, origins = axes[self._bodies], origins[self._bodies, :, :1]
-        poses = np.empty((len(axes), POSE))
-        poses[:, :3] = state.base_position + (origins + axes @ self._places)[..., 0]
-        poses[:, 3:] = Rotation.from_matrix(axes @ self._turns).as_quat()
-        return poses
+    def poses(self, poses: Array) -> Array:
+        """Return (K, 7) position, m, and orientation x, y, z, w of all in the inertial frame.
+
+        Args:
+            poses: (M, 7) of the base, then of each body on the one that carries it.
+        """
+        base, *bodies = poses.tolist()
+        placed = [base]
+        for parent, pose in zip(self._parents, bodies, strict=True):
+            placed.append(_on(placed[parent], pose))
+        return np.array([_on(placed[row], pose) for row, pose in self._shapes])
+
+
+def _on(outer: Pose, inner: Pose) -> Pose:
+    """Return a pose, given on the axes of a frame, where that frame's own is given."""
+    x, y, z, a, b, c, w = outer
+    u, v, s, d, e, f, g = inner
+    # p + 2 w (q x r) + 2 q x (q x r)
+    k, m, n = 2.0 * (b * s - c * v), 2.0 * (c * u - a * s), 2.0 * (a * v - b * u)
+    return (
+        x + u + w * k + b * n - c * m,
+        y + v + w * m + c * k - a * n,
+        z + s + w * n + a * m - b * k,
+        w * d + a * g + b * f - c * e,
+        w * e + b * g + c * d - a * f,
+        w * f + c * g + a * e - b * d,
+        w * g - a * d - b * e - c * f,
+    )
+
+
+def _pose(shape: Visual) -> Pose:
+    x, y, z = map(float, shape.position)
+    w, a, b, c = map(float, wxyz(shape.rotation))
+    return x, y, z, a, b, c, w
 
 
 def _marker(shape: Visual, name: str, number: int) -> Marker:

@@ -23,6 +23,7 @@ from space_robot_msgs_py.wire.markers import no_markers
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.find import find_robot
 from space_robot_sim.robot.markers import RobotMarkers
+from space_robot_sim.robot.poses import RobotPoses
 from space_robot_sim.robot.shapes import LINK_COLOUR, shapes_of
 from space_robot_sim.robot.tree import Visual
 from space_robot_sim.robot.urdf_text import urdf_text
@@ -73,7 +74,8 @@ def test_poses_are_pinocchios(seed: int, kinds: list[str]) -> None:
     rng = np.random.default_rng(seed)
     robot = Robot.of_tree("tree", random_bodies(rng, ["revolute", *kinds]))
     state = random_state(robot, rng)
-    message = decode(RobotMarkers(robot, TIMEBASE).encode(state), topics.MARKERS.type)
+    data = RobotMarkers(robot, TIMEBASE).encode(state.tick, RobotPoses(robot).at(state))
+    message = decode(data, topics.MARKERS.type)
     expected = pinocchio_shapes(robot, state)
     for marker, placed in zip(message.markers, expected, strict=True):
         p, o = marker.pose.position, marker.pose.orientation
@@ -100,7 +102,8 @@ def test_fields() -> None:
     robot = replace(find_robot("paper"), visuals=SHAPES)
     markers = RobotMarkers(robot, TIMEBASE, prefix="sat1/")
     state = random_state(robot, np.random.default_rng(1))
-    data = markers.encode(state)
+    poses = RobotPoses(robot)
+    data = markers.encode(state.tick, poses.at(state))
     found = decode(data, topics.MARKERS.type).markers
     names = [(marker.ns, marker.id) for marker in found]
     assert names == [
@@ -116,9 +119,8 @@ def test_fields() -> None:
     assert [marker.mesh_resource for marker in found[3:]] == ["file:///a%20b.stl", SHAPES[4].mesh]
     assert [marker.mesh_use_embedded_materials for marker in found] == [0, 0, 0, 1, 0]
     assert {marker.action for marker in found} == {0}
-    again = decode(
-        markers.encode(random_state(robot, np.random.default_rng(2))), topics.MARKERS.type
-    )
+    other = random_state(robot, np.random.default_rng(2))
+    again = decode(markers.encode(other.tick, poses.at(other)), topics.MARKERS.type)
     assert [(marker.ns, marker.id) for marker in again.markers] == names
     moved = np.array([again.markers[0].pose.position.x, found[0].pose.position.x])
     assert moved[0] != moved[1]
@@ -132,8 +134,10 @@ def test_rclpy_reads_it() -> None:
     robot = replace(find_robot("paper"), visuals=SHAPES)
     state = random_state(robot, np.random.default_rng(1))
     markers = RobotMarkers(robot, TIMEBASE)
-    message = serialization.deserialize_message(markers.encode(state), messages.MarkerArray)
-    (position, orientation) = markers.poses(state)[3, :3], markers.poses(state)[3, 3:]
+    poses = RobotPoses(robot).at(state)
+    data = markers.encode(state.tick, poses)
+    message = serialization.deserialize_message(data, messages.MarkerArray)
+    position, orientation = np.split(markers.poses(poses)[3], [3])
     marker = message.markers[3]
     p, o = marker.pose.position, marker.pose.orientation
     assert ([p.x, p.y, p.z], [o.x, o.y, o.z, o.w]) == (position.tolist(), orientation.tolist())
