@@ -11,7 +11,9 @@ NAME = "space_robot"
 EXECUTABLES = [str(path) for path in sorted(Path("resource/executables").iterdir())]
 
 CONFIG = [
-    (f"share/{NAME}/{path.parent}", [str(path)]) for path in sorted(Path("config").rglob("*.yaml"))
+    (f"share/{NAME}/{path.parent}", [str(path)])
+    for path in sorted(Path("config").rglob("*.*"))
+    if path.suffix == ".yaml" or path.parent.name == "views"
 ]
 
 LAUNCH = [str(path) for path in sorted(Path("launch").glob("*.launch.py"))]

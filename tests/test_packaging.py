@@ -220,6 +220,13 @@ def test_an_installed_node_runs_with_the_python_that_installed_it(prefix: Path) 
     assert "'no_such'" in ended.stderr
 
 
+def test_all_of_config_is_installed(prefix: Path) -> None:
+    files = [path for path in (ROOT / "config").rglob("*") if path.is_file()]
+    assert {path.suffix for path in files} >= {".yaml", ".rviz", ".json", ".xml"}
+    for path in files:
+        assert (prefix / "share/space_robot" / path.relative_to(ROOT)).is_file(), path
+
+
 def test_the_command_is_where_colcon_extends_the_path(prefix: Path) -> None:
     assert os.access(prefix / "bin/space-robot", os.X_OK)
 

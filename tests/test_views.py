@@ -1,0 +1,175 @@
+"""The layouts of config/views: what they show is in a bag of ours, in words that the tools know."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+import yaml
+from paths import CONFIG
+from rosbags.highlevel import AnyReader
+
+from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.flight.simulate import simulate
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.wire.controller_telemetry import SIGNALS
+from space_robot_sim.robot import Robot
+
+VIEWS = CONFIG / "views"
+SHOWN = {topic.full_name: topic for topic in (topics.ROBOT_DESCRIPTION, topics.MARKERS)}
+PANEL_TITLES = {"foxglovePanelTitle", "lichtblickPanelTitle"}
+PANELS = {
+    "3D": {
+        "cameraState", "followMode", "followTf", "scene", "transforms", "topics", "layers",
+        "publish",
+    },
+    "Plot": {
+        "paths", "showLegend", "legendDisplay", "showPlotValuesInLegend", "showXAxisLabels",
+        "showYAxisLabels", "isSynced", "xAxisVal", "sidebarDimension", "yAxisLabel",
+        "minYValue", "maxYValue",
+    },
+}  # fmt: skip
+"""Keys of a panel's settings, from the sources of Lichtblick, which Foxglove's are named as."""
+PATH = {"value", "label", "enabled", "timestampMethod", "color"}
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """The last message of each topic in a bag."""
+    bag = tmp_path_factory.mktemp("views") / "bag"
+    simulate(Flight(FlightPlan(duration=0.05)), bag)
+    with AnyReader([bag]) as reader:
+        return {
+            connection.topic: reader.deserialize(data, connection.msgtype)
+            for connection, _, data in reader.messages()
+        }
+
+
+def value_of(path: str, seen: dict[str, Any]) -> Any:
+    """What Foxglove's message path says of the messages: ``/topic.field[0].field``."""
+    topic, *fields = path.split(".")
+    found = seen[topic]
+    for field in fields:
+        name, _, index = field.rstrip("]").partition("[")
+        found = getattr(found, name)
+        found = found[int(index)] if index else found
+    return found
+
+
+def foxglove() -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((VIEWS / "foxglove.json").read_text("utf-8"))
+    return found
+
+
+def panels_of(node: Any) -> Iterator[str]:
+    """The panels that the layout places."""
+    if isinstance(node, str):
+        yield node
+        return
+    assert set(node) == {"first", "second", "direction", "splitPercentage"}
+    assert node["direction"] in ("row", "column")
+    yield from panels_of(node["first"])
+    yield from panels_of(node["second"])
+
+
+def test_foxglove_paths_are_numbers_of_a_bag(seen: dict[str, Any]) -> None:
+    found = foxglove()
+    assert {*found} == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
+    assert sorted(panels_of(found["layout"])) == sorted(found["configById"])
+    for name, panel in found["configById"].items():
+        assert set(panel) <= PANELS[name.partition("!")[0]] | PANEL_TITLES, name
+        for path in panel.get("paths", ()):
+            assert set(path) == PATH
+            assert isinstance(value_of(path["value"], seen), float), path
+
+
+def test_foxglove_shows_the_robot_in_the_inertial_frame(seen: dict[str, Any]) -> None:
+    panel = foxglove()["configById"]["3D!robot"]
+    assert panel["topics"]["/robot_description"]["visible"]
+    assert set(panel["topics"]) <= set(SHOWN)
+    assert panel["followTf"] == topics.INERTIAL_FRAME
+    assert seen["/tf"].transforms[0].header.frame_id == topics.INERTIAL_FRAME
+    assert seen["/robot_description"].data.startswith("<?xml")
+
+
+def error_places(robot: Robot) -> list[int]:
+    """Where the telemetry has the error of each axis."""
+    axes = len(robot.axis_names)
+    start = 1 + SIGNALS.index("e") * axes
+    return list(range(start, start + axes))
+
+
+def test_errors_are_those_of_the_telemetry(paper_robot: Robot, seen: dict[str, Any]) -> None:
+    """Its layout is that of the paper's robot: axes base x, y, z and six joints."""
+    places = error_places(paper_robot)
+    assert "e" in seen["/controller/telemetry"].layout.dim[0].label
+    for text in (
+        (VIEWS / name).read_text("utf-8") for name in ("foxglove.json", "plotjuggler.xml")
+    ):
+        found = [int(i) for i in re.findall(r"/controller/telemetry[./]data\[(\d+)\]", text)]
+        assert found == places
+
+
+def plotjuggler_names(topic: str, message: Any) -> Iterator[str]:
+    """Names of the curves that PlotJuggler makes of a message."""
+    if message.__msgtype__ == "sensor_msgs/msg/JointState":
+        for field in ("position", "velocity", "effort"):
+            for name, _ in zip(message.name, getattr(message, field), strict=False):
+                yield f"{topic}/{name}/{field}"
+        return
+    yield from _leaves(topic, message)
+
+
+def _leaves(path: str, value: Any) -> Iterator[str]:
+    if hasattr(value, "__msgtype__"):
+        for field in value.__dataclass_fields__:
+            if field != "__msgtype__":
+                yield from _leaves(f"{path}/{field}", getattr(value, field))
+    elif isinstance(value, str) or not hasattr(value, "__len__"):
+        yield path
+    else:
+        for number, item in enumerate(value):
+            yield from _leaves(f"{path}[{number}]", item)
+
+
+def test_plotjuggler_curves_are_in_a_bag(seen: dict[str, Any]) -> None:
+    root = ElementTree.parse(VIEWS / "plotjuggler.xml").getroot()
+    (area,) = root.iter("tabbed_widget")
+    assert area.attrib == {"name": "Main Window", "parent": "main_window"}
+    known = {name for topic, message in seen.items() for name in plotjuggler_names(topic, message)}
+    curves = [curve.attrib["name"] for curve in root.iter("curve")]
+    assert set(curves) <= known
+    assert len(curves) > 30
+    for splitter in root.iter("DockSplitter"):
+        assert int(splitter.attrib["count"]) == len(splitter)
+        assert len(splitter.attrib["sizes"].split(";")) == len(splitter)
+        assert all(child.tag == "DockArea" and child.find("plot") is not None for child in splitter)
+
+
+def test_rviz_listens_as_we_send(seen: dict[str, Any]) -> None:
+    """Topics, their durability and the fixed frame; classes are those of RViz' own plugins."""
+    found = yaml.safe_load((VIEWS / "fly.rviz").read_text("utf-8"))["Visualization Manager"]
+    assert found["Global Options"]["Fixed Frame"] == topics.INERTIAL_FRAME
+    displays = {display["Class"].rpartition("/")[2]: display for display in found["Displays"]}
+    assert set(displays) == {"Grid", "RobotModel", "TF", "MarkerArray"}
+    assert all(display["Enabled"] for display in displays.values())
+    heard = {
+        SHOWN[given["Value"]]: given
+        for given in (displays["RobotModel"]["Description Topic"], displays["MarkerArray"]["Topic"])
+    }
+    assert set(heard) == {topics.ROBOT_DESCRIPTION, topics.MARKERS}
+    for topic, given in heard.items():
+        durability = "Transient Local" if topic.transient_local else "Volatile"
+        assert (given["Durability Policy"], given["Depth"]) == (durability, topic.depth)
+        assert given["Reliability Policy"] == "Reliable"
+
+
+def test_no_layout_names_a_file_of_a_machine() -> None:
+    files = [path for path in VIEWS.iterdir() if path.is_file()]
+    assert {path.name for path in files} == {"fly.rviz", "foxglove.json", "plotjuggler.xml"}
+    for path in files:
+        assert not re.search(r"/(home|tmp|root|work)/", path.read_text("utf-8")), path
