@@ -162,12 +162,14 @@ def topic_page() -> str:
             "transient local" if topic.transient_local else "volatile",
             _occasion(topic),
         )
-        for topic in (*topics.RECORDED, topics.DIAGNOSTICS, topics.SIMULATION_PAUSED)
+        for topic in (
+            *topics.RECORDED, topics.MARKERS, topics.DIAGNOSTICS, topics.SIMULATION_PAUSED,
+        )
     )  # fmt: skip
     return "\n\n".join([
         "# Topics", MADE,
         "All are reliable and keep the last messages. Fields, units, frames and rates are in"
-        " [bags](../manual/bags.md#topics). Every topic but the last two is recorded. These are"
+        " [bags](../manual/bags.md#topics). Every topic but the last three is recorded. These are"
         " the names of nodes without a namespace; in one, as `/sat1`, all but `/diagnostics` begin"
         " with it: `/sat1/joint_states`; so do the frames in `/tf`, but for `inertial`. `/tf` and"
         " `/tf_static` themselves are sent by a plant that finds tf2_msgs installed.",
@@ -182,6 +184,8 @@ def _type(topic: topics.Topic) -> str:
 def _occasion(topic: topics.Topic) -> str:
     if topic.is_latched:
         return "once"
+    if topic is topics.MARKERS:
+        return "every 33 ms or more, while somebody listens"
     if topic.carries:
         return "every 10 ms, or every tick if that is longer"
     if topic.per_tick and topic.is_optional:

@@ -12,8 +12,9 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.carrier import unwrap, wrap
 from space_robot_msgs_py.wire.definitions import definition, jazzy
+from space_robot_msgs_py.wire.poses import POSE
 from space_robot_msgs_py.wire.robot_description import robot_description
-from space_robot_msgs_py.wire.tf import POSE, Frame, TransformsCodec
+from space_robot_msgs_py.wire.tf import Frame, TransformsCodec
 
 NAMES = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9)
 TIMEBASE = Timebase(500_000)
