@@ -103,8 +103,8 @@ def _tube(start: Array, end: Array, radius: float, body: int) -> Iterator[Visual
     if length < THINNEST:
         return
     yield Visual(
-        "cylinder", (radius, length), _turn_to(along / length), 0.5 * (start + end), colour=LINK_COLOUR,
-        body=body,
+        "cylinder", (radius, length), _turn_to(along / length), 0.5 * (start + end),
+        colour=LINK_COLOUR, body=body,
     )  # fmt: skip
 
 

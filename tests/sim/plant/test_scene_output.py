@@ -16,6 +16,8 @@ from space_robot_sim.robot.urdf_text import urdf_text
 
 pytest.importorskip("rclpy")
 
+from space_robot_msgs_py.ros.locks import look, topic_lock  # noqa: E402
+
 if TYPE_CHECKING:
     from ground import Ground
 
@@ -37,9 +39,12 @@ def wait_for_message(ground: Ground, subscription: RawSubscription) -> bytes:
 
 
 def test_who_comes_late_is_told_all_that_holds_for_the_flight(
-    start: Callable[..., object], ground: Ground, paper_robot: Robot
+    start: Callable[..., object], ground: Ground, domain: int, paper_robot: Robot
 ) -> None:
-    """The plant has sent its first state, and waits for an answer, when the listener comes."""
+    """The plant has sent its first state, and waits for an answer, when the listener comes.
+
+    It has claimed what it does not send, too, so others' messages there are foreign.
+    """
     from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
 
     start("plant")
@@ -53,3 +58,7 @@ def test_who_comes_late_is_told_all_that_holds_for_the_flight(
     assert text.rstrip("\n") == urdf_text(paper_robot).rstrip("\n")
     (tool,) = decode(unwrap(wait_for_message(ground, static)), topics.TF_STATIC.type).transforms
     assert (tool.header.frame_id, tool.child_frame_id) == ("joint6", "tool")
+    for topic in (topics.ROBOT_DESCRIPTION, topics.TRANSFORMS, topics.WHEELS_STATE):
+        claimed = look(topic_lock(domain, topic.full_name))
+        assert claimed[0], topic
+        assert bool(claimed[1]) is (topic is not topics.WHEELS_STATE)
