@@ -63,8 +63,8 @@ class Player:
     """Sends the messages of a bag as the graph's own publishers."""
 
     def __init__(self, ground: Ground) -> None:
-        self._outs = {topic: RawPublisher(ground.node, topic) for topic in topics.ALL}
-        self._claim = Claim(ground.node, [topic.full_name for topic in topics.ALL])
+        self._outs = {topic: RawPublisher(ground.node, topic) for topic in topics.RECORDED}
+        self._claim = Claim(ground.node, [topic.full_name for topic in topics.RECORDED])
 
     def is_heard(self) -> bool:
         """Whether the recorder is connected, beside all others that listen."""
