@@ -182,7 +182,7 @@ def _type(topic: topics.Topic) -> str:
 
 
 def _occasion(topic: topics.Topic) -> str:
-    if topic.is_latched:
+    if topic in topics.SCENE and topic.is_latched:
         return "once"
     if topic is topics.MARKERS:
         return "every 33 ms or more, while somebody listens"
