@@ -1,0 +1,73 @@
+"""Pages that are made of the code: the commands' help and the docstrings, by package and room."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+
+from space_robot_control.cli.main import cli
+
+PUBLIC = """\
+# Names for users
+
+What programs import; names of other modules may change from version to version. `load_bag` returns a
+[`FlightLog`][space_robot_msgs_py.bag.flight_log.FlightLog]; a law of one's own is a
+[`ControlLaw`][space_robot_control.laws.base.ControlLaw]; bad input raises
+[`InputError`][space_robot_msgs_py.errors.InputError]; for Gymnasium there is
+[`SpaceRobotEnv`][space_robot_control.scenario.gymnasium_env].
+
+::: space_robot_control
+
+::: space_robot_sim
+"""
+PACKAGES = ("space_robot_control", "space_robot_sim", "space_robot_msgs_py")
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the pages, and tell the navigation of them."""
+    root = Path(config.config_file_path).parent
+    files.append(File.generated(config, "reference/commands.md", content=commands()))
+    files.append(File.generated(config, "reference/api/index.md", content=PUBLIC))
+    python: list[object] = [{"Names for users": "reference/api/index.md"}]
+    for package in PACKAGES:
+        pages = []
+        for room in rooms(root / package):
+            uri = f"reference/api/{package}/{room}.md"
+            files.append(File.generated(config, uri, content=_room(package, room)))
+            pages.append({room: uri})
+        python.append({package: pages})
+    config.extra["added"] = {"Reference": [{"Commands": "reference/commands.md"}, {"Python": python}]}
+    return files
+
+
+def commands() -> str:
+    """Text of the page with the help of each command, as it is printed."""
+    parts = ["# Commands", *_help(cli, click.Context(cli, info_name="space-robot"), 1)]
+    return "\n\n".join(parts)
+
+
+def _help(command: click.Command, context: click.Context, level: int) -> Iterator[str]:
+    if level > 1:
+        yield f"{'#' * level} {context.command_path.partition(' ')[2]}"
+    yield f"```text\n{command.get_help(context)}\n```"
+    if isinstance(command, click.Group):
+        for name in command.list_commands(context):
+            inner = command.commands[name]
+            yield from _help(inner, click.Context(inner, context, name), level + 1)
+
+
+def rooms(package: Path) -> Iterator[str]:
+    """Yield the names of the folders of a package that are rooms, and of its modules."""
+    for path in sorted(package.iterdir()):
+        if path.is_dir() and (path / "__init__.py").exists():
+            yield path.name
+        elif path.suffix == ".py" and path.stem != "__init__":
+            yield path.stem
+
+
+def _room(package: str, room: str) -> str:
+    return f"# {package}.{room}\n\n::: {package}.{room}\n    options:\n      show_submodules: true\n"
