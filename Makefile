@@ -20,7 +20,7 @@ export PYTHONPYCACHEPREFIX := $(CURDIR)/$(VENV)/pycache
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
 
-.PHONY: help setup fly test quick coverage hooks lint kernels bench mutation notebooks clean
+.PHONY: help setup fly test quick coverage hooks lint kernels docs bench mutation notebooks clean
 
 help:
 	@echo "make setup               .venv with the package and ROS 2 Jazzy"
@@ -31,6 +31,7 @@ help:
 	@echo "make hooks               from then on a commit passes style, types and the quick tests"
 	@echo "make lint                style and types only"
 	@echo "make kernels             compile the dynamics and the laws, once"
+	@echo "make docs                docs/ as a site in site/, to be read without a network"
 	@echo "make bench [ARGS=...]    how fast it is, e.g. make bench ARGS='plant laws'; --help tells more"
 	@echo "make mutation [ARGS=...] small faults put in, one at a time: do the tests notice?"
 	@echo "make notebooks           run docs/notebooks and keep what they show"
@@ -69,6 +70,10 @@ lint: $(VENV)/.tests
 kernels: $(VENV)/.tests
 	$(VENV)/bin/python -c "from space_robot_control.flight.compilation import compile_kernels as c; c(True)"
 
+docs: $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/python -m mkdocs --quiet build --strict
+	@echo "site/index.html"
+
 bench: $(VENV)/.tests
 	@$(VENV)/bin/python tests/benchmarks $(ARGS)
 
@@ -80,7 +85,7 @@ notebooks: $(VENV)/.tests
 	$(VENV)/bin/python docs/notebooks/execute.py
 
 clean:
-	rm -rf $(VENV) build install log *.egg-info .coverage .coverage.* .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) build install log site *.egg-info .coverage .coverage.* .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find $(PACKAGES) tests -name __pycache__ -prune -exec rm -rf {} +
 
 # Stamps: what is installed in .venv, renewed when the packaging changes.
@@ -93,6 +98,11 @@ $(VENV)/.tests: setup.py pyproject.toml | $(VENV)/.made
 	@echo "installing space_robot, ROS 2 and the tests' tools into $(VENV): some minutes, once"
 	@$(PIP_INSTALL) --no-compile --editable '.[ros,test]'  # most modules are never imported
 	@touch $(VENV)/.flies $@
+
+$(VENV)/.docs: setup.py | $(VENV)/.made
+	@echo "installing space_robot and what makes its site into $(VENV): a minute, once"
+	@$(PIP_INSTALL) --editable '.[docs]'
+	@touch $@
 
 $(VENV)/.made:
 	@command -v $(PYTHON) >/dev/null || \

@@ -59,6 +59,15 @@ setup(
         "bench": ["bsk", "hypothesis", "mujoco", "pin", "psutil>=5.9"],
         "campaign": ["pandas>=2.1", "pyarrow>=14"],  # tables of `campaign`
         "dask": ["distributed>=2024.1"],  # `campaign run --scheduler`
+        # `make docs`
+        "docs": [
+            "mermaidx",
+            "mkdocs-material>=9.7",
+            "mkdocstrings[python]>=1.0",
+            "nbconvert",
+            "ruff",  # wraps the signatures
+            "ziamath",
+        ],
         "gym": ["gymnasium>=1.0"],  # space_robot_control.scenario.gymnasium_env
         "mutation": ["cosmic-ray"],  # tests/mutation
         "notebooks": ["ipykernel", "pandas>=2.1", "pyarrow>=14"],  # docs/notebooks
@@ -76,9 +85,13 @@ setup(
             "gymnasium>=1.0",
             "hypothesis",
             "ipykernel",
+            "mermaidx",
+            "mkdocs-material>=9.7",
+            "mkdocstrings[python]>=1.0",
             "mujoco",
             "mypy",
             "nbclient",
+            "nbconvert",
             "pandas>=2.1",
             "pin",
             "pre-commit",
@@ -95,6 +108,7 @@ setup(
             "types-psutil",
             "viser>=1.1",
             "xacro",
+            "ziamath",
         ],
         "view": ["trimesh>=4", "viser>=1.1"],  # `view`
         "xacro": ["xacro"],  # robots in files that end in .xacro

@@ -1,9 +1,12 @@
 """The flight software: control laws, controller, mission, and how flights are flown and judged.
 
-from space_robot_control import Scenario
-flight = Scenario(controller="tde_stc", case="3", sensors="fine").fly()
-Campaign.load("my.yaml").run(runs=1000, seed=7, out="campaigns/a").verdicts
-replay("flights/one").has_passed
+One flight, many, and one again:
+
+    from space_robot_control import Campaign, Scenario, replay
+
+    flight = Scenario(controller="tde_stc", case="3", sensors="fine").fly()
+    Campaign.load("my.yaml").run(runs=1000, seed=7, out="campaigns/a").verdicts
+    replay("flights/one").has_passed
 """
 
 from __future__ import annotations

@@ -63,6 +63,7 @@ SLOW = (
     "control/flight/test_long_flights.py", "control/flight/test_shipped_robots.py",
     "msgs/bag/test_bag_fuzz.py", "test_notebooks.py", "test_examples.py", "test_tutorial.py",
     "msgs/bag/test_description_fuzz.py", "test_packaging.py", "test_shown_outputs.py",
+    "test_site.py",
 )  # fmt: skip
 """Folders and files whose tests take seconds each."""
 FLYING_UNTIL = 0.7

@@ -1,36 +1,47 @@
-"""Equations become MathML when the site is made, which browsers draw by themselves."""
+"""Equations become pictures when the site is made: no script and no font is needed to read them."""
 
 from __future__ import annotations
 
-import html
 import re
-from importlib import resources
+from functools import cache
+from html import unescape
+from xml.etree import ElementTree
 
-from latex2mathml.converter import convert
-from mkdocs.config.defaults import MkDocsConfig
-from mkdocs.structure.files import File, Files
+import ziafont
+import ziamath
 from mkdocs.structure.pages import Page
 
 EQUATION = re.compile(
     r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<tex>.*?)\\[)\]]</(?P=tag)>', re.DOTALL
 )
-BAR = re.compile(r'<mo[^>]*>(?:\||&#x0007C;)</mo>')
-FONT = "STIXTwoMath-Regular.ttf"
-
-
-def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add a font with all that equations need, for those whose system has none."""
-    font = str(resources.files("ziamath") / "fonts" / FONT)
-    files.append(File.generated(config, f"assets/{FONT}", abs_src_path=font))
-    return files
+NUMBER = re.compile(r"\\tag\{(.*?)\}")
+SIZE = 20.0
+"""Of the letters, in the pictures' own unit; they are shown as large as the text around them."""
+ziafont.config.precision = 2
 
 
 def on_page_content(html: str, page: Page, **_: object) -> str:
     """Draw what Markdown has left as LaTeX."""
-    return EQUATION.sub(_mathml, html)
+    return EQUATION.sub(lambda found: _equation(found["tex"], found["tag"] == "div"), html)
 
 
-def _mathml(match: re.Match[str]) -> str:
-    display = "block" if match["tag"] == "div" else "inline"
-    made = convert(html.unescape(match["tex"]).strip(), display=display)
-    return BAR.sub('<mo stretchy="false" lspace="0" rspace="0">|</mo>', made)
+def _equation(text: str, displayed: bool) -> str:
+    number = NUMBER.search(text)
+    picture = _picture(" ".join(unescape(NUMBER.sub("", text)).split()), displayed)
+    if not displayed:
+        return picture
+    label = f"<span>({number[1]})</span>" if number else ""
+    return f'<div class="equation">{picture}{label}</div>'
+
+
+@cache
+def _picture(tex: str, displayed: bool) -> str:
+    """Draw an equation that scales with the text and stands on its line."""
+    bars = tex.replace(r"\lvert", "|").replace(r"\rvert", "|")  # theirs are drawn too high
+    drawn = ziamath.Latex(bars, size=SIZE, color="currentColor", inline=not displayed)
+    svg = drawn.svgxml()
+    width, height = (float(svg.attrib.pop(side)) / SIZE for side in ("width", "height"))
+    style = f"width: {width:.3f}em; height: {height:.3f}em"
+    style += f"; vertical-align: {drawn.getyofst() / SIZE:.3f}em"
+    svg.attrib |= {"class": "math", "role": "img", "aria-label": tex, "style": style}
+    return ElementTree.tostring(svg, encoding="unicode")

@@ -17,6 +17,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     """Put README's beginning before the list of documents, whose title becomes a heading."""
     if page.file.src_uri != INDEX:
         return markdown
+    page.meta["hide"] = ["navigation"]
     readme = Path(config.config_file_path).with_name("README.md").read_text("utf-8")
     beginning = links.rewritten(readme.partition(END)[0], "README.md", INDEX, files)
     return f"{beginning}\n#{markdown}"

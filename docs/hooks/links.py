@@ -9,6 +9,7 @@ from pathlib import Path
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files, InclusionLevel
 from mkdocs.structure.pages import Page
+from notebooks import page_of
 
 DOCS, SHOWN = "docs", "source"
 TARGET = re.compile(r"(?<=\]\()(?![a-z]+:|#)([^)#\s]+)(?=[)#])")
@@ -20,14 +21,21 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     root = Path(config.config_file_path).parent
     pages = [file.src_uri for file in files.documentation_pages()]
     while pages:
-        source = _in_repository(pages.pop())
-        text = (root / source).read_text("utf-8") if source.endswith(".md") else ""
-        for target in TARGET.findall(text):
+        page = files.src_uris[pages.pop()]
+        source = _in_repository(page.src_uri)
+        for target in TARGET.findall(page.content_string) if source.endswith(".md") else ():
             path = posixpath.normpath(posixpath.join(posixpath.dirname(source), target))
             uri = _on_site(path)
             if _is_in_docs(path) or uri in files.src_uris or not (root / path).is_file():
                 continue
-            files.append(File.generated(config, uri, content=_page(root / path, path), inclusion=InclusionLevel.NOT_IN_NAV))
+            files.append(
+                File.generated(
+                    config,
+                    uri,
+                    content=_page(root / path, path),
+                    inclusion=InclusionLevel.NOT_IN_NAV,
+                )
+            )
             pages.append(uri)
     return files
 
@@ -63,7 +71,7 @@ def _is_in_docs(path: str) -> bool:
 def _on_site(path: str) -> str:
     """Where a file of the repository is on the site, by both paths from the top."""
     if _is_in_docs(path):
-        return path.removeprefix(f"{DOCS}/")
+        return page_of(path.removeprefix(f"{DOCS}/"))
     return f"{SHOWN}/{path}" if path.endswith(".md") else f"{SHOWN}/{path}.md"
 
 

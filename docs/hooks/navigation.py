@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import Files
+from notebooks import page_of
 
 INDEX = "README.md"
 LINE = re.compile(
@@ -21,7 +22,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         if line["section"]:
             pages = sections.setdefault(line["section"], [])
         else:
-            pages.append({line["title"]: line["page"]})
+            pages.append({line["title"]: page_of(line["page"])})
     for section, added in config.extra.pop("added").items():
         sections[section] += added
     config.nav = [{"Home": INDEX}, *({title: pages} for title, pages in sections.items())]

@@ -14,16 +14,18 @@ from space_robot_control.cli.main import cli
 PUBLIC = """\
 # Names for users
 
-What programs import; names of other modules may change from version to version. `load_bag` returns a
-[`FlightLog`][space_robot_msgs_py.bag.flight_log.FlightLog]; a law of one's own is a
+What programs import; names of other modules may change from version to version. `load_bag` returns
+a [`FlightLog`][space_robot_msgs_py.bag.flight_log.FlightLog]; a law of one's own is a
 [`ControlLaw`][space_robot_control.laws.base.ControlLaw]; bad input raises
 [`InputError`][space_robot_msgs_py.errors.InputError]; for Gymnasium there is
-[`SpaceRobotEnv`][space_robot_control.scenario.gymnasium_env].
+[`SpaceRobotEnv`][space_robot_control.scenario.gymnasium_env.SpaceRobotEnv].
 
 ::: space_robot_control
 
 ::: space_robot_sim
 """
+WIDTH = 100
+"""Columns of the commands' help."""
 PACKAGES = ("space_robot_control", "space_robot_sim", "space_robot_msgs_py")
 
 
@@ -36,17 +38,22 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for package in PACKAGES:
         pages = []
         for room in rooms(root / package):
-            uri = f"reference/api/{package}/{room}.md"
-            files.append(File.generated(config, uri, content=_room(package, room)))
-            pages.append({room: uri})
+            uri = f"reference/api/{package}/{room.stem}.md"
+            files.append(File.generated(config, uri, content=docstrings(room, root)))
+            pages.append({room.stem: uri})
         python.append({package: pages})
-    config.extra["added"] = {"Reference": [{"Commands": "reference/commands.md"}, {"Python": python}]}
+    config.extra["added"] = {
+        "Reference": [{"Commands": "reference/commands.md"}, {"Python": python}]
+    }
     return files
 
 
 def commands() -> str:
     """Text of the page with the help of each command, as it is printed."""
-    parts = ["# Commands", *_help(cli, click.Context(cli, info_name="space-robot"), 1)]
+    parts = [
+        "# Commands",
+        *_help(cli, click.Context(cli, info_name="space-robot", terminal_width=WIDTH), 1),
+    ]
     return "\n\n".join(parts)
 
 
@@ -60,14 +67,23 @@ def _help(command: click.Command, context: click.Context, level: int) -> Iterato
             yield from _help(inner, click.Context(inner, context, name), level + 1)
 
 
-def rooms(package: Path) -> Iterator[str]:
-    """Yield the names of the folders of a package that are rooms, and of its modules."""
+def rooms(package: Path) -> Iterator[Path]:
+    """Yield the folders of a package that are rooms, and its modules."""
     for path in sorted(package.iterdir()):
-        if path.is_dir() and (path / "__init__.py").exists():
-            yield path.name
-        elif path.suffix == ".py" and path.stem != "__init__":
-            yield path.stem
+        is_room = (path / "__init__.py").exists() or path.suffix == ".py"
+        if is_room and path.stem not in ("__init__", "cli"):  # the commands have their own page
+            yield path
 
 
-def _room(package: str, room: str) -> str:
-    return f"# {package}.{room}\n\n::: {package}.{room}\n    options:\n      show_submodules: true\n"
+def docstrings(room: Path, root: Path) -> str:
+    """Text of the page of a room: what stands in each of its files, once."""
+    files = sorted(room.rglob("*.py")) if room.is_dir() else [room]
+    parts = []
+    for file in files:
+        name = ".".join(file.relative_to(root).with_suffix("").parts).removesuffix(".__init__")
+        options = [f"heading_level: {1 if file is files[0] else 2}"]
+        options += ["members: false"] if file.stem == "__init__" else []
+        parts.append(
+            "\n      ".join([f"::: {name}", *options]).replace("\n", "\n    options:\n", 1)
+        )
+    return "\n\n".join(parts)
