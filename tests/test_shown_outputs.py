@@ -68,18 +68,18 @@ def test_the_page_on_stability_has_the_numbers_of_its_command() -> None:
         "docs/explanation/stability.md", "| Lemma 1, spectral norm", "| reaching time below (56)"
     )
     assert not [*differences(shown, [
-        f"| Lemma 1, spectral norm of W below 1 | fails: {lemma['spectral_norm']['max']:.3f} |",
+        f"| Lemma 1, spectral norm of $W$ below 1 | fails: {lemma['spectral_norm']['max']:.3f} |",
         f"| the same with the spectral radius | holds: {lemma['spectral_radius']['max']:.3f} |",
-        "| `K_2 > beta`, also circle criterion (73) | fails on every axis, by factors of "
+        r"| $K_2 > \beta$, also circle criterion (73) | fails on every axis, by factors of "
         f"{min(excess):.0f} to {max(excess):.0f}; without friction by "
         f"{min(without_friction):.0f} to {max(without_friction):.0f} |",
-        "| `K_1^2 > 4 K_2` | holds on every axis |",
-        f"| LMI (51) with the M of (48) | fails: largest eigenvalue {min(eigenvalues):.2f} to "
-        f"{max(eigenvalues):.2f}, with beta = gamma = 0 |",
-        "| LMI (51) with M free, beta measured | no gamma |",
-        f"| the same, beta = K_2 / 2 | gamma {min(gammas):.4f} (base) to {max(gammas):.3f} |",
-        "| reaching time below (56) for beta = K_2 / 2 | not applicable: the flight exceeds that "
-        f"beta on every axis. It arrives within {max(t for t, _ in base):.1f} s (base) and "
+        "| $K_1^2 > 4K_2$ | holds on every axis |",
+        f"| LMI (51) with the $M$ of (48) | fails: largest eigenvalue {min(eigenvalues):.2f} to "
+        rf"{max(eigenvalues):.2f}, with $\beta = \gamma = 0$ |",
+        r"| LMI (51) with $M$ free, $\beta$ measured | no $\gamma$ |",
+        rf"| the same, $\beta = K_2/2$ | $\gamma$ {min(gammas):.4f} (base) to {max(gammas):.3f} |",
+        r"| reaching time below (56) for $\beta = K_2/2$ | not applicable: the flight exceeds that "
+        rf"$\beta$ on every axis. It arrives within {max(t for t, _ in base):.1f} s (base) and "
         f"{min(t for t, _ in joints):.2f} to {max(t for t, _ in joints):.2f} s (joints), the "
         f"bounds would be {min(limit for _, limit in base):.0f} and "
         f"{min(limit for _, limit in joints):.0f} to {max(limit for _, limit in joints):.0f} s |",
