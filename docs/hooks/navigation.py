@@ -10,9 +10,8 @@ from mkdocs.structure.files import Files
 from notebooks import page_of
 
 INDEX = "README.md"
-LINE = re.compile(
-    r"^\*\*(?P<section>[^*]+)\*\*|^- \[(?P<title>[^]]+)\]\((?P<page>[^):#]+)", re.MULTILINE
-)
+LINE = re.compile(r"^\*\*(?P<section>[^*]+)\*\*|^- .*", re.MULTILINE)
+LINK = re.compile(r"\[([^]]+)\]\(([^):#]+)\)")
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -21,8 +20,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for line in LINE.finditer((Path(config.docs_dir) / INDEX).read_text("utf-8")):
         if line["section"]:
             pages = sections.setdefault(line["section"], [])
-        else:
-            pages.append({line["title"]: page_of(line["page"])})
+            continue
+        for title, page in LINK.findall(line[0]):
+            pages.append({title[0].upper() + title[1:]: page_of(page)})
     for section, added in config.extra.pop("added").items():
         sections[section] += added
     config.nav = [{"Home": INDEX}, *({title: pages} for title, pages in sections.items())]

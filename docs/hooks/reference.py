@@ -24,6 +24,8 @@ a [`FlightLog`][space_robot_msgs_py.bag.flight_log.FlightLog]; a law of one's ow
 
 ::: space_robot_sim
 """
+OF_PROGRAMS = {"campaign", "flight", "paper", "ros"}
+"""Rooms that the commands are made of: of their files the page says what each is for, no more."""
 WIDTH = 100
 """Columns of the commands' help."""
 PACKAGES = ("space_robot_control", "space_robot_sim", "space_robot_msgs_py")
@@ -76,13 +78,14 @@ def rooms(package: Path) -> Iterator[Path]:
 
 
 def docstrings(room: Path, root: Path) -> str:
-    """Text of the page of a room: what stands in each of its files, once."""
+    """Text of the page of a room: what stands in each of its files, once; found below the manual."""
     files = sorted(room.rglob("*.py")) if room.is_dir() else [room]
-    parts = []
+    parts = ["---\nsearch:\n  boost: 0.5\n---"]
     for file in files:
         name = ".".join(file.relative_to(root).with_suffix("").parts).removesuffix(".__init__")
         options = [f"heading_level: {1 if file is files[0] else 2}"]
-        options += ["members: false"] if file.stem == "__init__" else []
+        is_brief = file.stem == "__init__" or room.name in OF_PROGRAMS
+        options += ["members: false"] if is_brief else []
         parts.append(
             "\n      ".join([f"::: {name}", *options]).replace("\n", "\n    options:\n", 1)
         )
