@@ -78,7 +78,7 @@ def rooms(package: Path) -> Iterator[Path]:
 
 
 def docstrings(room: Path, root: Path) -> str:
-    """Text of the page of a room: what stands in each of its files, once; found below the manual."""
+    """Text of the page of a room: what stands in its files, once. The manual is found before."""
     files = sorted(room.rglob("*.py")) if room.is_dir() else [room]
     parts = ["---\nsearch:\n  boost: 0.5\n---"]
     for file in files:
