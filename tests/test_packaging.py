@@ -130,6 +130,11 @@ def test_the_makefile_installs_extras_of_setup_py() -> None:
     assert {"ros", "test", "mutation"} <= named <= set(setup_keyword("extras_require"))
 
 
+def test_the_extra_that_makes_the_site_is_part_of_that_of_the_tests() -> None:
+    extras = setup_keyword("extras_require")
+    assert {*extras["docs"]} <= {*extras["test"]}
+
+
 def test_types_of_untyped_libraries_are_told_of_libraries_that_are_used() -> None:
     """The list in pyproject.toml, of modules that mypy need not find."""
     text = (ROOT / "pyproject.toml").read_text("utf-8")

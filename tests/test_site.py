@@ -99,11 +99,6 @@ def test_commands_and_the_names_for_users_are_there(site: Path) -> None:
     assert law.count('id="space_robot_control.laws.base.ControlLaw"') == 1
 
 
-def test_the_extra_that_makes_the_site_is_part_of_that_of_the_tests() -> None:
-    extras = setup_keyword("extras_require")
-    assert {*extras["docs"]} <= {*extras["test"]}
-
-
 def test_links_to_sources_lead_to_pages_of_them(site: Path) -> None:
     page = (site / "manual/campaign_variables.html").read_text("utf-8")
     assert 'href="../source/config/campaigns/first.yaml.html"' in page
