@@ -25,7 +25,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         source = _in_repository(page.src_uri)
         for target in TARGET.findall(page.content_string) if source.endswith(".md") else ():
             path = posixpath.normpath(posixpath.join(posixpath.dirname(source), target))
-            uri = _on_site(path)
+            uri = on_site(path)
             if _is_in_docs(path) or uri in files.src_uris or not (root / path).is_file():
                 continue
             files.append(
@@ -55,20 +55,20 @@ def rewritten(markdown: str, source: str, uri: str, files: Files) -> str:
         files: all of the site; links to what is not among them stay as they are.
     """
 
-    def on_site(match: re.Match[str]) -> str:
+    def new_target(match: re.Match[str]) -> str:
         path = posixpath.normpath(posixpath.join(posixpath.dirname(source), match[1]))
-        if _on_site(path) not in files.src_uris:
+        if on_site(path) not in files.src_uris:
             return match[1]
-        return posixpath.relpath(_on_site(path), posixpath.dirname(uri) or ".")
+        return posixpath.relpath(on_site(path), posixpath.dirname(uri) or ".")
 
-    return TARGET.sub(on_site, markdown)
+    return TARGET.sub(new_target, markdown)
 
 
 def _is_in_docs(path: str) -> bool:
     return path.startswith(f"{DOCS}/")
 
 
-def _on_site(path: str) -> str:
+def on_site(path: str) -> str:
     """Where a file of the repository is on the site, by both paths from the top."""
     if _is_in_docs(path):
         return page_of(path.removeprefix(f"{DOCS}/"))

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import posixpath
 import re
 from pathlib import Path
 
+import links
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import Files
-from notebooks import page_of
 
 INDEX = "README.md"
-LINE = re.compile(r"^\*\*(?P<section>[^*]+)\*\*|^- .*", re.MULTILINE)
+LINE = re.compile(r"^\*\*(?P<section>[^*]+)\*\*.*|^- .*", re.MULTILINE)
 LINK = re.compile(r"\[([^]]+)\]\(([^):#]+)\)")
 
 
@@ -20,9 +21,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for line in LINE.finditer((Path(config.docs_dir) / INDEX).read_text("utf-8")):
         if line["section"]:
             pages = sections.setdefault(line["section"], [])
-            continue
-        for title, page in LINK.findall(line[0]):
-            pages.append({title[0].upper() + title[1:]: page_of(page)})
+        for title, target in LINK.findall(line[0]):
+            page = links.on_site(posixpath.normpath(posixpath.join(links.DOCS, target)))
+            pages.append({title[0].upper() + title[1:]: page})
     for section, added in config.extra.pop("added").items():
         sections[section] += added
     config.nav = [{"Home": INDEX}, *({title: pages} for title, pages in sections.items())]
