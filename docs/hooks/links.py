@@ -25,7 +25,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         source = _in_repository(page.src_uri)
         for target in TARGET.findall(page.content_string) if source.endswith(".md") else ():
             path = posixpath.normpath(posixpath.join(posixpath.dirname(source), target))
-            uri = on_site(path)
+            uri = site_path(path)
             if _is_in_docs(path) or uri in files.src_uris or not (root / path).is_file():
                 continue
             files.append(
@@ -57,9 +57,9 @@ def rewritten(markdown: str, source: str, uri: str, files: Files) -> str:
 
     def new_target(match: re.Match[str]) -> str:
         path = posixpath.normpath(posixpath.join(posixpath.dirname(source), match[1]))
-        if on_site(path) not in files.src_uris:
+        if site_path(path) not in files.src_uris:
             return match[1]
-        return posixpath.relpath(on_site(path), posixpath.dirname(uri) or ".")
+        return posixpath.relpath(site_path(path), posixpath.dirname(uri) or ".")
 
     return TARGET.sub(new_target, markdown)
 
@@ -68,7 +68,7 @@ def _is_in_docs(path: str) -> bool:
     return path.startswith(f"{DOCS}/")
 
 
-def on_site(path: str) -> str:
+def site_path(path: str) -> str:
     """Where a file of the repository is on the site, by both paths from the top."""
     if _is_in_docs(path):
         return page_of(path.removeprefix(f"{DOCS}/"))

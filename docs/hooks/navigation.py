@@ -22,7 +22,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         if line["section"]:
             pages = sections.setdefault(line["section"], [])
         for title, target in LINK.findall(line[0]):
-            page = links.on_site(posixpath.normpath(posixpath.join(links.DOCS, target)))
+            page = links.site_path(posixpath.normpath(posixpath.join(links.DOCS, target)))
             pages.append({title[0].upper() + title[1:]: page})
     for section, added in config.extra.pop("added").items():
         sections[section] += added
