@@ -1,0 +1,22 @@
+"""What the pages of the documentation tell to type works, in the order of each page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from page_shell import PageShell, starts_graphs
+from pages import PAGES, name
+
+
+@pytest.fixture(scope="module")
+def shell(tmp_path_factory: pytest.TempPathFactory) -> PageShell:
+    return PageShell(tmp_path_factory.mktemp("pages"))
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if starts_graphs(page)], ids=name
+)
+def test_the_commands_of_a_page_run(page: Path, shell: PageShell) -> None:
+    failed = shell.run(page)
+    assert not failed, "\n\n".join(failed)
