@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -126,6 +126,11 @@ def entries_of(bag: Path) -> list[Entry]:
     clock = 1_795_220_105_128_297_452
     sent = ((topic.recorded, data) for topic, data in messages_of(bag) if not topic.carries)
     return [(t.full_name, t.type, clock + 31_000 * i, data) for i, (t, data) in enumerate(sent)]
+
+
+def within(namespace: str, entries: Sequence[Entry]) -> list[Entry]:
+    """The same messages of a robot in a namespace."""
+    return [(namespace + name, kind, stamp, data) for name, kind, stamp, data in entries]
 
 
 def rosbags_bag(folder: Path, entries: Iterable[Entry], setup: Callable[[Writer], Any]) -> Path:

@@ -4,24 +4,27 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from bags import entries_of, mcap_of
+import yaml
+from bags import entries_of, mcap_of, within
 from flights import space_robot_here
 from pages import Item, files, items, name
-from paths import CONFIG, DATA
+from paths import CONFIG, DATA, DOCS
 
 SHORTER = {
-    r"campaign run .*law_league_\d": "--runs 4 --workers 0",  # a grid of four
-    r"campaign run .*(first|my.yaml)": "--runs 12 --workers 0",  # row 11 is flown again
+    r"campaign run .*first": "--runs 12 --workers 0",  # row 11 is flown again
+    r"campaign run .*law_league_": "--runs 4 --workers 0",  # a grid of four
     r"campaign run": "--runs 1 --workers 0",
+    r"fly .*--scenario": "--help",  # a scenario is read before
     r"fly .*(kill|stop)_": "--duration {}",
     r"fly": "--composed --duration 0.5",
     r"reproduce": "--only tde_stc/1 --duration 0.5 --jobs 1",
@@ -30,147 +33,234 @@ SHORTER = {
     r"stability": "--duration 2",
     r"sweep": "--duration {} --draws 1 --jobs 1",
 }
-"""Options that are added to the commands that begin so; {} is half a second after the last time named."""
-TIMES = r"(?<=@)[\d.-]+|(?<=--swap )[\d.]+"
-LASTS_S = {"docs/manual/analysis.md": 16.5}
-"""Of flights on pages that look at a later time."""
+"""What is added to a command that begins so; {} is half a second after the last time in it."""
+TIME = re.compile(r"(?:@|--swap )([\d.]+)(?:-([\d.]+))?")
+LASTS_S = {"docs/manual/analysis.md": 16.0}
+"""Flights of pages that look at a later time."""
+OF_GRAPHS = re.compile(
+    r"fly .*(--(composed|domain|realtime|restart-controller|scenario)|list|:)|replay|soak"
+)
+"""Commands that need a graph. All other options of `fly` are those of `simulate`, which flies the
+same bits (tests/control/flight/graph holds it to that) and is asked in its place."""
 PLACEHOLDERS = {
     "CASE": "3", "COMMAND": "fly", "D": "2", "F": "100", "FOLDER": "flights/one", "LAW": "ctc",
-    "LINK": "upper", "MODE": "filtered", "NAME": "ets_vii", "S": "tactical", "SIGMA": "1e-4",
+    "LINK": "upper_arm", "MODE": "filtered", "NAME": "ets_vii", "S": "tactical", "SIGMA": "1e-4",
 }  # fmt: skip
-"""What stands for a word of capitals in a command."""
+"""What stands for a word in capitals."""
 EXIT_CODES = {
-    r"gains check(?! .*(robust|tuned|my_gains))": 1,
+    r"gains check(?! --(gains|actuators))": 1,
+    r"replay .*k_1": 1,
+    r"robot ETSVII.urdf$": 2,
+    r"simulate --controller ctc --gains printed$": 1,
 }
-"""Of commands that end otherwise than with 0, as their pages say."""
+"""Of commands that do not end with 0, as their pages say."""
 NOT_RUN = {
-    r"\. .venv/bin/activate": "of an installation",
+    r"\. .venv/bin/activate": "the tests have an environment",
     r"(ros2|source|python -m colcon|export ROS_|for node in)\b": "ROS 2 from apt",
     r"(git|mkdir -p ws|cp TraceableRobotModels|pip|python3 -m venv|sudo apt)\b": "from elsewhere",
-    r"make\b": "these tests, among others",
+    r"make\b|BAG_FUZZ_EXAMPLES": "runs these tests, or for long",
     r"nft\b": "the machine's firewall",
     r"dask\b|.*--scheduler": "a cluster: tests/control/campaign/runner/test_cluster.py has one",
     r"python docs/law_league.py": "4,000 flights",
     r"python tests/hostile": "half an hour",
 }
 """Commands that are not run, and why."""
-
-
-def _both(folder: Path) -> None:
-    """A bag of two robots, as `ros2 bag record` takes it."""
-
-
-GIVEN: dict[str, Callable[[Path], Any]] = {
-    "README.md": lambda folder: shutil.copy(DATA / "arm.urdf", folder / "my.urdf"),
-    "docs/manual/urdf.md": lambda folder: shutil.copy(DATA / "arm.urdf", folder / "my.urdf"),
-    "docs/your_robot.md": lambda folder: shutil.copy(DATA / "arm.urdf", folder / "ETSVII.urdf"),
+PYTHON_ELSEWHERE = {
+    "docs/explanation/errata.md": "tests/test_docs.py",
+    "docs/manual/python.md": "tests/control/scenario/test_python_manual.py",
 }
-"""Files that a page takes for granted."""
+"""Pages whose snippets another test runs."""
+
+
+def _bag_of_others(folder: Path) -> None:
+    """One flight, recorded by someone whose joint states have another name."""
+    space_robot_here("simulate", "--duration", "0.1", "--bag", str(folder / "ours"))
+    entries = [
+        (n.replace("/joint_states", "/arm/joint_states"), *rest)
+        for n, *rest in entries_of(folder / "ours")
+    ]
+    (folder / "theirs").mkdir()
+    mcap_of(folder / "theirs/x.mcap", entries)
+
+
+def _bag_of_two(folder: Path) -> None:
+    """Two robots' flights in one bag, as ROS's recorder makes it."""
+    space_robot_here("simulate", "--duration", "0.1", "--bag", str(folder / "ours"))
+    entries = entries_of(folder / "ours")
+    (folder / "flights/both").mkdir(parents=True)
+    both = sorted([*within("/sat1", entries), *within("/sat2", entries)], key=lambda e: e[2])
+    mcap_of(folder / "flights/both/x.mcap", both)
+
+
+def _urdf(folder: Path) -> None:
+    for file in ("my.urdf", "my.xacro"):
+        shutil.copy(DATA / "docs.urdf", folder / file)
+
+
+def _urdf_with_a_defect(folder: Path) -> None:
+    """And the law of the page on laws."""
+    text = (DATA / "docs.urdf").read_text("utf-8")
+    (folder / "ETSVII.urdf").write_text(text.replace('izz="2"', 'izz="9"'))
+    (folder / "my_laws.py").write_text(files(DOCS / "manual/control_laws.md")["my_laws.py"])
+
+
+def _slow_gains(folder: Path) -> None:
+    (folder / "slow").mkdir()
+    gains = {"ctc": {"k_p": [9.0], "k_d": [6.0]}}
+    content = {"controller_node": {"ros__parameters": gains}}
+    (folder / "slow/ctc.yaml").write_text(yaml.safe_dump(content))
+
+
+GIVEN: dict[str, Callable[[Path], None]] = {
+    "README.md": _urdf,
+    "docs/manual/analysis.md": _bag_of_others,
+    "docs/manual/namespaces.md": _bag_of_two,
+    "docs/manual/urdf.md": _urdf,
+    "docs/measurements/reality.md": _slow_gains,
+    "docs/your_robot.md": _urdf_with_a_defect,
+}
+"""Makes the files that a page takes for granted."""
 
 CLIENT = r"""
 set -euo pipefail
-trap 'printf "end\0" > "$HERE/ask"' EXIT
+trap 'printf "end\0" > "$PIPES/ask"' EXIT
 ask() {
-    printf '%s\0' "$PWD" "${PYTHONPATH-}" "$@" > "$HERE/ask"
-    read -r answer < "$HERE/answer"
-    cat "$HERE/printed"
+    printf '%s\0' "$PWD" "${PYTHONPATH-}" "$@" > "$PIPES/ask"
+    read -r answer < "$PIPES/answer"
+    cat "$PIPES/printed"
 }
 space-robot() { ask space-robot "$@"; }
 """
-"""What is a process of its own elsewhere is asked of the test's: all that it has imported and compiled is there."""
+"""`space-robot` asks the test's process, which has imported all of it already."""
 
 
 def is_run(item: Item) -> bool:
-    """Whether it is a command that can be run here."""
+    """Whether it is a command that is run here."""
     return item.kind == "shell" and not any(re.match(p, item.text) for p in NOT_RUN)
 
 
-def starts_graphs(page: Path) -> bool:
-    """Whether one of its commands starts ROS processes, or is a node."""
+def needs_graph(page: Path) -> bool:
+    """Whether a command of the page starts a node, or many."""
     return any(
-        is_run(item) and re.search(r"space-robot (fly|replay|soak)\b", item.text)
+        is_run(item) and re.search(rf"space-robot ({OF_GRAPHS.pattern})", item.text)
         for item in items(page)
     )
 
 
 class PageShell:
-    """Runs pages, each in a folder of its own; a command that needs none of a page's files once."""
+    """Runs pages, each in a folder of its own."""
 
     def __init__(self, root: Path) -> None:
-        self.root, self.seen = root, set[tuple[str, ...]]()
+        self.root = root
+        self.seen: set[tuple[str, ...]] = set()
+        """Commands that named no file of their page: they do the same on every page."""
 
     def run(self, page: Path) -> list[str]:
-        """Run a page from its top to its end; return what failed, a text each."""
+        """Run commands and snippets from top to end; return what failed."""
+        folder = self._folder(page)
+        pipes = folder.with_suffix(".pipes")
+        pipes.mkdir()
+        for pipe in ("ask", "answer"):
+            os.mkfifo(pipes / pipe)
+        bash = subprocess.Popen(
+            ["bash", "-c", "\n".join([CLIENT, *self._script(page)])], cwd=folder, text=True,
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+            env={**os.environ, "PIPES": str(pipes)},
+        )  # fmt: skip
+        failures: list[str] = []
+        names: dict[str, Any] = {}
+        while (asked := (pipes / "ask").read_bytes().decode().split("\0")[:-1]) != ["end"]:
+            with pytest.MonkeyPatch.context() as patch:
+                patch.chdir(asked[0])
+                if asked[2] == "python":
+                    printed, failure = "", self._python(asked[3], names)
+                else:
+                    self._find_modules(asked[1], patch)
+                    printed, failure = self._space_robot(page, asked[3:])
+            failures += [failure] if failure else []
+            (pipes / "printed").write_text(printed)
+            (pipes / "answer").write_text("\n")
+        told = bash.communicate()[1]
+        return failures + ([told] if bash.returncode else [])
+
+    def _folder(self, page: Path) -> Path:
+        """Where the page's reader is: the files that it shows are there, and those it has not."""
         folder = self.root / name(page).replace("/", "_")
         folder.mkdir()
         (folder / "config").symlink_to(CONFIG)
         for path, text in files(page).items():
-            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).parent.mkdir(exist_ok=True)
             (folder / path).write_text(text)
-        GIVEN.get(name(page), lambda _: None)(folder)
-        found = [item for item in items(page) if is_run(item) or item.kind == "python"]
-        script = [
-            item.text if item.kind == "shell" else f"ask python {i}" for i, item in enumerate(found)
+        if name(page) in GIVEN:
+            GIVEN[name(page)](folder)
+        return folder
+
+    def _script(self, page: Path) -> list[str]:
+        """The page's lines, each once."""
+        words = re.compile(rf"\b({'|'.join(PLACEHOLDERS)})\b")
+        found = [
+            words.sub(lambda m: PLACEHOLDERS[m[1]], re.sub(r" +#.*", "", item.text))
+            if is_run(item)
+            else f"ask python {shlex.quote(item.text)}"
+            for item in items(page)
+            if is_run(item) or (item.kind == "python" and name(page) not in PYTHON_ELSEWHERE)
         ]
-        words = "|".join(PLACEHOLDERS)
-        script = [re.sub(rf"\b({words})\b", lambda m: PLACEHOLDERS[m[1]], t) for t in script]
-        script = list(dict.fromkeys(script))
-        here = self.root / "here"
-        shutil.rmtree(here, ignore_errors=True)
-        here.mkdir()
-        for pipe in ("ask", "answer"):
-            os.mkfifo(here / pipe)
-        bash = subprocess.Popen(
-            ["bash", "-c", CLIENT + "\n".join(script)], cwd=folder, text=True,
-            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
-            env={**os.environ, "HERE": str(here)},
-        )  # fmt: skip
-        failures, names = [], {}
-        while (asked := (here / "ask").read_bytes().decode().split("\0")[:-1]) != ["end"]:
-            where, python_path, program, *arguments = asked
-            with pytest.MonkeyPatch.context() as patch:
-                patch.chdir(where)
-                if program == "python":
-                    failure, printed = self._python(found[int(arguments[0])].text, names), ""
-                else:
-                    failure, printed = self._space_robot(page, arguments, python_path, patch)
-            failures += [failure] * bool(failure)
-            (here / "printed").write_text(printed)
-            (here / "answer").write_text("done\n")
-        told = bash.communicate()[1]
-        return failures + [told] * bool(bash.returncode)
+        return list(dict.fromkeys(found))
 
     def _python(self, code: str, names: dict[str, Any]) -> str:
         try:
-            exec(compile(code, "page", "exec"), names)
+            exec(compile(code, "snippet", "exec"), names)
         except Exception:
             return code + traceback.format_exc()
         return ""
 
-    def _space_robot(
-        self, page: Path, arguments: list[str], python_path: str, patch: pytest.MonkeyPatch
-    ) -> tuple[str, str]:
-        line = " ".join(arguments)
-        times = [float(t) for text in re.findall(TIMES, line) for t in text.split("-") if t]
-        lasts = max([LASTS_S.get(name(page), 0.0), *times]) + 0.5
-        added = next((o for p, o in SHORTER.items() if re.match(p + r"\b", line)), "")
-        added = "" if "--help" in line or "--fault list" in line else added.format(lasts)
-        call = (*arguments, *added.split())
-        if call in self.seen:
-            return "", ""
+    def _find_modules(self, python_path: str, patch: pytest.MonkeyPatch) -> None:
+        """Let modules of the page's folder be imported, and no older ones of their names."""
         patch.setenv("PYTHONPATH", python_path)
-        for path in python_path.split(os.pathsep):
+        for path in filter(None, python_path.split(os.pathsep)):
             patch.syspath_prepend(Path(path).resolve())
-        import time; t0=os.times(); before = set(sys.modules)
-        ended = space_robot_here(*call)
-        t1=os.times(); print(f"{t1.user+t1.system-t0.user-t0.system:.2f}+{t1.children_user+t1.children_system-t0.children_user-t0.children_system:.2f} {t1.elapsed-t0.elapsed:.1f}", name(page), ' '.join(call), flush=True)
-        for module in set(sys.modules) - before:
-            file = getattr(sys.modules[module], "__file__", None)
-            if file and Path(file).is_relative_to(self.root):
+        for module, found in list(sys.modules.items()):
+            if Path(getattr(found, "__file__", None) or "/").is_relative_to(self.root):
                 del sys.modules[module]
-        if not any(Path(part).exists() for word in call for part in re.split("[=@:]", word)):
-            self.seen.add(call)
-        expected = next((c for p, c in EXIT_CODES.items() if re.match(p + r"\b", line)), 0)
-        if ended.returncode == expected:
-            return "", ended.stdout
-        return f"space-robot {' '.join(call)}: {ended.returncode}\n{ended.stderr[-1500:]}", ""
+
+    def _space_robot(self, page: Path, given: list[str]) -> tuple[str, str]:
+        """What the command printed, and how it failed."""
+        command = shorter(given, LASTS_S.get(name(page), 0.0))
+        if command in self.seen:
+            return "", ""
+        ended = space_robot_here(*command)
+        if not any(Path(part).exists() for word in command for part in re.split("[=@]", word)):
+            self.seen.add(command)
+        line = " ".join(given)
+        wanted = next((code for p, code in EXIT_CODES.items() if re.match(p, line)), 0)
+        if ended.returncode == wanted:
+            return ended.stdout, ""
+        told = f"exit code {ended.returncode}, not {wanted}\n{ended.stderr[-1500:]}"
+        return "", f"space-robot {line}\n(run as {' '.join(command)}): {told}"
+
+
+def shorter(given: list[str], lasts_s: float) -> tuple[str, ...]:
+    """The command as it is run: with its flights cut short."""
+    line = " ".join(given)
+    command = list(given)
+    if given[0] == "fly" and "--help" not in given and not OF_GRAPHS.match(line):
+        command[0] = "simulate"
+    if given[:2] == ["campaign", "run"]:
+        command[2] = short_campaign(given[2])
+    if "--help" in given or "list" in given:
+        return tuple(command)
+    times = [float(text) for found in TIME.findall(line) for text in found if text]
+    added = next((a for p, a in SHORTER.items() if re.match(p, " ".join(command))), "")
+    return (*command, *added.format(max([lasts_s, *times]) + 0.5).split())
+
+
+def short_campaign(file: str) -> str:
+    """A copy of a campaign whose flights last until its requirements begin, and half a second."""
+    path = Path(file) if file.endswith(".yaml") else CONFIG / f"campaigns/{file}.yaml"
+    content = yaml.safe_load(path.read_text("utf-8"))
+    from_s = max((r.get("from_s", 0.0) for r in content.get("require", {}).values()), default=0.0)
+    content["scenario"]["duration"] = from_s + 0.5
+    Path("short").mkdir(exist_ok=True)
+    copy = Path("short") / path.name
+    copy.write_text(yaml.safe_dump(content))
+    return str(copy)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -17,6 +16,7 @@ from bags import (
     mcap_of,
     messages_of,
     record,
+    within,
 )
 
 from space_robot_msgs_py import topics
@@ -37,10 +37,6 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
 @pytest.fixture(scope="module")
 def entries(recorded: Recorded) -> list[Entry]:
     return entries_of(recorded.folder)
-
-
-def within(namespace: str, entries: Sequence[Entry]) -> list[Entry]:
-    return [(namespace + name, kind, stamp, data) for name, kind, stamp, data in entries]
 
 
 def recorded_as(
