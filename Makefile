@@ -43,7 +43,7 @@ setup: $(VENV)/.flies
 fly: $(VENV)/.flies
 	@$(VENV)/bin/space-robot fly --controller tde_stc --case 1 $(ARGS)
 
-test: $(VENV)/.tests
+test:
 	@$(MAKE) --no-print-directory --jobs 2 lint kernels
 	$(PYTEST) $(ARGS)
 
@@ -66,8 +66,8 @@ lint: $(VENV)/.tests
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
 
-# Else both test processes would begin with it.
-kernels: $(VENV)/.tests
+# Else both test processes would begin with it. It begins while the tests' tools are installed.
+kernels: $(VENV)/.flies
 	$(VENV)/bin/python -c "from space_robot_control.flight.compilation import compile_kernels as c; c(True)"
 
 docs: $(VENV)/.docs
@@ -91,13 +91,13 @@ clean:
 # Stamps: what is installed in .venv, renewed when the packaging changes.
 $(VENV)/.flies: setup.py pyproject.toml | $(VENV)/.made
 	@echo "installing space_robot and ROS 2 into $(VENV): a minute or two, once"
-	@$(PIP_INSTALL) --editable '.[ros,soak,campaign]'
+	@$(PIP_INSTALL) --no-compile --editable '.[ros,soak,campaign]'  # most modules are never imported
 	@touch $@
 
-$(VENV)/.tests: setup.py pyproject.toml | $(VENV)/.made
-	@echo "installing space_robot, ROS 2 and the tests' tools into $(VENV): some minutes, once"
-	@$(PIP_INSTALL) --no-compile --editable '.[ros,test]'  # most modules are never imported
-	@touch $(VENV)/.flies $@
+$(VENV)/.tests: setup.py pyproject.toml | $(VENV)/.flies
+	@echo "installing the tests' tools into $(VENV): a minute, once"
+	@$(PIP_INSTALL) --no-compile --editable '.[ros,test]'
+	@touch $@
 
 $(VENV)/.docs: setup.py | $(VENV)/.made
 	@echo "installing space_robot and what makes its site into $(VENV): a minute, once"

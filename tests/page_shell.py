@@ -38,7 +38,7 @@ TIME = re.compile(r"(?:@|--swap )([\d.]+)(?:-([\d.]+))?")
 LASTS_S = {"docs/manual/analysis.md": 16.0}
 """Flights of pages that look at a later time."""
 OF_GRAPHS = re.compile(
-    r"fly .*(--(composed|domain|realtime|restart-controller|scenario)|list|:)|replay|soak"
+    r"fly .*(--(composed|domain|realtime|restart-controller|scenario)|list|\w:[A-Z])|replay|soak"
 )
 """Commands that need a graph. All other options of `fly` are those of `simulate`, which flies the
 same bits (tests/control/flight/graph holds it to that) and is asked in its place."""
