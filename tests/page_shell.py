@@ -208,8 +208,10 @@ class PageShell:
         return list(dict.fromkeys(found))
 
     def _python(self, code: str, names: dict[str, Any]) -> str:
+        file = Path("snippet.py").resolve()  # kernels are cached beside their file
+        file.write_text(code)
         try:
-            exec(compile(code, "snippet", "exec"), names)
+            exec(compile(code, str(file), "exec"), names)
         except Exception:
             return code + traceback.format_exc()
         return ""
@@ -255,11 +257,12 @@ def shorter(given: list[str], lasts_s: float) -> tuple[str, ...]:
 
 
 def short_campaign(file: str) -> str:
-    """A copy of a campaign whose flights last until its requirements begin, and half a second."""
+    """A copy of a campaign whose flights last half a second; what is required, from their start."""
     path = Path(file) if file.endswith(".yaml") else CONFIG / f"campaigns/{file}.yaml"
     content = yaml.safe_load(path.read_text("utf-8"))
-    from_s = max((r.get("from_s", 0.0) for r in content.get("require", {}).values()), default=0.0)
-    content["scenario"]["duration"] = from_s + 0.5
+    content["scenario"]["duration"] = 0.5
+    for requirement in content.get("require", {}).values():
+        requirement.pop("from_s", None)
     Path("short").mkdir(exist_ok=True)
     copy = Path("short") / path.name
     copy.write_text(yaml.safe_dump(content))

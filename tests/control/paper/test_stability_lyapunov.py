@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cvxpy as cp
 import numpy as np
 import pytest
 from closed_loop import GAINS
@@ -90,6 +89,8 @@ def feasible(k_1: float, k_2: float, beta: float, gamma: float) -> bool:
     """Whether Clarabel finds an M for (51), written for K_1 = 1 (time in units of 1 / K_1)."""
     kappa, b = k_2 / k_1**2, beta / k_1**2
     a, e = np.array([[-0.5, 0.5], [-kappa, 0.0]]), np.eye(2)
+    import cvxpy as cp  # two seconds, which each test process would take to collect this file
+
     m, slack = cp.Variable((2, 2), symmetric=True), cp.Variable()
     # V and phi in units of beta: the corner is C^T C, the disturbance enters through b B
     corner = a.T @ m + m @ a + gamma / k_1 * m + C.T @ C
