@@ -33,10 +33,11 @@ SHORTER = {
     r"soak": "--minutes 0.001 --duration 0.5",
     r"stability": "--duration 2",
     r"sweep": "--duration {} --draws 1 --jobs 1",
+    r"view": "--no-open",
 }
 """What is added to a command that begins so; {} is half a second after the last time in it."""
 TIME = re.compile(r"(?:@|--swap )([\d.]+)(?:-([\d.]+))?")
-LASTS_S = {"docs/manual/analysis.md": 16.0}
+LASTS_S = {"docs/manual/analysis.md": 16.0, "docs/manual/view.md": 15.0}
 """Flights of pages that look at a later time."""
 OF_GRAPHS = re.compile(
     r"fly .*(--(composed|domain|realtime|restart-controller|scenario)|list|\w:[A-Z])|replay|soak"
@@ -64,6 +65,9 @@ NOT_RUN = {
     r"dask\b|.*--scheduler": "a cluster: tests/control/campaign/runner/test_cluster.py has one",
     r"python docs/law_league.py": "4,000 flights",
     r"python tests/hostile": "half an hour",
+    r"python docs/view_picture.py": "a browser: tests/control/view has one",
+    r"space-robot (sim|fly --paused)\b": "two terminals: the tests of `sim` fly and step at once",
+    r"space-robot view flights/mine": "a flight of the reader's robot: tests/control/view",
 }
 """Commands that are not run, and why."""
 PYTHON_ELSEWHERE = {
