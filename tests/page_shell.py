@@ -66,7 +66,7 @@ NOT_RUN = {
     r"python docs/law_league.py": "4,000 flights",
     r"python tests/hostile": "half an hour",
     r"python docs/view_picture.py": "a browser: tests/control/view has one",
-    r"space-robot (sim|fly --paused)\b": "two terminals: the tests of `sim` fly and step at once",
+    r"space-robot (sim|fly --paused)\b": "two terminals: test_pause_and_step.py flies and steps",
     r"space-robot view flights/mine": "a flight of the reader's robot: tests/control/view",
 }
 """Commands that are not run, and why."""
