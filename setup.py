@@ -43,6 +43,7 @@ setup(
         "mcap>=1.5",
         "numba>=0.58.1",
         "numpy>=1.26,<3",
+        "pillow>=8",
         "pydantic>=2.5",
         "pyyaml>=6",
         "rich>=13",

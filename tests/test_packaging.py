@@ -24,7 +24,12 @@ TOOLS = (
     "mujoco", "cvxpy", "distributed", "gymnasium", "hypothesis", "pandas", "pinocchio", "psutil",
     "pyarrow", "xacro",
 )  # fmt: skip
-PYPI = {"yaml": "pyyaml", "typing_extensions": "typing-extensions", "pinocchio": "pin"}
+PYPI = {
+    "PIL": "pillow",
+    "yaml": "pyyaml",
+    "typing_extensions": "typing-extensions",
+    "pinocchio": "pin",
+}
 """Names on PyPI of modules that are not called as their package."""
 OF_EXTRAS = {
     "distributed": "dask", "gymnasium": "gym", "pandas": "campaign", "psutil": "soak",
@@ -33,7 +38,7 @@ OF_EXTRAS = {
 """Packages that one command needs, and their extra."""
 OF_ROS = {"simulation_interfaces"}
 """Packages of ROS that are used where they are installed."""
-ROSDEP = {"pyyaml": "yaml"}
+ROSDEP = {"pillow": "pil", "pyyaml": "yaml"}
 """Names of rosdep's keys, behind python3-, where they are not the package's."""
 
 

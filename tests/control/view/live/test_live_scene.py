@@ -108,8 +108,12 @@ def messages(data: bytes) -> list[dict[str, Any]]:
 
 
 def fly(domain: int, bag: Path, *options: str) -> FlightLog:
+    """Fly by the wall clock: in lockstep it may be over before anybody has found it."""
     subprocess.run(
-        [*COMMAND, "fly", "--duration", "1", "--domain", str(domain), "--bag", str(bag), *options],
+        [
+            *COMMAND, "fly", "--realtime", "--duration", "3", "--domain", str(domain),
+            "--bag", str(bag), *options,
+        ],
         check=True, timeout=PATIENCE_S, capture_output=True, env=ros_environment(),
     )  # fmt: skip
     return read_flight(bag)
