@@ -58,7 +58,9 @@ EXIT_CODES = {
 """Of commands that do not end with 0, as their pages say."""
 NOT_RUN = {
     r"\. .venv/bin/activate": "the tests have an environment",
-    r"(ros2|source|python -m colcon|export ROS_|for node in)\b": "ROS 2 from apt",
+    r"(ROS_DOMAIN_ID=7 )?(ros2|rviz2|plotjuggler)\b": "ROS 2 from apt",
+    r"(source|python -m colcon|export ROS_|for node in)\b": "ROS 2 from apt",
+    r"rerun\b": "a viewer of 100 MB",
     r"(git|mkdir -p ws|cp TraceableRobotModels|pip|python3 -m venv|sudo apt)\b": "from elsewhere",
     r"make\b|BAG_FUZZ_EXAMPLES": "runs these tests, or for long",
     r"nft\b": "the machine's firewall",
