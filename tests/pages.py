@@ -20,7 +20,7 @@ BEGINNING = re.compile(r"(?:\$ )?((?:[A-Z_]+=\S* )*([\w./-]+).*)")
 """Of a line: the command without its prompt, and the command's first word."""
 COMMANDS = {
     ".", "cp", "dask", "export", "for", "git", "make", "mkdir", "nft", "pip", "python",
-    "python3", "ros2", "sed", "source", "space-robot", "sudo",
+    "plotjuggler", "python3", "rerun", "ros2", "rviz2", "sed", "source", "space-robot", "sudo",
 }  # fmt: skip
 """First words of commands; all other indented lines are what one prints."""
 INLINE = re.compile(r"`(space-robot [^`]*\s(?:-|\S*[./@=])[^`]*)`")
