@@ -91,7 +91,7 @@ clean:
 # Stamps: what is installed in .venv, renewed when the packaging changes.
 $(VENV)/.flies: setup.py pyproject.toml | $(VENV)/.made
 	@echo "installing space_robot and ROS 2 into $(VENV): a minute or two, once"
-	@$(PIP_INSTALL) --no-compile --editable '.[ros,soak,campaign]'  # most modules are never imported
+	@$(PIP_INSTALL) --no-compile --editable '.[ros,soak,campaign,view]'  # most modules are never imported
 	@touch $@
 
 $(VENV)/.tests: setup.py pyproject.toml | $(VENV)/.flies
