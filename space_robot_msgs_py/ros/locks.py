@@ -10,7 +10,7 @@ import fcntl
 import os
 import tempfile
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -103,15 +103,12 @@ def nodes_in(domain: int, namespace: str = ROOT) -> list[Holder]:
     return _holders([path for path in found if path.name.count(".") == wanted.name.count(".")])
 
 
-def newest_node(name: str, namespace: str = "") -> tuple[int, str] | None:
-    """Find the living node that has this name without its namespace and began last.
+def living_nodes(name: str, namespace: str = "") -> Iterator[tuple[int, str]]:
+    """Yield domain and namespace of this machine's nodes of a name, those that began last first.
 
     Args:
         name: its last part.
         namespace: its first part; empty: any.
-
-    Returns:
-        Domain and namespace; None if there is none on this machine.
     """
     start, end = _path("").stem, f".{name}.lock"
     files = _path("").parent.glob(f"{start}*@*{end}")
@@ -119,8 +116,12 @@ def newest_node(name: str, namespace: str = "") -> tuple[int, str] | None:
         domain, _, dotted = path.name.removeprefix(start).removesuffix(end).partition("@")
         found = dotted.replace(".", "/") or ROOT
         if domain.isdecimal() and namespace in ("", found) and look(path)[0]:
-            return int(domain), found
-    return None
+            yield int(domain), found
+
+
+def newest_node(name: str, namespace: str = "") -> tuple[int, str] | None:
+    """Return the first of `living_nodes`; None if there is none."""
+    return next(living_nodes(name, namespace), None)
 
 
 def _holders(paths: Iterable[Path]) -> list[Holder]:

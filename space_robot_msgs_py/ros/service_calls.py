@@ -12,6 +12,8 @@ from .rclpy_internals import ServiceWaitSet
 
 OVERLOADED_S = 1.0
 """Calls that have been waiting without a break for this long are a storm."""
+COUNTED_S = 0.1
+"""Of the time from one call to the next: a few slow ones, as transitions, are no storm."""
 FULL_LOOK_S = 5.0
 
 
@@ -30,26 +32,26 @@ class ServiceCalls(SingleThreadedExecutor):
         """True if calls come faster than they are run; beyond 1000 of a kind they are lost."""
         self._unfinished: list[Any] = []
         """Calls whose callback waits for something that the node's loop does."""
-        self._busy_since: float | None = None
-        """When the first of the calls ended after each of which another one waited."""
+        self._began_at: float | None = None
+        """When the last call began; None if none waited after it."""
+        self._busy_s = 0.0
+        """How long there has been no break."""
 
     def run_one(self, timeout_s: float = 0.0) -> bool:
         """Run a call that waits, or comes within ``timeout_s``; tell whether there was one."""
         if not timeout_s and not self._is_worth_a_look():
-            self._busy_since, self.is_overloaded = None, False
-            return False
+            return self._take_a_break()
         # the end of a call wakes the executor, whose next look then ends at once and finds nothing
-        callback = self._next(timeout_s) or (self._next(0.0) if self._busy_since else None)
+        callback = self._next(timeout_s) or (self._next(0.0) if self._began_at else None)
         if callback is None:
-            self._busy_since, self.is_overloaded = None, False
-            return False
+            return self._take_a_break()
         if callback in self._unfinished:
             return self._go_on(callback)
-        # judged here, not later: one slow call, as a transition, or a loop that starts is no storm
-        since = self._busy_since
-        self.is_overloaded = since is not None and time.monotonic() - since > OVERLOADED_S
+        now = time.monotonic()
+        self._busy_s += min(now - (self._began_at or now), COUNTED_S)
+        self._began_at = now
+        self.is_overloaded = self._busy_s > OVERLOADED_S
         callback()
-        self._busy_since = self._busy_since or time.monotonic()
         self.count += 1
         if not callback.done():
             self._unfinished.append(callback)
@@ -57,9 +59,14 @@ class ServiceCalls(SingleThreadedExecutor):
             raise error
         return True
 
+    def _take_a_break(self) -> bool:
+        """Note that no call waits: there is no storm."""
+        self._began_at, self._busy_s, self.is_overloaded = None, 0.0, False
+        return False
+
     def _go_on(self, callback: Any) -> bool:
         """Run a call again that waits for something; several looks for one call are no storm."""
-        self.forget_waiting()
+        self._began_at, self._busy_s = None, 0.0
         callback()
         if callback.done():
             self._unfinished.remove(callback)
@@ -80,10 +87,6 @@ class ServiceCalls(SingleThreadedExecutor):
             return self._requests.is_called()
         self._full_look_at = now + FULL_LOOK_S
         return True
-
-    def forget_waiting(self) -> None:
-        """Forget how long calls have waited: another node of this process was to blame."""
-        self._busy_since = None
 
     def _next(self, timeout_s: float) -> Any:
         try:

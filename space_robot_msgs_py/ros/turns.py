@@ -17,7 +17,6 @@ from .waiting import SPIN_S, Waiter
 
 LISTENER_PERIOD_S = 0.02
 REMIND_S = 5.0
-LONG_CALL_S = 0.1
 UPKEEP_GAP_S = 2e-3
 """Between one node's upkeep and another's, so that all of them together delay no tick."""
 UPKEEP_PATIENCE_S = 0.02
@@ -63,24 +62,14 @@ class Turns:
         """Wait for service calls, as there is nothing else to do; False when all are shut down."""
         timeout_s = PERIOD_S / len(self._nodes)
         for upkeep in self._upkeeps:
-            self._serve(upkeep, timeout_s)
+            upkeep.run(timeout_s)
         return not all(node.is_shut_down for node in self._nodes)
 
     def _serve_one(self) -> None:
         """Run the upkeep that is due first."""
         first = self._due.index(min(self._due))
-        self._due[first] = self._serve(self._upkeeps[first])
+        self._due[first] = self._upkeeps[first].run()
         self._upkeep_at = max(min(self._due), time.monotonic() + UPKEEP_GAP_S)
-
-    def _serve(self, upkeep: Upkeep, timeout_s: float = 0.0) -> float:
-        """Run a node's upkeep; when to run it again."""
-        begin = time.monotonic()
-        due = upkeep.run(timeout_s)
-        if time.monotonic() - begin > LONG_CALL_S:
-            for other in self._upkeeps:  # whose calls have waited for this one
-                if other is not upkeep:
-                    other.node.calls.forget_waiting()
-        return due
 
     def _rest(self, now: float) -> bool:
         """Do what can wait for others, or wait until a node has something to do.

@@ -43,9 +43,7 @@ def ros_domain(given: int | None = None, namespace: str = ROOT) -> Iterator[int]
             started some.
         FlightError: none is free.
     """
-    of_user = os.environ.get("ROS_DOMAIN_ID", "")
-    if given is None and of_user.isdecimal():
-        given = int(of_user)
+    given = domain_asked_for(given)
     domain, lock = _free_domain(namespace) if given is None else (given, _take(given, namespace))
     _held.add((domain, namespace))
     try:
@@ -54,6 +52,12 @@ def ros_domain(given: int | None = None, namespace: str = ROOT) -> Iterator[int]
         if lock:
             _held.remove((domain, namespace))
             lock.release()
+
+
+def domain_asked_for(given: int | None) -> int | None:
+    """Return ``given``, or the user's ROS_DOMAIN_ID; None: the user leaves it open."""
+    of_user = os.environ.get("ROS_DOMAIN_ID", "")
+    return int(of_user) if given is None and of_user.isdecimal() else given
 
 
 def _free_domain(namespace: str) -> tuple[int, FileLock]:

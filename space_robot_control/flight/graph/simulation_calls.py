@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import time
 from typing import Any
 
 from space_robot_msgs_py.config.namespace import full_namespace
 from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.ros.locks import look, node_lock
+from space_robot_msgs_py.ros.locks import living_nodes
 from space_robot_sim.plant.settings import MOST_TICKS
 
-from .domain import DOMAINS
+from .domain import domain_asked_for
 from .node_services import call_trigger, set_parameters
 from .temporary_node import TemporaryNode
 
@@ -37,6 +36,7 @@ def call_simulation(action: str, domain: int | None, namespace: str, ticks: int 
     if not 1 <= ticks <= MOST_TICKS:
         raise InputError(f"--ticks {ticks}: 1 to {MOST_TICKS} were expected")
     namespace = full_namespace(namespace)
+    domain = domain_asked_for(domain)
     domain = domain_of_plant(namespace) if domain is None else domain
     visitor = TemporaryNode("simulation_call", domain, namespace)
     try:
@@ -58,17 +58,14 @@ def call_simulation(action: str, domain: int | None, namespace: str, ticks: int 
 
 
 def domain_of_plant(namespace: str) -> int:
-    """Return ROS_DOMAIN_ID, or the domain of the only plant of a ``namespace`` on this machine.
+    """Return the domain of the only plant of a ``namespace`` on this machine.
 
     Raises:
         InputError: there is none, or more than one.
     """
-    if (of_user := os.environ.get("ROS_DOMAIN_ID", "")).isdecimal():
-        return int(of_user)
-    name = f"{namespace.rstrip('/')}/{PLANT}"
-    locks = {domain: node_lock(domain, name) for domain in (0, *DOMAINS)}
-    found: list[int] = [domain for domain, lock in locks.items() if lock.exists() and look(lock)[0]]
+    found = sorted(domain for domain, _ in living_nodes(PLANT, namespace))
     if len(found) != 1:
+        name = f"{namespace.rstrip('/')}/{PLANT}"
         there = f"in ROS domains {', '.join(map(str, found))}" if found else "on this machine"
         number = "several" if found else "no"
         raise InputError(f"{number} {name} {there}: name one's ROS domain with --domain")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from typing import NamedTuple
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.namespace import full_namespace
 from space_robot_msgs_py.ros.locks import newest_node, nodes_in
 
+from ...flight.graph.domain import domain_asked_for
 from ...flight.graph.temporary_node import TemporaryNode
 
 PLANT = "plant_node"
@@ -43,9 +43,7 @@ class Finder:
             InputError: it cannot be a namespace.
         """
         self._namespace = full_namespace(namespace) if namespace else ""
-        of_user = os.environ.get("ROS_DOMAIN_ID", "")
-        if domain is None and of_user.isdecimal():
-            domain = int(of_user)
+        domain = domain_asked_for(domain)
         self._node = None if domain is None else TemporaryNode("viewer_looks", domain)
         self._domain = domain
 

@@ -105,6 +105,23 @@ def test_what_comes_after_a_call_is_no_storm(
     calls.shutdown()
 
 
+def test_a_few_slow_calls_are_no_storm(
+    node: Any, ask: Callable[..., list[Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Transitions, and what else waits while a process is too busy to be asked."""
+    monkeypatch.setattr(service_calls, "OVERLOADED_S", 0.25)
+    monkeypatch.setattr(service_calls, "COUNTED_S", 0.1)
+    calls = ServiceCalls(node)
+    ask(4)
+    time.sleep(0.3)
+    judged = []
+    while calls.run_one():
+        judged.append(calls.is_overloaded)
+        time.sleep(0.3)
+    assert judged == [False, False, False, True]
+    calls.shutdown()
+
+
 class _Asked:
     """A node that always has calls waiting, for `Upkeep`, and the clock that both go by."""
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import signal
 import subprocess
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from flights import COMMAND, ros_environment
+from flights import COMMAND, ros_environment, space_robot_here
 from numpy.typing import NDArray
 
 from space_robot_control.view.live import serve as serving
@@ -52,7 +53,7 @@ class Server(threading.Thread):
         self._options, self._left = LiveOptions(domain=domain, port=0), flights + 1
         self.lines: list[str] = []
         self.address = ""
-        self.waits = threading.Event()
+        self.waits, self.follows = threading.Event(), threading.Event()
         self.error: BaseException | None = None
 
     def run(self) -> None:
@@ -63,6 +64,8 @@ class Server(threading.Thread):
 
     def _say(self, line: str) -> None:
         self.lines.append(line)
+        if line.startswith("following"):
+            self.follows.set()
         if line == serving.WAITING:
             self._left -= 1
             self.waits.set()
@@ -107,15 +110,21 @@ def messages(data: bytes) -> list[dict[str, Any]]:
     return found
 
 
-def fly(domain: int, bag: Path, *options: str) -> FlightLog:
-    """Fly by the wall clock: in lockstep it may be over before anybody has found it."""
-    subprocess.run(
+def fly(domain: int, bag: Path, is_followed: threading.Event, *options: str) -> FlightLog:
+    """Fly by the wall clock, as soon as somebody follows."""
+    with subprocess.Popen(
         [
-            *COMMAND, "fly", "--realtime", "--duration", "3", "--domain", str(domain),
+            *COMMAND, "fly", "--paused", "--realtime", "--duration", "3", "--domain", str(domain),
             "--bag", str(bag), *options,
         ],
-        check=True, timeout=PATIENCE_S, capture_output=True, env=ros_environment(),
-    )  # fmt: skip
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
+    ) as process:  # fmt: skip
+        assert is_followed.wait(PATIENCE_S)
+        until = time.monotonic() + PATIENCE_S
+        while space_robot_here("sim", "resume", "--domain", str(domain)).returncode:
+            assert time.monotonic() < until
+        _, errors = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 0, errors
     return read_flight(bag)
 
 
@@ -160,7 +169,8 @@ def test_two_flights_one_after_the_other(tmp_path: Path, free_domain: int) -> No
     shown.append([])
     threading.Thread(target=watch, daemon=True).start()
     for k, options in enumerate(given):
-        log = fly(free_domain, tmp_path / f"bag{k}", *options)
+        log = fly(free_domain, tmp_path / f"bag{k}", server.follows, *options)
+        server.follows.clear()
         seen, _ = shown[-1], shown.append([])
         rows = shown_rows(log, seen)
         assert len(set(rows)) > 3
