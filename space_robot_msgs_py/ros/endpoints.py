@@ -161,13 +161,6 @@ class RawSubscription:
         taken = take_serialized(self.handle, self._type)
         return None if taken is None else taken[0]
 
-    def take_newest(self) -> bytes | None:
-        """Take all messages there are; return the last."""
-        newest = None
-        while (data := self.take()) is not None:
-            newest = data
-        return newest
-
     def take_with_source(self) -> Received | None:
         """Take the next message, with when and by whom it was sent."""
         return self._take_serialized(self.handle, self._type)

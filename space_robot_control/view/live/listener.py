@@ -12,7 +12,6 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import InputError, MessageError
 from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.base_state import BaseState
-from space_robot_msgs_py.wire.codec import Codec
 from space_robot_msgs_py.wire.controller_law import LawCodec
 from space_robot_msgs_py.wire.joint_states import JointStates
 from space_robot_msgs_py.wire.message import MessageDescription
@@ -24,13 +23,12 @@ from space_robot_sim.robot.find import find_robot
 from ...flight.graph.monitor import Event, Monitor
 from ...flight.graph.node_services import get_parameters
 from .finder import PLANT, Place
+from .state_topic import StateTopic
 
 Array = NDArray[np.float64]
 
 MEASURED: tuple[type[MessageDescription], ...] = (JointStates, BaseState)
 TRUE: tuple[type[MessageDescription], ...] = (TruthJoints, TruthBase)
-DEPTH = 2
-"""Messages kept of a topic: older ones than the newest are of no use."""
 
 
 class Sample(NamedTuple):
@@ -78,11 +76,10 @@ class Listener:
         self._timebase = Timebase(round(period * 1e9))
         self._names = RobotNames.of(self.robot.joint_names, passive=self.robot.passive_names)
         self._state = RobotState.allocate(self.robot.n)
-        self._subscriptions: list[tuple[RawSubscription, MessageDescription, Codec]] = []
-        self._sources: tuple[type[MessageDescription], ...] = ()
-        self._heard: set[topics.Topic] = set()
-        self._time = 0.0
-        """That of the newest state, s."""
+        self._kinds: tuple[type[MessageDescription], ...] = ()
+        self._topics: list[StateTopic] = []
+        self._stamp_ns: int | None = None
+        """The newest sample's time."""
         self.law = ""
         """The law that commands; empty: not told yet."""
 
@@ -108,17 +105,17 @@ class Listener:
         events += self._monitor.poll()
         while (data := self._law.take()) is not None:
             events += self._read_law(data)
-        self._choose_sources(with_states)
-        is_new = False
-        for subscription, describe, codec in self._subscriptions:
-            if (data := subscription.take_newest()) is not None:
-                is_new |= self._read(describe, codec, data)
-        if not is_new or len(self._heard) < len(self._sources):
+        self._choose_topics(with_states)
+        stamp_ns = self._newest_of_all()
+        if stamp_ns is None or stamp_ns == self._stamp_ns:
             return None
+        self._stamp_ns = stamp_ns
+        for topic in self._topics:
+            topic.fill(self._state, stamp_ns)
         state, passive = self._state, len(self._names.passive)
         angles = np.concatenate([state.joint_positions, state.passive_positions[:passive]])
         return Sample(
-            self._time, state.base_position.copy(), state.quaternion.copy(), angles,
+            1e-9 * stamp_ns, state.base_position.copy(), state.quaternion.copy(), angles,
             state.applied_torque.copy(), self._monitor.error,
         )  # fmt: skip
 
@@ -134,37 +131,25 @@ class Listener:
         faults = {PLANT: f"faults: {told['faults']}"} if "faults" in told else {}
         return {**faults, **self._monitor.complaints}
 
-    def _choose_sources(self, with_states: bool) -> None:
-        from space_robot_msgs_py.ros.endpoints import RawSubscription
-
+    def _choose_topics(self, with_states: bool) -> None:
         node = self._monitor.node
-        sources = TRUE if node.count_publishers(topics.TRUTH_BASE.name) else MEASURED
-        sources = sources if with_states else ()
-        if sources == self._sources:
+        kinds = TRUE if node.count_publishers(topics.TRUTH_BASE.name) else MEASURED
+        kinds = kinds if with_states else ()
+        if kinds == self._kinds:
             return
-        for subscription, _, _ in self._subscriptions:
-            subscription.close()
-        self._subscriptions, self._sources, self._heard = [], sources, set()
-        for kind in sources:
-            describe = kind.of_robot(self._names, self._timebase)
-            subscription = RawSubscription(node, kind.topic, self._group, DEPTH, best_effort=True)
-            self._subscriptions.append((subscription, describe, Codec(describe)))
+        for topic in self._topics:
+            topic.close()
+        self._kinds = kinds
+        self._topics = [
+            StateTopic(node, self._group, kind, self._names, self._timebase) for kind in kinds
+        ]
 
-    def _read(self, describe: MessageDescription, codec: Codec, data: bytes) -> bool:
-        """Take the last row of a message into the state; False: it is not of this robot."""
-        try:
-            stamp_ns, numbers = codec.decode(data)
-        except MessageError:
-            return False
-        rows = numbers.reshape(-1, sum(column.length for column in describe.columns))
-        at = 0
-        for column in describe.columns:
-            target = getattr(self._state, column.name)
-            target[column.first : column.first + column.length] = rows[-1, at : at + column.length]
-            at += column.length
-        self._heard.add(describe.topic)
-        self._time = stamp_ns * 1e-9 + (len(rows) - 1) * self._timebase.period
-        return True
+    def _newest_of_all(self) -> int | None:
+        """Return the newest time for which each topic has a row: base and arm of one tick."""
+        for topic in self._topics:
+            topic.take()
+        times = [set(topic.rows) for topic in self._topics]
+        return max(set.intersection(*times), default=None) if times else None
 
     def _read_law(self, data: bytes) -> list[Event]:
         try:
