@@ -24,7 +24,8 @@ from launch.substitutions import EnvironmentVariable, LaunchConfiguration
 from launch_ros.actions import LifecycleNode
 
 from space_robot_control.cli.launch_arguments import launch_arguments, launched_flight
-from space_robot_control.flight.graph.launched import NODES, launched_parameters
+from space_robot_control.flight.graph.launched import launched_parameters
+from space_robot_control.flight.graph.node_names import NODE_NAMES
 from space_robot_msgs_py.ros.process_environment import DEFAULTS
 
 PACKAGE = "space_robot"
@@ -66,7 +67,7 @@ def fly(context: LaunchContext) -> list:
             package=PACKAGE, executable=name, name=name, namespace=flight.plan.namespace,
             parameters=[str(file)], output="screen", sigterm_timeout=RECORDER_S,
         )
-        for name in NODES
+        for name in NODE_NAMES
     ]  # fmt: skip
     return [
         RegisterEventHandler(OnShutdown(on_shutdown=lambda *_: file.unlink() or folder.rmdir())),

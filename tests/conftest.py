@@ -22,6 +22,7 @@ else:
     )
     settings.load_profile("ci")
 
+from command import Ran, Run
 from flights import Flown, Start, ros_environment, space_robot_here
 from paths import CONFIG, TESTS
 
@@ -126,6 +127,21 @@ def paper_robot() -> Robot:
 def seven_joint_robot() -> Robot:
     """A smaller satellite with 7 joints and products of inertia."""
     return Robot.from_yaml(ROBOTS / "seven_joint.yaml")
+
+
+@pytest.fixture
+def space_robot(capsys: pytest.CaptureFixture[str]) -> Run:
+    """Run a `space-robot` command to its end, in this process."""
+
+    def run(*words: object) -> Ran:
+        from space_robot_control.cli.main import main
+
+        with pytest.raises(SystemExit) as ended:
+            main([*map(str, words)])
+        out, err = capsys.readouterr()
+        return Ran(int(ended.value.code or 0), out, err)
+
+    return run
 
 
 @pytest.fixture

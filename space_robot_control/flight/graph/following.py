@@ -19,6 +19,7 @@ from .foreign import ForeignNodes
 from .injection import Injector
 from .listeners import wait_for
 from .monitor import Event, Monitor
+from .node_names import NODE_NAMES, ORDER, PLANT
 from .node_services import change_state
 from .processes import Graph, node_command
 from .watch import Watch
@@ -28,8 +29,6 @@ INJECTING_POLL_S = 0.01
 STALL_TIMEOUT_S = 60.0
 LISTENER_TIMEOUT_S = 5.0
 """How long a controller that is started again waits for its listeners."""
-ORDER = ("recorder", "mission", "controller", "plant")
-NODE_NAMES = tuple(f"{node}_node" for node in ORDER)
 
 
 class InterruptedFlightError(FlightError):
@@ -156,7 +155,7 @@ class _Follower:
 
     def _show_progress(self, show: FlightProgress) -> None:
         monitor, now = self._monitor, time.monotonic()
-        is_paused = monitor.modes.get("plant_node") == PAUSED
+        is_paused = monitor.modes.get(PLANT) == PAUSED
         if monitor.simulated_s != self._last_s or (not self._begun_at and monitor.has_begun):
             self._begun_at = self._begun_at or now
             self._last_s, self._moved_at = monitor.simulated_s, now

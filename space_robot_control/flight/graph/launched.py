@@ -8,11 +8,7 @@ from ..bag_path import check_bag_path
 from ..compilation import compile_kernels
 from ..plan import Flight
 from .composed import write_parameters
-from .following import NODE_NAMES
 from .orchestrator import flight_parameters
-
-NODES = NODE_NAMES
-"""Names of nodes and executables, in the order of their activation."""
 
 
 def launched_parameters(flight: Flight, bag: Path, autostart: bool, folder: Path) -> Path:

@@ -7,13 +7,14 @@ from collections.abc import Collection
 from space_robot_msgs_py import topics
 
 from ..node_settings import SCHEMAS
+from .node_names import PLANT
 
 _TO_CONTROLLER = ("controller_node", "recorder_node")
 
 LISTENERS = {
     topics.JOINT_STATES: _TO_CONTROLLER,
     topics.BASE_STATE: _TO_CONTROLLER,
-    topics.COMMAND: ("plant_node", "recorder_node"),
+    topics.COMMAND: (PLANT, "recorder_node"),
     topics.REFERENCE_JOINTS: _TO_CONTROLLER,
     topics.REFERENCE_BASE: _TO_CONTROLLER,
     topics.TELEMETRY: ("recorder_node",),

@@ -11,10 +11,10 @@ from space_robot_msgs_py.ros.locks import living_nodes
 from space_robot_sim.plant.settings import MOST_TICKS
 
 from .domain import domain_asked_for
+from .node_names import PLANT
 from .node_services import call_trigger, set_parameters
 from .temporary_node import TemporaryNode
 
-PLANT = "plant_node"
 FIND_S = 5.0
 """A node that is there is discovered in 0.1 to 1.8 s."""
 LOOK_S = 0.02

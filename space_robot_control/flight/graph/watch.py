@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Collection, Sequence
 
 from .monitor import Event, Monitor
+from .node_names import PLANT
 from .processes import Graph, NodeProcess
 
 HUNG_S = 2.0
@@ -91,7 +92,7 @@ class Watch:
     def _lose_leader(self, leader: NodeProcess) -> None:
         """End the flight; if the plant has flown to its end it was the recorder that failed."""
         self._monitor.poll()
-        tick = int(self._monitor.values.get("plant_node", {}).get("tick", 0))
+        tick = int(self._monitor.values.get(PLANT, {}).get("tick", 0))
         self._has_flown = leader is self._graph.host_of("recorder") and tick >= self._last_tick
         if not self._has_flown:
             raise leader.early_end()

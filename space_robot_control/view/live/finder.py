@@ -9,9 +9,8 @@ from space_robot_msgs_py.config.namespace import full_namespace
 from space_robot_msgs_py.ros.locks import newest_node, nodes_in
 
 from ...flight.graph.domain import domain_asked_for
+from ...flight.graph.node_names import PLANT
 from ...flight.graph.temporary_node import TemporaryNode
-
-PLANT = "plant_node"
 
 
 class Place(NamedTuple):

@@ -21,8 +21,9 @@ from space_robot_sim.robot import Robot
 from space_robot_sim.robot.find import find_robot
 
 from ...flight.graph.monitor import Event, Monitor
+from ...flight.graph.node_names import PLANT
 from ...flight.graph.node_services import get_parameters
-from .finder import PLANT, Place
+from .finder import Place
 from .state_topic import StateTopic
 
 Array = NDArray[np.float64]

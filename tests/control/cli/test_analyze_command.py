@@ -5,41 +5,24 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
+from command import Run
 from PIL import Image
 
 from space_robot_control.analysis import analyze as report_of
 from space_robot_control.analysis import excerpt
-from space_robot_control.cli.main import main
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight
 
 
-class Result(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
-Analyze = Callable[..., Result]
-
-
 @pytest.fixture
-def analyze(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Analyze:
+def analyze(space_robot: Run, monkeypatch: pytest.MonkeyPatch) -> Run:
     monkeypatch.setenv("COLUMNS", "100")
-
-    def run(*arguments: object) -> Result:
-        with pytest.raises(SystemExit) as ended:
-            main(["analyze", *map(str, arguments)])
-        out, err = capsys.readouterr()
-        return Result(int(ended.value.code or 0), out, err)
-
-    return run
+    return partial(space_robot, "analyze")
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +35,7 @@ def bags(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 
 def test_json_of_one_is_an_object_and_of_several_a_list(
-    analyze: Analyze, bags: tuple[Path, Path]
+    analyze: Run, bags: tuple[Path, Path]
 ) -> None:
     one, many = analyze(bags[0], "--json"), analyze(*bags, "--json")
     assert json.loads(one.out) == report_of(read_flight(bags[0]))
@@ -60,7 +43,7 @@ def test_json_of_one_is_an_object_and_of_several_a_list(
     assert json.loads(many.out)[0] == json.loads(one.out)
 
 
-def test_one_bag_is_a_table_and_further_figures(analyze: Analyze, bags: tuple[Path, Path]) -> None:
+def test_one_bag_is_a_table_and_further_figures(analyze: Run, bags: tuple[Path, Path]) -> None:
     result = analyze(bags[0])
     assert result.code == 0
     for words in (
@@ -76,7 +59,7 @@ def test_one_bag_is_a_table_and_further_figures(analyze: Analyze, bags: tuple[Pa
     assert max(map(len, result.out.splitlines())) <= 100
 
 
-def test_several_stand_side_by_side(analyze: Analyze, bags: tuple[Path, Path]) -> None:
+def test_several_stand_side_by_side(analyze: Run, bags: tuple[Path, Path]) -> None:
     result = analyze(*bags)
     header = result.out.splitlines()[1]
     assert header.index("tde_stc") < header.index("ctc")
@@ -85,7 +68,7 @@ def test_several_stand_side_by_side(analyze: Analyze, bags: tuple[Path, Path]) -
 
 
 def test_six_bags_make_more_than_one_table(
-    analyze: Analyze, bags: tuple[Path, Path], tmp_path: Path
+    analyze: Run, bags: tuple[Path, Path], tmp_path: Path
 ) -> None:
     copies = [shutil.copytree(bags[0], tmp_path / f"flight_with_a_long_name_{k}") for k in range(6)]
     result = analyze(*copies)
@@ -95,7 +78,7 @@ def test_six_bags_make_more_than_one_table(
 
 
 def test_bags_of_one_name_are_told_apart(
-    analyze: Analyze, bags: tuple[Path, Path], tmp_path: Path
+    analyze: Run, bags: tuple[Path, Path], tmp_path: Path
 ) -> None:
     paths = [shutil.copytree(bags[0], tmp_path / day / "flight") for day in ("monday", "tuesday")]
     result = analyze(*paths, "--csv", tmp_path / "csv")
@@ -104,13 +87,13 @@ def test_bags_of_one_name_are_told_apart(
     assert result.code == 0
 
 
-def test_from_and_to_are_what_all_figures_are_of(analyze: Analyze, bags: tuple[Path, Path]) -> None:
+def test_from_and_to_are_what_all_figures_are_of(analyze: Run, bags: tuple[Path, Path]) -> None:
     result = analyze(bags[0], "--from", 0.1, "--to", 0.2, "--json")
     assert json.loads(result.out) == report_of(excerpt(read_flight(bags[0]), 0.1, 0.2))
 
 
 def test_pictures_are_pngs_and_renewed(
-    analyze: Analyze, bags: tuple[Path, Path], tmp_path: Path
+    analyze: Run, bags: tuple[Path, Path], tmp_path: Path
 ) -> None:
     """Those of one flight, then of two in the same folder: of the same names, not the same."""
     shown = []
@@ -131,7 +114,7 @@ def test_pictures_are_pngs_and_renewed(
 
 @pytest.mark.parametrize(("from_s", "to_s"), [(0.1, 0.1005), (0.1, 0.101), (0.0, 0.0015)])
 def test_the_shortest_excerpts_have_what_they_can_have(
-    analyze: Analyze, bags: tuple[Path, Path], tmp_path: Path, from_s: float, to_s: float
+    analyze: Run, bags: tuple[Path, Path], tmp_path: Path, from_s: float, to_s: float
 ) -> None:
     result = analyze(
         *bags, "--from", from_s, "--to", to_s, "--html", tmp_path / "page.html",
@@ -141,9 +124,7 @@ def test_the_shortest_excerpts_have_what_they_can_have(
     assert "no settling" in result.out
 
 
-def test_the_page_stands_by_itself(
-    analyze: Analyze, bags: tuple[Path, Path], tmp_path: Path
-) -> None:
+def test_the_page_stands_by_itself(analyze: Run, bags: tuple[Path, Path], tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     assert analyze(*bags, "--html", page).code == 0
     text = page.read_text("utf-8")
@@ -156,7 +137,7 @@ def test_the_page_stands_by_itself(
 
 
 def test_exports_are_named_and_not_overwritten(
-    analyze: Analyze, bags: tuple[Path, Path], tmp_path: Path
+    analyze: Run, bags: tuple[Path, Path], tmp_path: Path
 ) -> None:
     table = tmp_path / "one.parquet"
     assert analyze(bags[0], "--parquet", table).code == 0
@@ -168,7 +149,7 @@ def test_exports_are_named_and_not_overwritten(
 
 
 def test_a_bag_that_nobody_finished_is_analysed_and_said_so(
-    analyze: Analyze, bags: tuple[Path, Path], tmp_path: Path
+    analyze: Run, bags: tuple[Path, Path], tmp_path: Path
 ) -> None:
     shutil.copytree(bags[0], tmp_path / "cut")
     (tmp_path / "cut" / "metadata.yaml").unlink()
@@ -184,7 +165,7 @@ def test_a_bag_that_nobody_finished_is_analysed_and_said_so(
     assert "not whole" in (tmp_path / "cut.html").read_text("utf-8")
 
 
-def test_a_robot_that_is_not_here_costs_only_its_figures(analyze: Analyze, tmp_path: Path) -> None:
+def test_a_robot_that_is_not_here_costs_only_its_figures(analyze: Run, tmp_path: Path) -> None:
     flight = Flight(FlightPlan(duration=0.05))
     log = simulate(flight)
     log.flight.pop("robot_file", None)
@@ -211,7 +192,7 @@ def test_a_robot_that_is_not_here_costs_only_its_figures(analyze: Analyze, tmp_p
     ],
 )
 def test_what_cannot_be_is_one_line(
-    analyze: Analyze, bags: tuple[Path, Path], arguments: list[str], words: str
+    analyze: Run, bags: tuple[Path, Path], arguments: list[str], words: str
 ) -> None:
     given = [text.format(bag=bags[0], other=bags[1]) for text in arguments]
     result = analyze(*given)

@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from command import Run
 
 from space_robot_control.analysis.files import whole_file
-from space_robot_control.cli.main import main
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.simulate import simulate
 from space_robot_msgs_py.errors import InputError
@@ -95,39 +95,33 @@ def test_a_full_standard_error_ends_no_flight() -> None:
 
 @pytest.mark.parametrize("option", ["--csv", "--parquet", "--html", "--plot"])
 def test_files_on_a_full_or_read_only_file_system(
-    bag: Path, mounted: Mount, option: str, capsys: pytest.CaptureFixture[str]
+    bag: Path, mounted: Mount, option: str, space_robot: Run
 ) -> None:
     for options, why in (("ro", "Read-only file system"), ("size=16k", "No space left on device")):
         folder = mounted(options)
         target = folder if option == "--plot" else folder / f"x.{option[2:]}"
-        with pytest.raises(SystemExit) as ended:
-            main(["analyze", str(bag), option, str(target)])
-        line = one_line(capsys.readouterr().err)
+        code, _, err = space_robot("analyze", bag, option, target)
+        line = one_line(err)
         assert str(folder) in line
         assert why in line or "no permission" in line
-        assert ended.value.code == 2
+        assert code == 2
         assert list(folder.iterdir()) == []
 
 
-def test_below_a_file_nothing_can_be_written(
-    bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_below_a_file_nothing_can_be_written(bag: Path, tmp_path: Path, space_robot: Run) -> None:
     (tmp_path / "file").touch()
     for option in ("--csv", "--html", "--plot"):
-        with pytest.raises(SystemExit) as ended:
-            main(["analyze", str(bag), option, str(tmp_path / "file" / "x" / f"y.{option[2:]}")])
-        assert ended.value.code == 2
-        assert str(tmp_path / "file") in capsys.readouterr().err.splitlines()[-1]
+        target = tmp_path / "file" / "x" / f"y.{option[2:]}"
+        code, _, err = space_robot("analyze", bag, option, target)
+        assert code == 2
+        assert str(tmp_path / "file") in err.splitlines()[-1]
 
 
-def test_a_replay_that_is_refused_leaves_no_empty_table(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["replay", str(tmp_path / "nowhere"), "--csv", str(tmp_path / "x.csv")])
-    assert ended.value.code == 2
+def test_a_replay_that_is_refused_leaves_no_empty_table(tmp_path: Path, space_robot: Run) -> None:
+    code, _, err = space_robot("replay", tmp_path / "nowhere", "--csv", tmp_path / "x.csv")
+    assert code == 2
     assert list(tmp_path.iterdir()) == []
-    assert "no such bag" in capsys.readouterr().err
+    assert "no such bag" in err
 
 
 def test_an_older_file_stays_whole_if_the_new_one_fails(tmp_path: Path) -> None:

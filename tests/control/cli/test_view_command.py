@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import html
 import re
-from collections.abc import Callable
+from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 import trimesh
+from command import Run
 from paths import DATA
 from scene_pages import Scene, plot_data
 
@@ -25,28 +25,10 @@ LARGEST = 3e6
 """Bytes of a page of a flight of 30 s."""
 
 
-class Result(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
-View = Callable[..., Result]
-
-
 @pytest.fixture
-def view(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> View:
+def view(space_robot: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
     monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: object) -> Result:
-        with pytest.raises(SystemExit) as ended:
-            main(["view", *map(str, arguments)])
-        out, err = capsys.readouterr()
-        return Result(int(ended.value.code or 0), out, err)
-
-    return run
+    return partial(space_robot, "view")
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +94,7 @@ def test_the_plots_are_the_bags_errors(whole: Path, bags: tuple[Path, Path]) -> 
 
 
 def test_several_are_drawn_over_one_another_with_a_legend(
-    view: View, bags: tuple[Path, Path], tmp_path: Path
+    view: Run, bags: tuple[Path, Path], tmp_path: Path
 ) -> None:
     out = tmp_path / "new" / "both.html"
     result = view(*bags, "--no-open", "--out", out, "--title", "law <against> law", "--light")
@@ -128,7 +110,7 @@ def test_several_are_drawn_over_one_another_with_a_legend(
 
 
 def test_side_by_side_and_an_excerpt_at_a_rate(
-    view: View, bags: tuple[Path, Path], tmp_path: Path
+    view: Run, bags: tuple[Path, Path], tmp_path: Path
 ) -> None:
     result = view(*bags, "--side-by-side", "--from", 0.1, "--to", 0.2, "--rate", 100, "--no-open")
     assert result.code == 0, result.err
@@ -140,7 +122,7 @@ def test_side_by_side_and_an_excerpt_at_a_rate(
 
 
 def test_an_older_page_is_replaced_but_not_by_half_a_one(
-    view: View, bags: tuple[Path, Path], tmp_path: Path
+    view: Run, bags: tuple[Path, Path], tmp_path: Path
 ) -> None:
     out = tmp_path / "p.html"
     out.write_text("older")
@@ -151,7 +133,7 @@ def test_an_older_page_is_replaced_but_not_by_half_a_one(
 
 
 def test_the_page_is_opened_in_the_users_browser(
-    view: View, bags: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    view: Run, bags: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     browser, opened = tmp_path / "browser", tmp_path / "opened"
     browser.write_text(f'#!/bin/sh\necho "$1" > {opened}\n')
@@ -175,7 +157,7 @@ def test_the_page_is_opened_in_the_users_browser(
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(
-    view: View,
+    view: Run,
     bags: tuple[Path, Path],
     tmp_path: Path,
     arguments: tuple[str, ...],
@@ -189,7 +171,7 @@ def test_what_is_wrong_is_said_in_one_line(
 
 
 def test_without_viser_one_line_says_what_to_install(
-    view: View, bags: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+    view: Run, bags: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("space_robot_control.view.stage.find_spec", lambda name: None)
     result = view(bags[1], "--no-open")
@@ -197,7 +179,7 @@ def test_without_viser_one_line_says_what_to_install(
     assert result.err == "space-robot: error: view needs viser: pip install 'space_robot[view]'\n"
 
 
-def test_a_bag_has_no_shapes_of_a_urdf_until_it_is_named(view: View, tmp_path: Path) -> None:
+def test_a_bag_has_no_shapes_of_a_urdf_until_it_is_named(view: Run, tmp_path: Path) -> None:
     urdf = tmp_path / "urdf" / "arm.urdf"
     urdf.parent.mkdir()
     urdf.write_bytes((DATA / "arm.urdf").read_bytes())

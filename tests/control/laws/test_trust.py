@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 from bags import redescribed
+from command import Run
 
 from space_robot_control.analysis import analyze
-from space_robot_control.cli.main import main
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.replay.choice import ControllerChoice
 from space_robot_control.flight.simulate import simulate
@@ -151,19 +151,16 @@ def test_a_replay_reads_no_file_that_a_bag_names(tmp_path: Path) -> None:
 
 
 def test_on_the_command_line_it_is_one_line_and_an_option(
-    bag: Path, tmp_path: Path, ran: Callable[[], bool], capsys: pytest.CaptureFixture[str]
+    bag: Path, tmp_path: Path, ran: Callable[[], bool], space_robot: Run
 ) -> None:
     import shutil
 
     copy = shutil.copytree(bag, tmp_path / "bag")
     redescribed(copy, json.dumps(described(controller_node={"controller": LAW})))
-    with pytest.raises(SystemExit) as ended:
-        main(["replay", str(copy)])
-    assert ended.value.code == 2
-    assert "--trust" in capsys.readouterr().err.splitlines()[-1]
-    with pytest.raises(SystemExit) as ended:
-        main(["analyze", str(copy), "--json"])
-    assert not ended.value.code
+    code, _, err = space_robot("replay", copy)
+    assert code == 2
+    assert "--trust" in err.splitlines()[-1]
+    assert space_robot("analyze", copy, "--json").code == 0
     assert not ran()
 
 

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import json
 import re
+from functools import partial
 from pathlib import Path
 
 import pytest
+from command import Run
 
 from space_robot_control.campaign.flown import Campaign
-from space_robot_control.cli.main import main
 
 
-def report(capfd: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as ended:
-        main(["campaign", "report", *arguments])
-    out, err = capfd.readouterr()
-    code = ended.value.code
-    assert isinstance(code, int)
-    return code, out, err
+@pytest.fixture
+def report(space_robot: Run) -> Run:
+    return partial(space_robot, "campaign", "report")
 
 
 @pytest.fixture(scope="module")
@@ -34,12 +31,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_it_prints_and_writes(
-    folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_it_prints_and_writes(folder: Path, tmp_path: Path, report: Run) -> None:
     html, markdown = tmp_path / "a.html", tmp_path / "a.md"
     code, out, err = report(
-        capfd, str(folder), "--html", str(html), "--markdown", str(markdown), "--metric",
+        str(folder), "--html", str(html), "--markdown", str(markdown), "--metric",
         "attitude_rms",
     )  # fmt: skip
     assert code == 0, err
@@ -48,31 +43,27 @@ def test_it_prints_and_writes(
     assert html.read_text("utf-8").startswith("<!doctype html>")
     assert "| tde_stc |" in markdown.read_text("utf-8")
     assert (tmp_path / "a.png").is_file()
-    assert report(capfd, str(folder), "--html", str(html))[0] == 2
+    assert report(str(folder), "--html", str(html))[0] == 2
 
 
-def test_a_campaign_that_was_killed_has_a_report(
-    folder: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_campaign_that_was_killed_has_a_report(folder: Path, report: Run) -> None:
     """Its rows are in the journal only; the table comes back to the byte."""
     table = folder / "table.parquet"
     before = table.read_bytes()
     table.unlink()
-    code, out, err = report(capfd, str(folder), "--json")
+    code, out, err = report(str(folder), "--json")
     assert code == 0, err
     content = json.loads(out)
     assert (content["rows"], content["laws"]) == (12, ["ctc", "tde_stc"])
     assert table.read_bytes() == before
 
 
-def test_bad_input_is_one_line(
-    folder: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_bad_input_is_one_line(folder: Path, tmp_path: Path, report: Run) -> None:
     for arguments, text in (
         ([str(tmp_path)], "is no campaign's folder"),
         ([str(folder), "--metric", "x"], "unknown metric 'x': choose one of attitude_rms"),
     ):
-        code, out, err = report(capfd, *arguments)
+        code, out, err = report(*arguments)
         assert (code, out) == (2, "")
         assert re.fullmatch(r"space-robot: error: [^\n]+\n", err), err
         assert text in err

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
+from command import Run
 from flights import COMMAND, Flown, ros_environment, space_robot_here
 
-from space_robot_control.cli.main import main
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_control.flight.replay.outcome import Options, Replay
 from space_robot_control.flight.replay.run import replay
@@ -230,15 +230,11 @@ def test_by_the_clock_missed_ticks_are_counted(
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(
-    recorded: Callable[..., Path],
-    capsys: pytest.CaptureFixture[str],
-    options: tuple[str, ...],
-    said: str,
+    recorded: Callable[..., Path], space_robot: Run, options: tuple[str, ...], said: str
 ) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["replay", str(recorded()), *options])
-    assert ended.value.code == 2
-    assert said in capsys.readouterr().err
+    code, _, err = space_robot("replay", recorded(), *options)
+    assert code == 2
+    assert said in err
 
 
 @pytest.mark.parametrize(
