@@ -114,8 +114,8 @@ def messages(data: bytes) -> list[dict[str, Any]]:
 def fly(domain: int, bag: Path, shown: list[Poses], *options: str) -> FlightLog:
     """Fly by the wall clock, once the first steps have been shown."""
 
-    def sim(word: str) -> bool:
-        return space_robot_here("sim", word, "--domain", str(domain)).returncode == 0
+    def sim(*words: str) -> bool:
+        return space_robot_here("sim", *words, "--domain", str(domain)).returncode == 0
 
     with subprocess.Popen(
         [
@@ -125,7 +125,7 @@ def fly(domain: int, bag: Path, shown: list[Poses], *options: str) -> FlightLog:
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
     ) as process:  # fmt: skip
         until = time.monotonic() + PATIENCE_S
-        while not (sim("step") and any(is_robot_in(poses) for poses in shown)):
+        while not (sim("step", "--ticks", "50") and any(is_robot_in(poses) for poses in shown)):
             assert time.monotonic() < until
         assert sim("resume")
         _, errors = process.communicate(timeout=PATIENCE_S)
