@@ -58,7 +58,7 @@ def follow(
         InputError: others publish its topics, or have its nodes' names.
         FlightError: it cannot go on.
     """
-    monitor = Monitor(domain, flight.plan.namespace)
+    monitor = Monitor(domain, flight.plan.namespace, period=flight.period)
     try:
         follower = _Follower(graph, flight, parameters, monitor, stopped)
         with flight_progress(follower.total_s, flight.controller.law.name) as show:
@@ -126,11 +126,16 @@ class _Follower:
             news += self._watch.poll(monitor.simulated_s)
             self._foreign.watch()
             self._show_progress(show)
-            if monitor.simulated_s < self._last_clock_s:  # what ends then is meant to
-                for event in news:
-                    show.say(str(event))
-                self._events += news
+            self._keep(news, show)
+        self._keep(monitor.poll(), show)
         show(self.total_s, "")
+
+    def _keep(self, news: Sequence[Event], show: FlightProgress) -> None:
+        """Say and keep what happened before the plant's last clock: what ends then is meant to."""
+        for event in news:
+            if event.simulated_s < self._last_clock_s:
+                show.say(str(event))
+                self._events.append(event)
 
     def end(self) -> dict[str, Any]:
         """Stop the other nodes; report what happened."""
@@ -141,7 +146,9 @@ class _Follower:
         self._monitor.poll()  # the nodes' last reports
         found = degradation(self._monitor.values, self._fault_kinds, self._realtime)
         return {
-            "events": [event._asdict() for event in self._events],
+            "events": [
+                event._asdict() for event in sorted(self._events, key=lambda e: e.simulated_s)
+            ],
             "nodes": self._monitor.values,
             "restarts": self._watch.restarts,
             "failures": [*self._watch.failures, *found.failures],

@@ -29,6 +29,7 @@ class Event(NamedTuple):
     """Something that happened in a flight."""
 
     simulated_s: float
+    """That of its tick, if the node tells one; else when it was heard of."""
     node: str
     what: str
 
@@ -40,9 +41,21 @@ class Monitor:
     """Simulated time from /clock, errors from telemetry, the nodes' modes from /diagnostics."""
 
     def __init__(
-        self, domain: int, namespace: str = topics.ROOT, name: str = "flight_monitor"
+        self,
+        domain: int,
+        namespace: str = topics.ROOT,
+        name: str = "flight_monitor",
+        period: float = 0.0,
     ) -> None:
-        """Join the graph as ``name`` in the ``namespace`` of a robot; others are passed over."""
+        """Join the graph.
+
+        Args:
+            domain: ROS domain.
+            namespace: of the robot; others are passed over.
+            name: of the node that listens.
+            period: of the plant's ticks, s; 0: not known, and events have the time at which they
+                are heard of.
+        """
         from space_robot_msgs_py.ros.endpoints import (
             FollowedSubscription,
             PolledCallbackGroup,
@@ -50,7 +63,7 @@ class Monitor:
         )
 
         self._visitor = TemporaryNode(name, domain, namespace)
-        self._namespace = namespace
+        self._namespace, self._period = namespace, period
         self.node = self._visitor.node
         group = PolledCallbackGroup()
         self._clock = FollowedSubscription(self.node, topics.CLOCK, group, depth=CLOCK_DEPTH)
@@ -111,7 +124,14 @@ class Monitor:
         before, self.modes[name] = self.modes.get(name), mode
         level_before, self._levels[name] = self._levels.get(name, 0), status.level
         is_news = before != mode and (status.level > 0 or level_before > 0)
-        return [Event(self.simulated_s, name, mode)] if is_news else []
+        return [Event(self._time_of(name), name, mode)] if is_news else []
+
+    def _time_of(self, name: str) -> float:
+        """Return the simulated time of a node's last report, by the tick that it tells."""
+        with suppress(ValueError):
+            if (tick := int(self.values[name].get("tick", 0))) > 0 and self._period:
+                return tick * self._period
+        return self.simulated_s
 
     @property
     def errors(self) -> tuple[float, float] | None:

@@ -9,6 +9,7 @@ are composed, which takes half the processor's time; one of those is flown again
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -99,6 +100,15 @@ class Seen:
     def modes(self, node: str) -> list[str]:
         """The node's modes that were worth an event."""
         return [event["what"] for event in self.graph["events"] if event["node"] == f"{node}_node"]
+
+    def tells(self, node: str, what: str, at_s: float) -> bool:
+        """Whether an event is among those of its node, with its tick's time."""
+        return any(
+            event["node"] == f"{node}_node"
+            and event["what"] == what
+            and event["simulated_s"] == pytest.approx(at_s, abs=PERIOD)
+            for event in self.graph["events"]
+        )
 
     def error(self, start_s: float, stop_s: float) -> float:
         """Largest joint error in a stretch, rad."""
@@ -233,10 +243,17 @@ MATRIX: list[tuple[str, str, str, Check]] = [
     ("scaled_quaternion", "long silences", "the controller goes safe, then back",
      lambda seen: "safe: quaternion not unit" in " ".join(seen.modes("controller"))
      and seen.modes("controller")[-1] == "nominal"),
+    ("scaled_quaternion", "long silences", "told with the time of its tick",
+     lambda seen: seen.tells("controller", "safe: quaternion not unit", 0.1 + HOLD_TICKS * PERIOD)
+     and seen.tells("controller", "nominal", 0.25)),
     ("scaled_quaternion", "long silences", "no torque after hold_ticks", no_torque(0.1, 0.25)),
     ("drop_command", "long silences", "the plant goes safe, then back",
      lambda seen: "safe: no good command, the torque is zero" in seen.modes("plant")
      and seen.modes("plant")[-1] == "nominal"),
+    ("drop_command", "long silences", "told with the time of its tick",
+     lambda seen: seen.tells(
+         "plant", "safe: no good command, the torque is zero", 0.4 + HOLD_TICKS * PERIOD
+     ) and seen.tells("plant", "nominal", 0.55)),
     ("drop_command", "long silences", "no torque after hold_ticks", no_torque(0.4, 0.55)),
     ("drop_state", "long silences", "no torque when states come again",
      lambda seen: bool(np.all(seen.log.applied_torque[round(0.85 / PERIOD)] == 0.0))),
@@ -251,7 +268,7 @@ def test_reaction(
     seen: Callable[[str], Seen], fault: str, flight: str, reaction: str, check: Check
 ) -> None:
     this = seen(flight)
-    assert check(this), (this.expected, this.graph)
+    assert check(this), f"{this.expected}\n{json.dumps(this.graph, indent=1)}"
     assert this.log.ticks == 2000
     assert np.isfinite(this.log.applied_torque).all()
 
