@@ -128,10 +128,14 @@ class Monitor:
 
     def _time_of(self, name: str) -> float:
         """Return the simulated time of a node's last report, by the tick that it tells."""
-        with suppress(ValueError):
-            if (tick := int(self.values[name].get("tick", 0))) > 0 and self._period:
-                return tick * self._period
-        return self.simulated_s
+        tick = self.tick_of(name)
+        return tick * self._period if tick > 0 and self._period else self.simulated_s
+
+    def tick_of(self, name: str) -> int:
+        """Return the tick that a node told last; 0 if it has told none."""
+        with suppress(ValueError):  # somebody else's words
+            return int(self.values.get(name, {}).get("tick", 0))
+        return 0
 
     @property
     def errors(self) -> tuple[float, float] | None:

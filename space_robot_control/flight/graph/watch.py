@@ -92,8 +92,8 @@ class Watch:
     def _lose_leader(self, leader: NodeProcess) -> None:
         """End the flight; if the plant has flown to its end it was the recorder that failed."""
         self._monitor.poll()
-        tick = int(self._monitor.values.get(PLANT, {}).get("tick", 0))
-        self._has_flown = leader is self._graph.host_of("recorder") and tick >= self._last_tick
+        is_recorders = leader is self._graph.host_of("recorder")
+        self._has_flown = is_recorders and self._monitor.tick_of(PLANT) >= self._last_tick
         if not self._has_flown:
             raise leader.early_end()
 

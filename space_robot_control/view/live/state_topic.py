@@ -39,7 +39,8 @@ class StateTopic:
 
         self._describe = kind.of_robot(names, timebase)
         self._codec = Codec(self._describe)
-        self._period_ns = round(timebase.period * 1e9)
+        self._width = sum(column.length for column in self._describe.columns)
+        self._period_ns = timebase.period_ns
         self._subscription = RawSubscription(node, kind.topic, group, KEPT, best_effort=True)
         self.rows: dict[int, Array] = {}
         """The last row of each of the newest messages, by its time in ns."""
@@ -51,7 +52,7 @@ class StateTopic:
                 stamp_ns, numbers = self._codec.decode(data)
             except MessageError:
                 continue
-            rows = numbers.reshape(-1, sum(column.length for column in self._describe.columns))
+            rows = numbers.reshape(-1, self._width)
             self.rows[stamp_ns + (len(rows) - 1) * self._period_ns] = rows[-1].copy()
         while len(self.rows) > KEPT:
             del self.rows[next(iter(self.rows))]
