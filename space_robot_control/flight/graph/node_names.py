@@ -3,5 +3,5 @@
 ORDER = ("recorder", "mission", "controller", "plant")
 """The order in which they are activated."""
 NODE_NAMES = tuple(f"{node}_node" for node in ORDER)
-"""Of nodes and executables, in that order."""
+"""Names of nodes and executables, in that order."""
 PLANT = NODE_NAMES[-1]

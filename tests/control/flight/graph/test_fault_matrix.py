@@ -102,7 +102,7 @@ class Seen:
         return [event["what"] for event in self.graph["events"] if event["node"] == f"{node}_node"]
 
     def tells(self, node: str, what: str, at_s: float) -> bool:
-        """Whether an event is among those of its node, with its tick's time."""
+        """Tell if an event is among those of its node, with its tick's time."""
         return any(
             event["node"] == f"{node}_node"
             and event["what"] == what
