@@ -2,13 +2,18 @@
 
 PYTHON ?= python3
 VENV := .venv
+# Versions that are known to work; `make newest` goes without.
+CONSTRAINTS := constraints.txt
+# Extras with versions in it. Not apt, which has ROS's own NumPy, and not bench: Basilisk holds others back.
+CONSTRAINED := campaign dask docs gym mutation notebooks parquet ros soak test view xacro
 PACKAGES := space_robot_control space_robot_msgs_py space_robot_sim
 # A file's tests run in one process; tests/conftest.py has the files in an order that fills both.
 PYTEST := $(VENV)/bin/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
 # Tests of kernels that are short enough without a compiler.
 INTERPRETED := $(addprefix tests/,sim/dynamics sim/environment sim/robot sim/sensors sim/faults \
   control/laws $(addprefix control/controller/test_,tracking.py time_delay_estimation.py controller.py))
-PIP_INSTALL := $(VENV)/bin/python -m pip install -qq --disable-pip-version-check
+PIP := $(VENV)/bin/python -m pip install -qq --disable-pip-version-check
+PIP_INSTALL := $(PIP) $(foreach file,$(CONSTRAINTS),--constraint $(file) --build-constraint $(file))
 
 # A ROS sourced in this terminal must not mix with the one in .venv.
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH PYTHONHOME PYTHONPATH
@@ -20,12 +25,14 @@ export PYTHONPYCACHEPREFIX := $(CURDIR)/$(VENV)/pycache
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
 
-.PHONY: help setup fly test quick coverage hooks lint kernels docs bench mutation notebooks clean
+.PHONY: help setup fly test check quick coverage hooks lint kernels docs bench mutation notebooks \
+  newest constraints clean
 
 help:
 	@echo "make setup               .venv with the package and ROS 2 Jazzy"
 	@echo "make fly [ARGS=...]      fly case 1 under TDE-STC, e.g. make fly ARGS='--controller ctc'"
-	@echo "make test [ARGS=...]     style, types and tests; ARGS go to pytest"
+	@echo "make test [ARGS=...]     all tests; ARGS go to pytest"
+	@echo "make check [ARGS=...]    style, types and all tests: what a change must pass"
 	@echo "make quick [ARGS=...]    the tests that start no ROS and take little time"
 	@echo "make coverage            which lines the tests run; twice as long as make test"
 	@echo "make hooks               from then on a commit passes style, types and the quick tests"
@@ -35,6 +42,8 @@ help:
 	@echo "make bench [ARGS=...]    how fast it is, e.g. make bench ARGS='plant laws'; --help tells more"
 	@echo "make mutation [ARGS=...] small faults put in, one at a time: do the tests notice?"
 	@echo "make notebooks           run docs/notebooks and keep what they show"
+	@echo "make newest [ARGS=...]   make check with the newest versions of everything, in .venv-newest"
+	@echo "make constraints         write constraints.txt anew: the newest versions that fit together"
 	@echo "make clean               delete .venv and what was built or cached here"
 	@echo "PYTHON=python3.12 chooses the Python (3.10 to 3.13) of a new .venv."
 
@@ -43,9 +52,12 @@ setup: $(VENV)/.flies
 fly: $(VENV)/.flies
 	@$(VENV)/bin/space-robot fly --controller tde_stc --case 1 $(ARGS)
 
-test:
-	@$(MAKE) --no-print-directory --jobs 2 lint kernels
+test: kernels $(VENV)/.tests
 	$(PYTEST) $(ARGS)
+
+check:
+	@$(MAKE) --no-print-directory --jobs 2 lint kernels
+	@$(MAKE) --no-print-directory test
 
 quick: $(VENV)/.tests
 	$(PYTEST) -m "not ros and not slow" $(ARGS)
@@ -84,22 +96,38 @@ mutation: $(VENV)/.tests
 notebooks: $(VENV)/.tests
 	$(VENV)/bin/python docs/notebooks/execute.py
 
+# Of what failed with it, the versions that are listed first are the suspects.
+newest:
+	rm -rf .venv-newest
+	@$(MAKE) --no-print-directory VENV=.venv-newest CONSTRAINTS= .venv-newest/.tests
+	@echo "constraints.txt has other versions of:"
+	@.venv-newest/bin/python -m pip install --disable-pip-version-check --dry-run \
+	  --constraint constraints.txt --editable '.[ros,test]' | sed -n 's/^Would install //p'
+	@$(MAKE) --no-print-directory VENV=.venv-newest CONSTRAINTS= check
+
+constraints: $(VENV)/.made
+	@$(PIP) uv
+	printf 'pip\nsetuptools\n' | $(VENV)/bin/python -m uv pip compile --quiet --upgrade --universal \
+	  --python-version 3.10 --no-annotate --no-emit-index-url \
+	  --custom-compile-command 'make constraints' --output-file constraints.txt \
+	  $(addprefix --extra ,$(CONSTRAINED)) setup.py -
+
 clean:
 	rm -rf $(VENV) build install log site *.egg-info .coverage .coverage.* .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find $(PACKAGES) tests -name __pycache__ -prune -exec rm -rf {} +
 
 # Stamps: what is installed in .venv, renewed when the packaging changes.
-$(VENV)/.flies: setup.py pyproject.toml | $(VENV)/.made
+$(VENV)/.flies: setup.py pyproject.toml $(CONSTRAINTS) | $(VENV)/.made
 	@echo "installing space_robot and ROS 2 into $(VENV): a minute or two, once"
 	@$(PIP_INSTALL) --no-compile --editable '.[ros,soak,campaign,view]'  # most modules are never imported
 	@touch $@
 
-$(VENV)/.tests: setup.py pyproject.toml | $(VENV)/.flies
+$(VENV)/.tests: setup.py pyproject.toml $(CONSTRAINTS) | $(VENV)/.flies
 	@echo "installing the tests' tools into $(VENV): a minute, once"
 	@$(PIP_INSTALL) --no-compile --editable '.[ros,test]'
 	@touch $@
 
-$(VENV)/.docs: setup.py | $(VENV)/.made
+$(VENV)/.docs: setup.py $(CONSTRAINTS) | $(VENV)/.made
 	@echo "installing space_robot and what makes its site into $(VENV): a minute, once"
 	@$(PIP_INSTALL) --editable '.[docs]'
 	@touch $@
@@ -114,5 +142,5 @@ $(VENV)/.made:
 	  { echo "error: $(PYTHON) cannot make virtual environments:" \
 	    "sudo apt install python3-venv" >&2; exit 1; }
 	@$(PYTHON) -m venv --clear $(VENV)
-	@$(PIP_INSTALL) --upgrade pip  # 23.0 needs minutes to resolve [ros,test]
+	@$(PIP) --upgrade $(or $(shell grep -s '^pip==' $(CONSTRAINTS)),pip)  # 23.0 needs minutes to resolve [ros,test]
 	@touch $@
