@@ -13,6 +13,8 @@ from xml.etree import ElementTree
 
 import pytest
 from import_graph import PACKAGES, modules
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from space_robot_control.cli.main import cli
 from space_robot_control.flight.node_modules import MODULES
@@ -133,6 +135,35 @@ def test_the_makefile_installs_extras_of_setup_py() -> None:
     text = (ROOT / "Makefile").read_text("utf-8")
     named = {name for group in re.findall(r"'\.\[([\w,]+)\]'", text) for name in group.split(",")}
     assert {"ros", "test", "mutation"} <= named <= set(setup_keyword("extras_require"))
+
+
+def test_every_requirement_has_its_known_version_for_each_python() -> None:
+    """By the markers of the lines: exactly one holds, and it is a version that setup.py admits."""
+    lines = (ROOT / "constraints.txt").read_text("utf-8").splitlines()
+    pinned = [Requirement(line) for line in lines if line[0] not in " #"]
+    extras: dict[str, list[str]] = setup_keyword("extras_require")
+    left_out = {"apt", "bench"}
+    required = [*setup_keyword("install_requires"), "pip", "setuptools"]
+    required += [text for extra in extras.keys() - left_out for text in extras[extra]]
+    for python in ("3.10", "3.11", "3.12", "3.13"):
+        versions = {"python_version": python, "python_full_version": f"{python}.0"}
+        here = {
+            canonicalize_name(pin.name): next(iter(pin.specifier)).version
+            for pin in pinned
+            if pin.marker is None or pin.marker.evaluate(versions)
+        }
+        for text in required:
+            wanted = Requirement(text)
+            assert wanted.specifier.contains(here[canonicalize_name(wanted.name)]), (python, text)
+
+
+def test_make_test_runs_the_tests_and_nothing_else() -> None:
+    """A new release of a checker of types or style must not stop a new user's tests."""
+    text = (ROOT / "Makefile").read_text("utf-8")
+    recipes = dict(re.findall(r"^(\w+):([^\n]*\n(?:\t.*\n)*)", text, re.MULTILINE))
+    assert "lint" not in recipes["test"]
+    assert all(step in recipes["check"] for step in ("lint", "test"))
+    assert re.findall(r"^exec (.*)$", (ROOT / ".ci/run").read_text(), re.M) == ["make check"]
 
 
 def test_the_extra_that_makes_the_site_is_part_of_that_of_the_tests() -> None:

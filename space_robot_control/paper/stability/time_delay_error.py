@@ -57,6 +57,6 @@ def error_derivative(error: Array, period: float) -> ErrorDerivative:
     return ErrorDerivative(
         max_error=np.max(np.abs(estimated), axis=0),
         beta=np.max(derivative, axis=0),
-        beta_at_s=(np.argmax(derivative, axis=0) + 2) * period,
+        beta_at_s=(np.argmax(derivative, axis=0) + 2).astype(np.float64) * period,
         beta_99_9_percentile=np.percentile(derivative, 99.9, axis=0),
     )
