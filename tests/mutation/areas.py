@@ -74,7 +74,6 @@ AREAS = {
     "config": _room("msgs/config", "control/cli/test_options.py"),
     "ros": _room("msgs/ros", "control/flight/graph/test_graph_nodes.py", marks=""),
     "wire": _room("msgs/wire"),
-    "plant_node": _files("sim", "control/flight/graph/test_graph_nodes.py", marks=""),
     "actuators": _room(
         "sim/actuators", "sim/plant/test_*.py", "control/controller/allocation/test_*.py"
     ),
@@ -88,7 +87,10 @@ AREAS = {
     "plant": _room("sim/plant"),
     "robot": _room("sim/robot", "sim/dynamics/test_equations_of_motion.py"),
     "sensors": _room("sim/sensors", "sim/plant/test_*.py"),
-    "nodes": _files("control", "control/flight/graph/test_graph_nodes.py", marks=""),
+    "nodes": Area(
+        (f"{PACKAGES['sim']}/*.py", f"{PACKAGES['control']}/*.py"),
+        ("tests/control/flight/graph/test_graph_nodes.py",), "",
+    ),
     "analysis": _room("control/analysis", marks="not ros"),
     "campaign": _room("control/campaign", marks="not ros"),
     "cli": _room("control/cli", "test_start_up.py", marks="not ros"),
