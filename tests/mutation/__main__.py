@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import difflib
 import queue
+import secrets
 import signal
 import sys
 import tempfile
 import threading
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from random import Random
@@ -50,19 +52,28 @@ def table(results: list[Result]) -> Table:
     return shown
 
 
+def draw(areas: list[str], count: int, seed: int) -> Iterator[tuple[str, Mutant]]:
+    """Mutants of the areas by turns; which have one more than others is drawn, too."""
+    Random(seed).shuffle(areas)
+    for number, area in enumerate(areas):
+        share = count // len(areas) + (number < count % len(areas))
+        modules = list(AREAS[area].modules())
+        yield from ((area, m) for m in sample(modules, share, Random(f"{seed} {area}")))
+
+
 @click.command()
 @click.option("--area", "areas", multiple=True, type=click.Choice(list(AREAS)), help="[all]")
-@click.option("--count", default=10, show_default=True, help="Mutants of each area.")
-@click.option("--seed", default=0, show_default=True, help="Of the sample.")
+@click.option("--count", default=60, show_default=True, help="Mutants, as many of each area.")
+@click.option("--seed", type=int, help="Of the sample.  [a new one]")
 @click.option("--jobs", default=1, show_default=True, help="Mutants tried at a time.")
 @click.option("--list", "only_list", is_flag=True, help="Show the sample, try nothing.")
-def main(areas: tuple[str, ...], count: int, seed: int, jobs: int, only_list: bool) -> None:
+def main(areas: tuple[str, ...], count: int, seed: int | None, jobs: int, only_list: bool) -> None:
     """Try a random sample of mutants on the tests near them, and list those that survive."""
     console = Console(width=160 if not sys.stdout.isatty() else None)
-    chosen: list[tuple[str, Mutant]] = []
-    for area in areas or AREAS:
-        modules = list(AREAS[area].modules())
-        chosen += [(area, m) for m in sample(modules, count, Random(f"{seed} {area}"))]
+    if seed is None:
+        seed = secrets.randbelow(10**6)
+    console.print(f"seed {seed}", highlight=False)
+    chosen = list(draw(list(areas or AREAS), count, seed))
     if only_list:
         for area, mutant in chosen:
             console.print(f"{area}: {mutant.module}:{mutant.line}", change(mutant), markup=False)
@@ -75,15 +86,13 @@ def main(areas: tuple[str, ...], count: int, seed: int, jobs: int, only_list: bo
         copies: queue.Queue[Copy] = queue.Queue()
         for copy in everywhere:
             copies.put(copy)
-        limits = {
-            area: _limit(area, copies, console) for area in dict.fromkeys(a for a, _ in chosen)
-        }
         lock = threading.Lock()
 
         def work(area: str, mutant: Mutant) -> None:
             copy = copies.get()
             try:
-                outcome = copy.trial(mutant, AREAS[area].tests_of(mutant.module), limits[area])
+                tests = AREAS[area].tests_of(mutant.module)
+                outcome = copy.trial(mutant, tests, AREAS[area].marks)
             finally:
                 copies.put(copy)
             with lock:
@@ -116,15 +125,6 @@ def main(areas: tuple[str, ...], count: int, seed: int, jobs: int, only_list: bo
 
 def _interrupt(number: int, frame: object) -> NoReturn:
     raise KeyboardInterrupt
-
-
-def _limit(area: str, copies: queue.Queue[Copy], console: Console) -> float:
-    """Seconds that the tests of an area may take: thrice what they take on the code as it is."""
-    copy = copies.get()
-    seconds = copy.baseline(AREAS[area].tests_of(Path())).seconds
-    copies.put(copy)
-    console.print(f"{area}: the tests take {seconds:.0f} s and pass", highlight=False)
-    return 60.0 + 3.0 * seconds
 
 
 if __name__ == "__main__":

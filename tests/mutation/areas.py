@@ -1,4 +1,4 @@
-"""Which code is mutated, and which tests must notice: those near it, not whole flights."""
+"""Which code is mutated, and which tests must notice: those of its room."""
 
 from __future__ import annotations
 
@@ -10,83 +10,99 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 class Area(NamedTuple):
-    """Patterns of files below the root."""
+    """A room of a package and the tests that stand near it, as patterns below the root."""
 
     sources: tuple[str, ...]
     tests: tuple[str, ...]
+    marks: str = "not ros and not slow"
+    """Which of those tests run, as pytest's ``-m`` takes it."""
 
     def modules(self) -> Iterator[Path]:
         """Modules that may be mutated, relative to the root."""
         for pattern in self.sources:
-            found = (path.relative_to(ROOT) for path in _found(pattern))
-            yield from (path for path in found if path.name != "__init__.py")
+            paths = (path.relative_to(ROOT) for path in _paths(pattern))
+            yield from (path for path in paths if path.name != "__init__.py")
 
     def tests_of(self, module: Path) -> list[str]:
-        """Tests of the area, those that bear the module's name first."""
-        tests = {path.relative_to(ROOT) for pattern in self.tests for path in _found(pattern)}
-        return [str(path) for path in sorted(tests, key=lambda test: module.stem not in test.stem)]
+        """Tests of the area: those that bear the module's name first, then those of its folder."""
+        tests = {path.relative_to(ROOT) for pattern in self.tests for path in _paths(pattern)}
+        folder = module.parent.name
+
+        def distance(test: Path) -> tuple[bool, bool, Path]:
+            return module.stem not in test.stem, folder != test.parent.name, test
+
+        return [str(path) for path in sorted(tests, key=distance)]
 
 
-def _found(pattern: str) -> list[Path]:
-    if not (found := sorted(ROOT.glob(pattern))):
+def _paths(pattern: str) -> list[Path]:
+    if not (paths := sorted(ROOT.glob(pattern))):
         raise LookupError(f"no file is named {pattern}")
-    return found
+    return paths
 
 
-SIM, CONTROL, MSGS = "space_robot_sim", "space_robot_control", "space_robot_msgs_py"
+PACKAGES = {
+    "msgs": "space_robot_msgs_py",
+    "sim": "space_robot_sim",
+    "control": "space_robot_control",
+}
 
 
-def _rooms(package: str, *rooms: str, further: tuple[str, ...] = ()) -> Area:
-    """Rooms of a package with the tests that stand in rooms of the same names, and further ones."""
-    tests = f"tests/{package.split('_')[2]}"
+def _room(place: str, *further: str, marks: str = Area(sources=(), tests=()).marks) -> Area:
+    """A room such as ``sim/plant`` with the tests of the same name, and further ones."""
+    package, _, room = place.partition("/")
+    tests = (f"tests/{place}/**/test_*.py", *(f"tests/{name}" for name in further))
+    return Area((f"{PACKAGES[package]}/{room}/**/*.py",), tests, marks)
+
+
+def _files(place: str, *tests: str, marks: str = Area(sources=(), tests=()).marks) -> Area:
+    """The modules of a folder without those of the folders in it."""
+    package, _, room = place.partition("/")
     return Area(
-        tuple(f"{package}/{room}/**/*.py" for room in rooms),
-        (*(f"{tests}/{room}/**/test_*.py" for room in rooms), *further),
+        (str(Path(PACKAGES[package], room, "*.py")),),
+        tuple(f"tests/{name}" for name in tests),
+        marks,
     )
 
 
 CLOSED_LOOP = (
-    "tests/control/flight/test_compiled_loop.py", "tests/control/flight/test_closed_loop.py",
-)  # fmt: skip
-GUARDS = (
-    f"{CONTROL}/controller/supervisor.py", f"{MSGS}/wire/*_guard.py", f"{SIM}/plant/*_guard.py",
+    "control/flight/test_compiled_loop.py", "control/flight/test_closed_loop.py",
 )  # fmt: skip
 AREAS = {
-    "laws": _rooms(
-        CONTROL, "laws", further=("tests/control/controller/test_takeover.py", *CLOSED_LOOP)
+    "messages": _files("msgs", "msgs/test_*.py", "msgs/bag/test_*.py", marks="not slow"),
+    "bag": _room("msgs/bag"),
+    "compiled": _room("msgs/compiled"),
+    "config": _room("msgs/config", "control/cli/test_options.py"),
+    "ros": _room("msgs/ros", "control/flight/graph/test_graph_nodes.py", marks=""),
+    "wire": _room("msgs/wire"),
+    "actuators": _room(
+        "sim/actuators", "sim/plant/test_*.py", "control/controller/allocation/test_*.py"
     ),
-    "controller": _rooms(CONTROL, "controller", further=CLOSED_LOOP),
-    "mission": _rooms(CONTROL, "mission", further=CLOSED_LOOP),
-    "elementary": _rooms(SIM, "elementary"),
-    "dynamics": _rooms(
-        SIM, "dynamics",
-        further=("tests/sim/robot/test_*.py", "tests/sim/plant/test_conservation.py",
-                 "tests/sim/plant/test_plant.py"),
+    "dynamics": _room(
+        "sim/dynamics", "sim/robot/test_*.py", "sim/plant/test_conservation.py",
+        "sim/plant/test_plant.py",
     ),
-    "robot": _rooms(SIM, "robot", further=("tests/sim/dynamics/test_equations_of_motion.py",)),
-    "environment": _rooms(SIM, "environment", further=("tests/sim/plant/test_plant.py",)),
-    "faults": _rooms(
-        SIM, "faults", further=("tests/sim/sensors/test_*.py", "tests/sim/plant/test_*.py")
+    "elementary": _room("sim/elementary"),
+    "environment": _room("sim/environment", "sim/plant/test_*.py"),
+    "faults": _room("sim/faults", "sim/sensors/test_*.py", "sim/plant/test_*.py"),
+    "plant": _room("sim/plant"),
+    "robot": _room("sim/robot", "sim/dynamics/test_equations_of_motion.py"),
+    "sensors": _room("sim/sensors", "sim/plant/test_*.py"),
+    "nodes": Area(
+        (f"{PACKAGES['sim']}/*.py", f"{PACKAGES['control']}/*.py"),
+        ("tests/control/flight/graph/test_graph_nodes.py",), "",
     ),
-    "sensors": Area(
-        (f"{SIM}/sensors/*.py", f"{SIM}/actuators/*.py"),
-        ("tests/sim/sensors/test_*.py", "tests/sim/plant/test_*.py"),
-    ),
-    "plant": _rooms(SIM, "plant"),
-    "guards": Area(
-        GUARDS,
-        ("tests/control/controller/test_supervisor.py", "tests/msgs/wire/test_*_guard.py",
-         "tests/sim/plant/test_command_guard.py"),
-    ),
-    "metrics": _rooms(CONTROL, "analysis"),
-    "view": _rooms(CONTROL, "view"),
-    "flight": Area(
-        (f"{CONTROL}/flight/*.py",), ("tests/control/flight/test_*.py",),
-    ),
-    "bag": _rooms(MSGS, "bag"),
-    "wire": _rooms(MSGS, "wire"),
-    "config": _rooms(MSGS, "config"),
-    "compiled": _rooms(MSGS, "compiled"),
+    "analysis": _room("control/analysis", marks="not ros"),
+    "campaign": _room("control/campaign", marks="not ros"),
+    "cli": _room("control/cli", "test_start_up.py", marks="not ros"),
+    "controller": _room("control/controller", *CLOSED_LOOP),
+    "flight": _files("control/flight", "control/flight/test_*.py"),
+    "graph": _room("control/flight/graph", marks=""),
+    "replay": _room("control/flight/replay", marks=""),
+    "laws": _room("control/laws", "control/controller/test_takeover.py", *CLOSED_LOOP),
+    "mission": _room("control/mission", *CLOSED_LOOP),
+    "paper": _room("control/paper", "control/cli/test_stability_command.py", marks="not ros"),
+    "scenario": _room("control/scenario", marks="not ros"),
+    "tuning": _room("control/tuning", "control/cli/test_gains_command.py", marks="not ros"),
+    "view": _room("control/view", "control/cli/test_view_command.py", marks="not ros"),
 }  # fmt: skip
-"""By what is said on the command line. The tests of an area are those without the marks ros and
-slow: they would take minutes for each mutant."""
+"""Every module of the three packages is in one of them, by what is said on the command line."""

@@ -79,7 +79,7 @@ def _without(source: str, occurrence: int) -> str:
 
 
 def _unused_ranges(tree: ast.AST) -> Iterator[Place]:
-    """Annotations, which nobody evaluates, `slots=True` of classes, and texts of errors."""
+    """What no test can notice: annotations, `slots=True`, texts, lines of a script or a checker."""
     for node in ast.walk(tree):
         parts: list[Any] = []
         if isinstance(node, ast.FunctionDef):
@@ -88,11 +88,19 @@ def _unused_ranges(tree: ast.AST) -> Iterator[Place]:
             parts = list(node.decorator_list)
         elif isinstance(node, ast.arg | ast.AnnAssign):
             parts = [node.annotation]
-        elif isinstance(node, ast.JoinedStr):
+        elif isinstance(node, ast.JoinedStr) or _is_for_tools(node):
             parts = [node]
         for part in parts:
             if part is not None:
                 yield (part.lineno, part.col_offset), (part.end_lineno, part.end_col_offset)
+
+
+def _is_for_tools(node: ast.AST) -> bool:
+    """Return True for ``if TYPE_CHECKING`` and ``if __name__ == "__main__"``."""
+    if not isinstance(node, ast.If):
+        return False
+    names = {part.id for part in ast.walk(node.test) if isinstance(part, ast.Name)}
+    return bool(names & {"TYPE_CHECKING", "__name__"})
 
 
 @cache
@@ -113,6 +121,12 @@ def mutants(module: Path) -> dict[int, list[Mutant]]:
             if not any(first <= start and stop <= last for first, last in unused):
                 found[start[0]].append(Mutant(module, name, occurrence, start[0]))
     for occurrence, node in enumerate(_deletable(parsed)):
+        start, stop = (
+            (node.lineno, node.col_offset),
+            (node.end_lineno or 0, node.end_col_offset or 0),
+        )
+        if any(first <= start and stop <= last for first, last in unused):
+            continue
         found[node.lineno].append(Mutant(module, DELETE, occurrence, node.lineno))
     return dict(found)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -16,6 +17,9 @@ from typing import NamedTuple
 from areas import ROOT
 from mutants import Mutant
 
+LIMIT_S = 1200.0
+"""Time for the tests of one mutant; one that makes them hang is noticed."""
+
 
 class Outcome(NamedTuple):
     """What the tests said."""
@@ -23,7 +27,7 @@ class Outcome(NamedTuple):
     verdict: str
     """killed, timeout, survived."""
     by: str
-    """The test that failed first."""
+    """The test that failed first; empty where not even the tests could be collected."""
     seconds: float
 
 
@@ -34,6 +38,7 @@ class Copy:
         self._tree, self._kernels = folder / "tree", folder / "kernels"
         self._process: subprocess.Popen[str] | None = None
         self._stopped = False
+        self._passing: set[str] = set()
         listed = subprocess.run(
             ["git", "ls-files", "-co", "--exclude-standard"],
             cwd=ROOT, check=True, text=True, capture_output=True,
@@ -44,28 +49,27 @@ class Copy:
                 target.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy2(ROOT / name, target)
 
-    def baseline(self, tests: Sequence[str]) -> Outcome:
-        """The tests on the code as it is, kernels compiled anew.
+    def trial(self, mutant: Mutant, tests: Sequence[str], marks: str) -> Outcome:
+        """Run the tests on a mutant.
 
         Raises:
-            RuntimeError: they fail.
+            RuntimeError: the test that fails also fails without the mutant.
         """
-        outcome = self._test(tests, limit_s=3600.0)
-        if outcome.verdict != "survived":
-            raise RuntimeError(f"without any mutant: {outcome}")
-        return outcome
-
-    def trial(self, mutant: Mutant, tests: Sequence[str], limit_s: float) -> Outcome:
-        """What the tests say of a mutant."""
         module, kept = self._tree / mutant.module, set(self._caches())
         original = module.read_bytes()
         try:
             module.write_text(mutant.text(), encoding="utf-8")
-            return self._test(tests, limit_s)
+            outcome = self._test(tests, marks)
         finally:
             module.write_bytes(original)
             for folder in set(self._caches()) - kept:
                 shutil.rmtree(folder)
+        if outcome.verdict == "killed" and outcome.by not in self._passing:
+            without = self._test([outcome.by or tests[0]], marks)
+            if without.verdict != "survived":
+                raise RuntimeError(f"without any mutant: {without}")
+            self._passing.add(outcome.by)
+        return outcome
 
     def stop(self) -> None:
         """End the tests that run, and begin no others."""
@@ -77,7 +81,7 @@ class Copy:
     def _caches(self) -> Iterable[Path]:
         return self._kernels.iterdir() if self._kernels.exists() else ()
 
-    def _test(self, tests: Sequence[str], limit_s: float) -> Outcome:
+    def _test(self, tests: Sequence[str], marks: str) -> Outcome:
         """Run pytest until the first failure."""
         environment = {
             **os.environ,
@@ -88,13 +92,13 @@ class Copy:
         begun = time.monotonic()
         process = subprocess.Popen(
             [sys.executable, "-m", "pytest", "-x", "-p", "no:cacheprovider", "--tb=no",
-             "-m", "not ros and not slow", *tests],
+             "-m", marks, *tests],
             cwd=self._tree, env=environment, text=True, start_new_session=True,
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
         )  # fmt: skip
         self._process = process
         try:
-            output, _ = process.communicate(timeout=limit_s)
+            output, _ = process.communicate(timeout=LIMIT_S)
         except subprocess.TimeoutExpired:
             return Outcome("timeout", "", time.monotonic() - begun)
         finally:
@@ -107,5 +111,5 @@ class Copy:
         seconds = time.monotonic() - begun
         if process.returncode == 0:
             return Outcome("survived", "", seconds)
-        failed = [line for line in output.splitlines() if line.startswith(("FAILED", "ERROR"))]
-        return Outcome("killed", failed[0].split(" - ")[0] if failed else output[-200:], seconds)
+        failed = re.findall(r"^(?:FAILED|ERROR) (.*?)(?: - .*)?$", output, re.MULTILINE)
+        return Outcome("killed", failed[0] if failed else "", seconds)
