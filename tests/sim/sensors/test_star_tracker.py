@@ -47,10 +47,12 @@ def test_it_is_sampled_held_and_late_to_the_tick(interval: int, delay: int) -> N
     assert ticks_shown(bench, 200) == expected
 
 
-def test_an_interval_is_a_whole_number_of_ticks() -> None:
-    bench = Bench(star_tracker={"rate": 300.0, "delay": 0.0012})  # 6.67 ticks, 2.4 ticks
-    assert bench.block[0].star_tracker.interval == 7
-    assert bench.block[0].star_tracker.delay == 2
+@pytest.mark.parametrize("period", [PERIOD, 4e-3])
+def test_an_interval_is_a_whole_number_of_ticks(period: float) -> None:
+    """The nearest, at any period."""
+    settings = {"rate": 1.0 / (6.67 * period), "delay": 2.4 * period}
+    tracker = Bench(period=period, star_tracker=settings).block[0].star_tracker
+    assert (tracker.interval, tracker.delay) == (7, 2)
 
 
 @pytest.mark.parametrize("boresight", [[0.0, 0.0, 1.0], [1.0, 2.0, -2.0]])
