@@ -72,7 +72,7 @@ def test_lost_states_are_bridged() -> None:
 
 
 def ramped_state_at(tick: int) -> RobotState:
-    """As `state_at`; rates and joint rates rise evenly, and from tick 301 on a torque is applied."""
+    """As `state_at`; rates and joint rates rise evenly, from tick 301 on a torque is applied."""
     state, t = state_at(tick), tick * PERIOD
     taken = max(0, (tick - 20) // 20 * 20) * PERIOD
     state.quaternion[:] = exponential(OMEGA * (taken + 2.0 * taken * taken))
