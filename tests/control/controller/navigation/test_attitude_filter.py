@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from attitude_sensors import (
@@ -18,6 +20,7 @@ from attitude_sensors import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles import skew
+from paths import ROOT
 from scipy.linalg import expm, solve_discrete_are
 from scipy.stats import chi2
 
@@ -267,6 +270,58 @@ def test_an_update_is_kalmans_within_the_gate_and_none_beyond(
     np.testing.assert_allclose(filter.bias - bias, moved[3:], rtol=1e-6, atol=1e-14)
     found = attitude_error(truth, filter.quaternion)
     np.testing.assert_allclose(found, moved[:3], rtol=1e-6, atol=1e-12)
+
+
+# What the gyro does that the filter does not know
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
+def test_a_jump_of_the_rate_costs_up_to_half_of_it_times_the_tick(share: float) -> None:
+    """``(s - 1/2) jump h``, at a share s of the tick, until the tracker measures again."""
+    case, jump, when = Case(period=5e-4, interval=400), np.array([0.02, -0.03, 0.01]), 200
+    ticks = np.arange(350)
+    since = np.maximum(0.0, ticks - when - share)[:, np.newaxis]
+    truth = exponential(since * case.period * jump)
+    rates = np.where(ticks[:, np.newaxis] > when, jump, 0.0)
+    found = filtered(case, Measured(np.tile(truth[0], (len(ticks), 1)), rates, 0.0 * rates))
+    error = attitude_error(found.present, truth)
+    np.testing.assert_array_equal(error[: when + 1], 0.0)
+    expected = (0.5 - share) * case.period * jump
+    np.testing.assert_allclose(error[when + 1 :], np.tile(expected, (149, 1)), atol=1e-10)
+
+
+def test_against_a_scale_error_a_walk_of_the_bias_helps_and_its_first_variance_does_not() -> None:
+    """The numbers of docs/manual/navigation.md: RMS an axis in a turn that comes after a rest."""
+    scale, rate, duration = 3e-4, np.radians(1.0), 60.0
+    tactical = Case(
+        across=4e-5, about=3e-4, arw=2.9e-6, rrw=8e-8, bias=4.8e-6, period=5e-3, interval=40,
+        delay=30,
+    )  # fmt: skip
+    time = tactical.period * np.arange(round(2.0 * duration / tactical.period))
+    omega, turning = rate * np.array([0.6, 0.0, 0.8]), (time > duration)[:, np.newaxis]
+    attitudes = exponential(omega * np.maximum(0.0, time - duration)[:, np.newaxis])
+    rates, late = np.where(turning, omega, 0.0), time > duration + 2.0
+    flights = [
+        measure(tactical, attitudes, rates, np.random.default_rng(seed)) for seed in range(8)
+    ]
+
+    def error(case: Case, scale: float) -> float:
+        squares = [
+            attitude_error(
+                filtered(case, seen._replace(gyro=seen.gyro + scale * rates)).present, attitudes
+            )[late] ** 2
+            for seen in flights
+        ]  # fmt: skip
+        return float(np.sqrt(np.mean(squares)))
+
+    found = [
+        error(tactical, scale), error(tactical._replace(bias=scale * rate), scale),
+        error(tactical._replace(rrw=scale * rate / duration**0.5), scale), error(tactical, 0.0),
+    ]  # fmt: skip
+    text = (ROOT / "docs/manual/navigation.md").read_text("utf-8")
+    (paragraph,) = (part for part in text.split("\n\n") if "scale error e is" in part)
+    shown = [float(number) for number in re.findall(r"by (\d\.\de-5)", paragraph)]
+    np.testing.assert_allclose(found, shown, atol=0.06e-5)
 
 
 # Signs, the same twice, outliers
