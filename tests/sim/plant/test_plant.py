@@ -265,6 +265,38 @@ def test_divergence_is_an_error_with_its_tick(paper_robot: Robot, torque: float,
     assert "tick 8 (t = 0.0040 s)" in str(caught.value)
 
 
+@pytest.mark.parametrize("saved_at", [3, 250, 300])
+def test_a_plant_that_goes_back_flies_the_same_bits_again(
+    paper_robot: Robot, saved_at: int
+) -> None:
+    """Over blocks of noise, faults that begin and end, late commands and a capture."""
+    target = '{"mass": 9.0, "inertia": [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]}'
+    plant = plant_of(
+        paper_robot, friction=FrictionSettings(), command_latency_ticks=3, fault_seed=4,
+        gyro={"angle_random_walk": 1e-3, "rate_random_walk": 1e-2}, encoders={"noise": 1e-3},
+        star_tracker={"noise_across": 1e-3, "rate": 100.0, "delay": 0.02},
+        faults=["stuck_joint@0.1-0.135:2=9", "noise_gyro@0.14-0.16:1", "saturate_joints@0.13:0.3"],
+        events=[f"capture@0.14:{target}"],
+    )  # fmt: skip
+    torques = np.random.default_rng(1).normal(size=(600, 9))
+
+    def flown(begin: int, end: int) -> Array:
+        rows = []
+        for tick in range(begin, end):
+            plant.step(Command(tick, torques[tick]))
+            rows.append(np.concatenate([plant.state.numbers, plant.truth.numbers]))
+        return np.array(rows)
+
+    flown(0, saved_at)
+    saved = plant.save()
+    first, mass = flown(saved_at, 600), plant.robot.mass.sum()
+    for _ in range(2):
+        plant.restore(saved)
+        assert plant.tick == saved_at
+        np.testing.assert_array_equal(flown(saved_at, 600), first)
+        assert plant.robot.mass.sum() == mass
+
+
 @given(st.integers(0, 2**32 - 1), st.integers(0, 4))
 def test_the_fastest_rate_is_of_base_joints_and_wheels(seed: int, wheels: int) -> None:
     """And NaN if any of them is; how fast the base drifts does not count."""

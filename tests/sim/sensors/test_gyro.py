@@ -75,17 +75,19 @@ def test_each_sample_is_the_exact_discretisation_of_both_walks(period: float, sh
 
 
 def test_at_tick_0_there_is_the_initial_bias_and_white_noise() -> None:
-    """The variance of single samples, over 1000 seeds: sigma_v^2 / h + sigma_u^2 h / 12."""
+    """The variance of samples, over 1000 seeds: sigma_v^2 / h + sigma_u^2 h / 12 + sigma^2."""
     sigma_v, sigma_u, period, bias = 1e-4, 1e-2, 0.05, np.array([1.0, -2.0, 3.0])
+    sigma = 5e-4
     settings = {
         "angle_random_walk": sigma_v, "rate_random_walk": sigma_u, "initial_bias": bias.tolist(),
+        "noise": sigma,
     }  # fmt: skip
     bench, state = Bench(period=period, gyro=settings), RobotState.allocate(N)
     rates = np.empty((1000, 3))
     for seed in range(len(rates)):
         bench.draws.drawn = seed, -1
         rates[seed] = bench.measure(state).omega_base - bias
-    expected = sigma_v**2 / period + sigma_u**2 * period / 12.0
+    expected = sigma_v**2 / period + sigma_u**2 * period / 12.0 + sigma**2
     assert np.mean(rates**2) == pytest.approx(expected, rel=5.0 * np.sqrt(2.0 / rates.size))
 
 

@@ -100,6 +100,15 @@ def test_a_blind_tracker_tells_what_it_told_last() -> None:
     assert shown[95:] == [90] * 5
 
 
+def test_the_first_measurement_is_there_at_once_with_its_noise() -> None:
+    """However late the others are; then each is held until the next is released."""
+    settings = {"rate": 1.0 / (10 * PERIOD), "delay": 25 * PERIOD, "noise_across": 1e-3}
+    bench = Bench(truth=turning(0), star_tracker=settings)
+    told = np.array([bench.measure(turning(tick)).quaternion.copy() for tick in range(60)])
+    assert (told[0] != turning(0).quaternion).any()
+    assert np.flatnonzero(np.diff(told, axis=0).any(axis=1)).tolist() == [34, 44, 54]
+
+
 def test_a_tracker_that_is_blind_from_the_start_tells_where_the_base_was() -> None:
     bench = Bench("tracker_blind@0-0.01", truth=turning(0), star_tracker={"noise_across": 0.1})
     for tick in range(20):
