@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -102,3 +103,19 @@ def cases(draw: st.DrawFn, joints: Sequence[int] = JOINTS) -> Case:
     n = draw(st.sampled_from(joints))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     return Case(random_robot(rng, n), random_state(rng, n), rng)
+
+
+@st.composite
+def branched_cases(draw: st.DrawFn, joints: Sequence[int] = JOINTS) -> Case:
+    """As `cases`: of trees, whose joints turn and slide and are in the order of visiting."""
+    n = draw(st.sampled_from(joints))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    path, parents = [0], []
+    for joint in range(n):  # each on the body before it, or on one that this one is on
+        path = path[: rng.integers(1, len(path) + 1)]
+        parents.append(path[-1])
+        path.append(joint + 1)
+    robot = replace(
+        random_robot(rng, n), parent=np.array(parents), is_prismatic=rng.random(n) < 0.3
+    )  # fmt: skip
+    return Case(robot, random_state(rng, n), rng)

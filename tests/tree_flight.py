@@ -101,17 +101,21 @@ class TreeFlight:
         stiffness = np.array([spring.stiffness for spring in self.robot.springs])
         return float(0.5 * stiffness @ stretched**2)
 
-    def derivative(self, torque: Array, q: Array, v: Array) -> Array:
-        """Of ``[q, v]``: motors and springs push, friction brakes."""
+    def derivative(self, torque: Array, q: Array, v: Array, disturbed: Array) -> Array:
+        """Of ``[q, v]``: motors and springs push, friction brakes.
+
+        ``disturbed`` (n+3,) N m: taken from the base, about inertial axes, and from the motors.
+        """
         robot, columns, n = self.robot, self.oracle.columns, self.robot.n
         tau, own = np.zeros(self.model.nv), np.array(robot.friction)[:, 1]
         usual = np.where(np.arange(robot.joint_count) < n, self.viscous, 0.0)
-        tau[3:6], tau[columns[:n]] = torque[:3], torque[3:]
+        turn = pin.Quaternion(q[3:7] / np.linalg.norm(q[3:7]))
+        tau[3:6] = torque[:3] - turn.matrix().T @ disturbed[:3]
+        tau[columns[:n]] = torque[3:] - disturbed[3:]
         tau[columns] -= np.where(np.isnan(own), usual, own) * v[columns]
         for column, spring in zip(columns[n:], robot.springs, strict=True):
             stretched = q[column + 1] - spring.rest
             tau[column] -= spring.stiffness * stretched + spring.damping * v[column]
-        turn = pin.Quaternion(q[3:7] / np.linalg.norm(q[3:7]))
         x, y, z, w = q[3:7]
         omega = v[3:6]
         rate = 0.5 * np.array([*(w * omega + np.cross([x, y, z], omega)), -omega @ [x, y, z]])

@@ -193,6 +193,10 @@ def test_on_a_turning_base_torque_becomes_force_with_the_attitude_it_began_at(
         np.testing.assert_allclose(j0.T @ force[:3], torque[:3], rtol=1e-9, atol=1e-9)
         np.testing.assert_array_equal(force[3:], torque[3:])
         np.testing.assert_array_equal(controller.block[0].pair.applied_force, force)
+        state.tick += 1  # the next interval began at ``later``
+        controller.update(state, reference)
+        j0 = attitude_jacobian_base(sign * later)
+        np.testing.assert_allclose(j0.T @ force[:3], torque[:3], rtol=1e-9, atol=1e-9)
 
 
 # Taking over

@@ -11,7 +11,7 @@ from oracles import (
     pinocchio_mass_matrix,
     rotation_of,
 )
-from random_robots import Case, State, cases
+from random_robots import Case, State, branched_cases, cases
 
 from space_robot_msgs_py.samples import ReferenceChunk
 from space_robot_sim import Robot
@@ -39,7 +39,7 @@ def half_turned(s: State) -> State:
 
 
 @FEW
-@given(cases())
+@given(cases() | branched_cases())
 def test_joints_are_the_schur_complement_of_pinocchios_h_and_c(case: Case) -> None:
     """At any attitude, half a turn included; the base's axes stand apart."""
     robot = case.robot
@@ -57,7 +57,7 @@ def test_joints_are_the_schur_complement_of_pinocchios_h_and_c(case: Case) -> No
 
 
 @FEW
-@given(cases())
+@given(cases() | branched_cases())
 def test_torques_of_the_joints_alone_cause_the_acceleration_wanted(case: Case) -> None:
     """``tau = H_f thetadd + c_f`` with any momentum, by Pinocchio's articulated bodies."""
     robot, s, rng = case
@@ -71,7 +71,7 @@ def test_torques_of_the_joints_alone_cause_the_acceleration_wanted(case: Case) -
 
 
 @FEW
-@given(cases())
+@given(cases() | branched_cases())
 def test_inverse_dynamics_is_pinocchios_without_momentum(case: Case) -> None:
     """The base turns as momentum asks, and its axes get nothing."""
     robot, s, rng = case

@@ -11,7 +11,7 @@ from oracles import (
     pinocchio_mass_matrix,
     rotation_of,
 )
-from random_robots import Case, State, cases, random_state
+from random_robots import Case, State, branched_cases, cases, random_state
 
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import Reference
@@ -40,7 +40,7 @@ def in_inertial(state: State, torque: Array) -> Array:
 
 
 @FEW
-@given(cases())
+@given(cases() | branched_cases())
 def test_it_is_what_moves_pinocchios_robot_so(case: Case) -> None:
     """And the base's CoM is free: no force holds it."""
     robot, rng = case.robot, case.rng
@@ -53,7 +53,7 @@ def test_it_is_what_moves_pinocchios_robot_so(case: Case) -> None:
 
 
 @FEW
-@given(cases())
+@given(cases() | branched_cases())
 def test_it_is_the_equation_of_motion_without_the_base_translation(case: Case) -> None:
     """``tau = H22 a + c2 - H21 H11^-1 (H12 a + c1)``, H and c by Pinocchio."""
     robot, state = case.robot, case.state

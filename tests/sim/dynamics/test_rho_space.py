@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from numpy.typing import NDArray
 from oracles import attitude_jacobian_inertial, rotation_of, skew, turned
-from random_robots import Case, State, cases, random_state
+from random_robots import Case, State, branched_cases, cases, random_state
 
 from space_robot_sim import Robot, bias_force, forward_dynamics, mass_matrix
 from space_robot_sim.dynamics.rho_space import RhoSpaceModel, rho_space_into
@@ -54,7 +54,7 @@ def assert_relative(actual: Array, expected: Array, tolerance: float = 1e-10) ->
 
 
 @FEW
-@given(cases())
+@given(cases() | branched_cases())
 def test_model_agrees_with_the_formulas_in_the_spec(case: Case) -> None:
     """``H_S = J^-T H_r J^-1``, ``c_S = J^-T (c_r - H_r J^-1 Jdot J^-1 rhodot)``."""
     robot, s, _ = case
@@ -71,7 +71,7 @@ def test_model_agrees_with_the_formulas_in_the_spec(case: Case) -> None:
 
 
 @FEW
-@given(cases())
+@given(cases() | branched_cases())
 def test_elimination_before_and_after_the_change_of_coordinates_agree(case: Case) -> None:
     """(25) on all n+6 coordinates, then the Schur complement, is the same model."""
     robot, s, _ = case
@@ -92,7 +92,7 @@ def test_elimination_before_and_after_the_change_of_coordinates_agree(case: Case
 
 
 @FEW
-@given(cases())
+@given(cases() | branched_cases())
 def test_model_explains_the_motion_of_the_free_robot(case: Case) -> None:
     """H_S rhodd + c_S = F_S = J^-T F, rhodd from forward_dynamics with f0 = 0."""
     robot, s, rng = case
@@ -124,7 +124,7 @@ def test_convective_term_agrees_with_a_finite_difference_of_the_attitude(
 
 
 @FEW
-@given(cases())
+@given(cases() | branched_cases())
 def test_inertia_is_symmetric_positive_definite(case: Case) -> None:
     assume(abs(case.state.quaternion[0]) > CLOSEST_ETA)
     inertia, _ = rho_space(case.robot, case.state)

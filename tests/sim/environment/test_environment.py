@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from pydantic import ValidationError
 from random_robots import random_robot
+from random_trees import KINDS, random_bodies
 
+from space_robot_msgs_py.samples import RobotNames
 from space_robot_sim.environment.disturbance import (
     Disturbance,
     DisturbanceSettings,
@@ -18,10 +20,14 @@ from space_robot_sim.environment.disturbance import (
 from space_robot_sim.environment.friction import (
     Friction,
     FrictionSettings,
+    StuckJoint,
     coefficients,
     friction_torque,
 )
 from space_robot_sim.environment.payload import PayloadSettings, with_payload
+from space_robot_sim.faults.grammar import parse_faults
+from space_robot_sim.faults.schedule import Schedule
+from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
@@ -53,6 +59,7 @@ def equation_61(n: int, k: float, t: float) -> Array:
     return np.array([*[base] * 3, *[inner] * 3, *[outer] * 6][: n + 3])
 
 
+@settings(max_examples=40)
 @given(st.integers(1, 9), st.sampled_from([0.0, 1.0, 2.0, 3.0]), st.floats(0.0, 30.0, width=32))
 def test_disturbance_is_equation_61(n: int, scale: float, time: float) -> None:
     """At any time, for all cases' amplitudes and any number of joints."""
@@ -130,6 +137,27 @@ def test_a_robots_own_friction_comes_before_the_settings() -> None:
     assert friction.viscous[:4].tolist() == [found[j, 1] for j in robot.order]
 
 
+@settings(max_examples=25)
+@given(st.integers(0, 2**32 - 1), st.lists(st.sampled_from(KINDS), min_size=2, max_size=8))
+def test_a_stuck_joint_is_the_one_named(seed: int, kinds: list[str]) -> None:
+    """Of a tree, in which passive joints and other branches come before it; and it comes free."""
+    bodies = random_bodies(np.random.default_rng(seed), ["revolute", *kinds])
+    robot = Robot.of_tree("tree", bodies)
+    names = RobotNames(robot.joint_names, passive=robot.passive_names)
+    friction = Friction.build(robot, FrictionSettings())
+    sound = friction.coulomb.copy()
+    rows = {robot.all_joint_names[joint]: row for row, joint in enumerate(robot.order)}
+    for name in robot.joint_names:
+        texts = [f"stuck_joint@1-2:{name}=9"]
+        stuck = StuckJoint(Schedule(parse_faults(texts, PLANT_KINDS), 0, 0.5, names))
+        stuck.apply(2, friction)
+        expected = sound.copy()
+        expected[rows[name]] = 9.0
+        np.testing.assert_array_equal(friction.coulomb, expected)
+        stuck.apply(4, friction)
+        np.testing.assert_array_equal(friction.coulomb, sound)
+
+
 def test_friction_of_a_joint_that_breaks_away_opposes_what_comes() -> None:
     """Not yet turning, it has the whole Coulomb torque; one that stands has none of its own."""
     joints, out = Friction.build(FOUR, FrictionSettings(coulomb=5.0)), np.empty(4)
@@ -160,7 +188,7 @@ def test_no_payload_is_the_nominal_robot(paper_robot: Robot) -> None:
 
 
 @pytest.mark.parametrize(
-    ("settings", "values"),
+    ("section", "values"),
     [
         (FrictionSettings, {"coulomb": -0.1}),
         (FrictionSettings, {"viscous": float("nan")}),
@@ -172,7 +200,7 @@ def test_no_payload_is_the_nominal_robot(paper_robot: Robot) -> None:
     ],
 )
 def test_settings_refuse_what_is_not_physical(
-    settings: type[FrictionSettings], values: dict[str, float]
+    section: type[FrictionSettings], values: dict[str, float]
 ) -> None:
     with pytest.raises(ValidationError, match=next(iter(values))):
-        settings(**values)
+        section(**values)

@@ -6,11 +6,18 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from hypothesis import given, settings
-from oracles import pinocchio_model, pinocchio_state, rotation_of
+from hypothesis import strategies as st
+from oracles import pinocchio_state, rotation_of
 from random_robots import Case, State, cases
+from wheel_oracles import pinocchio_with_wheels, random_rotors, settings_of
 
 from space_robot_msgs_py.samples import RobotState
-from space_robot_sim.plant.conservation import generalised_velocity, kinetic_energy, momentum
+from space_robot_sim.plant.conservation import (
+    NO_WHEELS,
+    generalised_velocity,
+    kinetic_energy,
+    momentum,
+)
 
 FEW = settings(max_examples=40)
 
@@ -28,31 +35,30 @@ def measured(state: State, position: np.ndarray) -> RobotState:
 
 
 @FEW
-@given(cases())
-def test_momentum_agrees_with_pinocchio(case: Case) -> None:
-    """Centroidal momentum, moved from the CoM to the inertial origin."""
+@given(cases(), st.sampled_from([0, 1, 4]))
+def test_momentum_and_kinetic_energy_agree_with_pinocchio(case: Case, count: int) -> None:
+    """Centroidal momentum, moved from the CoM to the inertial origin; wheels are bodies there."""
     robot, state, rng = case
-    position = rng.normal(size=3)
-    model = pinocchio_model(robot)
+    position, rotors = rng.normal(size=3), random_rotors(rng, robot, count) if count else []
+    sample = measured(state, position)
+    sample.wheel_velocities[:count] = speeds = 100.0 * rng.normal(size=count)
+    model = pinocchio_with_wheels(robot, rotors)
     data = model.createData()
-    configuration, velocity = pinocchio_state(state, position)
+    moving = state._replace(
+        theta=np.concatenate([state.theta, rng.normal(size=count)]),
+        rate=np.concatenate([state.rate, speeds]),
+    )  # fmt: skip
+    configuration, velocity = pinocchio_state(moving, position)
     about_com = pin.computeCentroidalMomentum(model, data, configuration, velocity)
     com = pin.centerOfMass(model, data, configuration)
-    linear, angular = momentum(robot, measured(state, position))
+    wheels = settings_of(rotors) if count else NO_WHEELS
+    linear, angular = momentum(robot, sample, wheels)
     expected = about_com.angular + np.cross(com, about_com.linear)
     scale = np.abs(expected).max() + np.abs(about_com.linear).max()
     np.testing.assert_allclose(linear, about_com.linear, atol=1e-12 * scale)
     np.testing.assert_allclose(angular, expected, atol=1e-12 * scale)
-
-
-@FEW
-@given(cases())
-def test_kinetic_energy_agrees_with_pinocchio(case: Case) -> None:
-    robot, state, rng = case
-    model = pinocchio_model(robot)
-    expected = pin.computeKineticEnergy(model, model.createData(), *pinocchio_state(state))
-    sample = measured(state, rng.normal(size=3))
-    assert kinetic_energy(robot, sample) == pytest.approx(expected, rel=1e-12)
+    energy = pin.computeKineticEnergy(model, data, configuration, velocity)
+    assert kinetic_energy(robot, sample, wheels) == pytest.approx(energy, rel=1e-12)
 
 
 @FEW

@@ -7,19 +7,22 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import pinocchio_acceleration, pinocchio_model, rotation_of
 from pydantic import ValidationError
 from random_robots import State, random_quaternion, random_robot
 from scipy.integrate import solve_ivp
 
+from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.environment.payload import PayloadSettings
 from space_robot_sim.plant.conservation import kinetic_energy, momentum
-from space_robot_sim.plant.plant import Plant, PlantSettings
+from space_robot_sim.plant.plant import Plant, PlantSettings, fastest_rate
 from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
@@ -126,21 +129,21 @@ def test_integration_is_of_fourth_order() -> None:
 
 
 @pytest.mark.parametrize("friction", [SMOOTH, FrictionSettings()], ids=["smooth", "friction"])
-def test_momentum_is_conserved_over_30_s_of_violent_arm_motion(
+def test_momentum_is_conserved_over_10_s_of_violent_arm_motion(
     paper_robot: Robot, friction: FrictionSettings
 ) -> None:
     """Motors and friction are internal: what starts at rest keeps zero momentum.
 
     Also the quaternion stays unit, at every sample.
     """
-    time = np.arange(60_000)[:, np.newaxis] * PERIOD
+    time = np.arange(20_000)[:, np.newaxis] * PERIOD
     amplitude = np.array([80.0, 100.0, 60.0, 12.0, 10.0, 5.0])
     frequency = np.array([0.31, 0.43, 0.37, 0.9, 1.1, 1.3])
-    torques = np.zeros((60_000, 9))
+    torques = np.zeros((20_000, 9))
     torques[:, 3:] = amplitude * np.cos(2.0 * np.pi * frequency * time)
     plant = plant_of(paper_robot, initial_joints_deg=START_DEG, friction=friction)
     fastest = np.zeros(6)
-    for stretch in torques.reshape(300, 200, 9):
+    for stretch in torques.reshape(100, 200, 9):
         state = fly(plant, stretch)
         linear, angular = momentum(paper_robot, state)
         assert np.abs(linear).max() < 1e-9
@@ -148,7 +151,7 @@ def test_momentum_is_conserved_over_30_s_of_violent_arm_motion(
         assert abs(np.linalg.norm(state.quaternion) - 1.0) < 1e-15
         fastest = np.maximum(fastest, np.abs(state.joint_velocities))
     assert fastest.max() > 3.0, "joints must swing at several rad/s for this to mean much"
-    assert plant.tick == 60_000
+    assert plant.tick == 20_000
 
 
 def test_angular_momentum_grows_by_the_base_torque_only(paper_robot: Robot) -> None:
@@ -260,6 +263,52 @@ def test_divergence_is_an_error_with_its_tick(paper_robot: Robot, torque: float,
         fly(plant, np.full((5, 9), torque))
     assert caught.value.tick == plant.tick == 8
     assert "tick 8 (t = 0.0040 s)" in str(caught.value)
+
+
+@pytest.mark.parametrize("saved_at", [3, 250, 300])
+def test_a_plant_that_goes_back_flies_the_same_bits_again(
+    paper_robot: Robot, saved_at: int
+) -> None:
+    """Over blocks of noise, faults that begin and end, late commands and a capture."""
+    target = '{"mass": 9.0, "inertia": [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]}'
+    plant = plant_of(
+        paper_robot, friction=FrictionSettings(), command_latency_ticks=3, fault_seed=4,
+        gyro={"angle_random_walk": 1e-3, "rate_random_walk": 1e-2}, encoders={"noise": 1e-3},
+        star_tracker={"noise_across": 1e-3, "rate": 100.0, "delay": 0.02},
+        faults=["stuck_joint@0.1-0.135:2=9", "noise_gyro@0.14-0.16:1", "saturate_joints@0.13:0.3"],
+        events=[f"capture@0.14:{target}"],
+    )  # fmt: skip
+    torques = np.random.default_rng(1).normal(size=(600, 9))
+
+    def flown(begin: int, end: int) -> Array:
+        rows = []
+        for tick in range(begin, end):
+            plant.step(Command(tick, torques[tick]))
+            rows.append(np.concatenate([plant.state.numbers, plant.truth.numbers]))
+        return np.array(rows)
+
+    flown(0, saved_at)
+    saved = plant.save()
+    first, mass = flown(saved_at, 600), plant.robot.mass.sum()
+    for _ in range(2):
+        plant.restore(saved)
+        assert plant.tick == saved_at
+        np.testing.assert_array_equal(flown(saved_at, 600), first)
+        assert plant.robot.mass.sum() == mass
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 4))
+def test_the_fastest_rate_is_of_base_joints_and_wheels(seed: int, wheels: int) -> None:
+    """And NaN if any of them is; how fast the base drifts does not count."""
+    rng, n = np.random.default_rng(seed), 3
+    model, x = random_robot(rng, n).model.copy(), rng.normal(size=13 + 2 * n + wheels + 2)
+    assign(model, wheel_count=wheels)
+    rates = x[10 + n : 13 + 2 * n + wheels]
+    x[: 10 + n] *= 1e3
+    x[x.size - 2 :] = np.nan  # behind the last wheel
+    assert fastest_rate(model, x) == np.abs(rates).max()
+    rates[rng.integers(rates.size)] = np.nan
+    assert np.isnan(fastest_rate(model, x))
 
 
 def test_initial_configuration_must_fit_the_robot(paper_robot: Robot) -> None:

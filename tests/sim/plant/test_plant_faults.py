@@ -57,10 +57,14 @@ def test_a_time_without_a_tick_is_an_error() -> None:
 
 @given(st.integers(0, 2**31 - 1), st.integers(0, 5000))
 def test_draws_depend_on_seed_place_and_tick_alone(seed: int, tick: int) -> None:
-    """Not on when the fault began, what was asked before, nor its neighbours."""
+    """Not on when the fault began, what was asked before, whether it happens, nor neighbours."""
     early, late = scheduled("drop_state@0:0.5", seed=seed), scheduled("drop_state@0.01", seed=seed)
     early.choose(3, 10)
     assert early.choose(tick, 1000) == late.choose(tick, 1000)
+    happened = [t for t in range(400) if early.happens_at(t)]
+    chosen = [early.choose(t, 1000) for t in happened]
+    assert len(happened) == pytest.approx(200, abs=50)
+    assert np.mean(chosen) == pytest.approx(499.5, abs=5.0 * 289.0 / len(chosen) ** 0.5)
     texts = ["drop_state@0:1", "drop_state@0:1"]
     one, two = Schedule(parse_faults(texts, PLANT_KINDS), seed, PERIOD).faults
     assert one.choose(tick, 10**9) != two.choose(tick, 10**9)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -18,16 +19,17 @@ from oracles import (
     rotation_of,
 )
 from random_robots import State, random_quaternion, random_robot
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 
 from space_robot_msgs_py.samples import Command
 from space_robot_sim.dynamics.attitude import quaternion_rate
 from space_robot_sim.dynamics.model import Data
+from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.plant.conservation import kinetic_energy, momentum
 from space_robot_sim.plant.integrator import Stages
 from space_robot_sim.plant.plant import Plant, PlantSettings
-from space_robot_sim.plant.stick_slip import slide_or_stand
+from space_robot_sim.plant.stick_slip import integrate, slide_or_stand
 from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
@@ -118,10 +120,10 @@ def test_joints_stand_or_break_away_as_coulombs_law_has_it(n: int, seed: int) ->
 
 @pytest.mark.parametrize("substeps", [1, 3])
 def test_a_joint_held_below_its_friction_stands_still(paper_robot: Robot, substeps: int) -> None:
-    """For 10 s, to the last bit, though the base is turned and the torque changes."""
+    """For 1 s, to the last bit, though the base is turned and the torque changes."""
     plant = plant_of(paper_robot, 0.02, 0.2, substeps=substeps)
     start = plant.state.joint_positions.copy()
-    for tick in range(20_000):
+    for tick in range(2_000):
         torque = np.full(9, 0.019 * np.sin(0.01 * tick))
         torque[:3] *= 0.01
         plant.step(Command(tick, torque))
@@ -163,6 +165,97 @@ def test_a_joint_comes_to_rest_when_and_where_it_should() -> None:
         plant.step(Command(tick, np.zeros(4)))
     assert plant.state.joint_velocities[0] == 0.0
     np.testing.assert_allclose(plant.state.joint_positions, exact.y[7:8, -1], rtol=0.0, atol=1e-13)
+
+
+SPIN, STEP = 0.5, 0.01
+"""kg m2 of each of six balls, and s, of one long step."""
+
+
+def balls(**disturbance: float) -> Plant:
+    """Balls turned about their own centres, on a base that none of them moves; it drifts."""
+    centred: dict[str, Any] = {"com": [0.0] * 3, "parent": "base"}
+    ball = {"mass": 1.0, "inertia": [SPIN] * 3 + [0.0] * 3, **centred}
+    base = {"mass": 1e9, "inertia": [1e12] * 3 + [0.0] * 3}
+    links = [{"name": f"ball{k}", **ball} for k in range(6)]
+    robot = Robot.from_dict({"robot": {"name": "balls", "base": base, "links": links}})
+    settings = DisturbanceSettings(
+        scale=1.0, base_amplitude=0.0, outer_amplitude=0.0, inner_frequencies=[5.0, 0.0],
+        **disturbance,
+    )  # fmt: skip
+    plant = plant_of(robot, 0.0, initial_joints_deg=[0.0] * 6, disturbance=settings)
+    plant.memory.x[13] = 2.0
+    return plant
+
+
+class Course(NamedTuple):
+    """Angle and rate after a torque that is a function of time, from a time on."""
+
+    angle: float
+    rate: float
+
+    @classmethod
+    def under(cls, torque: Callable[[float], float], begin: float, end: float) -> Course:
+        """From rest, by quadrature."""
+        rate = quad(torque, begin, end, epsabs=1e-13)[0]
+        angle = quad(lambda t: (end - t) * torque(t), begin, end, epsabs=1e-14)[0]
+        return cls(angle / SPIN, rate / SPIN)
+
+
+@pytest.mark.parametrize(
+    ("motor", "coulomb"), [(0.0, 1.0), (0.5, 0.3)], ids=["stands at first", "comes back at first"]
+)
+@pytest.mark.parametrize("tick", [0, 20])
+def test_where_one_joint_comes_to_rest_others_break_away(
+    motor: float, coulomb: float, tick: int
+) -> None:
+    """All in one step, under a disturbance that grows in it: against the integrals of the torques.
+
+    One joint stands at first, or would break away and come back; where others have come to rest, it
+    turns the other way. Three stop one after the other, and stay.
+    """
+    amplitude, begin = 10.0, tick * STEP
+
+    def disturbance(t: float) -> float:
+        return amplitude * np.sin(10.0 * np.pi * t)
+
+    plant, brake = balls(inner_amplitude=amplitude), 20.0
+    memory, stops = plant.memory, begin + np.array([0.005, 0.0075])
+    # how fast and far they go that are braked to rest at these times
+    thrown = [
+        Course.under(lambda t: brake + disturbance(t), begin, stop) for stop in stops.tolist()
+    ]
+    outer = 0.0025 * brake / SPIN
+    memory.environment.friction.coulomb[:4] = coulomb, brake, brake, brake
+    memory.x[14 + 6 : 17 + 6] = thrown[0].rate, thrown[1].rate, outer
+    memory.stages.actuation[6] = motor
+    integrate(memory.model, memory.environment, memory.x, begin, STEP, memory.stages)
+    rates, angles = memory.x[19:25], memory.x[7:13]
+    # slides back from the first stop on, that of the joint without disturbance
+    first = begin + 0.0025
+    if motor - disturbance(first) >= -coulomb:
+        first = float(stops[0])
+    slides = Course.under(lambda t: motor + coulomb - disturbance(t), first, begin + STEP)
+    assert slides.rate < -1e-3
+    np.testing.assert_allclose(rates, [slides.rate, *[0.0] * 5], rtol=0.0, atol=2e-7)
+    assert not rates[1:4].any()
+    ways = [
+        thrown[k].rate * (stop - begin) - thrown[k].angle for k, stop in enumerate(stops.tolist())
+    ]
+    expected = [slides.angle, *ways, 0.5 * 0.0025 * outer, 0.0, 0.0]
+    np.testing.assert_allclose(angles, expected, rtol=0.0, atol=2e-9)
+    assert memory.x[0] == pytest.approx(2.0 * STEP, rel=1e-12), "time passes once"
+
+
+def test_substeps_are_as_many_short_ticks() -> None:
+    """The disturbance goes on from one to the next."""
+    long, short = (balls(inner_amplitude=3.0) for _ in range(2))
+    long.period, long.memory.substeps = 4.0 * PERIOD, 4.0  # type: ignore[misc]
+    for tick in range(20):
+        long.step(Command(tick, np.ones(9)))
+        for k in range(4):
+            short.step(Command(4 * tick + k, np.ones(9)))
+    assert np.abs(long.state.joint_velocities[:3] / long.state.joint_velocities[3:]).max() < 0.9
+    np.testing.assert_allclose(long.memory.x, short.memory.x, rtol=1e-12, atol=1e-15)
 
 
 @given(st.sampled_from([1, 3, 6]), st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.2]))

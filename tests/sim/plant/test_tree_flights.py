@@ -9,19 +9,33 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from tree_flight import PERIOD, SEEDS, TORQUE, TreeFlight, tree
 
+from space_robot_sim.environment.disturbance import DisturbanceSettings
+
 Array = NDArray[np.float64]
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_step_agrees_with_an_adaptive_integrator(seed: int) -> None:
-    """0.3 s in two holds of torque: motors, springs with damping, friction of the robot's own."""
-    flight = TreeFlight(tree(seed), viscous=0.2)
+    """0.3 s in two holds of torque: motors, springs with damping, friction of the robot's own.
+
+    Base and motors are disturbed, each by a sine of its own.
+    """
+    disturbance = DisturbanceSettings(
+        scale=1.0, base_amplitude=30.0, inner_amplitude=3.0, base_frequencies=[1.5, 0.0],
+        inner_frequencies=[3.0, 0.0],
+    )  # fmt: skip
+    flight = TreeFlight(tree(seed), viscous=0.2, disturbance=disturbance)
     x = np.concatenate(flight.configuration())
-    nq = flight.model.nq
-    for torque in (TORQUE, -0.5 * TORQUE[::-1]):
+    nq, hold = flight.model.nq, 300 * PERIOD
+
+    def disturbed(t: float) -> Array:
+        base, motors = 30.0 * np.sin(3.0 * np.pi * t), 3.0 * np.sin(6.0 * np.pi * t)
+        return np.array([base] * 3 + [motors] * flight.robot.n)
+
+    for begin, torque in ((0.0, TORQUE), (hold, -0.5 * TORQUE[::-1])):
         solution = solve_ivp(
-            lambda _, x, torque=torque: flight.derivative(torque, x[:nq], x[nq:]),
-            (0.0, 300 * PERIOD), x, method="DOP853", rtol=1e-12, atol=1e-12,
+            lambda t, x, torque=torque: flight.derivative(torque, x[:nq], x[nq:], disturbed(t)),
+            (begin, begin + hold), x, method="DOP853", rtol=1e-12, atol=1e-12,
         )  # fmt: skip
         x = solution.y[:, -1]
         flight.fly(torque, 300)

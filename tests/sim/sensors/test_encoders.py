@@ -16,12 +16,12 @@ from space_robot_sim.sensors.encoders import Encoders, EncoderSettings
 Array = NDArray[np.float64]
 
 
-def moving(tick: int) -> RobotState:
+def moving(tick: int, period: float = PERIOD) -> RobotState:
     """Joints that leave rest at tick 0, each at its own rate."""
     state = RobotState.allocate(N)
     state.tick = tick
     state.joint_velocities[:] = 0.1 + 0.01 * np.arange(N)
-    state.joint_positions[:] = 1.0 + state.joint_velocities * tick * PERIOD
+    state.joint_positions[:] = 1.0 + state.joint_velocities * tick * period
     return state
 
 
@@ -70,26 +70,29 @@ def test_noise_of_angles_and_of_measured_rates() -> None:
     assert np.abs(np.mean(angles * rates) / 2e-5) < 5.0 / np.sqrt(angles.size)
 
 
-@pytest.mark.parametrize("lag", [1, 10, 256])
-def test_differenced_rates(lag: int) -> None:
+@pytest.mark.parametrize(("lag", "period"), [(1, 5e-4), (10, 3e-3), (256, 5e-4)])
+def test_differenced_rates(lag: int, period: float) -> None:
     """The mean rate over the time; at rest before tick 0."""
-    bench = Bench(truth=moving(0), encoders={"difference_ticks": lag})
-    for tick in range(600):
-        state = moving(tick)
+    bench = Bench(truth=moving(0), period=period, encoders={"difference_ticks": lag})
+    for tick in range(lag + 300):
+        state = moving(tick, period)
         told = bench.measure(state).joint_velocities
         share = min(1.0, tick / lag)
         np.testing.assert_allclose(told, share * state.joint_velocities, atol=1e-9)
 
 
-@pytest.mark.parametrize("lag", [1, 20])
-def test_noise_of_differenced_rates(lag: int) -> None:
-    """2^1/2 sigma / (N T); samples N ticks apart are correlated by -1/2."""
-    state = a_state()
-    bench = Bench(encoders={"noise": 1e-5, "difference_ticks": lag})
-    rates = bench.watch(state, 6000, "joint_velocities")[lag:]
-    sigma = np.sqrt(2.0) * 1e-5 / (lag * PERIOD)
-    assert rates.std() == pytest.approx(sigma, rel=0.04)
-    assert np.mean(rates[lag:] * rates[:-lag]) / sigma**2 == pytest.approx(-0.5, abs=0.05)
+@pytest.mark.parametrize(("lag", "own"), [(1, 0.0), (20, 3e-3)])
+def test_noise_of_differenced_rates(lag: int, own: float) -> None:
+    """2^1/2 sigma / (N T); samples N ticks apart have half of it, negative, in common.
+
+    The noise of rates comes on top.
+    """
+    state, sigma = a_state(), 1e-5
+    settings = {"noise": sigma, "difference_ticks": lag, "velocity_noise": own}
+    rates = Bench(encoders=settings).watch(state, 4000, "joint_velocities")[lag:]
+    variance = 2.0 * (sigma / (lag * PERIOD)) ** 2
+    assert np.mean(rates**2) == pytest.approx(variance + own**2, rel=0.07)
+    assert np.mean(rates[lag:] * rates[:-lag]) / variance == pytest.approx(-0.5, abs=0.06)
 
 
 def test_rates_have_steps_of_their_own() -> None:

@@ -1,22 +1,18 @@
-"""The gyro: its Allan variance against both random walks, bias, scale and steps."""
+"""The gyro: both random walks against their exact discretisation, bias, scale and steps."""
 
 from __future__ import annotations
-
-from functools import cache
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.linalg import expm
 from sensor_bench import Bench, N, a_state
 
 from space_robot_msgs_py.samples import RobotState
 
 Array = NDArray[np.float64]
 
-SEEDS = range(4)
 
-
-@cache
 def record(ticks: int, period: float, seed: int, **settings: float) -> Array:
     """Measured rates (ticks, 3) of a base at rest."""
     bench = Bench(seed=seed, period=period, gyro=settings)
@@ -31,55 +27,68 @@ def allan_variance(rates: Array, count: int) -> Array:
     return result
 
 
-@pytest.mark.parametrize("count", [1, 10, 100])
-def test_angle_random_walk(count: int) -> None:
-    """Allan variance sigma_v^2 / tau (IEEE 952), whatever the period: a slope of -1."""
-    for period in (5e-4, 0.01):
-        rates = np.hstack([record(6000, period, seed, angle_random_walk=1e-4) for seed in SEEDS])
-        found = allan_variance(rates, count).mean()
-        assert found == pytest.approx(1e-8 / (count * period), rel=0.1)
-
-
-@pytest.mark.parametrize("count", [30, 100])
-def test_rate_random_walk(count: int) -> None:
-    """Allan variance sigma_u^2 tau / 3 (IEEE 952): a slope of +1."""
-    rates = np.hstack([record(6000, 0.1, seed, rate_random_walk=1e-5) for seed in SEEDS])
-    found = allan_variance(rates, count).mean()
-    assert found == pytest.approx(1e-10 * count * 0.1 / 3.0, rel=0.15)
-
-
-def test_both_walks_cross_where_they_should() -> None:
-    """At tau = 3^1/2 sigma_v / sigma_u both have the same share."""
+def test_the_walks_have_the_slopes_of_ieee_952() -> None:
+    """Allan variance sigma_v^2 / tau + sigma_u^2 tau / 3, around where both have the same share."""
     sigma_v, sigma_u, period = 1e-4, 1e-4, 0.02
-    count = round(np.sqrt(3.0) * sigma_v / sigma_u / period)
-    both = {"angle_random_walk": sigma_v, "rate_random_walk": sigma_u}
-    rates = np.hstack([record(6000, period, seed, **both) for seed in SEEDS])
-    tau = count * period
-    expected = sigma_v**2 / tau + sigma_u**2 * tau / 3.0
-    assert allan_variance(rates, count).mean() == pytest.approx(expected, rel=0.1)
+    walks = {"angle_random_walk": sigma_v, "rate_random_walk": sigma_u}
+    rates = np.hstack([record(4000, period, seed, **walks) for seed in range(6)])
+    for tau in np.array([0.1, 1.0]) * np.sqrt(3.0) * sigma_v / sigma_u:
+        expected = sigma_v**2 / tau + sigma_u**2 * tau / 3.0
+        found = allan_variance(rates, round(tau / period)).mean()
+        assert found == pytest.approx(expected, rel=0.12)
 
 
-def test_the_angle_and_the_bias_walk_as_farrenkopf_says() -> None:
-    """Over 1200 gyros at rest, 40 samples on: variances of angle, bias and their product.
+def exact_covariance(sigma_v: float, sigma_u: float, period: float) -> Array:
+    """(2, 2) of angle and bias after a period, by Van Loan's exponential (1978)."""
+    drift = np.array([[0.0, 1.0], [0.0, 0.0]])
+    density = np.diag([sigma_v**2, sigma_u**2])
+    both = expm(np.block([[-drift, density], [np.zeros((2, 2)), drift.T]]) * period)
+    covariance: Array = both[2:, 2:].T @ both[:2, 2:]
+    return covariance
 
-    P = [[s_v^2 t + s_u^2 t^3 / 3, s_u^2 t^2 / 2], [s_u^2 t^2 / 2, s_u^2 t]], for any period.
+
+@pytest.mark.parametrize("period", [5e-4, 0.05, 3.0])
+@pytest.mark.parametrize("share", [0.3, 4.0])
+def test_each_sample_is_the_exact_discretisation_of_both_walks(period: float, share: float) -> None:
+    """What angle and bias gain in each period: covariance, and nothing from tick to tick.
+
+    ``share``: of the angle's variance, the bias's walk to the white noise.
     """
-    sigma_v, sigma_u, period, steps = 1e-4, 1e-3, 0.05, 40
-    walks = []
-    for seed in range(400):
-        bench = Bench(
-            seed=seed, period=period,
-            gyro={"angle_random_walk": sigma_v, "rate_random_walk": sigma_u},
-        )  # fmt: skip
-        rates = bench.watch(RobotState.allocate(N), steps + 1, "omega_base")
-        walks.append([rates[1:].sum(axis=0) * period, bench.block[0].gyro.bias])
-    angle, bias = np.array(walks).transpose(1, 0, 2).reshape(2, -1)
-    t = steps * period
-    found = [np.mean(angle**2), np.mean(angle * bias), np.mean(bias**2)]
-    expected = [
-        sigma_v**2 * t + sigma_u**2 * t**3 / 3.0, sigma_u**2 * t**2 / 2.0, sigma_u**2 * t,
-    ]  # fmt: skip
-    np.testing.assert_allclose(found, expected, rtol=5.0 * np.sqrt(2.0 / angle.size))
+    sigma_v, ticks = 1e-4, 3000
+    sigma_u = np.sqrt(3.0 * share) * sigma_v / period
+    bench = Bench(
+        period=period, gyro={"angle_random_walk": sigma_v, "rate_random_walk": sigma_u}
+    )  # fmt: skip
+    state, angles, biases = RobotState.allocate(N), np.empty((ticks, 3)), np.empty((ticks, 3))
+    for state.tick in range(ticks):
+        angles[state.tick] = period * bench.measure(state).omega_base
+        biases[state.tick] = bench.block[0].gyro.bias
+    assert not biases[0].any(), "before tick 0 nothing walks"
+    gained = np.stack([angles[1:] - period * biases[:-1], np.diff(biases, axis=0)])
+    scale = np.sqrt(np.diag(exact_covariance(sigma_v, sigma_u, period)))
+    gained /= scale[:, np.newaxis, np.newaxis]
+    flat, bound = gained.reshape(2, -1), 5.0 * np.sqrt(2.0 / (3 * ticks))
+    expected = exact_covariance(sigma_v, sigma_u, period) / np.outer(scale, scale)
+    np.testing.assert_allclose(flat @ flat.T / flat.shape[1], expected, rtol=0.0, atol=bound)
+    late = np.einsum("itk,jtk->ij", gained[:, 1:], gained[:, :-1]) / flat.shape[1]
+    assert np.abs(late).max() < bound
+
+
+def test_at_tick_0_there_is_the_initial_bias_and_white_noise() -> None:
+    """The variance of samples, over 1000 seeds: sigma_v^2 / h + sigma_u^2 h / 12 + sigma^2."""
+    sigma_v, sigma_u, period, bias = 1e-4, 1e-2, 0.05, np.array([1.0, -2.0, 3.0])
+    sigma = 5e-4
+    settings = {
+        "angle_random_walk": sigma_v, "rate_random_walk": sigma_u, "initial_bias": bias.tolist(),
+        "noise": sigma,
+    }  # fmt: skip
+    bench, state = Bench(period=period, gyro=settings), RobotState.allocate(N)
+    rates = np.empty((1000, 3))
+    for seed in range(len(rates)):
+        bench.draws.drawn = seed, -1
+        rates[seed] = bench.measure(state).omega_base - bias
+    expected = sigma_v**2 / period + sigma_u**2 * period / 12.0 + sigma**2
+    assert np.mean(rates**2) == pytest.approx(expected, rel=5.0 * np.sqrt(2.0 / rates.size))
 
 
 def test_white_noise_of_a_sample_is_the_same_at_every_period() -> None:

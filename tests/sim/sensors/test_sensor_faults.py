@@ -11,7 +11,9 @@ from oracles import rotation_of
 from random_samples import assert_same
 from sensor_bench import Bench, a_state
 
-from space_robot_msgs_py.samples import STATE_FIELDS, RobotState
+from space_robot_msgs_py.samples import ACTUATOR_FIELDS, ALL_FIELDS, PASSIVE_FIELDS, RobotState
+from space_robot_sim.faults.schedule import BLOCK_TICKS
+from space_robot_sim.sensors.noise import Draws
 
 Array = NDArray[np.float64]
 
@@ -21,22 +23,29 @@ FIELDS = {
     "joint_position": "joint_positions",
     "joint_velocity": "joint_velocities",
 }
-REPORTED = [name for name in STATE_FIELDS if name != "applied_torque"]
+UNMEASURED = ("applied_torque", "wheel_torques", "thrusts")
+"""Not the sensors' affair."""
+REPORTED = [name for name in ALL_FIELDS if name not in UNMEASURED]
 
 
 def changed(measured: RobotState, state: RobotState) -> set[str]:
     return {n for n in REPORTED if (getattr(measured, n) != getattr(state, n)).any()}
 
 
-def test_sound_sensors_tell_the_truth_in_arrays_of_their_own() -> None:
-    """But for the torque, which they do not measure."""
-    state, bench = a_state(7), Bench()
-    torque = bench.measured.applied_torque.copy()
+@pytest.mark.parametrize("are_ideal", [True, False])
+def test_sound_sensors_tell_the_truth_in_arrays_of_their_own(are_ideal: bool) -> None:
+    """But for the torques, which they do not measure; what has no sensor is told as it is."""
+    state, bench, rng = a_state(7), Bench(), np.random.default_rng(3)
+    bench.block["are_ideal"] = are_ideal
+    for name in (*ACTUATOR_FIELDS, *PASSIVE_FIELDS):
+        values = getattr(state, name)
+        values[:] = rng.normal(size=values.size)
+    truth = state.copy()
     measured = bench.measure(state)
     assert changed(measured, state) == set()
-    np.testing.assert_array_equal(measured.applied_torque, torque)
-    measured.omega_base[:] = 9.0
-    assert_same(state, a_state(7))
+    assert not any(getattr(measured, name).any() for name in UNMEASURED)
+    measured.block[:] = 9.0
+    np.testing.assert_array_equal(state.numbers, truth.numbers)
 
 
 @pytest.mark.parametrize("kind", ["noise", "quantise"])
@@ -131,6 +140,19 @@ def test_draws_depend_on_seed_and_tick_alone() -> None:
     fresh, seeded = Bench("noise_gyro@0:0.1"), Bench("noise_gyro@0:0.1", seed=1)
     np.testing.assert_array_equal(fresh.measure(a_state(1000)).omega_base, first)
     assert (seeded.measure(a_state(1000)).omega_base != first).all()
+
+
+def test_each_sensor_and_each_block_of_ticks_has_numbers_of_its_own() -> None:
+    """Uncorrelated, of any two sensors, blocks and seeds."""
+    arrays = {name: np.empty((BLOCK_TICKS, 6)) for name in ("star_tracker", "gyro", "encoders")}
+    rows = []
+    for seed in (0, 1):
+        draws = Draws(seed, arrays)
+        for block in range(3):
+            assert draws.refill(BLOCK_TICKS * block + 7) == BLOCK_TICKS * (block + 1)
+            rows += [array.ravel().copy() for array in arrays.values()]
+    found = np.corrcoef(rows) - np.eye(len(rows))
+    assert np.abs(found).max() < 5.0 / np.sqrt(rows[0].size)
 
 
 def test_quantisation_comes_after_noise_whatever_the_order_given() -> None:

@@ -47,10 +47,12 @@ def test_it_is_sampled_held_and_late_to_the_tick(interval: int, delay: int) -> N
     assert ticks_shown(bench, 200) == expected
 
 
-def test_an_interval_is_a_whole_number_of_ticks() -> None:
-    bench = Bench(star_tracker={"rate": 300.0, "delay": 0.0012})  # 6.67 ticks, 2.4 ticks
-    assert bench.block[0].star_tracker.interval == 7
-    assert bench.block[0].star_tracker.delay == 2
+@pytest.mark.parametrize("period", [PERIOD, 4e-3])
+def test_an_interval_is_a_whole_number_of_ticks(period: float) -> None:
+    """The nearest, at any period."""
+    settings = {"rate": 1.0 / (6.67 * period), "delay": 2.4 * period}
+    tracker = Bench(period=period, star_tracker=settings).block[0].star_tracker
+    assert (tracker.interval, tracker.delay) == (7, 2)
 
 
 @pytest.mark.parametrize("boresight", [[0.0, 0.0, 1.0], [1.0, 2.0, -2.0]])
@@ -96,6 +98,15 @@ def test_a_blind_tracker_tells_what_it_told_last() -> None:
     assert shown[41:45] == [30] * 4
     assert shown[45:95] == [40] * 50
     assert shown[95:] == [90] * 5
+
+
+def test_the_first_measurement_is_there_at_once_with_its_noise() -> None:
+    """However late the others are; then each is held until the next is released."""
+    settings = {"rate": 1.0 / (10 * PERIOD), "delay": 25 * PERIOD, "noise_across": 1e-3}
+    bench = Bench(truth=turning(0), star_tracker=settings)
+    told = np.array([bench.measure(turning(tick)).quaternion.copy() for tick in range(60)])
+    assert (told[0] != turning(0).quaternion).any()
+    assert np.flatnonzero(np.diff(told, axis=0).any(axis=1)).tolist() == [34, 44, 54]
 
 
 def test_a_tracker_that_is_blind_from_the_start_tells_where_the_base_was() -> None:

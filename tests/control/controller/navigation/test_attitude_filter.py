@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from attitude_sensors import (
@@ -17,10 +19,17 @@ from attitude_sensors import (
 )
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.linalg import block_diag, expm, solve_discrete_are
+from oracles import skew
+from paths import ROOT
+from scipy.linalg import expm, solve_discrete_are
 from scipy.stats import chi2
 
-from space_robot_control.controller.navigation.attitude_filter import MOST_REJECTED
+from space_robot_control.controller.navigation.attitude_filter import (
+    MOST_REJECTED,
+    propagate_covariance,
+    update,
+)
+from space_robot_control.controller.navigation.navigation import Navigation
 
 REALITY = Case(across=5e-5, about=5e-5, arw=1e-6, rrw=1e-9, bias=1e-6, period=0.02, interval=5)
 """Its formula's values are 4.0139e-6 and 4.0010e-6 rad."""
@@ -36,10 +45,8 @@ def farrenkopf(sigma_n: float, sigma_v: float, sigma_u: float, dt: float) -> tup
 
 def riccati(case: Case, omega: Array) -> Array:
     """(6, 6) covariance before an update, in steady state, of a body that turns at ``omega``."""
-    x, y, z = omega
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     continuous = np.zeros((6, 6))
-    continuous[:3, :3], continuous[:3, 3:] = -skew, -np.eye(3)
+    continuous[:3, :3], continuous[:3, 3:] = -skew(omega), -np.eye(3)
     density = np.diag([case.arw**2] * 3 + [case.rrw**2] * 3)
     dt = case.period * case.interval
     # Van Loan 1978
@@ -68,58 +75,43 @@ def test_the_formula_is_that_of_the_specification() -> None:
     assert after == pytest.approx(4.0010e-6, abs=5e-11)
 
 
-def test_the_covariance_settles_at_farrenkopfs() -> None:
-    """On a body at rest the discrete propagation is exact."""
-    ticks = 200_001  # 20000 s, twenty times the bias's time constant
-    case = REALITY._replace(period=0.1, interval=1)
-    p = filtered(case, still(case, ticks, np.random.default_rng(1))).covariance[-1]
-    before, after = farrenkopf(5e-5, 1e-6, 1e-9, 0.1)
-    assert np.sqrt(p[0, 0]) == pytest.approx(after, rel=1e-7)
-    later = p[0, 0] - 0.2 * p[0, 3] + 0.01 * p[3, 3] + 1e-12 * 0.1 + 1e-18 * 0.1**3 / 3.0
-    assert np.sqrt(later) == pytest.approx(before, rel=1e-7)
+@pytest.mark.parametrize("degrees", [0.0, 3.0])
+def test_the_covariance_settles_where_riccati_and_farrenkopf_say(degrees: float) -> None:
+    """Their solution stays over a measurement and the ticks to the next; on a body at rest exactly.
+
+    With a boresight, and turning, so that attitude and axes mix.
+    """
+    case = REALITY if degrees == 0.0 else REALITY._replace(across=1e-5, about=8e-5, rrw=1e-7)
+    omega = np.radians(degrees) * np.array([1.0, -0.5, 0.3])
+    steady, filter = riccati(case, omega), case.filter()
+    filter.quaternion[:], filter.covariance[:] = [0.5, -0.5, 0.5, 0.5], steady
+    assert update(filter, filter.quaternion)
+    after = filter.covariance.copy()
+    for _ in range(case.interval):
+        filter.scratch.rotation[:] = omega * case.period
+        propagate_covariance(filter, case.period)
+    sigma = np.sqrt(np.diag(steady))
+    scale, tolerance = np.outer(sigma, sigma), 1e-3 if degrees else 1e-10
+    np.testing.assert_allclose(filter.covariance / scale, steady / scale, atol=tolerance)
+    if degrees == 0.0:
+        found = np.sqrt([steady[0, 0], after[0, 0]])
+        np.testing.assert_allclose(found, farrenkopf(5e-5, 1e-6, 1e-9, 0.1), rtol=1e-7)
 
 
 def test_true_errors_in_steady_state_are_farrenkopfs() -> None:
-    """Root mean square over 40 seeds, three axes and 400 s, just after updates."""
+    """Root mean square over 24 seeds, three axes and 300 s, just after updates."""
     before, after = farrenkopf(5e-5, 1e-6, 1e-9, 0.1)
     steady = riccati(REALITY, np.zeros(3))
     case = REALITY._replace(bias=float(np.sqrt(steady[3, 3])))
-    ticks, burnt = 25_000, 5_000
+    ticks, burnt = 20_000, 5_000
     squares = {"before": [], "after": []}  # type: dict[str, list[Array]]
-    for seed in range(40):
+    for seed in range(24):
         found = filtered(case, still(case, ticks, np.random.default_rng(seed)))
         error = attitude_error(found.delayed, np.array([1.0, 0.0, 0.0, 0.0]))
         squares["after"].append(error[burnt :: case.interval] ** 2)
         squares["before"].append(error[burnt + case.interval - 1 :: case.interval] ** 2)
     assert np.sqrt(np.mean(squares["after"])) == pytest.approx(after, rel=0.05)
     assert np.sqrt(np.mean(squares["before"])) == pytest.approx(before, rel=0.05)
-
-
-@pytest.mark.parametrize("degrees", [0.0, 3.0])
-def test_the_covariance_solves_riccatis_equation(degrees: float) -> None:
-    """With a boresight, and turning, so that attitude and axes mix."""
-    case = Case(across=1e-5, about=8e-5, arw=1e-6, rrw=1e-7, bias=1e-6, period=0.02, delay=7)
-    omega = np.radians(degrees) * np.array([1.0, -0.5, 0.3])
-    ticks = 20_000
-    attitudes = np.cumprod(np.ones(ticks))[:, None] * exponential(
-        np.arange(ticks)[:, None] * case.period * omega
-    )
-    rates = np.tile(omega, (ticks, 1))
-    found = filtered(case, measure(case, attitudes, rates, np.random.default_rng(2)))
-    # the last tick before an update, and one more tick by hand
-    last = (ticks - 1 - case.delay) // case.interval * case.interval + case.delay
-    x, y, z = omega
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    joint = np.zeros((6, 6))
-    joint[:3, :3], joint[:3, 3:] = -skew, -np.eye(3)
-    transition = expm(joint * case.period)
-    noise = block_diag(np.eye(3) * case.arw**2 * case.period, np.eye(3) * case.rrw**2 * case.period)
-    predicted = transition @ found.covariance[last - 1] @ transition.T + noise
-    expected = riccati(case, omega)
-    scale = np.sqrt(np.diag(expected))
-    np.testing.assert_allclose(
-        predicted / np.outer(scale, scale), expected / np.outer(scale, scale), atol=2e-3
-    )
 
 
 def nees(case: Case, attitudes: Array, rates: Array, seeds: int, at: list[int]) -> Array:
@@ -148,14 +140,14 @@ def test_the_filter_is_consistent(delay: int) -> None:
         across=1e-5, about=6e-5, arw=1e-6, rrw=2e-8, bias=2e-5, period=0.01, interval=10,
         delay=delay,
     )  # fmt: skip
-    ticks, seeds = 10_000, 60
+    ticks, seeds = 5_000, 60
 
     def rate(t: float) -> Array:
         return np.radians(3.0) * np.array([np.cos(0.3 * t), 0.5, np.sin(0.2 * t)])
 
     attitudes = turned_by(rate, ticks, case.period)
     rates = np.array([rate(case.period * k) for k in range(ticks)])
-    at = [50, 107, 309, 1003, 2501, 4999, 7504, 9999]
+    at = [50, 107, 309, 1003, 1499, 2501, 3504, 4999]
     found = nees(case, attitudes, rates, seeds, at)
     low, high = chi2.ppf([0.025, 0.975], 6 * seeds) / seeds
     inside = (found.mean(0) > low) & (found.mean(0) < high)
@@ -199,6 +191,137 @@ def test_a_large_slew_is_followed() -> None:
     error = attitude_error(found.present, attitudes)[100:]
     assert np.abs(error).max() < 2e-4
     assert np.sqrt((error[-1000:] ** 2).mean()) < 2e-5
+
+
+# A single step
+
+
+def random_covariance(rng: np.random.Generator, sigmas: Array) -> Array:
+    root = rng.normal(size=(6, 6)) * sigmas[:, np.newaxis]
+    covariance: Array = root @ root.T
+    return covariance
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([5e-4, 0.1]))
+@settings(max_examples=40)
+def test_a_propagated_covariance_is_van_loans(seed: int, period: float) -> None:
+    """Of turns of 0.01 rad, and noise and covariance that weigh alike, to third order in the turn.
+
+    Q is Farrenkopf's, of axes at rest: that is to first order, in a term of its own.
+    """
+    rng = np.random.default_rng(seed)
+    arw, turn = 1e-5, 0.01 * rng.normal(size=3)
+    rrw = arw / period * 10.0 ** rng.uniform(-0.5, 0.5)
+    case = Case(arw=arw, rrw=rrw, period=period)
+    sigmas = np.repeat([arw * period**0.5, arw / period**0.5], 3)
+    before = random_covariance(rng, sigmas)
+    drift = np.zeros((6, 6))
+    drift[:3, :3], drift[:3, 3:] = -skew(turn / period), -np.eye(3)
+    transition = expm(drift * period)
+
+    def propagated(covariance: Array) -> Array:
+        filter = case.filter()
+        filter.covariance[:], filter.scratch.rotation[:] = covariance, turn
+        propagate_covariance(filter, period)
+        found: Array = filter.covariance.copy()
+        return found
+
+    scale = np.outer(sigmas, sigmas)
+    noise = propagated(np.zeros((6, 6)))
+    still = np.zeros((6, 6))
+    still[:3, 3:] = -np.eye(3)
+    density = np.diag([arw**2] * 3 + [rrw**2] * 3)
+    both = expm(np.block([[-still, density], [np.zeros((6, 6)), still.T]]) * period)
+    np.testing.assert_allclose(noise / scale, both[6:, 6:].T @ both[:6, 6:] / scale, atol=1e-12)
+    expected = transition @ before @ transition.T + noise
+    error = np.abs(propagated(before) - expected) / scale
+    assert error.max() < 3.0 * np.linalg.norm(turn) ** 3 * np.abs(expected / scale).max()
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.5, 20.0), st.sampled_from([0.9, 0.999, 1.001, 1.1]))
+@settings(max_examples=60)
+def test_an_update_is_kalmans_within_the_gate_and_none_beyond(
+    seed: int, gate: float, share: float
+) -> None:
+    """The gate is in standard deviations of the innovation, whatever its direction."""
+    rng = np.random.default_rng(seed)
+    across, about = 10.0 ** rng.uniform(-6.0, -5.0, 2)
+    settings = Case(across=across, about=about).settings.model_copy(update={"gate": gate})
+    filter = Navigation.build(1, settings, 0.01).attitude
+    sigmas = np.repeat([1e-5, 1e-7], 3)
+    p = random_covariance(rng, sigmas)
+    filter.covariance[:], filter.bias[:] = p, 1e-6 * rng.normal(size=3)
+    filter.quaternion[:] = exponential(rng.normal(size=3))
+    truth, bias = filter.quaternion.copy(), filter.bias.copy()
+    s = p[:3, :3] + filter.noise
+    direction = rng.normal(size=3)
+    innovation = share * gate * np.linalg.cholesky(s) @ (direction / np.linalg.norm(direction))
+    accepted = update(filter, product(truth, exponential(innovation)))
+    assert accepted == (share < 1.0)
+    scale = np.outer(sigmas, sigmas)
+    if not accepted:
+        np.testing.assert_array_equal(filter.covariance, p)
+        np.testing.assert_array_equal(np.r_[filter.quaternion, filter.bias], np.r_[truth, bias])
+        return
+    gain = np.linalg.solve(s, p[:3]).T
+    after = p - gain @ s @ gain.T
+    np.testing.assert_allclose(filter.covariance / scale, after / scale, atol=1e-9)
+    moved = gain @ innovation
+    np.testing.assert_allclose(filter.bias - bias, moved[3:], rtol=1e-6, atol=1e-14)
+    found = attitude_error(truth, filter.quaternion)
+    np.testing.assert_allclose(found, moved[:3], rtol=1e-6, atol=1e-12)
+
+
+# What the gyro does that the filter does not know
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
+def test_a_jump_of_the_rate_costs_up_to_half_of_it_times_the_tick(share: float) -> None:
+    """``(s - 1/2) jump h``, at a share s of the tick, until the tracker measures again."""
+    case, jump, when = Case(period=5e-4, interval=400), np.array([0.02, -0.03, 0.01]), 200
+    ticks = np.arange(350)
+    since = np.maximum(0.0, ticks - when - share)[:, np.newaxis]
+    truth = exponential(since * case.period * jump)
+    rates = np.where(ticks[:, np.newaxis] > when, jump, 0.0)
+    found = filtered(case, Measured(np.tile(truth[0], (len(ticks), 1)), rates, 0.0 * rates))
+    error = attitude_error(found.present, truth)
+    np.testing.assert_array_equal(error[: when + 1], 0.0)
+    expected = (0.5 - share) * case.period * jump
+    np.testing.assert_allclose(error[when + 1 :], np.tile(expected, (149, 1)), atol=1e-10)
+
+
+def test_against_a_scale_error_a_walk_of_the_bias_helps_and_its_first_variance_does_not() -> None:
+    """The numbers of docs/manual/navigation.md: RMS an axis in a turn that comes after a rest."""
+    scale, rate, duration = 3e-4, np.radians(1.0), 60.0
+    tactical = Case(
+        across=4e-5, about=3e-4, arw=2.9e-6, rrw=8e-8, bias=4.8e-6, period=5e-3, interval=40,
+        delay=30,
+    )  # fmt: skip
+    time = tactical.period * np.arange(round(2.0 * duration / tactical.period))
+    omega, turning = rate * np.array([0.6, 0.0, 0.8]), (time > duration)[:, np.newaxis]
+    attitudes = exponential(omega * np.maximum(0.0, time - duration)[:, np.newaxis])
+    rates, late = np.where(turning, omega, 0.0), time > duration + 2.0
+    flights = [
+        measure(tactical, attitudes, rates, np.random.default_rng(seed)) for seed in range(8)
+    ]
+
+    def error(case: Case, scale: float) -> float:
+        squares = [
+            attitude_error(
+                filtered(case, seen._replace(gyro=seen.gyro + scale * rates)).present, attitudes
+            )[late] ** 2
+            for seen in flights
+        ]  # fmt: skip
+        return float(np.sqrt(np.mean(squares)))
+
+    found = [
+        error(tactical, scale), error(tactical._replace(bias=scale * rate), scale),
+        error(tactical._replace(rrw=scale * rate / duration**0.5), scale), error(tactical, 0.0),
+    ]  # fmt: skip
+    text = (ROOT / "docs/manual/navigation.md").read_text("utf-8")
+    (paragraph,) = (part for part in text.split("\n\n") if "scale error e is" in part)
+    shown = [float(number) for number in re.findall(r"by (\d\.\de-5)", paragraph)]
+    np.testing.assert_allclose(found, shown, atol=0.06e-5)
 
 
 # Signs, the same twice, outliers
@@ -250,8 +373,27 @@ def test_a_filter_that_is_wrong_begins_anew() -> None:
     found = filtered(case, measured, filter)
     assert filter.rejected == MOST_REJECTED
     error = np.linalg.norm(attitude_error(found.present, jump), axis=1)
-    assert (error[1000 : 1000 + 10 * (MOST_REJECTED - 1)] > 0.2).all()
-    assert (error[1000 + 10 * MOST_REJECTED :] < 5e-4).all()
+    again = 1000 + 10 * (MOST_REJECTED - 1)
+    assert (error[1000:again] > 0.2).all()
+    assert (error[again + 10 :] < 5e-4).all()
+    assert found.bias[again - 1].all()
+    assert not found.bias[again].any()
+    unknown = np.diag([case.across**2] * 2 + [case.about**2] + [case.bias**2] * 3)
+    np.testing.assert_allclose(found.covariance[again], unknown, rtol=1e-12, atol=1e-30)
+
+
+def test_only_measurements_in_a_row_make_it_begin_anew() -> None:
+    """Many wrong ones between good ones do not."""
+    case = Case(period=0.01, interval=10)
+    measured = still(case, 1000, np.random.default_rng(9))
+    wrong = measured.quaternions.copy()
+    for first in range(500, 500 + 20 * (MOST_REJECTED + 2), 20):
+        wrong[first : first + 10] = product(wrong[first], exponential(np.array([0.1, 0.0, 0.0])))
+    filter = case.filter()
+    found = filtered(case, measured._replace(quaternions=wrong), filter)
+    assert filter.rejected == MOST_REJECTED + 2
+    assert found.bias[500:].all()
+    assert np.abs(attitude_error(found.present[500:], measured.quaternions[0])).max() < 1e-3
 
 
 # Properties
@@ -285,14 +427,14 @@ def test_attitude_stays_unit_and_covariance_positive_definite(
 
 
 def test_numbers_stay_sound_over_hours() -> None:
-    """A million ticks, turning; the last errors are what the covariance says."""
+    """200,000 ticks, turning; the last errors are what the covariance says."""
     case = Case(
         across=1e-5, about=8e-5, arw=3e-7, rrw=1e-9, bias=1e-6, period=5e-3, interval=20, delay=20
     )
     omega = np.array([0.01, -0.02, 0.005])
     filter, worst = case.filter(), 0.0
     rng, bias = np.random.default_rng(8), np.zeros(3)
-    for block in range(10):
+    for block in range(2):
         ticks = np.arange(100_000 * block, 100_000 * (block + 1))
         attitudes = exponential(ticks[:, None] * case.period * omega)
         measured = measure(case, attitudes, np.tile(omega, (len(ticks), 1)), rng, bias)

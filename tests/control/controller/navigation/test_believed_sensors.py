@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from closed_loop import NAVIGATION
+from oracles import rotation_of
+from random_robots import random_quaternion
+from sensor_bench import Bench, a_state
 
 from space_robot_control.controller.navigation.believed_sensors import (
     LEAST,
@@ -60,6 +64,36 @@ def test_no_file_is_read_where_every_number_is_given() -> None:
     assert completed(NAVIGATION, "there is none", PERIOD) is NAVIGATION
     with pytest.raises(InputError, match="there is none"):
         completed(NAVIGATION.model_copy(update={"gyro_bias": -1.0}), "there is none", PERIOD)
+
+
+@pytest.mark.parametrize("period", [PERIOD, 0.02])
+def test_what_is_believed_of_sensors_is_what_they_do(period: float) -> None:
+    """Noise and whole steps of every sensor, against the errors of 1500 measurements."""
+    settings: dict[str, Any] = {
+        "star_tracker": {"noise_across": 2e-5, "noise_about": 9e-5, "step": 1e-4},
+        "gyro": {"angle_random_walk": 2e-6, "noise": 1e-4, "step": 5e-4},
+        "encoders": {"noise": 3e-6, "bits": 19, "velocity_noise": 2e-5, "velocity_step": 1e-4},
+    }
+    bench, rng, state = Bench(period=period, **settings), np.random.default_rng(0), a_state()
+    errors = []
+    for state.tick in range(1500):
+        state.block[0].quaternion[:] = random_quaternion(rng)
+        state.omega_base[:] = rng.normal(size=3)
+        state.joint_positions[:], state.joint_velocities[:] = rng.normal(size=(2, 6))
+        told = bench.measure(state)
+        turn = (rotation_of(state.quaternion).inv() * rotation_of(told.quaternion)).as_rotvec()
+        rates = told.omega_base - state.omega_base, told.joint_velocities - state.joint_velocities
+        errors.append(
+            [*turn, *rates[0], *(told.joint_positions - state.joint_positions), *rates[1]]
+        )
+    found = np.sqrt(np.mean(np.square(errors), axis=0))
+    believed = believed_numbers(SensorSettings.model_validate(settings), period)
+    sample = believed["gyro_angle_walk"] / period**0.5
+    expected = [
+        *[believed["tracker_across"]] * 2, believed["tracker_about"], *[sample] * 3,
+        *[believed["joint_angle_noise"]] * 6, *[believed["joint_rate_noise"]] * 6,
+    ]  # fmt: skip
+    np.testing.assert_allclose(found, expected, rtol=5.0 * (2.0 * len(errors)) ** -0.5)
 
 
 def test_nothing_is_believed_to_be_perfect() -> None:

@@ -56,7 +56,11 @@ def built(**changes: float) -> Navigation:
 def test_the_estimate_is_of_now_though_the_tracker_is_late() -> None:
     found = estimates(built(), list(range(400)))
     truth = exponential(OMEGA * PERIOD * np.arange(400)[:, None])
-    assert np.abs(attitude_error(found[:, :4], truth))[41:].max() < 1e-7
+    error = np.abs(attitude_error(found[:, :4], truth))
+    assert error[41:].max() < 1e-7
+    # the first one is taken for as old as the others
+    begun = exponential(OMEGA * PERIOD * 20)
+    np.testing.assert_allclose(found[0, :4], begun, rtol=0.0, atol=1e-15)
     np.testing.assert_allclose(found[:, 4:7], np.tile(OMEGA, (400, 1)), atol=1e-6)
 
 
@@ -71,19 +75,69 @@ def test_lost_states_are_bridged() -> None:
         assert navigation.attitude.updates == (27 if lost == 1 else 26)
 
 
-def test_after_a_long_gap_the_attitude_begins_anew_and_the_bias_stays() -> None:
-    navigation = built()
+def ramped_state_at(tick: int) -> RobotState:
+    """As `state_at`; rates and joint rates rise evenly, from tick 301 on a torque is applied."""
+    state, t = state_at(tick), tick * PERIOD
+    taken = max(0, (tick - 20) // 20 * 20) * PERIOD
+    state.quaternion[:] = exponential(OMEGA * (taken + 2.0 * taken * taken))
+    state.omega_base[:] = OMEGA * (1.0 + 4.0 * t)
+    state.joint_positions[:] = np.arange(N) * (0.1 + 0.5 * t * t)
+    state.joint_velocities[:] = np.arange(N) * t
+    state.applied_torque[:] = 5.0 if tick > 300 else 0.0
+    state.base_position[:], state.base_velocity[:] = [t, 2.0, 3.0], [4.0, t, 5.0]
+    return state
+
+
+def test_lost_states_of_an_even_ramp_are_as_if_they_had_come() -> None:
+    """Rates are interpolated, low-passes and joint filters go on by the time that passed."""
+    whole, *bridged = (built(rate_filter_hz=20.0) for _ in range(3))
+    for tick in range(340):
+        state = ramped_state_at(tick)
+        navigate(whole, tick, state.block[0], PERIOD)
+        for navigation, lost in zip(bridged, (2, LONGEST_BRIDGE - 1), strict=True):
+            if 301 <= tick < 301 + lost:
+                continue
+            navigate(navigation, tick, state.block[0], PERIOD)
+            if tick <= 300:
+                continue
+            for name in ("quaternion", "omega_base", "joint_positions", "joint_velocities"):
+                expected, found = (getattr(n.estimate, name) for n in (whole, navigation))
+                np.testing.assert_allclose(found, expected, rtol=0.0, atol=2e-9, err_msg=name)
+            expected, found = (n.estimate.applied_torque[:3] for n in (whole, navigation))
+            np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12)
+            for name in ("base_position", "base_velocity"):
+                sent = getattr(state, name)
+                np.testing.assert_array_equal(getattr(navigation.estimate, name), sent)
+
+
+def test_after_a_long_gap_the_attitude_begins_anew_and_the_bias_walks_on() -> None:
+    """Its estimate stays; its variance grows by sigma_u^2 times the gap."""
+    walk, elapsed = 1e-6, 30 * LONGEST_BRIDGE
+    navigation = built(gyro_rate_walk=walk)
     estimates(navigation, list(range(400)))
     bias = np.array([1e-4, -2e-4, 3e-4])
     navigation.attitude.bias[:] = bias
-    before = navigation.attitude.covariance[3, 3]
-    tick = 400 + LONGEST_BRIDGE
-    estimates(navigation, [tick])
+    before = navigation.attitude.covariance.copy()
+    tick = 399 + elapsed
+    (row,) = estimates(navigation, [tick])
     np.testing.assert_array_equal(navigation.attitude.bias, bias)
-    assert navigation.attitude.covariance[3, 3] > before
-    assert navigation.attitude.covariance[0, 3] == 0.0
-    late = navigation.estimate.quaternion
-    assert np.abs(attitude_error(late, exponential(OMEGA * PERIOD * tick))).max() < 1e-3
+    after = navigation.attitude.covariance
+    walked = before[3:, 3:] + walk**2 * elapsed * PERIOD * np.eye(3)
+    np.testing.assert_allclose(after[3:, 3:], walked, rtol=1e-12, atol=1e-30)
+    np.testing.assert_array_equal(after[:3, :3], navigation.attitude.noise)
+    assert not after[:3, 3:].any()
+    np.testing.assert_array_equal(row[4:7], OMEGA - bias)
+    assert np.abs(attitude_error(row[:4], exponential(OMEGA * PERIOD * tick))).max() < 1e-3
+
+
+def test_the_noise_of_a_tracker_is_that_of_its_axes() -> None:
+    """A boresight of any length: across^2 (E - b b^T) + about^2 b b^T."""
+    boresight = [2.0, -1.0, 2.0]
+    changed = {"tracker_boresight": boresight, "tracker_across": 2e-5, "tracker_about": 7e-5}
+    attitude = Navigation.build(N, SETTINGS.model_copy(update=changed), PERIOD).attitude
+    along = np.outer(boresight, boresight) / 9.0
+    expected = 4e-10 * (np.eye(3) - along) + 49e-10 * along
+    np.testing.assert_allclose(attitude.noise, expected, rtol=1e-13, atol=1e-24)
 
 
 @pytest.mark.parametrize("again", [100, 399])

@@ -1,0 +1,302 @@
+"""The plant's loop by a clock of its own: lockstep, silence, pauses, the wall clock, the end.
+
+Only what carries messages is stood in for; plant, guard, codecs and control are those that fly.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.samples import Command
+from space_robot_msgs_py.wire.clock import ClockCodec
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.source_guard import SourceGuard
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import PlantNodeSettings
+from space_robot_sim.robot import Robot
+
+pytest.importorskip("rclpy")
+
+from space_robot_msgs_py.ros.health import Level
+from space_robot_sim.plant import loop, scene_output, truth_output
+from space_robot_sim.plant.loop import ASK_AGAIN_S, PlantLoop
+
+Array = NDArray[np.float64]
+HOLD, DECIMATION, SILENCE_S = 30, 7, 1.0
+PERIOD = 5e-4
+STEP_S = 5e-6
+"""What a step of the loop takes."""
+
+
+class Topic:
+    """Publisher or subscription: what was sent, and what is to be taken."""
+
+    def __init__(self, node: Bench, topic: topics.Topic, *_: object) -> None:
+        self._node, self.topic, self.full_name = node, topic, topic.name
+        self.sent: list[bytes] = []
+        self.waiting: deque[bytes] = deque()
+        self.source = SourceGuard()
+        self._taken = 0
+        node.by_name[topic.name] = self
+
+    def publish(self, data: bytes) -> None:
+        self.sent.append(data)
+        self._node.hear(self.topic, data)
+
+    def take(self) -> bytes | None:
+        if not self.waiting:
+            return None
+        self._taken += 1
+        self.source.passes(self._taken, round(1e9 * self._node.now))
+        return self.waiting.popleft()
+
+    def counts(self, word: str) -> dict[str, int]:
+        return {}
+
+    def flush(self, timeout_s: float) -> None:
+        pass
+
+    def tell(self, is_paused: bool) -> None:
+        pass
+
+
+class Bench:
+    """A node for the loop, a clock that its waits advance, and a controller that answers."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        patch: pytest.MonkeyPatch,
+        answer: Callable[[int], bool],
+        **settings: Any,
+    ) -> None:
+        """``answer``: whether the state of a tick is answered, with `torque`."""
+        self.now, self.answer = 1000.0, answer
+        self.by_name: dict[str, Topic] = {}
+        self.logged: list[str] = []
+        self.waited_s = 0.0
+        self.states: list[tuple[int, float]] = []
+        """Tick and time of each state that was sent."""
+        patch.setattr(time, "monotonic", lambda: self.now)
+        for module in (loop, scene_output, truth_output):
+            patch.setattr(module, "RawPublisher", Topic)
+        patch.setattr(loop, "FollowedSubscription", Topic)
+        patch.setattr(loop, "PausedOutput", lambda node: Topic(node, topics.SIMULATION_PAUSED))
+        patch.setattr(scene_output, "find_spec", lambda name: None)
+        self.settings = PlantNodeSettings.resolve({
+            "hold_ticks": HOLD, "clock_decimation": DECIMATION, "silence_timeout": SILENCE_S,
+            "ticks": 100, **settings,
+        })  # fmt: skip
+        names = Plant(robot, self.settings, PERIOD).names
+        self._states = StateCodec(names, self.settings.timebase)
+        self._commands = CommandCodec(names.commanded, self.settings.timebase)
+        self._robot = robot
+        self.loop = PlantLoop(self, self.settings)  # type: ignore[arg-type]
+        self.loop.begin()
+
+    def hear(self, topic: topics.Topic, data: bytes) -> None:
+        """Answer the last part of a state at once."""
+        if topic != self._states.topics[-1]:
+            return
+        tick = self._states.decode(topic, data, self.loop._plant.state.copy())
+        self.states.append((tick, self.now))
+        if self.answer(tick):
+            self.send(tick, torque(tick))
+
+    def send(self, tick: int, values: Array) -> None:
+        message = self._commands.encode(Command(tick, values))
+        self.by_name[topics.COMMAND.name].waiting.append(message)
+
+    def run(self, until: Callable[[], bool] | None = None) -> None:
+        """Step the loop to its end, or until something holds; its waits pass at once."""
+        for _ in range(100_000):
+            if self.loop.is_complete or (until and until()):
+                return
+            wait = self.loop.step()
+            self.now += STEP_S
+            if wait and not any(entry.waiting for entry in wait.inputs):  # type: ignore[attr-defined]
+                self.now += wait.seconds
+                self.waited_s += wait.seconds
+        raise AssertionError("it does not end")
+
+    @property
+    def tick(self) -> int:
+        return self.loop.control.tick
+
+    def flown_by_hand(self, acting: Callable[[int], Array]) -> Array:
+        """The state's numbers after all ticks under these torques."""
+        plant = Plant(self._robot, self.settings, PERIOD)
+        for tick in range(self.settings.ticks):
+            plant.step(Command(tick, acting(tick)))
+        numbers: Array = plant.truth.numbers.copy()
+        return numbers
+
+    @property
+    def numbers(self) -> Array:
+        """Those of the true state that the loop's plant has come to."""
+        numbers: Array = self.loop._plant.truth.numbers
+        return numbers
+
+    # of a node
+
+    def log(self, text: str) -> None:
+        self.logged.append(text)
+
+    def report(self) -> None:
+        pass
+
+    def get_namespace(self) -> str:
+        return "/"
+
+
+def torque(tick: int) -> Array:
+    """Another one each tick."""
+    return np.linspace(0.1, 0.9, 9) * (1 + tick % 5)
+
+
+def always(tick: int) -> bool:
+    return True
+
+
+def test_in_lockstep_every_tick_waits_for_its_answer_and_no_longer(
+    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(paper_robot, monkeypatch, always)
+    bench.run()
+    assert [tick for tick, _ in bench.states] == list(range(100))
+    assert bench.waited_s == 0.0
+    np.testing.assert_array_equal(bench.numbers, bench.flown_by_hand(torque))
+    clock = ClockCodec()
+    expected = [
+        clock.encode(bench.settings.timebase.stamp_ns(k)) for k in range(0, 100, DECIMATION)
+    ]
+    assert bench.by_name[topics.CLOCK.name].sent == expected
+    health = bench.loop.health()
+    assert (health.mode, health.level) == ("nominal", Level.OK)
+    assert health.values["missed_deadlines"] == 0
+    assert health.values["held_ticks"] == 1
+
+
+def test_without_an_answer_it_asks_again_then_flies_by_the_clock_and_comes_back(
+    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Silent from tick 20 to 79: the last torque is held, then none; a tick lasts its period."""
+    bench = Bench(paper_robot, monkeypatch, lambda tick: not 20 <= tick < 80)
+    bench.run(lambda: bench.tick == 21)
+    asked = [when - 1000.0 for tick, when in bench.states if tick == 20]
+    assert len(asked) == 1 + int(SILENCE_S / (ASK_AGAIN_S + loop.PATIENCE_S))
+    assert np.diff(asked).min() > ASK_AGAIN_S
+    assert bench.now - 1000.0 == pytest.approx(SILENCE_S, abs=0.05)
+    assert bench.logged == ["no command for 1 s: the controller is silent"]
+    began = bench.now
+    bench.run(lambda: bench.tick == 45)
+    assert bench.now - began == pytest.approx(24 * PERIOD, abs=2 * PERIOD)
+    assert bench.loop.health().mode == "holding the last good command"
+    bench.run(lambda: bench.tick == 70)
+    health = bench.loop.health()
+    assert (health.mode[:4], health.level) == ("safe", Level.ERROR)
+    bench.run()
+    assert bench.logged[1:] == ["the controller answers again"]
+    assert bench.loop.missed_deadlines == 60
+    assert bench.now - began == pytest.approx(60 * PERIOD, abs=3 * PERIOD)
+
+    def acting(tick: int) -> Array:
+        if not 20 <= tick < 80:
+            return torque(tick)
+        return torque(19) if tick <= 19 + HOLD else np.zeros(9)
+
+    np.testing.assert_array_equal(bench.numbers, bench.flown_by_hand(acting))
+
+
+@pytest.mark.parametrize("realtime", [False, True])
+def test_pauses_and_steps_leave_no_trace(
+    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch, realtime: bool
+) -> None:
+    """However long they last: no command is missed, no time is lost, none is asked for again."""
+    bench = Bench(paper_robot, monkeypatch, always, realtime=realtime)
+    control = bench.loop.control
+    bench.run(lambda: bench.tick == 30)
+    for stop in (control.step, None):
+        if stop is None:
+            assert control.pause() is False
+        else:
+            control.pause()
+        bench.run(lambda: control.is_held)
+        assert bench.loop.health().mode == "paused"
+        bench.now += 100.0
+        held = control.tick
+        if stop:
+            assert stop(5) == 35
+            bench.run(lambda: control.is_held)
+            assert (held, control.tick) == (30, 35)
+    sent = [tick for tick, _ in bench.states]
+    assert sent == list(range(36))
+    control.resume()
+    before = bench.now
+    bench.run()
+    np.testing.assert_array_equal(bench.numbers, bench.flown_by_hand(torque))
+    assert bench.loop.missed_deadlines == 0
+    assert [tick for tick, _ in bench.states] == list(range(100))
+    expected = 65 * PERIOD if realtime else 0.0
+    assert bench.now - before == pytest.approx(expected, abs=3 * PERIOD)
+    assert not any("behind" in text for text in bench.logged)
+
+
+def test_by_the_wall_clock_a_late_command_acts_late(
+    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The answers of ten ticks do not come; the one before them is held."""
+    bench = Bench(
+        paper_robot, monkeypatch, lambda tick: not 50 <= tick < 60, realtime=True
+    )  # fmt: skip
+    bench.run()
+    assert bench.loop.missed_deadlines == 10
+    assert bench.now - 1000.0 == pytest.approx(99 * PERIOD, abs=3 * PERIOD)
+    expected = bench.flown_by_hand(lambda k: torque(49 if 50 <= k < 60 else k))
+    np.testing.assert_array_equal(bench.numbers, expected)
+
+
+def test_what_is_no_good_command_is_counted_and_does_not_act(
+    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Answers to other ticks and bytes of anything are passed over; NaN is an answer, but none."""
+
+    def answer(tick: int) -> bool:
+        if tick == 10:
+            bench.send(3, torque(0))
+            bench.send(tick + 50, torque(0))
+            bench.by_name[topics.COMMAND.name].waiting.append(b"\0\1\0\0nothing")
+        if tick == 20:
+            bench.send(tick, np.full(9, np.nan))
+        return tick != 20
+
+    bench = Bench(paper_robot, monkeypatch, answer)
+    bench.run()
+    values = bench.loop.health().values
+    refused = {k: v for k, v in values.items() if k.startswith("refused")}
+    assert refused.pop("refused: stamp") == 2
+    assert refused.pop("refused: not finite") == 1
+    assert list(refused.values()) == [1]
+    assert values["missed_deadlines"] == 1
+    assert bench.waited_s == 0.0
+    expected = bench.flown_by_hand(lambda k: torque(19 if k == 20 else k))
+    np.testing.assert_array_equal(bench.numbers, expected)
+
+
+def test_at_the_end_the_actuators_are_left_at_zero(
+    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(paper_robot, monkeypatch, lambda tick: tick < 40)
+    bench.run(lambda: bench.tick == 40)
+    bench.loop.stand_down()
+    assert bench.logged == ["flew 0.0200 s in 0.00 s"]
+    bench.run(lambda: bench.tick == 42)
+    assert not bench.loop._plant.state.applied_torque.any()
