@@ -31,7 +31,7 @@ from space_robot_control.cli.launch_arguments import (
 )
 from space_robot_control.flight.graph.launched import launched_parameters
 from space_robot_control.flight.graph.node_names import NODE_NAMES
-from space_robot_msgs_py.ros.process_environment import DEFAULTS
+from space_robot_msgs_py.ros.process_environment import defaults
 
 PACKAGE = "space_robot"
 AUTOSTART = "autostart"
@@ -43,7 +43,7 @@ def generate_launch_description() -> LaunchDescription:
     """Declare the arguments; the nodes follow from their values."""
     environment = [
         SetEnvironmentVariable(name, EnvironmentVariable(name, default_value=value))
-        for name, value in DEFAULTS.items()
+        for name, value in defaults().items()
     ]
     arguments = [
         DeclareLaunchArgument(

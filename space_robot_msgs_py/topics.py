@@ -93,9 +93,10 @@ TRUTH_BASE = Topic(
 TF = Topic("/tf", "tf2_msgs/msg/TFMessage", 100, stamp_at=4)
 TF_STATIC = Topic("/tf_static", TF.type, 1, transient_local=True, has_stamp=False)
 CARRIER = "std_msgs/msg/UInt8MultiArray"
-TRANSFORMS = Topic("transforms", CARRIER, 1_000, is_optional=True, carries=TF)
+# Hidden, as names with an underscore are in ROS: nobody but the recorder can read them.
+TRANSFORMS = Topic("_transforms", CARRIER, 1_000, is_optional=True, carries=TF)
 TRANSFORMS_STATIC = Topic(
-    "transforms/static", CARRIER, 1,
+    "_transforms/static", CARRIER, 1,
     transient_local=True, is_event=True, is_optional=True, carries=TF_STATIC,
 )  # fmt: skip
 ROBOT_DESCRIPTION = Topic(

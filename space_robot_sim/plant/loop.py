@@ -28,6 +28,7 @@ from ..robot.find import find_robot
 from .actuator_health import ActuatorHealth
 from .command_guard import CommandGuard
 from .exchange import NONE, SentState, exchange_of
+from .late_listeners import LateListeners
 from .plant import Plant
 from .run_control import PAUSED, RunControl
 from .scene_output import SceneOutput
@@ -85,6 +86,9 @@ class PlantLoop:
         self.outputs = (
             *self._state_out, self._clock_out, *self._truth.outputs, *self._scene.outputs,
         )  # fmt: skip
+        self._late_listeners = LateListeners(
+            (self._state_out[0], self._clock_out, *self._scene.viewed)
+        )
         self.wait_for = settings.wait_for
         self.is_complete = False
         self.control = RunControl(settings.paused)
@@ -145,7 +149,7 @@ class PlantLoop:
         if self._unsent:
             self._send_next()
         elif self.control.holds():
-            return HELD
+            return self._hold()
         else:
             self._end_tick()
         return None
@@ -196,6 +200,7 @@ class PlantLoop:
     def _begin_tick(self) -> None:
         tick = self._plant.tick
         self._is_under_way = True
+        self._late_listeners.begin()
         self._by_the_clock = self._controller_silent or (self._settings.realtime and tick > 0)
         self._must_give_way = self._by_the_clock and self._wall_clock.left(tick) <= 0.0
         self._heard_before = self._heard
@@ -248,12 +253,24 @@ class PlantLoop:
             return Wait(left - SPIN_BEFORE_DEADLINE_S, inputs)
         if left <= 0.0:
             if self.control.holds():
-                return HELD
+                return self._hold()
             if self._controller_silent and self._heard > self._heard_before:
                 self._node.log("the controller answers again")
                 self._controller_silent = False
             self._end_tick()
         return None
+
+    def _hold(self) -> Wait:
+        """Stay at the present tick; show it to those who join meanwhile.
+
+        Of the state only the joints' part: the controller does not answer a part alone.
+        """
+        if self._late_listeners.are_due(time.monotonic()):
+            self._clock_out.publish(self._clock_sent)
+            for output, message in zip(self._state_out[:1], self._sent.messages, strict=False):
+                output.publish(message)
+            self._scene.show(self._plant.truth)
+        return HELD
 
     def _end_tick(self) -> None:
         """Step the plant under the command in force, and begin the next tick."""
