@@ -10,7 +10,12 @@ from typing import NamedTuple
 ROOT = "/"
 """The namespace of nodes that are given none."""
 INERTIAL_FRAME = "inertial"
-BASE_FRAME = "base"
+BASE_FRAME = "base_link"
+"""Frame of the base, as REP 105 has it."""
+FORMER_BASE_FRAME = "base"
+"""The same in bags of releases up to 0.7."""
+BASE_JOINT = "base"
+"""Name of the base's six degrees of freedom in messages that have one a joint."""
 BASE_AXES = ("base_x", "base_y", "base_z")
 """Names of the base's torques in /command."""
 
