@@ -83,6 +83,8 @@ COMMAND = Topic("command", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
 REFERENCE_JOINTS = Topic("reference/joints", "trajectory_msgs/msg/JointTrajectory", 200)
 REFERENCE_BASE = Topic("reference/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 200)
 TELEMETRY = Topic("controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, has_stamp=False)
+# The telemetry once more, by name: what viewers plot; nobody here reads it.
+SIGNALS = Topic("controller/signals", "sensor_msgs/msg/JointState", 1_000, is_optional=True)
 LAW = Topic(
     "controller/law", "rcl_interfaces/msg/ParameterEvent", 100,
     transient_local=True, is_event=True,
@@ -116,7 +118,7 @@ ALL = (
 """All that tell of a flight: who reads a bag reads these."""
 SCENE = (TRANSFORMS, TRANSFORMS_STATIC, ROBOT_DESCRIPTION)
 """What viewers show of it; nobody here reads them again."""
-RECORDED = (*ALL, *SCENE)
+RECORDED = (*ALL, SIGNALS, *SCENE)
 """All that the recorder listens to."""
 STATES = (JOINT_STATES, BASE_STATE, WHEELS_STATE, THRUSTERS_STATE)
 """The parts of a state."""

@@ -18,6 +18,7 @@ LISTENERS = {
     topics.REFERENCE_JOINTS: _TO_CONTROLLER,
     topics.REFERENCE_BASE: _TO_CONTROLLER,
     topics.TELEMETRY: ("recorder_node",),
+    topics.SIGNALS: ("recorder_node",),
     topics.LAW: ("recorder_node",),
     topics.CLOCK: ("mission_node", "recorder_node"),
     topics.TRUTH_JOINTS: ("recorder_node",),
