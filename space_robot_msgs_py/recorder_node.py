@@ -93,6 +93,7 @@ class RecorderLoop:
         """Names in the root namespace by those that are heard."""
         self._pause = Wait(settings.drain_period, patience_s=PATIENCE_S)
         self._diagnostics = RawSubscription(node, topics.DIAGNOSTICS, self._group)
+        self._description = RawSubscription(node, topics.PLANT_DESCRIPTION, self._group)
         self._told = False
         self._from_ns = 0
         """When recording was taken up again, by the senders' clock; 0: it never paused."""
@@ -185,6 +186,7 @@ class RecorderLoop:
         for entry in self._inputs:
             taken, timely = self._take_some(entry)
             is_timely, waiting = is_timely or timely > 0, waiting or taken == TURN
+        self._take_description()
         self._take_counts()
         self._tell_failure()
         return is_timely, waiting
@@ -207,6 +209,13 @@ class RecorderLoop:
             if self._gives_way and self._until_ns is None:  # once told to stop, it is in a hurry
                 os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
         return TURN, timely
+
+    def _take_description(self) -> None:
+        """Note what the plant says that it flies."""
+        if (taken := self._description.take_with_source()) is not None:
+            with suppress(MessageError, ValueError):
+                flown = json.loads(decode(taken.data, topics.PLANT_DESCRIPTION.type).data)
+                self._recorder.describe(flown, taken.publisher, taken.sequence)
 
     def _take_counts(self) -> None:
         """Hear from the nodes how much they have sent."""

@@ -134,3 +134,8 @@ SIMULATION_PAUSED = Topic(
     transient_local=True, is_event=True, has_stamp=False,
 )  # fmt: skip
 """True while the plant is held: not recorded, for a bag tells nothing of the wall clock's time."""
+PLANT_DESCRIPTION = Topic(
+    "_plant_description", "std_msgs/msg/String", 1,
+    transient_local=True, is_event=True, has_stamp=False,
+)  # fmt: skip
+"""What the plant flies, as JSON: the recorder notes it with the bag, beside what it was told."""

@@ -25,7 +25,7 @@ LISTENERS = {
     topics.TRUTH_BASE: ("recorder_node",),
     topics.WHEELS_STATE: _TO_CONTROLLER,
     topics.THRUSTERS_STATE: ("recorder_node",),
-    **dict.fromkeys(topics.SCENE, ("recorder_node",)),
+    **dict.fromkeys((*topics.SCENE, topics.PLANT_DESCRIPTION), ("recorder_node",)),
 }
 """Nodes of the graph that subscribe to each topic."""
 
