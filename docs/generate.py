@@ -188,6 +188,8 @@ def _occasion(topic: topics.Topic) -> str:
         return "every 33 ms or more, while somebody listens"
     if topic.carries:
         return "every 10 ms, or every tick if that is longer"
+    if topic is topics.SIGNALS:
+        return "as /controller/telemetry"
     if topic.per_tick and topic.is_optional:
         return "each tick, where there are any"
     if topic.is_optional:

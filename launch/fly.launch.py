@@ -7,6 +7,7 @@ The arguments are the options of `space-robot fly`. It ends when the plant has c
 exit code 0, or when any node ends before, with exit code 1.
 """
 
+import sys
 from pathlib import Path
 from tempfile import mkdtemp
 
@@ -23,10 +24,14 @@ from launch.event_handlers import OnProcessExit, OnShutdown
 from launch.substitutions import EnvironmentVariable, LaunchConfiguration
 from launch_ros.actions import LifecycleNode
 
-from space_robot_control.cli.launch_arguments import launch_arguments, launched_flight
+from space_robot_control.cli.launch_arguments import (
+    launch_arguments,
+    launched_flight,
+    refuse_unknown,
+)
 from space_robot_control.flight.graph.launched import launched_parameters
 from space_robot_control.flight.graph.node_names import NODE_NAMES
-from space_robot_msgs_py.ros.process_environment import DEFAULTS
+from space_robot_msgs_py.ros.process_environment import defaults
 
 PACKAGE = "space_robot"
 AUTOSTART = "autostart"
@@ -38,7 +43,7 @@ def generate_launch_description() -> LaunchDescription:
     """Declare the arguments; the nodes follow from their values."""
     environment = [
         SetEnvironmentVariable(name, EnvironmentVariable(name, default_value=value))
-        for name, value in DEFAULTS.items()
+        for name, value in defaults().items()
     ]
     arguments = [
         DeclareLaunchArgument(
@@ -59,7 +64,9 @@ def fly(context: LaunchContext) -> list:
     def value(name: str) -> str:
         return LaunchConfiguration(name).perform(context)
 
-    flight, bag = launched_flight({name: value(name) for name, *_ in launch_arguments()})
+    names = [name for name, *_ in launch_arguments()]
+    refuse_unknown(sys.argv, __file__, [*names, AUTOSTART])
+    flight, bag = launched_flight({name: value(name) for name in names})
     folder = Path(mkdtemp(prefix="space_robot_launch_"))
     file = launched_parameters(flight, bag, value(AUTOSTART) == "true", folder)
     nodes = [

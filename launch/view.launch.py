@@ -25,6 +25,8 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
+from space_robot_control.cli.launch_arguments import launch_arguments, refuse_unknown
+
 RVIZ, PAGE = "rviz", "page"
 VIEW = [sys.executable, "-m", "space_robot_control.cli.main", "view"]
 
@@ -45,16 +47,21 @@ def generate_launch_description() -> LaunchDescription:
 
 def view(context: LaunchContext) -> list:
     """Start what shows, and what is shown."""
+    refuse_unknown(
+        sys.argv, __file__,
+        [*(name for name, *_ in launch_arguments()), "autostart", "play", "viewer"],
+    )  # fmt: skip
     bag = LaunchConfiguration("play").perform(context)
     viewer = LaunchConfiguration("viewer").perform(context) or (RVIZ if has_rviz() else PAGE)
     share = Path(get_package_share_directory("space_robot"))
     if viewer == PAGE and bag:
         return [ExecuteProcess(cmd=[*VIEW, bag], output="screen")]
     rviz = Node(
-        package="rviz2", executable="rviz2", arguments=["-d", str(share / "config/views/fly.rviz")]
-    )
-    if bag:
-        play = ExecuteProcess(cmd=["ros2", "bag", "play", bag, "--clock"], output="screen")
+        package="rviz2", executable="rviz2", arguments=["-d", str(share / "config/views/fly.rviz")],
+        parameters=[{"use_sim_time": True}],
+    )  # fmt: skip
+    if bag:  # its own /clock is played: no --clock, which would send a second one
+        play = ExecuteProcess(cmd=["ros2", "bag", "play", bag], output="screen")
         return [rviz, play]
     page = ExecuteProcess(cmd=[*VIEW, "--live"], output="screen")
     source = PythonLaunchDescriptionSource(str(share / "launch/fly.launch.py"))

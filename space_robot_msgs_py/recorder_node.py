@@ -33,6 +33,8 @@ TURN = 100
 """Messages taken of one topic before the next has its turn."""
 REPORTS = 5
 """Reports of nodes looked at in a round: to read one takes a tenth of a millisecond."""
+LOOK_PERIOD_S = 0.02
+"""Between two looks for publishers of topics that only some flights have."""
 AHEAD_OF_NEED = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
 """Topics of which messages that came while nothing was recorded are of the time after it, too."""
 PATIENCE_S = 0.002
@@ -54,7 +56,7 @@ class RecorderLoop:
         self, node: ManagedNode[RecorderNodeSettings], settings: RecorderNodeSettings,
         gives_way: bool = False,
     ) -> None:  # fmt: skip
-        """Open the bag and listen to all topics.
+        """Open the bag and listen to the topics that every flight has.
 
         Args:
             node: its node.
@@ -72,20 +74,26 @@ class RecorderLoop:
         path = Path(settings.bag or time.strftime("bag_%Y%m%d-%H%M%S"))
         if node.times_configured and settings.bag:  # reset: a bag is one flight from its start
             node.log(f"the bag of before the reset is now {set_aside(path)}")
-        group, namespace = PolledCallbackGroup(), node.get_namespace()
+        self._group, namespace = PolledCallbackGroup(), node.get_namespace()
+        self._names = {topic: node.resolve_topic_name(topic.name) for topic in topics.RECORDED}
         self._inputs = [
-            RawSubscription(node, topic, group, QUEUE_DEPTH) for topic in topics.RECORDED
+            self._listen_to(topic) for topic in topics.RECORDED if not topic.is_optional
         ]
+        self._unsent = [topic for topic in topics.RECORDED if topic.is_optional]
+        """Topics that nobody publishes yet: a flight need not have them."""
+        self._look_at = 0.0
+        """When to look for their publishers, by the monotonic clock."""
         self._recorder = BagRecorder(
             path, {"period": settings.period, **flight}, settings.timebase,
             settings.compression, settings.split_size, GraphPublishers(node),
-            {entry.topic.name: entry.full_name for entry in self._inputs}, namespace,
+            {topic.name: name for topic, name in self._names.items()}, namespace,
         )  # fmt: skip
         self.outputs: tuple[RawPublisher, ...] = ()
-        self._ours = {entry.full_name: entry.topic.full_name for entry in self._inputs}
+        self._ours = {name: topic.full_name for topic, name in self._names.items()}
         """Names in the root namespace by those that are heard."""
         self._pause = Wait(settings.drain_period, patience_s=PATIENCE_S)
-        self._diagnostics = RawSubscription(node, topics.DIAGNOSTICS, group)
+        self._diagnostics = RawSubscription(node, topics.DIAGNOSTICS, self._group)
+        self._description = RawSubscription(node, topics.PLANT_DESCRIPTION, self._group)
         self._told = False
         self._from_ns = 0
         """When recording was taken up again, by the senders' clock; 0: it never paused."""
@@ -111,6 +119,8 @@ class RecorderLoop:
         """End a chunk, or take what has come: both at once would last longer than a tick."""
         if self._recorder.flush_if_due():
             return self._pause
+        if self._unsent:
+            self._look_for_publishers()
         _, is_busy = self._take_round()
         return None if is_busy else self._pause
 
@@ -133,7 +143,8 @@ class RecorderLoop:
         """Tell what has come, and whether it is kept."""
         recorder = self._recorder
         foreign = {f"foreign {name}": count for name, count in recorder.foreign.items()}
-        values = {"received": recorder.received, **foreign}
+        tick = recorder.accounting[topics.JOINT_STATES.full_name].last
+        values = {"tick": max(0, tick), "received": recorder.received, **foreign}
         if self.failure:
             return Health(f"not recording: {self.failure}", Level.ERROR, values)
         if foreign:
@@ -154,6 +165,18 @@ class RecorderLoop:
             self._node.log(f"messages of {names} were left out: {foreign}")
         self._recorder.close()
 
+    def _listen_to(self, topic: topics.Topic) -> RawSubscription:
+        return RawSubscription(self._node, topic, self._group, QUEUE_DEPTH)
+
+    def _look_for_publishers(self) -> None:
+        """Listen to the optional topics that are published by now; a plant waits for it."""
+        if (now := time.monotonic()) < self._look_at:
+            return
+        self._look_at = now + LOOK_PERIOD_S
+        for topic in [t for t in self._unsent if self._node.count_publishers(self._names[t])]:
+            self._unsent.remove(topic)
+            self._inputs.append(self._listen_to(topic))
+
     def _take_round(self) -> tuple[bool, bool]:
         """Give each topic its turn; whether something was sent in time, whether more waits.
 
@@ -163,6 +186,7 @@ class RecorderLoop:
         for entry in self._inputs:
             taken, timely = self._take_some(entry)
             is_timely, waiting = is_timely or timely > 0, waiting or taken == TURN
+        self._take_description()
         self._take_counts()
         self._tell_failure()
         return is_timely, waiting
@@ -185,6 +209,13 @@ class RecorderLoop:
             if self._gives_way and self._until_ns is None:  # once told to stop, it is in a hurry
                 os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
         return TURN, timely
+
+    def _take_description(self) -> None:
+        """Note what the plant says that it flies."""
+        if (taken := self._description.take_with_source()) is not None:
+            with suppress(MessageError, ValueError):
+                flown = json.loads(decode(taken.data, topics.PLANT_DESCRIPTION.type).data)
+                self._recorder.describe(flown, taken.publisher, taken.sequence)
 
     def _take_counts(self) -> None:
         """Hear from the nodes how much they have sent."""

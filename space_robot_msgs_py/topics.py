@@ -10,7 +10,12 @@ from typing import NamedTuple
 ROOT = "/"
 """The namespace of nodes that are given none."""
 INERTIAL_FRAME = "inertial"
-BASE_FRAME = "base"
+BASE_FRAME = "base_link"
+"""Frame of the base, as REP 105 has it."""
+FORMER_BASE_FRAME = "base"
+"""The same in bags of releases up to 0.7."""
+BASE_JOINT = "base"
+"""Name of the base's six degrees of freedom in messages that have one a joint."""
 BASE_AXES = ("base_x", "base_y", "base_z")
 """Names of the base's torques in /command."""
 
@@ -78,6 +83,8 @@ COMMAND = Topic("command", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
 REFERENCE_JOINTS = Topic("reference/joints", "trajectory_msgs/msg/JointTrajectory", 200)
 REFERENCE_BASE = Topic("reference/base", "trajectory_msgs/msg/MultiDOFJointTrajectory", 200)
 TELEMETRY = Topic("controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_000, has_stamp=False)
+# The telemetry once more, by name: what viewers plot; nobody here reads it.
+SIGNALS = Topic("controller/signals", "sensor_msgs/msg/JointState", 1_000, is_optional=True)
 LAW = Topic(
     "controller/law", "rcl_interfaces/msg/ParameterEvent", 100,
     transient_local=True, is_event=True,
@@ -93,9 +100,10 @@ TRUTH_BASE = Topic(
 TF = Topic("/tf", "tf2_msgs/msg/TFMessage", 100, stamp_at=4)
 TF_STATIC = Topic("/tf_static", TF.type, 1, transient_local=True, has_stamp=False)
 CARRIER = "std_msgs/msg/UInt8MultiArray"
-TRANSFORMS = Topic("transforms", CARRIER, 1_000, is_optional=True, carries=TF)
+# Hidden, as names with an underscore are in ROS: nobody but the recorder can read them.
+TRANSFORMS = Topic("_transforms", CARRIER, 1_000, is_optional=True, carries=TF)
 TRANSFORMS_STATIC = Topic(
-    "transforms/static", CARRIER, 1,
+    "_transforms/static", CARRIER, 1,
     transient_local=True, is_event=True, is_optional=True, carries=TF_STATIC,
 )  # fmt: skip
 ROBOT_DESCRIPTION = Topic(
@@ -110,7 +118,7 @@ ALL = (
 """All that tell of a flight: who reads a bag reads these."""
 SCENE = (TRANSFORMS, TRANSFORMS_STATIC, ROBOT_DESCRIPTION)
 """What viewers show of it; nobody here reads them again."""
-RECORDED = (*ALL, *SCENE)
+RECORDED = (*ALL, SIGNALS, *SCENE)
 """All that the recorder listens to."""
 STATES = (JOINT_STATES, BASE_STATE, WHEELS_STATE, THRUSTERS_STATE)
 """The parts of a state."""
@@ -126,3 +134,8 @@ SIMULATION_PAUSED = Topic(
     transient_local=True, is_event=True, has_stamp=False,
 )  # fmt: skip
 """True while the plant is held: not recorded, for a bag tells nothing of the wall clock's time."""
+PLANT_DESCRIPTION = Topic(
+    "_plant_description", "std_msgs/msg/String", 1,
+    transient_local=True, is_event=True, has_stamp=False,
+)  # fmt: skip
+"""What the plant flies, as JSON: the recorder notes it with the bag, beside what it was told."""

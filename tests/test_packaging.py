@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -38,9 +39,7 @@ OF_EXTRAS = {
     "pyarrow": "parquet", "trimesh": "view", "viser": "view", "xacro": "xacro",
 }  # fmt: skip
 """Packages that one command needs, and their extra."""
-OF_ROS = {"simulation_interfaces"}
-"""Packages of ROS that are used where they are installed."""
-ROSDEP = {"pillow": "pil", "pyyaml": "yaml"}
+ROSDEP = {"pillow": "pil", "pyyaml": "yaml", "rosbags": "rosbags-pip"}
 """Names of rosdep's keys, behind python3-, where they are not the package's."""
 
 
@@ -98,7 +97,7 @@ def test_setup_py_and_the_imports_name_the_same_packages() -> None:
     """What is imported is required, or of an extra and looked for before; nothing else is."""
     found = third_party_imports()
     required = packages(setup_keyword("install_requires"))
-    assert found - set(OF_EXTRAS) - OF_ROS - dependencies("exec_depend") == required
+    assert found - set(OF_EXTRAS) - dependencies("exec_depend") == required
     extras = setup_keyword("extras_require")
     for name, extra in OF_EXTRAS.items():
         assert name in found
@@ -108,9 +107,14 @@ def test_setup_py_and_the_imports_name_the_same_packages() -> None:
 
 def third_party_imports() -> set[str]:
     """Packages that the three packages import anywhere, by their names on PyPI."""
+    return imports_of(ROOT / file for file in modules().values())
+
+
+def imports_of(files: Iterable[Path]) -> set[str]:
+    """Packages of others that some files import, by their names on PyPI."""
     names = set()
-    for file in modules().values():
-        for node in ast.walk(ast.parse((ROOT / file).read_text("utf-8"))):
+    for file in files:
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
             if isinstance(node, ast.Import):
                 names |= {alias.name.split(".")[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and not node.level and node.module:
@@ -193,11 +197,17 @@ def test_package_xml_has_what_setup_py_requires() -> None:
 
 
 def test_package_xml_has_the_packages_of_all_messages() -> None:
+    """Also of those that are sent only where their package is installed."""
     ros = dependencies("exec_depend")
-    assert {topic.type.split("/")[0] for topic in topics.ALL} <= ros
+    sent = {value for value in vars(topics).values() if isinstance(value, topics.Topic)}
+    assert {topic.type.split("/")[0] for topic in sent} <= ros
     wheels = packages(setup_keyword("extras_require")["ros"])
     assert "rclpy" in ros
     assert "ros-jazzy-rclpy" in wheels
+
+
+def test_package_xml_has_what_the_launch_files_import() -> None:
+    assert imports_of((ROOT / "launch").glob("*.py")) <= dependencies("exec_depend")
 
 
 def test_tests_depend_on_what_setup_py_says() -> None:

@@ -96,22 +96,22 @@ def test_foxglove_shows_the_robot_in_the_inertial_frame(seen: dict[str, Any]) ->
     assert seen["/robot_description"].data.startswith("<?xml")
 
 
-def error_places(robot: Robot) -> list[int]:
-    """Where the telemetry has the error of each axis."""
-    axes = len(robot.axis_names)
-    start = 1 + SIGNALS.index("e") * axes
-    return list(range(start, start + axes))
-
-
-def test_errors_are_those_of_the_telemetry(paper_robot: Robot, seen: dict[str, Any]) -> None:
-    """Its layout is that of the paper's robot: axes base x, y, z and six joints."""
-    places = error_places(paper_robot)
-    assert "e" in seen["/controller/telemetry"].layout.dim[0].label
-    for text in (
-        (VIEWS / name).read_text("utf-8") for name in ("foxglove.json", "plotjuggler.xml")
-    ):
-        found = [int(i) for i in re.findall(r"/controller/telemetry[./]data\[(\d+)\]", text)]
-        assert found == places
+def test_errors_are_those_of_the_law_by_the_names_of_the_axes(
+    paper_robot: Robot, seen: dict[str, Any]
+) -> None:
+    """Axes base x, y, z and six joints, whose numbers are the telemetry's."""
+    signals, telemetry = seen["/controller/signals"], seen["/controller/telemetry"]
+    names = list(paper_robot.axis_names)
+    assert list(signals.name) == names
+    stamp = signals.header.stamp
+    assert stamp.sec * 2000 + stamp.nanosec / 500_000 == telemetry.data[0]
+    rows = dict(zip(SIGNALS, telemetry.data[1:].reshape(len(SIGNALS), -1), strict=True))
+    for field, signal in (("position", "e"), ("velocity", "s"), ("effort", "n_hat")):
+        assert getattr(signals, field).tolist() == rows[signal].tolist()
+    plotted, layout = "/controller/signals", (VIEWS / "foxglove.json").read_text("utf-8")
+    assert [int(i) for i in re.findall(rf"{plotted}\.position\[(\d+)\]", layout)] == [*range(9)]
+    curves = (VIEWS / "plotjuggler.xml").read_text("utf-8")
+    assert re.findall(rf"{plotted}/(\w+)/position", curves) == names
 
 
 def plotjuggler_names(topic: str, message: Any) -> Iterator[str]:

@@ -7,12 +7,14 @@ described in its bag, and the same to the last bit as one of the command.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import click
 
+from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from ..flight.plan import Flight
@@ -71,6 +73,35 @@ def _argument(option: click.Option) -> LaunchArgument:
 
 def _name(option: click.Option) -> str:
     return max(option.opts, key=len).lstrip("-").replace("-", "_")
+
+
+def refuse_unknown(command_line: Sequence[str], file: str, names: Iterable[str]) -> None:
+    """See that a launch file is not started with an argument that it does not have.
+
+    launch itself takes any. Arguments of another launch file that includes this one are that one's
+    own.
+
+    Args:
+        command_line: of the process, as ``ros2 launch space_robot fly.launch.py case:=1``.
+        file: path of the launch file.
+        names: its arguments.
+
+    Raises:
+        InputError: an argument is unknown.
+    """
+    started, *words = [*command_line, ""]
+    while started and Path(started).name != Path(file).name:
+        started, *words = words
+    known = list(names)
+    for word in words:
+        name, is_argument, _ = word.partition(":=")
+        if is_argument and name not in known:
+            near = get_close_matches(name, known, n=1)
+            meant = f"did you mean {near[0]}? " if near else ""
+            raise InputError(
+                f"{Path(file).name}: unknown argument {short(name)}: "
+                f"{meant}--show-args lists all arguments"
+            )
 
 
 def launched_flight(values: Mapping[str, str]) -> LaunchedFlight:

@@ -11,6 +11,7 @@ from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec
 from space_robot_msgs_py.wire.controller_law import NODE, LawCodec
+from space_robot_msgs_py.wire.controller_signals import SignalsCodec
 from space_robot_msgs_py.wire.controller_telemetry import TelemetryCodec
 from space_robot_msgs_py.wire.stamp_guard import StampGuard
 
@@ -49,6 +50,7 @@ class Answering:
         self.stamps = StampGuard(settings.longest_jump)
         self._commands = CommandCodec(names.commanded, settings.timebase)
         self._telemetry = TelemetryCodec(names.axes)
+        self._signals = SignalsCodec(names.axes, settings.timebase)
         self._law = LawCodec(settings.timebase, node)
         self._telemetry_decimation = settings.telemetry_decimation
         self.answered = -1
@@ -89,7 +91,9 @@ class Answering:
         self.answered = tick
         yield topics.COMMAND, self.answer
         if tick % self._telemetry_decimation == 0:
-            yield topics.TELEMETRY, self._telemetry.encode(tick, controller.telemetry())
+            s, u, n_hat, e = controller.telemetry()
+            yield topics.TELEMETRY, self._telemetry.encode(tick, (s, u, n_hat, e))
+            yield topics.SIGNALS, self._signals.encode(tick, e, s, n_hat)
 
     def encode(self, command: Command) -> bytes:
         """Return a command's message."""

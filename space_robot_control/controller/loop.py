@@ -60,6 +60,7 @@ class ControllerLoop:
         self._out = {
             topics.COMMAND: self._command_out,
             topics.TELEMETRY: RawPublisher(node, topics.TELEMETRY),
+            topics.SIGNALS: RawPublisher(node, topics.SIGNALS),
             topics.LAW: RawPublisher(node, topics.LAW),
         }
         self.outputs = tuple(self._out.values())

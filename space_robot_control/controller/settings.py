@@ -52,7 +52,9 @@ class ControllerNodeSettings(NodeSettings):
 
     node: ClassVar[str] = "controller"
     selectors: ClassVar[tuple[str, ...]] = ("robot", "actuators", "gains")
-    sends: ClassVar[tuple[topics.Topic, ...]] = (topics.COMMAND, topics.TELEMETRY, topics.LAW)
+    sends: ClassVar[tuple[topics.Topic, ...]] = (
+        topics.COMMAND, topics.TELEMETRY, topics.SIGNALS, topics.LAW,
+    )  # fmt: skip
 
     controller: str = Field(
         "tde_stc", description="control law in force, or module:Class of your own"
@@ -66,7 +68,7 @@ class ControllerNodeSettings(NodeSettings):
         "config/actuators, or a path to their YAML",
     )
     telemetry_decimation: Annotated[int, Field(ge=1, le=10**6)] = Field(
-        20, description="ticks between two messages on /controller/telemetry"
+        20, description="ticks between two messages on /controller/telemetry and /controller/signals"
     )
     swaps: Texts = Field(
         [""], description="laws to swap to in flight, each as T:LAW with T in simulated seconds"

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 QUIET_S = 2.0
 """A signal that comes twice, as from ``timeout``, must not disturb the putting away."""
 
@@ -29,7 +29,7 @@ def exit_code(number: int) -> int:
 
 @contextmanager
 def raising_signals() -> Iterator[None]:
-    """In the context SIGINT, SIGTERM and SIGHUP raise `Interrupted` in the main thread."""
+    """In the context each of `SIGNALS` raises `Interrupted` in the main thread."""
     quiet_until = 0.0
 
     def raise_interrupted(number: int, frame: object) -> None:

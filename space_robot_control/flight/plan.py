@@ -11,6 +11,7 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
 from space_robot_sim.environment.friction import coefficients
 from space_robot_sim.faults.grammar import parse_faults
+from space_robot_sim.plant.description import actuators, plant_description
 from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import MOST_TICKS
@@ -166,11 +167,6 @@ class Flight:
         return [*in_plant, *self.plan.faults_of(PROCESS_KINDS)]
 
     @property
-    def events(self) -> list[str]:
-        """The texts of all events, by their times, with the targets' numbers."""
-        return [str(exchange.event) for exchange in self.plant.captures.exchanges]
-
-    @property
     def has_friction(self) -> bool:
         """True if the joints have friction."""
         return bool(coefficients(self.robot, self.plant_settings.friction).any())
@@ -190,23 +186,12 @@ class Flight:
 
     @property
     def _base_actuators(self) -> dict[str, Any]:
-        """The numbers of the base's actuators, and those believed where they are others."""
-        flown, believed = (
-            s.model_dump(include=set(BaseActuatorSettings.model_fields))
-            for s in (self.plant_settings, self.believed_actuators)
-        )
+        """The numbers of the base's actuators that the controller believes, if they are others."""
+        believed = actuators(self.believed_actuators)
         if self.plant_settings.base_actuation == "ideal":
             return {}
-        other = {} if believed == flown else {"controller_base_actuators": believed}
-        return {"base_actuators": flown, **other}
-
-    @property
-    def _prismatic_joints(self) -> dict[str, Any]:
-        """The joints whose numbers are m and N; none is told of, where there is none."""
-        robot = self.robot
-        kinds = zip(robot.all_joint_names, robot.is_prismatic, strict=True)
-        found = [name for name, is_prismatic in kinds if is_prismatic]
-        return {"prismatic_joints": found} if found else {}
+        is_same = believed == actuators(self.plant_settings)
+        return {} if is_same else {"controller_base_actuators": believed}
 
     @property
     def description(self) -> dict[str, Any]:
@@ -214,32 +199,25 @@ class Flight:
 
         The same plan with the same software gives the same one: it tells no time and no machine.
         """
-        plant, controller = self.plant_settings, self.controller_settings
+        controller, robots = self.controller_settings, self._robots.description
+        plant = plant_description(
+            self.robot, robots["robot_file"], self.plant, self.plant_settings
+        )
         swaps = [text for text in controller.swaps if text.strip()]
         return {
             "controller": self.law.name,
-            "case": plant.case,
-            "sensors": plant.sensors,
-            "actuators": plant.actuators,
+            **plant,
             **self._base_actuators,
             "gains": controller.gains,
-            "robot": self.robot.name,
             "mission": self._mission_name,
-            "period": self.period,
             "ticks": self.ticks,
-            "command_latency_ticks": plant.command_latency_ticks,
-            "friction": self.has_friction,
-            "realtime": plant.realtime,
             **self._navigation,
-            "seed": plant.fault_seed,
             **({"faults": self.faults} if self.faults else {}),
-            **({"events": self.events} if self.events else {}),
             **({"swaps": swaps} if swaps else {}),
             **({"restart_controller": True} if self.plan.restart_controller else {}),
             "parameters": self.parameters,
             "gains_used": self.gains_used,
-            **self._prismatic_joints,
-            **self._robots.description,
+            **robots,
             "versions": versions(),
             "commit": commit(),
         }

@@ -24,6 +24,7 @@ from space_robot_msgs_py.samples import Command, LawInForce, RobotState
 from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.controller_law import LawCodec
+from space_robot_msgs_py.wire.controller_signals import SignalsCodec
 from space_robot_msgs_py.wire.controller_telemetry import SIGNALS, TelemetryCodec
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 from space_robot_msgs_py.wire.truth_writer import TruthWriter
@@ -48,6 +49,7 @@ class Messages:
         self._commands = CommandCodec(names.commanded, timebase)
         self._references = ReferenceCodec(names.joints, timebase)
         self._telemetry = TelemetryCodec(names.axes)
+        self._signals = SignalsCodec(names.axes, flight.timebase)
         self._clock = ClockCodec()
         self._law = LawCodec(timebase)
         from space_robot_sim.plant.scene import SceneWriter  # of no use without a bag
@@ -111,6 +113,7 @@ class Messages:
             if tick % flight.controller_settings.telemetry_decimation == 0:
                 s, u, n_hat, e = log.telemetry[row]
                 record(topics.TELEMETRY, self._telemetry.encode(tick, (s, u, n_hat, e)))
+                record(topics.SIGNALS, self._signals.encode(tick, e, s, n_hat))
 
 
 @contextmanager

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_sim.robot import Robot
+from space_robot_sim.robot.frame_names import frame_names
 from space_robot_sim.robot.transforms import Transform, joint_transforms, tool_transforms, wxyz
 from space_robot_sim.robot.tree import Visual
 
@@ -36,7 +37,7 @@ class Look(NamedTuple):
 
 
 class RobotScene:
-    """A robot below a name of its own, as ``/tde_stc/base/joint1``: frames as tf has them."""
+    """A robot below a name of its own, as ``/tde_stc/base_link/link1``: frames as tf has them."""
 
     def __init__(self, scene: SceneApi, root: str, robot: Robot, look: Look | None = None) -> None:
         """Add the robot; it stands at zero.
@@ -48,7 +49,8 @@ class RobotScene:
             look: of its shapes.
         """
         self._scene, self._robot, self._look = scene, robot, look or Look()
-        base = robot.body_names[0]
+        self._names = frame_names(robot).bodies
+        base = self._names[0]
         self._paths = {base: f"{root}/{_part(base)}"}
         self.base: FrameHandle = scene.add_frame(self._paths[base], show_axes=False)
         self._frames: dict[str, FrameHandle] = {}
@@ -80,7 +82,7 @@ class RobotScene:
             shape: what it is.
             mesh: of a shape that is one.
         """
-        path = f"{self._paths[self._robot.body_names[shape.body]]}/{name}"
+        path = f"{self._paths[self._names[shape.body]]}/{name}"
         return _add_shape(self._scene, path, shape, self._look, mesh)
 
     def move(self, position: Array, quaternion: Array, moved: Sequence[Transform], k: int) -> None:

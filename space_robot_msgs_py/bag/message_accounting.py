@@ -160,7 +160,7 @@ def topics_with_allowed_gaps(flight: Mapping[str, Any]) -> frozenset[str]:
     """
     excused: tuple[topics.Topic, ...] = ()
     if any(flight.get(key) for key in ("realtime", "faults", "restart_controller")):
-        excused += (topics.COMMAND, topics.TELEMETRY)
+        excused += (topics.COMMAND, topics.TELEMETRY, topics.SIGNALS)
     if flight.get("faults"):
         excused += topics.STATES
     return frozenset(topic.full_name for topic in excused)

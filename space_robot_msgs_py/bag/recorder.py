@@ -25,6 +25,8 @@ from .sources import PARTICIPANT_BYTES, Publishers, Sources, Unknown
 from .writer import BagWriter
 
 FLIGHT_KEY = "space_robot.flight"
+ROBOT_KEY = "robot_file"
+"""The robot's numbers among what was flown."""
 CHUNK_BYTES = 1 << 16
 """Ended in 0.2 ms, less than a tick leaves free; read almost as fast as longer ones."""
 MOST_CHUNKS = 4
@@ -64,7 +66,7 @@ class BagRecorder:
         Raises:
             InputError: the bag exists already, or cannot be written.
         """
-        self._excused = topics_with_allowed_gaps(flight)
+        self._flight, self._excused = dict(flight), topics_with_allowed_gaps(flight)
         own = {topic.name: topic.in_namespace(namespace) for topic in topics.RECORDED}
         names = own | dict(names or {})
         self._written = {
@@ -73,7 +75,7 @@ class BagRecorder:
         """The topics under the names that they have in the bag."""
         self._writer = BagWriter(
             path, self._written.values(),
-            {FLIGHT_KEY: json.dumps(dict(flight)), **remappings_note(names, namespace)},
+            {FLIGHT_KEY: json.dumps(self._flight), **remappings_note(names, namespace)},
             compression, split_size,
         )  # fmt: skip
         self._chunk_bytes = min(CHUNK_BYTES, split_size or CHUNK_BYTES)
@@ -84,6 +86,7 @@ class BagRecorder:
             topic.full_name: Sources(topic.name, publishers or Unknown())
             for topic in topics.RECORDED
         }
+        self._plants = Sources(topics.PLANT_DESCRIPTION.name, publishers or Unknown())
         self.failure = ""
         """The reason why nothing is written any more (empty: all is well)."""
         self.kept_tick = -1
@@ -138,6 +141,25 @@ class BagRecorder:
         if self._open_bytes > self._most_bytes:  # nobody has found the time to flush
             self.flush()
         return True
+
+    def describe(self, flown: Any, publisher: bytes = b"", sequence: int = 0) -> None:
+        """Add to the flight's description what the plant says, where nobody has said more.
+
+        Args:
+            flown: the plant's description; from a foreign publisher, or no mapping: it is ignored.
+            publisher: GID (empty: not known).
+            sequence: the message's place among all of its publisher.
+        """
+        is_ours = not publisher or self._plants.take(publisher, sequence)
+        if not is_ours or not isinstance(flown, dict) or ROBOT_KEY in self._flight:
+            return
+        self._flight = flown | self._flight
+        self._excused = topics_with_allowed_gaps(self._flight)
+        if not self.failure:
+            try:
+                self._writer.describe({FLIGHT_KEY: json.dumps(self._flight)})
+            except OSError as error:
+                self._fail(error)
 
     def note_sent(self, topic_name: str, publisher: bytes, count: int) -> None:
         """A node says how many messages it has sent on a topic.

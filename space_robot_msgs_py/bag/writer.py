@@ -87,6 +87,16 @@ class BagWriter:
             self._latched[channel] = (publish_ns, sequence, data)
         return len(chunk.content)
 
+    def describe(self, description: Mapping[str, str]) -> None:
+        """Note more, or what is known better, in this file, those to come and at the end.
+
+        Raises:
+            OSError: that failed.
+        """
+        self._description |= description
+        self._add_records(self._description, ())
+        self._whole_bytes = self._files[-1].size
+
     def flush(self) -> None:
         """End the open chunk and hand it to the kernel.
 

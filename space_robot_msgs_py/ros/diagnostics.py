@@ -1,4 +1,7 @@
-"""/diagnostics: each node's `Health`, once a second and on every change of mode."""
+"""/diagnostics: each node's `Health`, once a second and on every change of mode.
+
+Its stamps are simulated times, as those of all other topics.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 
 from .. import topics
+from ..samples import Timebase
 from .health import Health, Level
 
 PERIOD_S = 1.0
@@ -25,8 +29,14 @@ class Diagnostics:
         self._last_s = -PERIOD_S
         self._last_tick: tuple[float, float] | None = None
 
-    def report(self, health: Health, now_or_never: bool = False) -> None:
-        """Publish if a second has passed or the mode has changed; or in any case, and wait."""
+    def report(self, health: Health, timebase: Timebase, now_or_never: bool = False) -> None:
+        """Publish if a second has passed or the mode has changed; or in any case, and wait.
+
+        Args:
+            health: its values may have the node's ``tick``, the message's stamp; 0 without it.
+            timebase: of the tick.
+            now_or_never: whether this is the last report.
+        """
         now = time.monotonic()
         changed = self._last is None or (health.mode, health.level) != (
             self._last.mode,
@@ -48,7 +58,9 @@ class Diagnostics:
             values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()],
         )  # fmt: skip
         message = DiagnosticArray(status=[status])
-        message.header.stamp = self._node.get_clock().now().to_msg()
+        tick = health.values.get("tick", 0)
+        seconds, rest_ns = divmod(timebase.stamp_ns(max(0, int(tick))), 1_000_000_000)
+        message.header.stamp.sec, message.header.stamp.nanosec = seconds, rest_ns
         self._publisher.publish(message)
         if now_or_never:
             self._publisher.wait_for_all_acked(Duration(seconds=FLUSH_S))

@@ -15,6 +15,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 
 from ..config.settings import NodeSettings
 from ..errors import InputError, SpaceRobotError
+from ..samples import Timebase
 from .diagnostics import Diagnostics
 from .exclusive import Claim, claim_name, foreign_publishers
 from .health import SENT, Health, Level
@@ -31,6 +32,8 @@ LOOK_AGAIN_S = 0.3
 LOOK_PERIOD_S = 1.0
 """To look for foreign publishers takes as long as the rest of a report."""
 PAUSE_S = 1e-3
+NO_TIME = Timebase(1)
+"""Of a node that has never been configured: it is at tick 0."""
 
 
 class ManagedNode(LifecycleNode, Generic[Schema]):
@@ -77,7 +80,11 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
 
     def report(self) -> None:
         """Report the health, if it is time again or the mode has changed."""
-        self._diagnostics.report(self._health())
+        self._diagnostics.report(self._health(), self._timebase)
+
+    @property
+    def _timebase(self) -> Timebase:
+        return self.settings.timebase if self.settings else NO_TIME
 
     def _health(self) -> Health:
         """Ask the loop, and add the messages it has sent: the recorder looks if all have come."""
@@ -145,7 +152,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             self._try(self._release)
         else:
             if self.loop is not None and self.is_active:
-                self._diagnostics.report(self._health(), now_or_never=True)
+                self._diagnostics.report(self._health(), self._timebase, now_or_never=True)
             self.trigger_shutdown()
         self.calls.finish()
         if self.error:

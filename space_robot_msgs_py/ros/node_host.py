@@ -30,6 +30,7 @@ from .managed_node import AUTOSTART, ManagedNode  # noqa: E402
 from .turns import Turns  # noqa: E402
 
 Schema = TypeVar("Schema", bound=NodeSettings)
+ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
 class NodeKind(NamedTuple, Generic[Schema]):
@@ -56,7 +57,7 @@ class NodeHost:
         self._nodes = nodes
         self._turns = Turns(nodes)
         self._is_signalled = False
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        for number in ENDING_SIGNALS:
             signal.signal(number, self._stop)
         hold_to_standard_input()
 
@@ -94,7 +95,7 @@ class NodeHost:
 def run_nodes(*kinds: NodeKind[Any], arguments: list[str] | None = None) -> NoReturn:
     """Run nodes in this process until a loop is complete, or until all are shut down.
 
-    Exit code 0 at the end or on SIGINT, SIGTERM or SIGHUP, 2 on bad input, 1 on a failed flight,
+    Exit code 0 at the end or on one of `ENDING_SIGNALS`, 2 on bad input, 1 on a failed flight,
     each failure with one line on standard error.
 
     Args:

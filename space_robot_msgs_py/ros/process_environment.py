@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from tempfile import gettempdir
 
 DEFAULTS = {
     # discovery stays on this machine
@@ -15,7 +16,14 @@ DEFAULTS = {
 }
 
 
+def defaults() -> dict[str, str]:
+    """Return `DEFAULTS`, and a folder for ROS' log files where there is no home for them."""
+    has_home = any(os.environ.get(name) for name in ("ROS_LOG_DIR", "ROS_HOME", "HOME"))
+    folder = {} if has_home else {"ROS_LOG_DIR": str(Path(gettempdir(), f"ros_log_{os.getuid()}"))}
+    return DEFAULTS | folder
+
+
 def set_defaults() -> None:
-    """Apply `DEFAULTS`; before rclpy is imported."""
-    for name, value in DEFAULTS.items():
+    """Apply `defaults`; before rclpy is imported."""
+    for name, value in defaults().items():
         os.environ.setdefault(name, value)

@@ -29,7 +29,7 @@ class BaseState(MessageDescription):
 
     def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
         """``names``: those of the joints do not matter here."""
-        super().__init__([topics.BASE_FRAME], timebase)
+        super().__init__([topics.BASE_JOINT], timebase)
 
     def content(self, rows: int = 1) -> Mapping[str, Any]:
         """The base, in the inertial frame."""

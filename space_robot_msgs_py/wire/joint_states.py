@@ -19,7 +19,7 @@ class JointStates(MessageDescription):
 
     topic = topics.JOINT_STATES
     fields: tuple[str, ...] = ("position", "velocity", "effort")
-    frame_id = ""
+    frame_id: str = ""
 
     def __init__(self, names: Sequence[str], timebase: Timebase, passive: int = 0) -> None:
         """``passive``: so many of the names, the last ones, are of joints without motors."""

@@ -27,7 +27,7 @@ class TruthBase(Trajectory):
 
     def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
         """``names``: those of the joints do not matter here."""
-        super().__init__([topics.BASE_FRAME], timebase)
+        super().__init__([topics.BASE_JOINT], timebase)
 
     def point(self) -> Mapping[str, Any]:
         """One body."""

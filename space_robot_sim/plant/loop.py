@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
 from collections import deque
 
 import numpy as np
+from rclpy.serialization import serialize_message
+from std_msgs.msg import String
 
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
@@ -24,10 +27,12 @@ from space_robot_msgs_py.samples import Command
 from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 
-from ..robot.find import find_robot
+from ..robot.find import robot_source
 from .actuator_health import ActuatorHealth
 from .command_guard import CommandGuard
+from .description import plant_description
 from .exchange import NONE, SentState, exchange_of
+from .late_listeners import LateListeners
 from .plant import Plant
 from .run_control import PAUSED, RunControl
 from .scene_output import SceneOutput
@@ -63,8 +68,10 @@ class PlantLoop:
     def __init__(self, node: ManagedNode[PlantNodeSettings], settings: PlantNodeSettings) -> None:
         """Make the plant and load its compiled code, so that no tick comes late for it."""
         self._node, self._settings = node, settings
-        robot = find_robot(settings.robot)
+        source = robot_source(settings.robot)
+        robot = source.robot
         self._plant = Plant(robot, settings, settings.period)
+        self._description = plant_description(robot, source.content, self._plant, settings)
         names = self._plant.names
         at_rest = Command(0, np.zeros(len(names.commanded)))
         Plant(robot, settings, settings.period).step(at_rest)
@@ -82,9 +89,14 @@ class PlantLoop:
         self._for_answer = Wait(PATIENCE_S, (self._command_in,), is_brief=True)
         self._truth = TruthOutput(node, self._plant, timebase)
         self._scene = SceneOutput(node, robot, timebase)
+        self._description_out = RawPublisher(node, topics.PLANT_DESCRIPTION)
         self.outputs = (
             *self._state_out, self._clock_out, *self._truth.outputs, *self._scene.outputs,
+            self._description_out,
         )  # fmt: skip
+        self._late_listeners = LateListeners(
+            (self._state_out[0], self._clock_out, *self._scene.viewed)
+        )
         self.wait_for = settings.wait_for
         self.is_complete = False
         self.control = RunControl(settings.paused)
@@ -120,6 +132,9 @@ class PlantLoop:
         self._unsent.clear()
         self._began_at, self._first_tick = time.monotonic(), self._plant.tick
         self._wall_clock.start(self._plant.tick)
+        if not self._description_out.sent:
+            text = String(data=json.dumps(self._description))
+            self._description_out.publish(serialize_message(text))
         self._scene.begin()
         self.tell_paused()
 
@@ -145,7 +160,7 @@ class PlantLoop:
         if self._unsent:
             self._send_next()
         elif self.control.holds():
-            return HELD
+            return self._hold()
         else:
             self._end_tick()
         return None
@@ -196,6 +211,7 @@ class PlantLoop:
     def _begin_tick(self) -> None:
         tick = self._plant.tick
         self._is_under_way = True
+        self._late_listeners.begin()
         self._by_the_clock = self._controller_silent or (self._settings.realtime and tick > 0)
         self._must_give_way = self._by_the_clock and self._wall_clock.left(tick) <= 0.0
         self._heard_before = self._heard
@@ -248,12 +264,24 @@ class PlantLoop:
             return Wait(left - SPIN_BEFORE_DEADLINE_S, inputs)
         if left <= 0.0:
             if self.control.holds():
-                return HELD
+                return self._hold()
             if self._controller_silent and self._heard > self._heard_before:
                 self._node.log("the controller answers again")
                 self._controller_silent = False
             self._end_tick()
         return None
+
+    def _hold(self) -> Wait:
+        """Stay at the present tick; show it to those who join meanwhile.
+
+        Of the state only the joints' part: the controller does not answer a part alone.
+        """
+        if self._late_listeners.are_due(time.monotonic()):
+            self._clock_out.publish(self._clock_sent)
+            for output, message in zip(self._state_out[:1], self._sent.messages, strict=False):
+                output.publish(message)
+            self._scene.show(self._plant.truth)
+        return HELD
 
     def _end_tick(self) -> None:
         """Step the plant under the command in force, and begin the next tick."""

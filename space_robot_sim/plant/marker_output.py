@@ -26,10 +26,16 @@ class MarkerOutput:
         self._poses, self._markers = RobotPoses(robot), RobotMarkers(robot, timebase, prefix)
         self._every = -(-PERIOD_NS // timebase.period_ns)
         self._output = RawPublisher(node, topics.MARKERS)
+        self.outputs = (self._output,)
 
     def send(self, truth: RobotState) -> None:
         """Send the shapes of a true state, if they are due."""
-        if truth.tick % self._every or not self._output.listener_count:
+        if truth.tick % self._every == 0:
+            self.show(truth)
+
+    def show(self, truth: RobotState) -> None:
+        """Send the shapes of a true state, if somebody listens."""
+        if not self._output.listener_count:
             return
         if not self._output.sent:  # those of the flight before may have other names
             self._output.publish(no_markers())

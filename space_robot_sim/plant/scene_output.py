@@ -33,6 +33,8 @@ class SceneOutput:
         self._markers = None
         if find_spec(topics.MARKERS.type.partition("/")[0]):
             self._markers = MarkerOutput(node, robot, timebase)
+        self.viewed = (*self._shared.values(), *(self._markers.outputs if self._markers else ()))
+        """Topics that only viewers listen to."""
         self._has_begun = False
 
     def begin(self) -> None:
@@ -47,6 +49,14 @@ class SceneOutput:
             self._publish(self._writer.poses(truth))
         if self._markers:
             self._markers.send(truth)
+
+    def show(self, truth: RobotState) -> None:
+        """Send viewers, not the recorder, the poses of a true state, whether they are due or not."""
+        for topic, data in self._writer.poses(truth):
+            if topic in self._shared:
+                self._shared[topic].publish(unwrap(data))
+        if self._markers:
+            self._markers.show(truth)
 
     def _publish(self, messages: Messages) -> None:
         for topic, data in messages:

@@ -27,6 +27,7 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
     sends: ClassVar[tuple[topics.Topic, ...]] = (
         topics.JOINT_STATES, topics.BASE_STATE, topics.CLOCK, *topics.TRUTH,
         topics.WHEELS_STATE, topics.THRUSTERS_STATE, *topics.SCENE,
+        topics.PLANT_DESCRIPTION,
     )  # fmt: skip
 
     mission: str = Field(

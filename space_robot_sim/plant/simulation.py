@@ -59,10 +59,12 @@ class Simulation:
         """Go so many ticks on, and return what to say of it once the plant is held again.
 
         Raises:
-            InputError: the plant is not active, not paused, or ``ticks`` cannot be.
+            InputError: the simulation is stopped or not paused, or ``ticks`` is less than 1.
             FlightError: something else has ended the step.
         """
-        loop, self._is_stopped = self._loop, False
+        loop = self._loop
+        if self._is_stopped:
+            raise InputError("the simulation is stopped: pause it before it is stepped")
         target = loop.control.step(ticks)
         await until(lambda: loop.control.is_held or self._node.loop is not loop)
         reached = loop.control.tick

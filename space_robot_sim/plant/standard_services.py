@@ -13,11 +13,14 @@ from space_robot_msgs_py.errors import FlightError, InputError
 from .simulation import Simulation, State
 
 FEATURES = (
-    "SIMULATION_RESET", "SIMULATION_RESET_TIME", "SIMULATION_RESET_STATE",
-    "SIMULATION_STATE_GETTING", "SIMULATION_STATE_SETTING", "SIMULATION_STATE_PAUSE",
-    "STEP_SIMULATION_SINGLE", "STEP_SIMULATION_MULTIPLE",
+    "SIMULATION_RESET", "SIMULATION_STATE_GETTING", "SIMULATION_STATE_SETTING",
+    "SIMULATION_STATE_PAUSE", "STEP_SIMULATION_SINGLE", "STEP_SIMULATION_MULTIPLE",
 )  # fmt: skip
-"""Names of constants of SimulatorFeatures."""
+"""Names of constants of SimulatorFeatures.
+
+SIMULATION_RESET_TIME and SIMULATION_RESET_STATE are missing: they announce that each can be reset
+alone.
+"""
 ABOUT = "space_robot: time, state, controller, mission and bag are reset together"
 
 Service = tuple[Any, str, Callable[[Any, Any], Any]]

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..elementary.matrices import product
 from ..elementary.rotations import rpy_of_rotation
-from .frame_names import distinct, frame_names, printable
+from .frame_names import distinct, frame_names, printable, urdf_joint_names
 from .inertia import inertia_elements
 from .robot import Robot
 from .shapes import Colour, shapes_of
@@ -50,8 +50,8 @@ def urdf_text(robot: Robot, name: str = "") -> str:
     root = Element("robot", name=printable(name or robot.name))
     for colour, material in materials.items():
         SubElement(SubElement(root, "material", name=material), "color", rgba=_words(colour))
-    taken: set[str] = set()
-    joints = [distinct(joint, "_", taken) for joint in robot.all_joint_names]
+    joints = urdf_joint_names(robot)
+    taken = {*joints, *frames.bodies, *frames.tools}
     for body in (0, *(joint + 1 for joint in robot.order)):
         if body:
             parent, child = frames.bodies[robot.parent[body - 1]], frames.bodies[body]

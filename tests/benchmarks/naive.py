@@ -52,7 +52,7 @@ def _joint_state(tick: int, names: list[str]) -> Any:
 def _base_state(tick: int) -> Any:
     message = message_type(topics.BASE_STATE.type)()
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(tick * 500_000, 10**9)
-    message.joint_names = [topics.BASE_FRAME]
+    message.joint_names = [topics.BASE_JOINT]
     for field, name in (("transforms", "Transform"), ("twist", "Twist"), ("wrench", "Wrench")):
         setattr(message, field, [message_type(f"geometry_msgs/msg/{name}")()])
     return message

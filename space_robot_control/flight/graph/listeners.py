@@ -18,13 +18,14 @@ LISTENERS = {
     topics.REFERENCE_JOINTS: _TO_CONTROLLER,
     topics.REFERENCE_BASE: _TO_CONTROLLER,
     topics.TELEMETRY: ("recorder_node",),
+    topics.SIGNALS: ("recorder_node",),
     topics.LAW: ("recorder_node",),
     topics.CLOCK: ("mission_node", "recorder_node"),
     topics.TRUTH_JOINTS: ("recorder_node",),
     topics.TRUTH_BASE: ("recorder_node",),
     topics.WHEELS_STATE: _TO_CONTROLLER,
     topics.THRUSTERS_STATE: ("recorder_node",),
-    **dict.fromkeys(topics.SCENE, ("recorder_node",)),
+    **dict.fromkeys((*topics.SCENE, topics.PLANT_DESCRIPTION), ("recorder_node",)),
 }
 """Nodes of the graph that subscribe to each topic."""
 

@@ -12,6 +12,8 @@ from space_robot_msgs_py.errors import FlightError
 TIMEOUT_S = 180.0
 """A node that is configured for the first time with so many joints compiles its kernels first."""
 POLL_S = 0.02
+ASK_AGAIN_S = 3.0
+"""A node in flight looks for calls once a second if its last answer was slow."""
 
 Check = Callable[[], None]
 """Called while waiting; raises to give up."""
@@ -107,10 +109,11 @@ def _call(
     node: Any, kind: Any, services: Sequence[str], request: Any, check: Check,
     timeout_s: float = TIMEOUT_S,
 ) -> list[Any]:  # fmt: skip
-    """Call services of one kind at the same time; return their answers."""
+    """Call services of one kind at the same time, each once; return their answers."""
     from rclpy.executors import SingleThreadedExecutor
 
     clients = {service: node.create_client(kind, service) for service in services}
+    probes = {service: _Probe(node, service.rpartition("/")[0]) for service in services}
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
     answers: dict[str, Any] = {}
@@ -119,7 +122,9 @@ def _call(
         while len(answers) < len(clients) or not all(a.done() for a in answers.values()):
             check()
             for service, client in clients.items():
-                if service not in answers and client.service_is_ready():
+                if service in answers or not client.service_is_ready():
+                    continue
+                if probes[service].is_answered():
                     answers[service] = client.call_async(request)
             if time.monotonic() > until:
                 silent = [s for s in services if s not in answers or not answers[s].done()]
@@ -130,3 +135,35 @@ def _call(
         executor.shutdown()
         for client in clients.values():
             node.destroy_client(client)
+        for probe in probes.values():
+            probe.close()
+
+
+class _Probe:
+    """Finds out whether a node's answers arrive here.
+
+    A node that has not discovered a caller yet drops its answer after 0.1 s, which a loaded machine
+    may take; the caller cannot see that. Discovery is in order: once the answer to a client that
+    was made after another one arrives, those to the other do, too.
+    """
+
+    def __init__(self, node: Any, name: str) -> None:
+        """``name``: the lifecycle node that is asked for its state, in the namespace of ``node``."""
+        from lifecycle_msgs.srv import GetState
+
+        self._node, self._request = node, GetState.Request()
+        self._client = node.create_client(GetState, f"{name}/get_state")
+        self._answers: list[Any] = []
+        self._ask_at = 0.0
+
+    def is_answered(self) -> bool:
+        """Tell whether an answer has come; else ask, if it is time again."""
+        now = time.monotonic()
+        if now >= self._ask_at and self._client.service_is_ready():
+            self._ask_at = now + ASK_AGAIN_S
+            self._answers.append(self._client.call_async(self._request))
+        return any(answer.done() for answer in self._answers)
+
+    def close(self) -> None:
+        """Ask no more."""
+        self._node.destroy_client(self._client)

@@ -16,7 +16,7 @@ from typing import Any
 
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.ros import lifeline
-from space_robot_msgs_py.ros.process_environment import DEFAULTS
+from space_robot_msgs_py.ros.process_environment import defaults
 from space_robot_msgs_py.ros.run_module import clean_environment, module_command
 from space_robot_msgs_py.topics import ROOT
 
@@ -42,7 +42,7 @@ def has_ros2_run() -> bool:
 def node_environment(domain: int) -> dict[str, str]:
     """Return a node's environment: the project's defaults unless the user set others."""
     return {
-        **DEFAULTS, **clean_environment(), **lifeline.held(), "ROS_DOMAIN_ID": str(domain),
+        **defaults(), **clean_environment(), **lifeline.held(), "ROS_DOMAIN_ID": str(domain),
     }  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 
+from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.ros.process_environment import set_defaults
 from space_robot_msgs_py.topics import ROOT
 
@@ -12,16 +13,24 @@ class TemporaryNode:
     """Joins a domain as ``<name>_<pid>``, without services or logs of its own."""
 
     def __init__(self, name: str, domain: int, namespace: str = ROOT) -> None:
+        """Join.
+
+        Raises:
+            FlightError: ROS does not start, as without a folder for its log files.
+        """
         set_defaults()
         import rclpy
         from rclpy.context import Context
         from rclpy.signals import SignalHandlerOptions
 
         self._context = Context()
-        rclpy.init(
-            args=[], context=self._context, domain_id=domain,
-            signal_handler_options=SignalHandlerOptions.NO,
-        )  # fmt: skip
+        try:
+            rclpy.init(
+                args=[], context=self._context, domain_id=domain,
+                signal_handler_options=SignalHandlerOptions.NO,
+            )  # fmt: skip
+        except Exception as error:  # RCLError is private
+            raise FlightError(f"ROS does not start: {str(error).splitlines()[0]}") from None
         self.node = rclpy.create_node(
             f"{name}_{os.getpid()}", context=self._context, namespace=namespace,
             start_parameter_services=False, enable_rosout=False,

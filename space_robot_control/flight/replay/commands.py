@@ -59,7 +59,9 @@ class CommandList:
 
     def __init__(self, axis_names: tuple[str, ...], timebase: Timebase) -> None:
         self._names, self._timebase = axis_names, timebase
-        self._codec = CompiledCodec(CommandMessages(axis_names, timebase))
+        own, former = (CommandMessages(axis_names, timebase) for _ in range(2))
+        former.frame_id = topics.FORMER_BASE_FRAME
+        self._usual = (CompiledCodec(own), CompiledCodec(former))
         self._torque = np.zeros(len(axis_names))
         usual = Form(topics.BASE_FRAME, str(list(axis_names)))
         self._forms: dict[Form, int] = {usual: 0}
@@ -68,9 +70,11 @@ class CommandList:
 
     def add(self, data: bytes) -> int | None:
         """Take a message; the tick it answers, or None if it is not readable."""
-        form = 0
+        form, stamp_ns = 0, FOREIGN
         try:
-            stamp_ns = self._codec.read(data, self._torque)
+            for codec in self._usual:
+                if (stamp_ns := codec.read(data, self._torque)) != FOREIGN:
+                    break
             if stamp_ns == FOREIGN:
                 stamp_ns, form = self._read_foreign(data)
             tick = self._timebase.tick(stamp_ns)

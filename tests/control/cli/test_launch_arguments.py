@@ -11,7 +11,11 @@ import pytest
 from paths import ROOT
 
 from space_robot_control.cli.fly import fly
-from space_robot_control.cli.launch_arguments import launch_arguments, launched_flight
+from space_robot_control.cli.launch_arguments import (
+    launch_arguments,
+    launched_flight,
+    refuse_unknown,
+)
 from space_robot_control.flight.plan import Flight, FlightPlan
 from space_robot_msgs_py.errors import InputError
 
@@ -96,3 +100,30 @@ def test_launch_files_are_python_with_the_function_that_launch_calls(file: Path)
 def test_a_launched_flight_is_checked_like_any_other() -> None:
     """By `Flight`, which needs no files but the package's."""
     assert isinstance(launched_flight({}).flight, Flight)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["kase:=1"], "fly.launch.py: unknown argument 'kase': did you mean case?"),
+        (["case:=1", "zzz:="], "unknown argument 'zzz': --show-args"),
+        (["case:=kase:=1", "--noninteractive"], ""),
+        ([], ""),
+    ],
+)
+@pytest.mark.parametrize(
+    "command", [["ros2", "launch", "space_robot", "fly.launch.py"], ["-c", "/x/fly.launch.py"]]
+)
+def test_an_argument_that_launch_would_let_pass_is_refused(
+    command: list[str], words: list[str], said: str
+) -> None:
+    names = [argument.name for argument in launch_arguments()]
+    if not said:
+        refuse_unknown([*command, *words], "/y/fly.launch.py", names)
+        return
+    with pytest.raises(InputError, match=re.escape(said)):
+        refuse_unknown([*command, *words], "/y/fly.launch.py", names)
+
+
+def test_arguments_of_a_launch_file_that_includes_ours_are_its_own() -> None:
+    refuse_unknown(["ros2", "launch", "mine.launch.py", "kase:=1"], "/y/fly.launch.py", ["case"])

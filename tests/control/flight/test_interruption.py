@@ -60,7 +60,7 @@ def _reproducing(folder: Path) -> Iterator[tuple[subprocess.Popen[str], list[psu
         process.communicate()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_reproduction_is_ended_in_one_line_with_nothing_left(
     tmp_path: Path, number: signal.Signals
 ) -> None:
@@ -85,14 +85,27 @@ def test_workers_end_with_a_killed_reproduction(tmp_path: Path) -> None:
         assert len(gone) == len(workers) >= 2  # and what forks them
 
 
-def test_signals_are_raised_once_and_put_back() -> None:
-    before = signal.getsignal(signal.SIGTERM)
-    with raising_signals():
-        with pytest.raises(Interrupted, match="stopped by SIGTERM") as raised:
-            signal.raise_signal(signal.SIGTERM)
-        signal.raise_signal(signal.SIGINT)  # again, from `timeout` or an impatient hand
-    assert raised.value.exit_code == 143
-    assert signal.getsignal(signal.SIGTERM) is before
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [(signal.SIGHUP, 129), (signal.SIGINT, 130), (signal.SIGQUIT, 131), (signal.SIGTERM, 143)],
+)
+@pytest.mark.parametrize("default", [signal.SIG_DFL, signal.SIG_IGN])
+def test_signals_are_raised_once_and_put_back(
+    number: signal.Signals, code: int, default: signal.Handlers
+) -> None:
+    """Also where a shell ignores them for what it starts in the background."""
+    if number == signal.SIGHUP and default is signal.SIG_IGN:
+        return  # nohup
+    original = signal.signal(number, default)
+    try:
+        with raising_signals():
+            with pytest.raises(Interrupted, match=f"stopped by {number.name}") as raised:
+                signal.raise_signal(number)
+            signal.raise_signal(signal.SIGINT)  # again, from `timeout` or an impatient hand
+        assert raised.value.exit_code == code
+        assert signal.getsignal(number) is default
+    finally:
+        signal.signal(number, original)
 
 
 def test_nohup_is_respected() -> None:

@@ -22,6 +22,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.samples import Timebase
 from space_robot_sim.robot import Robot
+from space_robot_sim.robot.frame_names import frame_names
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-6
@@ -44,9 +45,10 @@ def expected(robot: Robot, log: FlightLog, row: int) -> dict[str, pin.SE3]:
         q[model.joints[model.getJointId(name)].idx_q] = position
     pin.framesForwardKinematics(model, data, q)
     frames = {frame.name: data.oMf[i] for i, frame in enumerate(model.frames)}
-    found = {name: frames[name] for name in robot.body_names}
+    names = frame_names(robot).bodies
+    found = {new: frames[name] for new, name in zip(names, robot.body_names, strict=True)}
     for tool in robot.tools:
-        body = found[robot.body_names[tool.body]]
+        body = found[names[tool.body]]
         found[tool.name] = body * pin.SE3(tool.rotation, tool.position)
     return found
 
@@ -110,16 +112,16 @@ def test_side_by_side_nobody_is_in_anothers_place(flown) -> None:  # type: ignor
     logs, robots = {"a": log, "b/c": log, "d": log}, dict.fromkeys(("a", "b/c", "d"), robot)
     apart = Scene(flights_page(logs, robots, Options(side_by_side=True), quiet)).poses(0.5)
     together = Scene(flights_page(logs, robots, Options(), quiet)).poses(0.5)
-    roots = ("/a/base", "/b_c/base", "/d/base")
+    roots = ("/a/base_link", "/b_c/base_link", "/d/base_link")
     reach = [
         [poses.position for path, poses in apart.items() if path.startswith(root)] for root in roots
     ]
     for left, right in itertools.pairwise(reach):
         assert max(x for x, _, _ in left) < min(x for x, _, _ in right)
     for root in roots:
-        np.testing.assert_allclose(together[root].position, apart["/a/base"].position, atol=1e-8)
+        np.testing.assert_allclose(together[root].position, apart["/a/base_link"].position, atol=1e-8)
         np.testing.assert_allclose(
-            apart[root].position[1:], apart["/a/base"].position[1:], atol=1e-8
+            apart[root].position[1:], apart["/a/base_link"].position[1:], atol=1e-8
         )
 
 
@@ -157,7 +159,7 @@ def test_a_row_without_a_state_shows_the_one_before(flown, tmp_path: Path) -> No
     robot = shown_robot(log)
     log.quaternion[900:1100] = np.nan
     scene = Scene(flights_page({"one": log}, {"one": robot}, Options(rate=100.0), quiet))
-    held, before = scene.poses(0.5)["/one/base/joint1"], expected(robot, log, 899)["joint1"]
+    held, before = scene.poses(0.5)["/one/base_link/link1"], expected(robot, log, 899)["link1"]
     np.testing.assert_allclose(held.position, before.translation, atol=TOLERANCE)
     np.testing.assert_allclose(held.rotation, before.rotation, atol=TOLERANCE)
 

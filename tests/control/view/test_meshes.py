@@ -75,9 +75,9 @@ def test_a_mesh_is_drawn_in_its_size_and_a_mirrored_one_looks_outwards(
     with silent_server() as server:
         scene = RobotScene(server.scene, "/robot", replace(paper_robot, visuals=told))
         page = server.get_scene_serializer().as_html()
-    assert scene.base.name == "/robot/base"
+    assert scene.base.name == "/robot/base_link"
     found = Scene(page)
-    for name in ("/robot/base/shape_0", "/robot/base/shape_1"):
+    for name in ("/robot/base_link/shape_0", "/robot/base_link/shape_1"):
         vertices, faces = found.mesh(name)
         shown = trimesh.Trimesh(vertices, faces, process=False)
         np.testing.assert_allclose(np.ptp(vertices, axis=0), [0.1, 0.2, 0.3], rtol=1e-6)

@@ -76,7 +76,7 @@ def test_state_is_read_as_ros_messages(n: int, read: Any) -> None:
     base = read(base_data, "sensor_msgs/msg/MultiDOFJointState")
     assert seconds(base.header.stamp) == (2, 500_000)
     assert base.header.frame_id == topics.INERTIAL_FRAME
-    assert list(base.joint_names) == [topics.BASE_FRAME]
+    assert list(base.joint_names) == [topics.BASE_JOINT]
     (transform,), (twist,), (wrench,) = base.transforms, base.twist, base.wrench
     assert xyz(transform.translation) == state.base_position.tolist()
     assert [transform.rotation.w, *xyz(transform.rotation)] == state.quaternion.tolist()

@@ -69,7 +69,7 @@ def test_chunk_is_read_as_trajectories(n: int, length: int, reader: str) -> None
             STORE.deserialize_cdr(d, t) for d, t in zip(data, (JOINTS, BASE), strict=True)
         )
     assert list(joints.joint_names) == joint_names(n)
-    assert list(base.joint_names) == [topics.BASE_FRAME]
+    assert list(base.joint_names) == [topics.BASE_JOINT]
     assert base.header.frame_id == topics.INERTIAL_FRAME
     for message in (joints, base):
         assert (message.header.stamp.sec, message.header.stamp.nanosec) == (0, 50_000_000)

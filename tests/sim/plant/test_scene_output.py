@@ -57,7 +57,7 @@ def test_who_comes_late_is_told_all_that_holds_for_the_flight(
     text = decode(wait_for_message(ground, description), topics.ROBOT_DESCRIPTION.type).data
     assert text.rstrip("\n") == urdf_text(paper_robot).rstrip("\n")
     (tool,) = decode(unwrap(wait_for_message(ground, static)), topics.TF_STATIC.type).transforms
-    assert (tool.header.frame_id, tool.child_frame_id) == ("joint6", "tool")
+    assert (tool.header.frame_id, tool.child_frame_id) == ("link6", "tool")
     for topic in (topics.ROBOT_DESCRIPTION, topics.TRANSFORMS, topics.WHEELS_STATE):
         is_held, _ = look(topic_lock(domain, topic.full_name))
         assert is_held, topic

@@ -5,19 +5,22 @@ The constants are those of version 2.1's .msg and .srv files.
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Coroutine
 from types import SimpleNamespace as Record
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import pytest
 
 pytest.importorskip("rclpy")
 
-from space_robot_msgs_py.errors import InputError
+from space_robot_sim.plant.loop import PlantLoop
 from space_robot_sim.plant.run_control import RunControl
-from space_robot_sim.plant.simulation import Simulation, State
-from space_robot_sim.plant.standard_services import FEATURES, StandardServices
+from space_robot_sim.plant.simulation import Simulation
+from space_robot_sim.plant.standard_services import StandardServices
+
+if TYPE_CHECKING:
+    from space_robot_msgs_py.ros.managed_node import ManagedNode
+    from space_robot_sim.plant.settings import PlantNodeSettings
 
 MSG = Record(
     SimulationState=Record(STATE_STOPPED=0, STATE_PLAYING=1, STATE_PAUSED=2),
@@ -37,37 +40,46 @@ SRV = Record(
 QUITTING, SCOPE_ALL = 3, 255
 
 
-class Held:
-    """A simulation without a graph: what it is told acts on a `RunControl` at once."""
+class Node:
+    """A plant's node without ROS: its lifecycle, and a loop that goes on when it is told to."""
 
     def __init__(self) -> None:
-        self.control, self.resets = RunControl(), 0
+        self.settings = Record(period=0.0005, reset_with=[""])
+        self.is_active, self.starts, self.told = False, 0, [False]
+        self.start()
+
+    def start(self) -> None:
+        self.loop = object.__new__(PlantLoop)
+        self.loop.control = RunControl()
+        self.loop.tell_paused = lambda: self.told.append(self.control.is_paused)  # type: ignore[method-assign]
+        self.is_active, self.starts = True, self.starts + 1
+
+    def stop(self) -> None:
+        self.is_active = False
+
+    def log(self, text: str) -> None:
+        pass
 
     @property
-    def state(self) -> State:
-        return State.PAUSED if self.control.is_paused else State.PLAYING
+    def control(self) -> RunControl:
+        return self.loop.control
 
-    def pause(self) -> None:
-        self.control.pause()
-
-    def resume(self) -> None:
-        self.control.resume()
-
-    async def step(self, ticks: int) -> None:
-        self.control.begin(self.control.step(ticks))
-
-    async def reset(self, stop: bool = False) -> None:
-        if stop and not self.control.is_paused:
-            raise InputError("the plant is not active")
-        self.resets += 1
+    def run(self, ticks: int) -> int:
+        """Fly so many ticks, or until it is held; return the tick reached."""
+        for _ in range(ticks):
+            if not self.control.holds():
+                self.control.begin(self.control.tick + 1)
+        self.control.holds()
+        return self.control.tick
 
 
 class Caller:
     """Calls the services as a node would, with the package's fields."""
 
     def __init__(self) -> None:
-        self.simulation = Held()
-        self.services = StandardServices(cast(Simulation, self.simulation), MSG, SRV)
+        self.node = Node()
+        self.simulation = Simulation(cast("ManagedNode[PlantNodeSettings]", self.node))
+        self.services = StandardServices(self.simulation, MSG, SRV)
 
     @staticmethod
     def _response() -> Record:
@@ -92,58 +104,118 @@ class Caller:
     def reset(self, scope: int) -> tuple[int, str]:
         return self._answer(self.services.reset(Record(scope=scope), self._response()))
 
-    @staticmethod
-    def _answer(call: Coroutine[Any, Any, Any]) -> tuple[int, str]:
-        result = asyncio.run(call).result
-        return result.result, result.error_message
+    def _answer(self, call: Coroutine[Any, Any, Any]) -> tuple[int, str]:
+        while True:  # the plant goes on while a call waits for it
+            try:
+                call.send(None)
+            except StopIteration as end:
+                return end.value.result.result, end.value.result.error_message
+            self.node.run(1)
 
 
-def test_its_features_are_those_it_has() -> None:
-    assert Caller().features() == [20, 21, 22, 24, 25, 26, 31, 32]
-    assert len(FEATURES) == 8
+STOPPED, PLAYING, PAUSED = 0, 1, 2
+OK, FAILED, ALREADY = 1, 4, 101
+
+
+def test_it_announces_what_it_does_and_no_more() -> None:
+    """Each scope of a reset has its number; those of time and of state alone are not among them."""
+    caller = Caller()
+    features = caller.features()
+    assert features == [20, 24, 25, 26, 31, 32]
+    for feature, scope in ((21, 1), (22, 2), (23, 4)):
+        assert (caller.reset(scope)[0] == OK) == (feature in features)
+    assert caller.node.starts == 1
 
 
 def test_it_is_paused_and_played() -> None:
     caller = Caller()
-    assert caller.get_state() == 1
-    assert caller.set_state(1) == (101, "")
-    assert caller.set_state(2) == (1, "")
-    assert caller.get_state() == 2
-    assert caller.set_state(2) == (101, "")
-    assert caller.set_state(1) == (1, "")
-    assert caller.get_state() == 1
+    assert caller.get_state() == PLAYING
+    assert caller.set_state(PLAYING) == (ALREADY, "")
+    assert caller.set_state(PAUSED) == (OK, "")
+    assert caller.node.run(5) == 0
+    assert caller.get_state() == PAUSED
+    assert caller.set_state(PAUSED) == (ALREADY, "")
+    assert caller.set_state(PLAYING) == (OK, "")
+    assert caller.node.run(5) == 5
+    assert caller.get_state() == PLAYING
+    assert caller.node.told == [False, True, False]
 
 
-def test_only_what_is_paused_can_be_stepped() -> None:
+@pytest.mark.parametrize("ticks", [1, 7])
+def test_a_paused_simulation_is_stepped_and_paused_again(ticks: int) -> None:
     caller = Caller()
-    code, text = caller.step(1)
-    assert code == 4
-    assert "only a paused simulation" in text
-    caller.set_state(2)
-    assert caller.step(7) == (1, "")
-    assert caller.simulation.control.tick == 7
-    assert caller.step(0)[0] == 4
-    assert caller.simulation.control.tick == 7
+    caller.node.run(3)
+    caller.set_state(PAUSED)
+    assert caller.step(ticks) == (OK, "")
+    assert caller.node.run(9) == 3 + ticks
+    assert caller.get_state() == PAUSED
+    assert caller.step(0)[0] == FAILED
 
 
-def test_a_stop_is_a_reset() -> None:
+def test_what_plays_or_is_stopped_cannot_be_stepped() -> None:
     caller = Caller()
-    assert caller.set_state(0) == (102, "the plant is not active")
-    caller.set_state(2)
-    assert caller.set_state(0) == (1, "")
-    assert caller.simulation.resets == 1
+    assert caller.step(1)[0] == FAILED
+    assert caller.get_state() == PLAYING
+    assert caller.set_state(STOPPED) == (OK, "")
+    assert caller.step(1)[0] == FAILED
+    assert (caller.get_state(), caller.node.run(9)) == (STOPPED, 0)
+    assert caller.set_state(PAUSED) == (OK, ""), "it can be started paused"
+    assert caller.step(1) == (OK, "")
 
 
-def test_what_there_is_not_is_told_as_unsupported() -> None:
+@pytest.mark.parametrize("before", [PLAYING, PAUSED])
+def test_a_stop_is_a_reset_that_is_held_at_tick_0(before: int) -> None:
     caller = Caller()
-    assert caller.set_state(QUITTING)[0] == 0
-    for scope in (1, 2, 4):
-        assert caller.reset(scope)[0] == 0
-    assert caller.simulation.resets == 0
+    caller.node.run(4)
+    caller.set_state(before)
+    assert caller.set_state(STOPPED) == (OK, "")
+    assert (caller.node.starts, caller.node.run(9), caller.get_state()) == (2, 0, STOPPED)
+    assert caller.set_state(STOPPED) == (ALREADY, "")
+    assert caller.set_state(PLAYING) == (OK, "")
+    assert (caller.node.run(9), caller.get_state()) == (9, PLAYING)
 
 
 @pytest.mark.parametrize("scope", [0, 3, SCOPE_ALL])
-def test_time_and_state_are_reset_together(scope: int) -> None:
+@pytest.mark.parametrize("before", [PLAYING, PAUSED])
+def test_a_reset_goes_on_as_before_and_is_no_stop(scope: int, before: int) -> None:
+    """What was paused is paused at tick 0, so that it can be stepped; what played plays."""
     caller = Caller()
-    assert caller.reset(scope) == (1, "")
-    assert caller.simulation.resets == 1
+    caller.node.run(4)
+    caller.set_state(before)
+    assert caller.reset(scope) == (OK, "")
+    assert (caller.node.starts, caller.get_state()) == (2, before)
+    assert caller.node.told[-1] is (before == PAUSED), "the other nodes are told"
+    assert caller.node.run(3) == (0 if before == PAUSED else 3)
+    assert caller.step(2)[0] == (OK if before == PAUSED else FAILED)
+
+
+def test_a_reset_after_a_stop_leaves_it_paused() -> None:
+    caller = Caller()
+    caller.set_state(STOPPED)
+    assert caller.reset(0) == (OK, "")
+    assert caller.get_state() == PAUSED
+
+
+def test_a_plant_that_is_not_active_is_stopped_and_can_do_nothing() -> None:
+    caller = Caller()
+    caller.node.stop()
+    assert caller.get_state() == STOPPED
+    assert caller.set_state(PLAYING) == (102, "the plant is not active")
+    assert caller.step(1) == (FAILED, "the plant is not active")
+    assert caller.reset(0) == (FAILED, "the plant is not active")
+
+
+def test_a_step_that_a_reset_cuts_short_has_failed() -> None:
+    caller = Caller()
+    caller.set_state(PAUSED)
+    call = caller.services.step(Record(steps=5), caller._response())
+    call.send(None)
+    caller.node.run(2)
+    assert caller.reset(0) == (OK, "")
+    with pytest.raises(StopIteration) as end:
+        call.send(None)
+    assert end.value.value.result.result == FAILED
+
+
+def test_other_states_are_unsupported() -> None:
+    assert Caller().set_state(QUITTING)[0] == 0

@@ -107,8 +107,8 @@ def test_fields() -> None:
     found = decode(data, topics.MARKERS.type).markers
     names = [(marker.ns, marker.id) for marker in found]
     assert names == [
-        ("sat1/base", 0), ("sat1/joint1", 0), ("sat1/joint1", 1), ("sat1/joint1", 2),
-        ("sat1/joint2", 0),
+        ("sat1/base_link", 0), ("sat1/link1", 0), ("sat1/link1", 1), ("sat1/link1", 2),
+        ("sat1/link2", 0),
     ]  # fmt: skip
     assert [marker.type for marker in found] == [1, 2, 3, 10, 10]
     sizes = [[marker.scale.x, marker.scale.y, marker.scale.z] for marker in found]
@@ -141,7 +141,7 @@ def test_rclpy_reads_it() -> None:
     marker = message.markers[3]
     p, o = marker.pose.position, marker.pose.orientation
     assert ([p.x, p.y, p.z], [o.x, o.y, o.z, o.w]) == (position.tolist(), orientation.tolist())
-    assert (marker.type, marker.ADD, marker.ns) == (marker.MESH_RESOURCE, marker.action, "joint1")
+    assert (marker.type, marker.ADD, marker.ns) == (marker.MESH_RESOURCE, marker.action, "link1")
     turn = rotation_of(state.quaternion)
     base = message.markers[0].pose.orientation
     np.testing.assert_allclose(

@@ -65,6 +65,6 @@ def test_tools_are_where_pinocchio_has_them(seed: int, kinds: list[str]) -> None
 
 def test_frames_are_a_chain_from_the_inertial_one(paper_robot: Robot) -> None:
     frames = RobotPoses(paper_robot).frames
-    names = [INERTIAL_FRAME, "base", *(f"joint{i}" for i in range(1, 7))]
+    names = [INERTIAL_FRAME, "base_link", *(f"link{i}" for i in range(1, 7))]
     assert list(frames) == list(itertools.pairwise(names))
-    assert tool_poses(paper_robot)[0] == (("joint6", "tool"),)
+    assert tool_poses(paper_robot)[0] == (("link6", "tool"),)

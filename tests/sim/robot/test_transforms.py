@@ -11,6 +11,7 @@ from random_trees import KINDS, random_bodies
 from tree_oracle import pinocchio_tree
 
 from space_robot_sim.robot import Robot
+from space_robot_sim.robot.frame_names import frame_names
 from space_robot_sim.robot.transforms import joint_transforms, tool_transforms, wxyz
 
 kinds = st.lists(st.sampled_from(KINDS), max_size=8).map(lambda some: ["revolute", *some])
@@ -33,18 +34,20 @@ def test_composed_they_are_pinocchios_frames(kinds: list[str], seed: int) -> Non
     angles = rng.uniform(-3.0, 3.0, (2, robot.joint_count))
     for k in range(2):
         expected = frames_of(model, dict(zip(robot.all_joint_names, angles[k], strict=True)))
+        names = dict(zip(frame_names(robot).bodies, robot.body_names, strict=True))
         found = {robot.body_names[0]: pin.SE3.Identity()}
         for link in joint_transforms(robot, angles):
             place, turn = (
                 link.position[k % len(link.position)],
                 link.quaternion[k % len(link.quaternion)],
             )
-            found[link.child] = found[link.parent] * pin.SE3(rotation_of(turn).as_matrix(), place)
+            parent, child = names[link.parent], names[link.child]
+            found[child] = found[parent] * pin.SE3(rotation_of(turn).as_matrix(), place)
         for name, pose in found.items():
             np.testing.assert_allclose(pose.homogeneous, expected[name].homogeneous, atol=1e-12)
         assert set(found) == set(robot.body_names)
         for tool, link in zip(robot.tools, tool_transforms(robot), strict=True):
-            assert (link.parent, link.child) == (robot.body_names[tool.body], tool.name)
+            assert (names[link.parent], link.child) == (robot.body_names[tool.body], tool.name)
             np.testing.assert_array_equal(link.position, [tool.position])
             turn = rotation_of(link.quaternion[0]).as_matrix()
             np.testing.assert_allclose(turn, tool.rotation, atol=1e-15)

@@ -118,7 +118,7 @@ def test_random_trees(seed: int, kinds: list[str]) -> None:
     robot = random_tree(seed, kinds)
     assert_same_robot(read_back(robot), robot)
     oracle = TreeOracle(
-        pinocchio_model(urdf_text(robot)), robot.body_names[0], robot.all_joint_names, seed
+        pinocchio_model(urdf_text(robot)), frame_names(robot).bodies[0], robot.all_joint_names, seed
     )
     assert_same_dynamics(robot, oracle, seed)
     assert_frames_of_transforms(robot, oracle)
@@ -131,7 +131,7 @@ def test_shipped_robots(name: str) -> None:
     assert_same_robot(read_back(robot), robot)
     text = urdf_text(robot)
     assert text == urdf_text(find_robot(name)), "the same for the same robot"
-    oracle = TreeOracle(pinocchio_model(text), robot.body_names[0], robot.all_joint_names, 1)
+    oracle = TreeOracle(pinocchio_model(text), frame_names(robot).bodies[0], robot.all_joint_names, 1)
     assert_same_dynamics(robot, oracle, 1)
     assert_frames_of_transforms(robot, oracle)
     model = mujoco.MjModel.from_xml_string(text)
@@ -167,25 +167,60 @@ def robot_of(base: str, link: str, tool: str, **more: Any) -> Robot:
     return Robot.of_tree("two", [Body(base, 9.0, np.eye(3), np.zeros(3)), link_body])
 
 
-def test_names_are_there_once_and_can_be_told() -> None:
-    """Bodies, tools and the inertial frame share tf's names; tools share joints' in a URDF."""
-    names = frame_names(robot_of("base", "wrist", "wrist"))
-    assert names == (("base", "wrist"), ("wrist_tool", "wrist_tool2"))
-    names = frame_names(robot_of(INERTIAL_FRAME, "/a\nb", "a_b"))
-    assert names == (("inertial_body", "a_b"), ("a_b_tool", "a_b_tool2"))
-    for robot in (
-        robot_of("base", "tool_joint", "tool"),
-        robot_of(INERTIAL_FRAME, "/a\x01<&\"'b", "--"),
-    ):
-        text = urdf_text(robot)
-        links, joints = (
-            [element.attrib["name"] for element in ElementTree.fromstring(text).iter(tag)]
-            for tag in ("link", "joint")
-        )
-        assert len(set(links)) == len(links) == 4
-        assert len(set(joints)) == len(joints) == 3
-        assert Robot.from_dict({"robot": {"urdf_text": text}}).mass.sum() == 11.0
-        assert pinocchio_model(text).njoints == 3
+NAMES = st.sampled_from(
+    ["base", "base_link", "joint1", "link1", "link1_body", "tool", "tool_joint", "a", "a_link",
+     INERTIAL_FRAME, "/a\nb", "a_b", "--", "<&\"'"]
+)  # fmt: skip
+
+
+@given(
+    bodies=st.lists(NAMES, min_size=3, max_size=3, unique=True),
+    joints=st.lists(NAMES, min_size=2, max_size=2, unique=True),
+    tools=st.lists(NAMES, min_size=3, max_size=3),
+)
+def test_every_name_of_a_urdf_is_there_once(
+    bodies: list[str], joints: list[str], tools: list[str]
+) -> None:
+    """Among links, among joints, and among both; tf knows the same links; others can read it."""
+    numbers = (2.0, np.eye(3), np.zeros(3))
+    base, *moved = (
+        Body(name, *numbers, tools=(Tool(tool, np.eye(3), np.ones(3)),))
+        for name, tool in zip(bodies, tools, strict=True)
+    )
+    carried = [
+        replace(body, parent=parent, joint=Joint(joint, "revolute"))
+        for body, joint, parent in zip(moved, joints, bodies, strict=False)
+    ]
+    robot = Robot.of_tree("three", [base, *carried])
+    text, names = urdf_text(robot), frame_names(robot)
+    root = ElementTree.fromstring(text)
+    links, fixed = ([e.attrib["name"] for e in root.iter(tag)] for tag in ("link", "joint"))
+    assert sorted(links) == sorted([*names.bodies, *names.tools])
+    assert len({*links, *fixed}) == 6 + 5
+    assert INERTIAL_FRAME not in links
+    moving = {e.attrib["name"] for e in root.iter("joint") if e.attrib["type"] != "fixed"}
+    assert {name for name in joints if name.isidentifier()} <= moving, "joints keep their names"
+    assert pinocchio_model(text).njoints == 4
+
+
+@pytest.mark.parametrize(
+    ("body", "joint", "link"),
+    [
+        ("joint1", "joint1", "link1"), ("LeftJoint_2", "LeftJoint_2", "LeftLink_2"),
+        ("elbow", "elbow", "elbow_link"), ("arm", "shoulder", "arm"), ("link1", "joint1", "link1"),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize(("base", "root"), [("base", "base_link"), ("hull", "hull")])
+def test_frames_are_named_as_ros_does(
+    body: str, joint: str, link: str, base: str, root: str
+) -> None:
+    numbers = (2.0, np.eye(3), np.zeros(3))
+    moved = Body(body, *numbers, base, Joint(joint, "revolute"))
+    tools = (Tool(body, np.eye(3), np.ones(3)),)
+    robot = Robot.of_tree("two", [Body(base, *numbers), replace(moved, tools=tools)])
+    names = frame_names(robot)
+    assert names.bodies == (root, link)
+    assert names.tools == (f"{body}_tool",)
 
 
 def test_meshes_are_told_by_addresses(tmp_path: Path) -> None:

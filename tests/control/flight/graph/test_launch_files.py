@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import runpy
 import shutil
 import signal
 import subprocess
@@ -91,11 +92,17 @@ def test_it_is_the_flight_of_fly(
     assert not any(log.lost.values())
 
 
-def test_bad_arguments_start_no_node(launch: Callable[..., subprocess.Popen[str]]) -> None:
-    process = launch("controller:=pid")
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [("controller:=pid", "unknown controller 'pid'"), ("kase:=1", "unknown argument 'kase'")],
+)
+def test_bad_arguments_start_no_node(
+    launch: Callable[..., subprocess.Popen[str]], word: str, said: str
+) -> None:
+    process = launch(word)
     output, _ = process.communicate(timeout=60)
     assert process.returncode == 1
-    assert "unknown controller 'pid'" in output
+    assert said in output
     assert "process started" not in output
 
 
@@ -133,6 +140,30 @@ def test_a_node_that_dies_ends_it_with_an_error(
     process.wait(timeout=60)
     assert process.returncode == 1, output
     assert "mission_node ended with exit code -9" in output
+
+
+@pytest.mark.parametrize("words", [("play:=mine",), ()])
+def test_rviz_has_simulated_time_and_there_is_one_clock(
+    monkeypatch: pytest.MonkeyPatch, prefix: Path, words: tuple[str, ...]
+) -> None:
+    """RViz on the flight's /clock, or on that of the bag, which `ros2 bag play` plays as it is."""
+    from launch import LaunchContext
+    from launch.actions import ExecuteProcess
+    from launch_ros.actions import Node
+    from launch_ros.utilities import evaluate_parameters
+
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(prefix))
+    monkeypatch.setattr(sys, "argv", ["ros2", "launch", "space_robot", "view.launch.py", *words])
+    view = runpy.run_path(str(ROOT / "launch/view.launch.py"))["view"]
+    context = LaunchContext()
+    context.launch_configurations |= {"viewer": "rviz", "play": words[0][6:] if words else ""}
+    rviz, shown = view(context)
+    assert isinstance(rviz, Node)
+    parameters = evaluate_parameters(context, rviz._Node__parameters)  # no public way
+    assert parameters == ({"use_sim_time": True},)
+    if words:
+        assert isinstance(shown, ExecuteProcess)
+        assert [part[0].text for part in shown.cmd] == ["ros2", "bag", "play", "mine"]
 
 
 @pytest.mark.parametrize(

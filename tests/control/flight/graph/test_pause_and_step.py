@@ -21,11 +21,17 @@ from flights import COMMAND, Flown, Start, ros_environment, space_robot_here
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.ros.process_environment import set_defaults
+from space_robot_msgs_py.wire.cdr import header_stamp_ns
+from space_robot_msgs_py.wire.definitions import decode
 
 if TYPE_CHECKING:
     from ground import Ground
 
+set_defaults()
 pytest.importorskip("rclpy")
+
+from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription  # noqa: E402
 
 SHORT = ("--duration", "0.2")
 IMPATIENT = (
@@ -117,16 +123,36 @@ def test_after_a_reset_the_flight_is_a_fresh_one(
     assert not any(before.lost.values())
 
 
-def test_ctrl_c_ends_a_paused_flight(free_domain: int, tmp_path: Path) -> None:
-    bag = tmp_path / "bag"
-    with flying(free_domain, *SHORT, "--bag", str(bag)) as process:
-        sim(free_domain, "step", "--ticks", "40")
-        process.send_signal(signal.SIGINT)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGQUIT])
+def test_a_signal_ends_a_paused_flight_that_who_joins_late_sees(
+    free_domain: int, tmp_path: Path, number: signal.Signals
+) -> None:
+    """Tick 45 has no message of its own on /clock and /markers: shown is the clock of tick 40."""
+    from ground import Ground
+
+    bag, heard = tmp_path / "bag", {}
+    viewed = (topics.CLOCK, topics.JOINT_STATES, topics.MARKERS)
+    with flying(free_domain, *SHORT, "--composed", "--bag", str(bag)) as process:
+        sim(free_domain, "step", "--ticks", "45")
+        viewer = Ground(free_domain)
+        inputs = {t: RawSubscription(viewer.node, t, PolledCallbackGroup()) for t in viewed}
+
+        def hears_all() -> bool:
+            heard.update({t: d for t in viewed if (d := inputs[t].take()) is not None})
+            return len(heard) == len(viewed)
+
+        viewer.until(hears_all, "messages while the plant is paused")
+        viewer.close()
+        process.send_signal(number)
         _, errors = process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == 130, errors
+    assert process.returncode == 128 + number, errors
     log = read_flight(bag)
-    assert log.ticks == 41, "ticks 0 to 40 have been measured and answered"
+    assert log.ticks == 46, "ticks 0 to 45 have been measured and answered"
     assert not any(log.lost.values())
+    assert header_stamp_ns(heard[topics.CLOCK]) == 40 * 500_000
+    joints = decode(heard[topics.JOINT_STATES], topics.JOINT_STATES.type)
+    assert joints.header.stamp.nanosec == 45 * 500_000
+    assert list(joints.position) == log.joint_positions[45].tolist()
 
 
 def test_by_the_wall_clock_a_pause_is_no_lost_time(start: Start, ground: Ground) -> None:

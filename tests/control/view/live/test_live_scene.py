@@ -134,14 +134,14 @@ def fly(domain: int, bag: Path, shown: list[Poses], *options: str) -> FlightLog:
 
 
 def is_robot_in(poses: Poses) -> bool:
-    return any(name.startswith("Ori/robot/base/") for name in poses)
+    return any(name.startswith("Ori/robot/base_link/") for name in poses)
 
 
 def shown_rows(log: FlightLog, shown: list[Poses]) -> list[int]:
     """Return the row of the log that each frame shows; fail where there is none."""
-    rests = {"Pos/robot/base": ORIGIN, "Ori/robot/base": UNTURNED}
+    rests = {"Pos/robot/base_link": ORIGIN, "Ori/robot/base_link": UNTURNED}
     truths = [log.base_position, log.quaternion]
-    path = "/robot/base"
+    path = "/robot/base_link"
     for link in joint_transforms(find_robot("paper"), log.joint_positions):
         path = f"{path}/{link.child}"
         rests[f"Ori{path}"] = UNTURNED
