@@ -157,7 +157,7 @@ NAMESPACE = click.option(
 
 TRUST = click.option(
     "--trust", is_flag=True,
-    help="Import the module:Class and read the files that the bag names: runs the bag's code.",
+    help="Import the law and read the files that the bag names: runs the bag's code.",
 )  # fmt: skip
 
 
@@ -203,7 +203,7 @@ REPAIR = click.option(
 OPTIONS: dict[str, Decorator] = {
     "controller": click.option(
         "--controller", default="tde_stc", show_default=True,
-        help="ctc, ctc_smc, tde_smc, tde_tsmc, tde_stc, or module:Class of your own."),
+        help="ctc, ctc_smc, tde_smc, tde_tsmc, tde_stc, or file.py:Class of your own."),
     "case": click.option(
         "--case", default="1", show_default=True,
         help="1, 2, 3, 4-1, 4-2, or a path to a case's YAML."),

@@ -55,7 +55,7 @@ class ControllerNodeSettings(NodeSettings):
     sends: ClassVar[tuple[topics.Topic, ...]] = (topics.COMMAND, topics.TELEMETRY, topics.LAW)
 
     controller: str = Field(
-        "tde_stc", description="control law in force, or module:Class of your own"
+        "tde_stc", description="control law in force, or file.py:Class or module:Class of your own"
     )
     gains: str = Field(
         "default", description="gain set of config/gains/<robot>, or a path to a file or folder"

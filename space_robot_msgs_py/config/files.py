@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from ..errors import InputError
+from .choices import choices
 from .trees import Tree, merge, nest
 from .validation import read_yaml, short
 from .yaml_text import check_file
@@ -45,8 +46,8 @@ def named_file(kind: str, name: str) -> Path:
     if not is_named(kind, name):
         names = sorted(file.stem for file in folder.glob("*.yaml"))
         raise InputError(
-            f"unknown {kind.rstrip('s')} {short(name)}: choose one of {', '.join(names)}, "
-            "or a path to a .yaml file"
+            f"unknown {kind.rstrip('s')} {short(name)}: "
+            f"{choices(name, names, ', or a path to a .yaml file')}"
         )
     return folder / f"{name}.yaml"
 
