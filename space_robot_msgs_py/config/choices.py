@@ -27,7 +27,7 @@ def choices(name: str, allowed: Iterable[str], also: str = "", listing: str = ""
     """
     names = list(allowed)
     near = [_shown(other) for other in nearest(name, names)]
-    suggestion = f"did you mean {' or '.join(near)}?" if near else ""
+    suggestion = f"did you mean {', '.join([*near[:-2], ' or '.join(near[-2:])])}?" if near else ""
     first = ", ".join(map(_shown, names[:MOST_LISTED]))
     count = f"{listing} lists all {len(names)}" if listing else f"{len(names)} in all"
     if len(names) <= MOST_LISTED:
@@ -55,5 +55,7 @@ def nearest(name: str, allowed: Sequence[str]) -> list[str]:
     for other in allowed[:MOST_COMPARED]:
         if len(other) <= LONGEST_COMPARED:
             by_spelling.setdefault(other.lower(), other)
+    if name.lower() in by_spelling:
+        return [by_spelling[name.lower()]]
     near = get_close_matches(name.lower(), by_spelling, MOST_NEAR)
     return [by_spelling[spelling] for spelling in near]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os.path
 from functools import cache
 from pathlib import Path
 
@@ -54,7 +55,8 @@ def named_file(kind: str, name: str) -> Path:
 
 def is_named(kind: str, name: str) -> bool:
     """Tell whether there is ``config/<kind>/<name>.yaml``."""
-    return "/" not in name and (config_directory() / kind / f"{name}.yaml").is_file()
+    # not Path.is_file, which raises an OSError for a name that is too long
+    return "/" not in name and os.path.isfile(config_directory() / kind / f"{name}.yaml")
 
 
 def named_layers(kind: str, name: str) -> list[Path]:
