@@ -35,8 +35,8 @@ def urdf(links: int, kind: str, matter: str = MATTER) -> str:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (urdf(10_000, "revolute"), "at most 4000 links can be read, here are 10000"),
-        (urdf(10_000, "fixed"), "at most 4000 links can be read, here are 10000"),
+        (urdf(MOST_LINKS + 1, "revolute"), "at most 4000 links can be read, here are 4001"),
+        (urdf(MOST_LINKS + 1, "fixed"), "at most 4000 links can be read, here are 4001"),
         (urdf(MOST_MOVING + 2, "continuous", ""), "at most 64 moving joints .* here are 257"),
     ],
 )
