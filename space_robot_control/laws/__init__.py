@@ -71,7 +71,8 @@ def find_law(name: str) -> type[ControlLaw]:
             one_of(attribute, own, "class", f" of {file}")
         law = getattr(imported, attribute)
     except InputError as error:
-        raise InputError(f"controller {short(name)}: {error}") from None
+        where = "" if file is None or file.is_absolute() else " (paths are from the current folder)"
+        raise InputError(f"controller {short(name)}: {error}{where}") from None
     except Exception as error:  # the module is the user's, and may raise anything
         why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
         why = " ".join(why.split())
