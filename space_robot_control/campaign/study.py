@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 from typing_extensions import Self
 
+from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, short, validate
 from space_robot_msgs_py.errors import InputError
@@ -186,7 +187,7 @@ def check_option(name: str) -> None:
         raise ValueError(f"{name} cannot be given: {OF_THE_CAMPAIGN[name]}")
     allowed = [option for option in FlightPlan.model_fields if option not in OF_THE_CAMPAIGN]
     if name not in allowed:
-        raise ValueError(f"unknown option {short(name)}: choose one of {', '.join(allowed)}")
+        raise ValueError(f"unknown option {short(name)}: {choices(name, allowed)}")
 
 
 def read_study(path: str | Path) -> Study:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .campaign_report import report
+from .numbers import FiniteRange
 from .options import folder_option
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ campaign.add_command(report)
     help="Hand the flights to a Dask cluster, as tcp://host:8786, instead of processes here.",
 )  # fmt: skip
 @click.option(
-    "--timeout", "timeout_s", type=click.FloatRange(0.0, min_open=True), metavar="S",
+    "--timeout", "timeout_s", type=FiniteRange(0.0, min_open=True), metavar="S",
     help="Longest wall-clock time of a flight; its row says out_of_time then [default: any].",
 )  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print outcomes and verdicts as JSON.")

@@ -47,7 +47,7 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     from ..flight.graph.orchestrator import fly as fly_graph
     from ..flight.terminal import echo_json
     from ..scenario.report import flight_report
-    from .report_display import show_report
+    from .report_display import show_next_steps, show_report
 
     flight = plan_flight(**options)
     bag = bag or default_bag(flight)
@@ -63,6 +63,8 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     if failures := report["graph"]["failures"]:
         ending = Ending.early(FlightError("; ".join(failures)), flight.period)
     show_report({**report, **ending.as_record()}, as_json)
+    if not as_json:
+        show_next_steps(bag)
     ending.check()
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from .numbers import FiniteRange
 from .options import flight_options
 
 
@@ -21,7 +22,7 @@ def gains() -> None:
 @gains.command()
 @click.option(
     "--controller", default="all", show_default=True,
-    help="A law's name, or module:Class of your own; all: every law that the gain set has.",
+    help="A law's name, or file.py:Class of your own; all: every law that the gain set has.",
 )  # fmt: skip
 @flight_options(
     "case", "gains", "robot", "mission", "sensors", "actuators", "navigation", "seed", "set", "json"
@@ -67,19 +68,19 @@ def check(as_json: bool, **options: Any) -> None:
     help="A case that is to be flown, with its payload; may be repeated.",
 )  # fmt: skip
 @click.option(
-    "--margin", type=click.FloatRange(0.0, 0.5, min_open=True), default=0.05, show_default=True,
+    "--margin", type=FiniteRange(0.0, 0.5, min_open=True), default=0.05, show_default=True,
     help="Share by which the torque reported may exceed the one commanded.",
 )  # fmt: skip
 @click.option(
-    "--mass-uncertainty", type=click.FloatRange(0.0, 0.9), default=0.2, show_default=True,
+    "--mass-uncertainty", type=FiniteRange(0.0, 0.9), default=0.2, show_default=True,
     help="Share by which each mass and inertia may be wrong.",
 )  # fmt: skip
 @click.option(
-    "--bandwidth", type=click.FloatRange(0.0, 1e4, min_open=True), metavar="W",
+    "--bandwidth", type=FiniteRange(0.0, 1e4, min_open=True), metavar="W",
     help="Poles of all laws, rad/s [default: what lag and ripple allow].",
 )  # fmt: skip
 @click.option(
-    "--ripple", type=click.FloatRange(0.0, 10.0, min_open=True), default=0.1, show_default=True,
+    "--ripple", type=FiniteRange(0.0, 10.0, min_open=True), default=0.1, show_default=True,
     help="Noise allowed on a torque, RMS, as a share of the largest that the mission asks.",
 )  # fmt: skip
 @click.option(

@@ -157,7 +157,7 @@ NAMESPACE = click.option(
 
 TRUST = click.option(
     "--trust", is_flag=True,
-    help="Import the module:Class and read the files that the bag names: runs the bag's code.",
+    help="Import the law and read the files that the bag names: runs the bag's code.",
 )  # fmt: skip
 
 
@@ -203,7 +203,7 @@ REPAIR = click.option(
 OPTIONS: dict[str, Decorator] = {
     "controller": click.option(
         "--controller", default="tde_stc", show_default=True,
-        help="ctc, ctc_smc, tde_smc, tde_tsmc, tde_stc, or module:Class of your own."),
+        help="ctc, ctc_smc, tde_smc, tde_tsmc, tde_stc, or file.py:Class of your own."),
     "case": click.option(
         "--case", default="1", show_default=True,
         help="1, 2, 3, 4-1, 4-2, or a path to a case's YAML."),
@@ -315,8 +315,8 @@ def plan_flight(**options: Any) -> Flight:
 def remarks_on(flight: Flight) -> list[str]:
     """Return what there is to say of a flight before it begins.
 
-    Of a robot's file that was repaired, of gains with too little margin, of joints that are asked
-    too much.
+    Of a robot's file that was repaired, of gains with too little margin (of default gains only
+    where hardware or a fault tries the margin), of joints that are asked too much.
     """
     from ..tuning.gain_check import pair_corner
     from ..tuning.warning import limit_remarks, margin_remarks
@@ -324,9 +324,11 @@ def remarks_on(flight: Flight) -> list[str]:
     flown = [flight.law, *(law for _, law in flight.swaps)]
     corner = pair_corner(flight.controller_settings)
     names = flight.plant.names
+    # the default gains of an ideal plant are the project's own choice: nobody is warned of them
+    tries_margin = flight.has_chosen_gains or bool(flight.faults) or bool(names.actuators)
     on_gains = margin_remarks(
         flown, flight.plant.robot, flight.mission_settings, corner, flight.controls_base,
-        on_thrusters=bool(names.thrusters and not names.wheels),
+        on_thrusters=bool(names.thrusters and not names.wheels), on_thin_margin=tries_margin,
     )  # fmt: skip
     on_limits = limit_remarks(flight.plant.robot, flight.mission_settings)
     return [*(f"repaired: {text}" for text in flight.robot.repairs), *on_gains, *on_limits]

@@ -7,28 +7,29 @@ from typing import Any
 
 import click
 
+from .numbers import FiniteRange
 from .options import NAMESPACE, OPTIONS, REMAP, TRUST, file_option
 
 
 @click.command()
 @click.argument("bag", type=click.Path(path_type=Path))
 @click.option(
-    "--controller", default="", help="Law to answer, or module:Class [default: the one that flew]."
+    "--controller", default="", help="Law to answer, or file.py:Class [default: the one that flew]."
 )
 @click.option("--gains", default="", help="Its gains [default: those flown].")
 @OPTIONS["set"]
 @click.option(
     "--rate",
-    type=click.FloatRange(0.0, 1e3, min_open=True),
+    type=FiniteRange(0.0, 1e3, min_open=True),
     metavar="R",
     help="By the wall clock, R times real time [default: lockstep].",
 )
 @click.option(
-    "--start", type=click.FloatRange(0.0), default=0.0, metavar="T",
+    "--start", type=FiniteRange(0.0), default=0.0, metavar="T",
     help="Simulated time to begin at, s.",
 )  # fmt: skip
 @click.option(
-    "--end", type=click.FloatRange(0.0, min_open=True), metavar="T",
+    "--end", type=FiniteRange(0.0, min_open=True), metavar="T",
     help="Simulated time to end before, s.",
 )  # fmt: skip
 @file_option("--csv", "table", help="File for both torques of every tick.")

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import shlex
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
+import click
 from rich.console import Console
 
 from ..analysis.report_tables import comparison_table, rms_table
@@ -27,6 +30,12 @@ def show_report(report: dict[str, Any], as_json: bool) -> None:
         print_table(rms_table(report), console := terminal())
         if (table := sizing_table(report)) and report["sizing"]["requirements"]:
             print_table(table, console)
+
+
+def show_next_steps(bag: Path) -> None:
+    """Say on standard error what can be done with a bag."""
+    name = shlex.quote(str(bag))
+    click.echo(f"next: space-robot view {name}\n      space-robot analyze {name}", err=True)
 
 
 def print_comparison(reports: dict[str, dict[str, Any]], console: Console) -> None:

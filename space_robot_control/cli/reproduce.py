@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .numbers import FiniteRange
 from .options import OPTIONS
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--duration",
-    type=click.FloatRange(0.0, 1e6, min_open=True),
+    type=FiniteRange(0.0, 1e6, min_open=True),
     help="Seconds to fly for a quick look [default: the mission's 30].",
 )
 @click.option(

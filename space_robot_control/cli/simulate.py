@@ -26,10 +26,11 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
       space-robot simulate --event capture@10:small_satellite --event release@25:0.05
     """
     from ..flight.bag_path import check_bag_path
+    from ..flight.compilation import compile_kernels
     from ..flight.disk_space import room_remark
     from ..flight.progress import flight_progress
     from ..scenario.in_process import fly_in_process
-    from .report_display import show_report
+    from .report_display import show_next_steps, show_report
 
     flight = plan_flight(**options)
     flight.check_in_process()
@@ -39,6 +40,7 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
             click.echo(remark, err=True)
     for remark in remarks_on(flight):
         click.echo(remark, err=True)
+    compile_kernels(bool(flight.plant.names.actuators))  # it has a progress line of its own
     began = time.monotonic()
     with flight_progress(flight.ticks * flight.period, flight.law.name) as show:
 
@@ -48,4 +50,6 @@ def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
         flown = fly_in_process(flight, bag, progress, keep_log=False)
     if as_json or flown.metrics:
         show_report(flown.report(), as_json)
+    if bag and flown.metrics and not as_json:
+        show_next_steps(bag)
     flown.check()

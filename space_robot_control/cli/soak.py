@@ -8,13 +8,14 @@ from pathlib import Path
 import click
 
 from ..flight.interruption import Interrupted
+from .numbers import FiniteRange
 from .options import OUTPUT, folder_option, put_json
 
 
 @click.command()
 @click.option(
     "--minutes",
-    type=click.FloatRange(0.0, min_open=True),
+    type=FiniteRange(0.0, min_open=True),
     default=30.0,
     show_default=True,
     help="How long to begin new flights.",
@@ -28,7 +29,7 @@ from .options import OUTPUT, folder_option, put_json
 )
 @click.option(
     "--duration",
-    type=click.FloatRange(0.5, 1e4),
+    type=FiniteRange(0.5, 1e4),
     default=5.0,
     show_default=True,
     help="Simulated seconds of each flight.",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .numbers import FiniteRange
 from .options import flight_options, folder_option
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 @flight_options("controller", "case", "gains", "robot", "mission", "duration", "friction", "json")
 @click.option(
     "--initial-error",
-    type=click.FloatRange(0.0, 0.1, min_open=True),
+    type=FiniteRange(0.0, 0.1, min_open=True),
     default=1e-3,
     show_default=True,
     help="Error of every axis at the start of the reaching flight (joints: rad).",

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from .numbers import FiniteRange
 from .options import OUTPUT, flight_options, folder_option, put_json
 
 GRADES = ("ideal", "fine", "tactical", "coarse")
@@ -31,7 +32,7 @@ GRADES = ("ideal", "fine", "tactical", "coarse")
     help="Flights of every law with all hardware.",
 )  # fmt: skip
 @click.option(
-    "--spread", type=click.FloatRange(0.0, 1.0, max_open=True), default=0.0, show_default=True,
+    "--spread", type=FiniteRange(0.0, 1.0, max_open=True), default=0.0, show_default=True,
     help="Largest relative error of the plant's masses and inertias; no law is told.",
 )  # fmt: skip
 @click.option("--seed", type=click.IntRange(0, 2**30), default=0, help="Seed of the draws.")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from .numbers import FiniteRange
 from .options import NAMESPACE, REMAP, TRUST, file_option
 
 
@@ -23,7 +24,7 @@ from .options import NAMESPACE, REMAP, TRUST, file_option
     help="A place for each robot [default: of one and the same robot all flights in one place].",
 )  # fmt: skip
 @click.option(
-    "--rate", type=click.FloatRange(0.0, 1e3, min_open=True), default=30.0, metavar="HZ",
+    "--rate", type=FiniteRange(0.0, 1e3, min_open=True), default=30.0, metavar="HZ",
     help="Poses a second of flight [default: 30]; fewer where the page grew beyond 3 MB.",
 )  # fmt: skip
 @click.option("--from", "from_s", type=float, metavar="T", help="Begin at T simulated seconds.")

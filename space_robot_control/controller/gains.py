@@ -157,7 +157,7 @@ def build_law(
     name: str | type[ControlLaw], settings: ControllerNodeSettings, axes: int,
     given: Mapping[str, Any] | None = None,
 ) -> ControlLaw:  # fmt: skip
-    """A law by name (or ``module:Class``) with the gains that the settings choose.
+    """A law by name (or as `find_law` takes it) with the gains that the settings choose.
 
     Args:
         name: of the law, or its class.

@@ -57,7 +57,7 @@ class ControllerNodeSettings(NodeSettings):
     )  # fmt: skip
 
     controller: str = Field(
-        "tde_stc", description="control law in force, or module:Class of your own"
+        "tde_stc", description="control law in force, or file.py:Class or module:Class of your own"
     )
     gains: str = Field(
         "default", description="gain set of config/gains/<robot>, or a path to a file or folder"

@@ -7,7 +7,10 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
+from space_robot_sim.faults.grammar import check_time
+from space_robot_sim.faults.schedule import tick_from
 
 
 class Swap(NamedTuple):
@@ -36,6 +39,11 @@ def _parse(text: str, period: float) -> Swap:
         time = float(seconds)
     except ValueError:
         time = math.nan
-    if not (0.0 <= time < math.inf and name.strip()):
-        raise InputError(f"swap {text!r}: T:LAW expected, T in simulated seconds, as in 5:tde_smc")
-    return Swap(math.ceil(time / period - 1e-6), name.strip())
+    where = f"swap {short(text)}"
+    if math.isnan(time) or not name.strip():
+        raise InputError(f"{where}: T:LAW expected, T in simulated seconds, as in 5:tde_smc")
+    try:
+        check_time(time)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    return Swap(int(tick_from(time, period)), name.strip())

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import subprocess
+from contextlib import AbstractContextManager
+from typing import Any
 
 import click
 import numpy as np
 
 from space_robot_msgs_py.compiled.cache import cache_directory
+from space_robot_msgs_py.compiled.call_graph import count_compiled, index_files
 from space_robot_msgs_py.ros.lifeline import hold_to_standard_input
 from space_robot_msgs_py.ros.run_module import module_command
 from space_robot_msgs_py.samples import Command, Reference, RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.compiled_codec import read, write
 
-from ..controller.allocation.allocation import allocation_code
-from ..laws import laws
+from ..controller.allocation.allocation import allocate, allocation_code
+from ..laws import CompiledLaw, laws
 from .child_process import child_process
+from .closed_loop import fly_ticks
 from .plan import Flight, FlightPlan
+from .progress import watching_progress
 from .simulate import simulate
 
 MARK, ALLOCATION_MARK = "complete", "allocation"
@@ -31,8 +37,8 @@ def compile_kernels(with_allocation: bool = False) -> None:
     _compile_flights()
     mark = cache_directory() / ALLOCATION_MARK
     if with_allocation and not mark.exists():
-        click.echo("compiling the allocation (once, about a quarter of a minute) ...", err=True)
-        allocation_code(is_used=True)
+        with _progress("the allocation", allocate):
+            allocation_code(is_used=True)
         mark.touch()
 
 
@@ -44,15 +50,23 @@ def _compile_flights() -> None:
     mark = cache_directory() / MARK
     if mark.exists():
         return
-    click.echo("compiling the dynamics and the laws (once, about half a minute) ...", err=True)
-    with child_process(module_command(__name__), stdout=subprocess.DEVNULL) as helper:
+    own = [law.kernel for law in laws().values() if issubclass(law, CompiledLaw)]
+    with _progress("the dynamics and the laws", fly_ticks, read, write, *own):
+        with child_process(module_command(__name__), stdout=subprocess.DEVNULL) as helper:
+            _step_plant()
+            helper.wait()
+        for law in laws():
+            simulate(Flight(FlightPlan(controller=law, duration=0.002)))
         _step_plant()
-        helper.wait()
-    for law in laws():
-        simulate(Flight(FlightPlan(controller=law, duration=0.002)))
-    _step_plant()
-    _answer_and_exchange()
+        _answer_and_exchange()
     mark.touch()
+
+
+def _progress(what: str, *kernels: Any) -> AbstractContextManager[None]:
+    """Say what is compiled, and show how many kernels are; other processes compile them, too."""
+    click.echo(f"compiling {what} (once an installation, a minute or two) ...", err=True)
+    files = index_files(kernels)
+    return watching_progress("kernels", len(files), lambda: count_compiled(files))
 
 
 def _step_plant() -> None:

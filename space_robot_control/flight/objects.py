@@ -25,7 +25,7 @@ from space_robot_sim.robot.find import ROBOTS, robot_as_path
 from space_robot_sim.sensors.sensors import SensorSettings
 
 from ..controller.plain_laws import law_of
-from ..laws import ControlLaw, find_law, laws
+from ..laws import ControlLaw, find_law, importable_name, laws
 from ..mission.mission import MissionSettings
 
 OF_PLANT = ("initial_joints_deg", "initial_quaternion", "events")
@@ -126,13 +126,13 @@ def law_given(law: Any) -> str | type[ControlLaw] | ControlLaw | None:
 
 
 def law_setting(law: str | type[ControlLaw] | ControlLaw | None) -> str:
-    """Return what the parameter ``controller`` says, ``module:Class`` of a law not shipped."""
+    """Return what the parameter ``controller`` says; `importable_name` of a law not shipped."""
     if law is None:
         return ""
     if isinstance(law, str):
         return law
     kind = law if isclass(law) else type(law)
-    return kind.name if laws().get(kind.name) is kind else f"{kind.__module__}:{kind.__qualname__}"
+    return kind.name if laws().get(kind.name) is kind else importable_name(kind)
 
 
 def numbers_of(value: str | Tree) -> tuple[str, Tree]:

@@ -39,7 +39,7 @@ class FlightPlan(StrictModel):
     """The options of ``fly`` and ``simulate``."""
 
     controller: LawGiven = "tde_stc"
-    """Its name or module:Class; a `ControlLaw` class or object; a function, see
+    """Its name, file.py:Class or module:Class; a `ControlLaw` class or object; a function, see
     `space_robot_control.controller.plain_laws`; None: none, on the bench."""
     case: Case = "1"
     gains: Gains = "default"

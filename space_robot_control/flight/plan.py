@@ -21,6 +21,7 @@ from ..controller.allocation.believed_actuators import believed_actuators
 from ..controller.controller import Controller
 from ..controller.gains import build_laws
 from ..controller.plain_laws import NoLaw
+from ..controller.settings import DEFAULT
 from ..controller.swaps import parse_swaps
 from ..laws import ControlLaw
 from ..mission.mission import Mission
@@ -50,6 +51,8 @@ class Flight:
         self.controller_settings = settings.controller
         self.mission_settings = settings.mission
         self.recorder_settings = settings.recorder
+        self.has_chosen_gains = settings.controller.gains != DEFAULT or bool(settings.gains)
+        """True unless the gains are the default set's."""
         self.period = settings.plant.period
         self.timebase = settings.plant.timebase
         self._robots = Robots(settings, plan.robot, plan.plant_robot)

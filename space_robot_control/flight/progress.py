@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -21,6 +22,10 @@ from .terminal import say, terminal
 
 LINE_S = 60.0
 """Time between two lines where no line can be redrawn."""
+WATCH_S, WATCHED_LINE_S = 0.5, 5.0
+"""Time between two counts of things that are watched, and between two lines about them."""
+WATCHER = "progress"
+"""Name of the thread that counts."""
 
 
 class FlightProgress:
@@ -61,11 +66,11 @@ def counting_progress(what: str) -> Iterator[Callable[[int], Callable[[], None]]
 
 
 @contextmanager
-def rated_progress(what: str) -> Iterator[Callable[[int, int, str], None]]:
+def rated_progress(what: str, line_s: float = LINE_S) -> Iterator[Callable[[int, int, str], None]]:
     """A progress line with rate and time left, for many things of which some may be done before.
 
     It begins when it is first called: with how many are done, how many there are, and a remark.
-    In a file, as of a cluster's job, it is a line every `LINE_S`.
+    In a file, as of a cluster's job, it is a line every ``line_s``.
     """
     with ExitStack() as stack:
         progress: Progress | None = None
@@ -73,7 +78,7 @@ def rated_progress(what: str) -> Iterator[Callable[[int, int, str], None]]:
 
         def show(done: int, total: int, remark: str) -> None:
             nonlocal progress, told_at
-            if not console.is_terminal and time.monotonic() >= told_at + LINE_S:
+            if not console.is_terminal and time.monotonic() >= told_at + line_s:
                 told_at = time.monotonic()
                 told = f"{what} {done}/{total}"
                 say(console, f"{told}, {remark}" if remark else told)
@@ -88,6 +93,33 @@ def rated_progress(what: str) -> Iterator[Callable[[int, int, str], None]]:
                 progress.update(progress.task_ids[0], completed=done, total=total, remark=remark)
 
         yield show
+
+
+@contextmanager
+def watching_progress(what: str, total: int, count: Callable[[], int]) -> Iterator[None]:
+    """A progress line for things that others do, which are counted now and then.
+
+    Args:
+        what: the things.
+        total: how many there are.
+        count: returns how many are done.
+    """
+    is_over = threading.Event()
+
+    def watch() -> None:
+        while not is_over.wait(WATCH_S):
+            show(count(), total, "")
+
+    with rated_progress(what, WATCHED_LINE_S) as show:
+        show(count(), total, "")
+        watcher = threading.Thread(target=watch, name=WATCHER, daemon=True)
+        watcher.start()
+        try:
+            yield
+        finally:
+            is_over.set()
+            watcher.join()
+        show(count(), total, "")
 
 
 class _Rate(ProgressColumn):

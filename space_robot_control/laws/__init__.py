@@ -1,22 +1,26 @@
 """The control laws, one file each.
 
 Your own: one class derived from `ControlLaw` and one YAML of its gains. A file put in this
-folder is found by its law's ``name``; a class on PYTHONPATH is named
-``module:Class`` wherever a controller's name is asked for.
+folder is found by its law's ``name``. Wherever a controller's name is asked for, a class in any
+other file is named ``path/file.py:Class``, one on PYTHONPATH ``module:Class``.
 """
 
 from __future__ import annotations
 
 import importlib
+import os.path
 import pkgutil
 from abc import ABCMeta
 from functools import cache
 from inspect import isabstract
 
+from space_robot_msgs_py.config.choices import choices
+from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 
 from .base import ControlLaw, LawGains, LawMemory, Signals, per_axis
 from .compiled import CompiledLaw
+from .law_file import ENDING, import_file, importable_name, law_file
 
 __all__ = [
     "CompiledLaw",
@@ -25,9 +29,13 @@ __all__ = [
     "LawMemory",
     "Signals",
     "find_law",
+    "importable_name",
     "laws",
     "per_axis",
 ]
+
+LONGEST_REASON = 200
+"""Characters of what a law's own code raises that are shown."""
 
 
 @cache
@@ -42,26 +50,49 @@ def laws() -> dict[str, type[ControlLaw]]:
 
 
 def find_law(name: str) -> type[ControlLaw]:
-    """The law of a name, or of a ``module:Class``.
+    """Return the law of a name, of a ``path/file.py:Class``, or of a ``module:Class``.
 
     Raises:
         InputError: there is no such law.
     """
     if name in laws():
         return laws()[name]
-    allowed = f"choose one of {', '.join(sorted(laws()))}, or module:Class"
-    module, separator, attribute = name.partition(":")
+    if name.endswith(ENDING):
+        raise InputError(f"controller {short(name)}: name the class as well, {name}:CLASS")
+    advice = choices(name, sorted(laws()), ", or file.py:Class or module:Class of your own")
+    module, separator, attribute = name.rpartition(":")
     if not separator:
-        raise InputError(f"unknown controller {name!r}: {allowed}")
+        raise InputError(f"unknown controller {short(name)}: {advice}")
+    file = law_file(name)
     try:
-        law = getattr(importlib.import_module(module), attribute)
+        imported = importlib.import_module(module) if file is None else import_file(file)
+        if file and not hasattr(imported, attribute):
+            own = [key for key, value in vars(imported).items() if _is_law(value)]
+            one_of(attribute, own, "class", f" of {file}")
+        law = getattr(imported, attribute)
+    except InputError as error:
+        where = "" if file is None or file.is_absolute() else " (paths are from the current folder)"
+        raise InputError(f"controller {short(name)}: {error}{where}") from None
     except Exception as error:  # the module is the user's, and may raise anything
         why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-        raise InputError(f"controller {name!r} cannot be imported ({why}): {allowed}") from None
+        why = " ".join(why.split())
+        why = why if len(why) <= LONGEST_REASON else f"{why[:LONGEST_REASON]}..."
+        advice = _advice(module, attribute, error) or advice
+        raise InputError(f"controller {short(name)} cannot be imported ({why}): {advice}") from None
     if not _is_law(law):
-        raise InputError(f"controller {name!r} is not a ControlLaw: {allowed}")
+        raise InputError(f"controller {short(name)} is not a ControlLaw: {advice}")
     found: type[ControlLaw] = law
     return found
+
+
+def _advice(module: str, attribute: str, error: Exception) -> str:
+    """Return what to do about a module that is not installed; empty if that is not the error."""
+    if not isinstance(error, ModuleNotFoundError):
+        return ""
+    own = f"{module.replace('.', '/')}{ENDING}"
+    if error.name and module.startswith(error.name) and os.path.isfile(own):
+        return f"the current folder is not searched for modules: name the file, {own}:{attribute}"
+    return "modules are searched for on PYTHONPATH; a file is named by its path, file.py:Class"
 
 
 def _is_law(value: object) -> bool:

@@ -1,7 +1,7 @@
 """Whose word is followed: a bag may be anybody's, and its description may name files and modules.
 
-Names of what is shipped are looked up whoever says them. A path to a file, or a ``module:Class``
-that would be imported, is opened only if the user has given it, or trusts the bag.
+Names of what is shipped are looked up whoever says them. A path to a file, or a ``module:Class`` or
+``file.py:Class`` that would be imported, is opened only if the user names it, or trusts the bag.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def check_law(name: str) -> None:
     if name not in laws():
         raise NotTrustedError(
             f"the bag names the law {_short(name)}, which is none of those shipped: if it is "
-            "module:Class, --trust imports it, which runs its code"
+            "module:Class or file.py:Class, --trust imports it, which runs its code"
         )
 
 

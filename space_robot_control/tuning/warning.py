@@ -29,6 +29,7 @@ def margin_remarks(
     acceleration_filter_hz: float = 0.0,
     controls_base: bool = True,
     on_thrusters: bool = False,
+    on_thin_margin: bool = True,
 ) -> list[str]:
     """Return a line for each of the laws that diverges, or nearly does, for its h_bar alone.
 
@@ -40,6 +41,7 @@ def margin_remarks(
         controls_base: whether anything turns the base.
         on_thrusters: whether thrusters alone do: their pulses come back into the demand, all but
             the share ``H^-1 h_bar``.
+        on_thin_margin: whether a law that flies with little margin is worth a line.
     """
     laws = {law.name: law for law in flown if law.h_bar.size}
     if not laws:
@@ -54,10 +56,10 @@ def margin_remarks(
         found = spectrum(inertia, law.h_bar[-inertia.shape[-1] :], weight)
         if not found.contracts:
             why = f"h_bar is too large for the robot (radius {found.radius:.3g}): it will diverge"
-        elif not found.is_sound:
+        elif not found.is_sound and on_thin_margin:
             why = (
                 f"h_bar leaves {found.margin:.2%} of margin in torque scale, "
-                f"{LEAST_MARGIN:.0%} is wise"
+                f"at least {LEAST_MARGIN:.0%} is recommended"
             )
             if on_thrusters:
                 why += ", and thrusters' pulses come back into the demand (--gains robust)"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os.path
 from functools import cache
 from pathlib import Path
 
 from ..errors import InputError
+from .choices import choices
 from .trees import Tree, merge, nest
 from .validation import read_yaml, short
 from .yaml_text import check_file
@@ -45,15 +47,16 @@ def named_file(kind: str, name: str) -> Path:
     if not is_named(kind, name):
         names = sorted(file.stem for file in folder.glob("*.yaml"))
         raise InputError(
-            f"unknown {kind.rstrip('s')} {short(name)}: choose one of {', '.join(names)}, "
-            "or a path to a .yaml file"
+            f"unknown {kind.rstrip('s')} {short(name)}: "
+            f"{choices(name, names, ', or a path to a .yaml file')}"
         )
     return folder / f"{name}.yaml"
 
 
 def is_named(kind: str, name: str) -> bool:
     """Tell whether there is ``config/<kind>/<name>.yaml``."""
-    return "/" not in name and (config_directory() / kind / f"{name}.yaml").is_file()
+    # not Path.is_file, which raises an OSError for a name that is too long
+    return "/" not in name and os.path.isfile(config_directory() / kind / f"{name}.yaml")
 
 
 def named_layers(kind: str, name: str) -> list[Path]:

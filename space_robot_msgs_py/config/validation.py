@@ -11,6 +11,7 @@ from typing import Any, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, field_validator
 
 from ..errors import InputError
+from .choices import choices
 from .text import printable
 from .yaml_text import YamlTextError, parse_yaml, read_file
 
@@ -88,8 +89,8 @@ def one_line(error: ValidationError, schema: type[BaseModel], where: str) -> str
     if first["type"] == "model_type":
         text = "a mapping was expected"
     if first["type"] == "extra_forbidden":
-        allowed = _allowed_keys(schema, first["loc"][:-1])
-        text, given = f"unknown key{given}: choose one of {', '.join(allowed)}", ""
+        allowed = choices(str(first["loc"][-1]), _allowed_keys(schema, first["loc"][:-1]))
+        text, given = f"unknown key{given}: {allowed}", ""
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return f"{where}: {key + ': ' if key else ''}{text}{given}{more}"
 
@@ -115,15 +116,23 @@ def short(value: Any) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
 
 
-def one_of(given: str, allowed: Iterable[str], what: str, context: str = "") -> str:
-    """Return ``given`` if it is allowed.
+def one_of(
+    name: str, allowed: Iterable[str], what: str, context: str = "", listing: str = ""
+) -> str:
+    """Return ``name`` if it is allowed.
+
+    Args:
+        name: as the user wrote it.
+        allowed: all names that are known.
+        what: the kind of thing that is named, for the error.
+        context: follows the name in the error, as `` in my.yaml``.
+        listing: see `choices`.
 
     Raises:
         InputError: naming what was given and what is allowed.
     """
     names = list(allowed)
-    if given not in names:
-        raise InputError(
-            f"unknown {what} {short(given)}{context}: choose one of {', '.join(names)}"
-        )
-    return given
+    if name not in names:
+        advice = choices(str(name), names, listing=listing)
+        raise InputError(f"unknown {what} {short(name)}{context}: {advice}")
+    return name

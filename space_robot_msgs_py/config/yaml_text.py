@@ -28,6 +28,8 @@ DEEPEST = 64
 """Lists and mappings within one another."""
 LONGEST_NAME = 250
 """Characters of a file's name that an error shows."""
+MOST_VALUES = 200_000
+"""Values in a text; they take a second to build."""
 MOST_REPEATED = 100_000
 """Values that aliases may add to those written out."""
 
@@ -120,6 +122,8 @@ def _measure(text: str) -> None:
     opened: list[tuple[str | None, int]] = []
     size = repeated = 0
     for event in yaml.parse(text, Loader=_Loader):
+        if size > MOST_VALUES:
+            raise _refused(f"more than {MOST_VALUES} values", event)
         if isinstance(event, yaml.CollectionStartEvent):
             opened.append((event.anchor, size))
             size += 1

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 
+from ..config.choices import choices
 from ..config.settings import NodeSettings, leaves
 from ..config.trees import flatten
 from ..errors import InputError
@@ -78,7 +79,7 @@ def refuse_unknown(node: Node) -> None:
         if name not in allowed and not name.startswith("qos_overrides."):
             raise InputError(
                 f"{node.get_name()} parameters: unknown parameter {name!r}: "
-                f"choose one of {', '.join(allowed)}"
+                f"{choices(name, allowed)}"
             )
 
 

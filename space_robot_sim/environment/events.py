@@ -20,7 +20,7 @@ from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
 from space_robot_msgs_py.errors import InputError
 
-from ..faults.grammar import NUMBER, shortest
+from ..faults.grammar import NUMBER, check_time, shortest
 from .target import Target, find_target
 
 _EVENT = re.compile(rf"(?P<kind>[^@]*)@(?P<time>{NUMBER})(?::(?P<argument>.+))?", re.ASCII)
@@ -157,8 +157,10 @@ def _split(text: str) -> tuple[str, float, str]:
         raise InputError(f"{where}: {' or '.join(FORMS)} expected, as capture@10:small_satellite")
     kind = one_of(match["kind"], ("capture", "release"), "kind", f" in {where}")
     time_s, argument = float(match["time"]), (match["argument"] or "").strip()
-    if not time_s < float("inf"):
-        raise InputError(f"{where}: T must be a number of seconds, got {match['time']}")
+    try:
+        check_time(time_s)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
     if kind == "capture" and not argument:
         raise InputError(f"{where}: a target is needed: capture@T:TARGET")
     return kind, time_s, argument

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
+from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotNames
@@ -53,8 +54,7 @@ def axes_of(name: str, about: About, names: RobotNames) -> tuple[int, ...]:
     known = {those[place]: (place,) for place in meant}
     found = {**numbers, **groups, **known}.get(name)
     if found is None:
-        of_numbers = [f"1 to {len(numbers)}"] if numbers else []
-        allowed = ", ".join((*known, *of_numbers, *groups))
-        choice = f"choose one of {allowed}" if allowed else "there is none"
-        raise InputError(f"no {about.name.lower().replace('_', ' ')} {short(name)}: {choice}")
+        also = [*([f"1 to {len(numbers)}"] if numbers else []), *groups]
+        advice = choices(name, known, f", {', '.join(also)}") if known else "there is none"
+        raise InputError(f"no {about.name.lower().replace('_', ' ')} {short(name)}: {advice}")
     return found

@@ -16,6 +16,8 @@ from space_robot_msgs_py.errors import InputError
 
 from .axes import About
 
+LATEST_S = 1e9
+"""Of a fault, an event or a swap, s of simulated time: its tick then fits in 64 bits."""
 NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FAULT = re.compile(
     rf"(?P<kind>[^@]*)@(?P<start>{NUMBER})(?:-(?P<stop>{NUMBER}))?(?::(?P<argument>.+))?",
@@ -155,10 +157,12 @@ def parse_fault(text: str, kinds: Kinds) -> Fault:
         raise InputError(f"{where}: KIND@T[-END][:ARGUMENT] expected, as in drop_state@2-3:0.1")
     start, stop = float(match["start"]), float(match["stop"] or math.inf)
     try:
-        kind = kinds[one_of(match["kind"], kinds, "kind")]
+        check_time(start)
+        check_time(stop if match["stop"] else 0.0, "END")
+        kind = kinds[one_of(match["kind"], kinds, "kind", listing="--fault list")]
         if match["stop"] and not kind.lasts:
             raise InputError(f"{kind.name} has no end: {kind.form}")
-        if not start < stop or (match["stop"] and math.isinf(stop)):
+        if not start < stop:
             raise InputError(f"END must be later than T, got {match['start']} to {match['stop']}")
         kind.read(match["argument"] or "")
     except InputError as error:
@@ -173,6 +177,16 @@ def parse_faults(texts: Iterable[str], kinds: Kinds) -> list[Fault]:
         InputError: see `parse_fault`.
     """
     return [parse_fault(text, kinds) for text in texts if text.strip()]
+
+
+def check_time(seconds: float, name: str = "T") -> None:
+    """See that a time can be that of something that happens in a flight.
+
+    Raises:
+        InputError: it is negative, or later than any flight lasts.
+    """
+    if not 0.0 <= seconds <= LATEST_S:
+        raise InputError(f"{name} must be from 0 to {LATEST_S:g} s, got {seconds:g}")
 
 
 def shortest(seconds: float) -> str:

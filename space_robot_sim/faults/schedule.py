@@ -143,5 +143,9 @@ class TemporaryChange:
 
 
 def tick_from(seconds: float, period: float) -> float:
-    """Return the first tick at or after a time; a millionth of a tick counts as rounding."""
-    return math.ceil(seconds / period - 1e-6) if math.isfinite(seconds) else seconds
+    """Return the first tick at or after a time; a millionth of a tick counts as rounding.
+
+    Of a time with more ticks than a float can count it is infinite.
+    """
+    ticks = seconds / period - 1e-6
+    return math.ceil(ticks) if math.isfinite(ticks) else ticks

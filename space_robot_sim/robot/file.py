@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 from typing_extensions import Self
 
-from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.config.validation import StrictModel, short
 from space_robot_msgs_py.topics import BASE_AXES
 
 from ..elementary.matrices import norm, product
 from ..elementary.rotations import exact_sines_cosines, rotation_of_rpy
 from .inertia import Inertia, Mass, check_inertia, inertia_tensor
-from .tree import Body, Joint, JointFriction, JointLimits, Spring, Tool
+from .tree import Body, Joint, JointFriction, JointLimits, Spring, Tool, first_repeated
 
 Array = NDArray[np.float64]
 
@@ -27,6 +27,8 @@ Coefficient = Annotated[float, Field(ge=0.0)]
 
 BASE = "base"
 """The name of the base in a robot's file."""
+MOST_LINKS = 4000
+"""Of a robot's file, those on fixed joints included."""
 
 
 class BaseFile(StrictModel):
@@ -157,9 +159,9 @@ class ToolFile(FrameFile):
 
 def _distinct_names(links: list[LinkFile]) -> list[LinkFile]:
     names = [link.name for link in links]
+    if (repeated := first_repeated(names)) is not None:
+        raise ValueError(f"joint names must differ, {short(repeated)} occurs twice")
     for name in names:
-        if names.count(name) > 1:
-            raise ValueError(f"joint names must differ, {name!r} occurs twice")
         if name in BASE_AXES:
             raise ValueError(f"{name!r} is the name of a base axis, not of a joint")
         if name == BASE:
@@ -172,7 +174,9 @@ class RobotFile(StrictModel):
 
     name: Annotated[str, Field(min_length=1)]
     base: BaseFile
-    links: Annotated[list[LinkFile], Field(min_length=1), AfterValidator(_distinct_names)]
+    links: Annotated[
+        list[LinkFile], Field(min_length=1, max_length=MOST_LINKS), AfterValidator(_distinct_names)
+    ]
     tool: ToolFile | None = None
     tools: list[ToolFile] = Field([])
 

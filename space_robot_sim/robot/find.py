@@ -14,10 +14,12 @@ names out of bags open nothing but what is shipped.
 
 from __future__ import annotations
 
+import os.path
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
+from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.files import GIVEN, config_directory, is_named, named_file
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.config.yaml_text import check_file, is_folder
@@ -69,8 +71,8 @@ def robot_files(robot: str) -> RobotFiles:
         return _own_folder(_file_of(path))
     if not is_named(ROBOTS, robot):
         raise InputError(
-            f"unknown robot {short(robot)}: choose one of {', '.join(robot_names())}, or a path "
-            "to a .yaml or .urdf file or to a folder"
+            f"unknown robot {short(robot)}: "
+            f"{choices(robot, robot_names(), ', or a path to a .yaml or .urdf file or a folder')}"
         )
     return _in_config(config_directory() / ROBOTS / f"{robot}.yaml")
 
@@ -133,14 +135,17 @@ def new_command(robot: str) -> str:
 
 
 def robot_as_path(robot: str) -> str:
-    """Return what a user means by a robot's name: ``r`` is the folder ``r/`` if none is called so.
+    """Return what a user means by a robot's name: ``r``, if no robot is called so, is a path.
 
-    Not for names out of bags: these open no folder of the user's.
+    It is then the folder ``r/`` or the file ``./r``. Not for names out of bags: these open no
+    folder of the user's.
     """
     name = split_choice(robot).name
     if not name or "/" in name or name.endswith((*YAML, *URDF)) or is_named(ROBOTS, robot):
         return robot
-    return f"{robot}/" if is_folder(Path(robot)) else robot
+    if is_folder(Path(robot)):
+        return f"{robot}/"
+    return f"./{robot}" if os.path.isfile(name) else robot
 
 
 def _in_config(file: Path) -> RobotFiles:
@@ -162,9 +167,15 @@ def _own_folder(file: Path) -> RobotFiles:
 
 def _file_of(folder: Path) -> Path:
     """Return the robot's file in a folder of its own."""
+    endings = (*YAML, *URDF)
+    if os.path.lexists(folder) and not is_folder(folder):
+        raise InputError(
+            f"robot {short(str(folder))}: not a robot's file, whose name ends in one of "
+            f"{', '.join(endings)}"
+        )
     if not is_folder(folder):
-        raise InputError(f"robot {short(str(folder))}: no such folder")
-    names = [OWN + ending for ending in (*YAML, *URDF)]
+        raise InputError(f"robot {short(str(folder))}: no such file or folder")
+    names = [OWN + ending for ending in endings]
     for name in names:
         if (folder / name).is_file():
             return folder / name

@@ -16,6 +16,7 @@ from pydantic import Field
 
 from space_robot_msgs_py.config.validation import StrictModel
 
+from ..dynamics.model import MOST_JOINTS
 from .tree import Body, Joint, JointFriction, JointLimits, Spring, Tool
 
 Array = NDArray[np.float64]
@@ -80,7 +81,7 @@ class RobotNumbers(StrictModel):
     """A robot's bodies, as a walk down each branch meets them."""
 
     name: Annotated[str, Field(min_length=1)]
-    bodies: Annotated[list[BodyNumbers], Field(min_length=2)]
+    bodies: Annotated[list[BodyNumbers], Field(min_length=2, max_length=MOST_JOINTS + 1)]
 
 
 class Document(StrictModel):

@@ -25,6 +25,8 @@ from .noise import in_steps, row_of
 Array = NDArray[np.float64]
 Angle = Annotated[float, Field(ge=0.0, le=1.0)]
 
+LEAST_RATE = 1e-6
+"""Hz; a measurement in eleven days."""
 MOST_UNDER_WAY = 64
 """Measurements that have been taken and are not released yet."""
 
@@ -100,6 +102,11 @@ class StarTracker(Record):
         Raises:
             InputError: the settings do not fit one another or the period.
         """
+        if 0.0 < settings.rate < LEAST_RATE:
+            raise InputError(
+                f"star_tracker.rate must be 0 (a measurement every tick) or at least "
+                f"{LEAST_RATE:g} Hz, got {settings.rate:g}"
+            )
         if settings.rate * period > 1.0 + 1e-9:
             raise InputError(
                 f"star_tracker.rate must be at most one measurement a tick, "

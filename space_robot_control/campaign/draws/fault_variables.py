@@ -51,7 +51,9 @@ def fault_variables(key: str, given: Any, where: str, names: RobotNames) -> list
     Raises:
         InputError: there is no such fault, or it has no number.
     """
-    kind = PLANT_KINDS[one_of(key.partition("@")[0], PLANT_KINDS, "kind of fault")]
+    kind = PLANT_KINDS[
+        one_of(key.partition("@")[0], PLANT_KINDS, "kind of fault", listing="--fault list")
+    ]
     distribution = read_distribution(given, where)
     if distribution.relative or distribution.offset:
         raise InputError(f"{where}: a fault has no nominal value: neither relative nor offset")

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
@@ -52,7 +53,7 @@ def chosen(element: str, names: Sequence[str], what: str) -> list[tuple[int, str
     if element.isdecimal() and 1 <= int(element) <= len(names):
         return [(int(element) - 1, names[int(element) - 1])]
     raise InputError(
-        f"no {what} {short(element)}: choose one of {', '.join(names)}, 1 to {len(names)}, or *"
+        f"no {what} {short(element)}: {choices(element, names, f', 1 to {len(names)}, or *')}"
         if names
         else f"no {what} {short(element)}: there is none"
     )

@@ -12,12 +12,13 @@ from typing import Any
 
 from ...flight.plan import Flight
 from ...flight.software import versions
+from ...laws.law_file import law_file
 
 DECIDE = ("python", "space_robot", "numpy", "scipy", "numba", "llvmlite")
 """Packages whose version may change the bits of a row."""
 OF_TABLES = "pyarrow"
 """The package that makes the table's bytes."""
-SUFFIXES = (".yaml", ".yml", ".urdf", ".xacro")
+SUFFIXES = (".yaml", ".yml", ".urdf", ".xacro", ".py")
 """Of files that a campaign's file may name."""
 
 
@@ -34,9 +35,10 @@ def software() -> dict[str, str | None]:
 
 def file_digests(values: Any) -> dict[str, str]:
     """Return the digest of every file that is named anywhere in a file's content, by its name."""
+    names = {str(law_file(text.partition("=")[0]) or text) for text in _texts(values)}
     return {
         name: digest(Path(name).read_bytes())
-        for name in sorted(set(_texts(values)))
+        for name in sorted(names)
         if name.endswith(SUFFIXES) and "\0" not in name and Path(name).is_file()
     }
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import math
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -14,6 +13,8 @@ from space_robot_msgs_py.bag.law_history import within
 from space_robot_msgs_py.errors import FlightError, InputError
 from space_robot_msgs_py.topics import Topic
 from space_robot_msgs_py.wire.codecs import StateCodec
+from space_robot_sim.faults.grammar import LATEST_S, check_time
+from space_robot_sim.faults.schedule import tick_from
 
 from ..compilation import compile_kernels
 from ..graph.domain import ros_domain
@@ -54,10 +55,10 @@ class _Run:
     def __init__(self, options: Options, recording: Recording, choice: ControllerChoice) -> None:
         self._options, self._recording, self._choice = options, recording, choice
         period = recording.timebase.period
-        self._start = math.ceil(options.start_s / period - 1e-6)
-        self._stop: float = options.end_s
-        if math.isfinite(options.end_s):
-            self._stop = math.ceil(options.end_s / period - 1e-6)
+        check_time(options.start_s, "start")
+        check_time(min(options.end_s, LATEST_S), "end")
+        self._start = int(tick_from(options.start_s, period))
+        self._stop = tick_from(options.end_s, period)
         self._recorded = self._read_commands()
         self._parts = self._choose_parts()
         if next(recording.states(self._parts, self._start, self._stop), None) is None:

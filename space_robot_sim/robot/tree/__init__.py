@@ -2,7 +2,7 @@
 
 from .arrays import TreeArrays
 from .bodies import Body, Joint, JointFriction, JointKind, JointLimits, Spring, Tool, Visual
-from .flatten import axes_with_z, flatten, parallel_axes
+from .flatten import axes_with_z, first_repeated, flatten, parallel_axes
 
 __all__ = [
     "Body",
@@ -15,6 +15,7 @@ __all__ = [
     "TreeArrays",
     "Visual",
     "axes_with_z",
+    "first_repeated",
     "flatten",
     "parallel_axes",
 ]

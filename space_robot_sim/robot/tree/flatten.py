@@ -6,12 +6,14 @@ of its body's frame, the base's frame is at its centre of mass.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.config.choices import choices
+from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from ...elementary.matrices import norm, product, turned_tensor
@@ -89,22 +91,31 @@ def parallel_axes(mass: float, arm: Array) -> Array:
     return found
 
 
+def first_repeated(names: Iterable[str]) -> str | None:
+    """Return the first name that occurs for a second time, None if all differ."""
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            return name
+        seen.add(name)
+    return None
+
+
 def _check_names(bodies: Sequence[Body], where: str) -> dict[str, Body]:
     by_name = {body.name: body for body in bodies}
     names = [body.name for body in bodies]
     joints = [body.joint.name for body in bodies if body.joint]
     for kind, given in (("body", names), ("joint", joints)):
-        for name in given:
-            if given.count(name) > 1:
-                raise InputError(f"{where}: {kind} names must differ, {name!r} occurs twice")
+        if (name := first_repeated(given)) is not None:
+            raise InputError(f"{where}: {kind} names must differ, {short(name)} occurs twice")
     bases = [body.name for body in bodies if body.joint is None]
     if len(bases) != 1:
         raise InputError(f"{where}: a robot has one base, here are {len(bases)}: {bases}")
     for body in bodies:
         if body.joint and body.parent not in by_name:
             raise InputError(
-                f"{where}: parent {body.parent!r} of {body.name!r} is no body, there are "
-                f"{', '.join(names)}"
+                f"{where}: parent {short(body.parent)} of {short(body.name)} is no body: "
+                f"{choices(body.parent, names)}"
             )
     return by_name
 

@@ -12,6 +12,7 @@ from space_robot_msgs_py.config.yaml_text import read_file
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
+from ...dynamics.model import MOST_JOINTS
 from ..tree import Body, JointFriction, Spring
 from .bodies import check_kinds, end_frames, make_bodies, mend_inertias, mend_massless
 from .elements import Element, parse_xml
@@ -23,6 +24,9 @@ from .visuals import read_colours
 from .xacro import expand_xacro
 
 XACRO = ".xacro"
+MOST_LINKS = 4000
+MOST_MOVING = 4 * MOST_JOINTS
+"""Joints that are not fixed; some of them may be locked for want of mass."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,7 @@ def parse_urdf(
     report = Report(str(path))
     root = parse_xml(text, report.where)
     name = _robot_name(root, path, report)
+    _check_counts(root, report)
     links = read_links(root, read_colours(root, report), path.absolute().parent, report)
     joints = read_joints(root, links, report)
     tree = build_tree(links, joints, base, report)
@@ -131,6 +136,23 @@ def _robot_name(root: Element, path: Path, report: Report) -> str:
         root.line, "robot", "it needs a printable name", name, f"named {short(path.stem)}"
     )
     return path.stem
+
+
+def _check_counts(root: Element, report: Report) -> None:
+    """Refuse a file that is far too large before it is read link by link.
+
+    Joints may turn out to be locked, so that more of them than can be flown are read.
+    """
+    links = len(list(root.all("link")))
+    if links > MOST_LINKS:
+        raise InputError(
+            f"{report.where}: at most {MOST_LINKS} links can be read, here are {links}"
+        )
+    moving = sum(joint.attributes.get("type") != "fixed" for joint in root.all("joint"))
+    if moving > MOST_MOVING:
+        raise InputError(
+            f"{report.where}: at most {MOST_JOINTS} moving joints can be flown, here are {moving}"
+        )
 
 
 def _all_elements(root: Element) -> list[Element]:

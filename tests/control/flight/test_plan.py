@@ -99,7 +99,7 @@ def test_gains_are_parameters_as_at_the_node() -> None:
         ({"recorder": {"robot": "seven_joint"}}, "recorder.robot cannot be set: use --robot"),
         ({"plant": {"wait_for": ["x"]}}, "plant.wait_for cannot be set"),
         ({"mission": {"autostart": False}}, "mission.autostart cannot be set"),
-        ({"plant": {"hold_tick": 5}}, "hold_tick: unknown key, got 5: choose one of"),
+        ({"plant": {"hold_tick": 5}}, "hold_tick: unknown key, got 5: did you mean hold_ticks?"),
         ({"controller": {"tde_stc.k_9": [1.0]}}, "unknown gain of tde_stc 'k_9'"),
         ({"controller": {"pid.k_1": [1.0]}}, "unknown law 'pid' in controller parameters"),
         ({"plnt": {"hold_ticks": 5}}, "unknown node 'plnt'"),

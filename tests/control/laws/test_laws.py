@@ -275,7 +275,6 @@ def test_a_law_of_ones_own_is_found_by_module_and_class() -> None:
     ("name", "why"),
     [
         ("pid", "unknown controller 'pid'"),
-        ("no_such_module:Law", "No module named 'no_such_module'"),
         ("space_robot_control.laws.ctc:Pid", "has no attribute 'Pid'"),
         ("space_robot_control.laws.ctc:", "cannot be imported"),
         ("space_robot_sim.robot:Robot", "is not a ControlLaw"),

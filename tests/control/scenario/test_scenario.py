@@ -197,7 +197,7 @@ def test_scenarios_are_values() -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"controler": "ctc"}, "unknown option 'controler' of Scenario: choose one of contr"),
+        ({"controler": "ctc"}, "unknown option 'controler' of Scenario: did you mean controller"),
         ({"realtime": True}, "unknown option 'realtime' of Scenario"),
         ({"duration": -1.0}, "Scenario: duration: Input should be greater than 0, got -1.0"),
         ({"robot": 3.5j}, "Scenario: robot: a name, a path or a Robot was expected"),

@@ -38,6 +38,23 @@ def test_table_iv_is_enough_for_joints_whose_base_is_free() -> None:
     assert remarks(FlightPlan(actuators="none")) == []
 
 
+def test_nobody_is_warned_of_the_default_gains_unless_the_flight_tries_their_margin() -> None:
+    """Who has chosen nothing is not greeted with a warning; who has tried something is."""
+    h_bar = {"controller": {"tde_stc.h_bar": [50.0] * 3 + [5.0] * 3 + [0.5] * 3}}
+    for plan, count in (
+        (FlightPlan(), 0),
+        (FlightPlan(case="3", sensors="fine"), 0),
+        (FlightPlan(gains="printed"), 1),
+        (FlightPlan(parameters=h_bar), 1),
+        (FlightPlan(gains={"h_bar": h_bar["controller"]["tde_stc.h_bar"]}), 1),
+        (FlightPlan(faults=["torque_scale@2:base=0.99"]), 1),
+        (FlightPlan(actuators="wheels"), 1),
+    ):
+        assert len(remarks_on(Flight(plan))) == count, plan
+    (line,) = remarks_on(Flight(with_h_bar(*[50.0] * 3, *[5.0] * 3, *[1.0] * 3)))
+    assert "diverge" in line
+
+
 def test_thrusters_are_told_which_gains_are_for_them() -> None:
     for actuators, is_said in (("thrusters", True), ("wheels_and_thrusters", False)):
         (line,) = remarks_on(Flight(FlightPlan(actuators=actuators)))

@@ -27,7 +27,8 @@ def test_misspelt_key_is_named_before_the_one_it_leaves_missing() -> None:
     with pytest.raises(InputError) as caught:
         validate(Outer, {"inner": {"masss": 1.0}}, "file.yaml")
     assert str(caught.value) == (
-        "file.yaml: inner.masss: unknown key, got 1.0: choose one of mass, name (and 1 more)"
+        "file.yaml: inner.masss: unknown key, got 1.0: choose one of mass, name "
+        "(did you mean mass?) (and 1 more)"
     )
 
 

@@ -15,6 +15,7 @@ from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.config.yaml_text import (
     DEEPEST,
     LARGEST_FILE,
+    MOST_VALUES,
     YamlTextError,
     check_file,
     parse_yaml,
@@ -62,6 +63,7 @@ def test_values(text: str, value: Any) -> None:
         ("!!python/object:os.system x", "could not determine a constructor"),
         ("9" * 5000, "is no int"),
         ("0x" + "f" * 5000, "is no int"),
+        ("[" + "1," * MOST_VALUES + "1]", f"more than {MOST_VALUES} values"),
         ("[" * 20_000, f"nested deeper than {DEEPEST} levels"),
         ("{a: " * 20_000, f"nested deeper than {DEEPEST} levels"),
         ("- " * 20_000, f"nested deeper than {DEEPEST} levels"),

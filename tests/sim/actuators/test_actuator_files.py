@@ -78,9 +78,9 @@ def test_single_numbers_come_over_those_of_the_file() -> None:
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("wheel: {}", "wheel: unknown key, got {}: choose one of "),
+        ("wheel: {}", "wheel: unknown key, got {}: did you mean wheels"),
         ("wheels: {axis: [1]}", r"wheels.axis: unknown key, got \[1\]: choose one of axes, coulomb,"
-         " initial_speed, max_momentum, max_torque, rotor_inertia, viscous$"),
+         " initial_speed, max_momentum, max_torque, rotor_inertia, viscous "),
         ("base_actuation: wheels", "base_actuation: Input should be 'ideal', 'hardware' or 'none'"),
         ("wheels: {axes: [1, 0, 0, 0]}", r"wheels.axes: x, y, z of at most 8 vectors were expected,"
          r" or \[0.0\] for none: 4 numbers, got \[1, 0, 0, 0\]$"),

@@ -70,14 +70,21 @@ def test_the_description_tells_all_of_a_robot_that_is_not_shipped(folder: Path) 
     assert said["parameters"]["mission"]["waypoint_times"] == [0.0, 12.0, 30.0]
 
 
-def test_what_is_not_there_is_said_in_one_line(folder: Path, tmp_path: Path) -> None:
+def test_what_is_not_there_is_said_in_one_line(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     shutil.copy(folder / "robot.yaml", tmp_path / "arm.yaml")
     with pytest.raises(InputError, match=r"no mission of its own: `space-robot new .*arm.yaml`"):
         Flight(FlightPlan(robot=str(tmp_path / "arm.yaml")))
     with pytest.raises(InputError, match=r"no gains of its own: `space-robot new .*arm.yaml`"):
         gain_files(str(tmp_path / "arm.yaml"), "default")
-    with pytest.raises(InputError, match=r"no such folder"):
+    with pytest.raises(InputError, match=r"no such file or folder"):
         find_robot(f"{tmp_path}/none/")
+    (tmp_path / "passwd").write_text("root:x:0:0:")
+    with pytest.raises(InputError, match=r"not a robot's file, whose name ends in one of \.yaml"):
+        find_robot(f"{tmp_path}/passwd")
+    monkeypatch.chdir(tmp_path)
+    assert robot_as_path("passwd") == "./passwd", "so that it is not an unknown name"
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match=r"no robot in this folder \(robot.yaml, robot.yml, "):
         find_robot(f"{tmp_path}/empty")

@@ -164,7 +164,7 @@ BAD: dict[str, tuple[Callable[[], list[Body]], str]] = {
     "two bases": (lambda: [HULL, replace(HULL, name="moon"), ARM], "one base, here are 2"),
     "unknown parent": (
         lambda: [HULL, replace(ARM, parent="x")],
-        "parent 'x' of 'arm' is no body, there are hull, arm",
+        "parent 'x' of 'arm' is no body: choose one of hull, arm",
     ),
     "circle": (
         lambda: [HULL, ARM, replace(ARM, name="leg", parent="leg", joint=Joint("k"))],
