@@ -96,8 +96,9 @@ def run(
                 show(progress.done, progress.total, failed)
 
             flown = Campaign.load(file).run(
-                runs, seed, out, workers, scheduler, timeout_s, progress=told
-            )
+                runs, seed, out, workers, scheduler, timeout_s, progress=told,
+                warn=lambda text: click.echo(text, err=True),
+            )  # fmt: skip
     except KeyboardInterrupt:
         if latest:
             done = f"{latest[0].done} of {latest[0].total} flights are kept in {out}"
@@ -116,12 +117,19 @@ def run(
 @click.argument("run", type=click.IntRange(0), metavar="RUN")
 @click.option("--law", metavar="LAW", help="As the campaign's file has it [default: its first].")
 @click.option("--bag", type=click.Path(path_type=Path), help="Folder of the bag to write.")
+@click.option(
+    "--trust", is_flag=True,
+    help="Import the module:Class and read the files that the campaign names: runs its code.",
+)  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
-def rerun(folder: Path, run: int, law: str | None, bag: Path | None, as_json: bool) -> None:
+def rerun(
+    folder: Path, run: int, law: str | None, bag: Path | None, trust: bool, as_json: bool
+) -> None:
     """Fly a row's flight again, to the same bits, and see that it is the same.
 
     DIR is the campaign's folder, RUN the number of the run. Exit code 1 if the flight differs from
-    the row in a single bit; it then says what may be the reason.
+    the row in a single bit; it then says what may be the reason. Modules and files that the
+    campaign names are not opened without --trust.
 
     \b
     Examples:
@@ -139,7 +147,7 @@ def rerun(folder: Path, run: int, law: str | None, bag: Path | None, as_json: bo
     if bag:
         check_bag_path(bag)
     try:
-        flown = FlownCampaign.open(folder).rerun(run, law, bag)
+        flown = FlownCampaign.open(folder, trust).rerun(run, law, bag)
     except SpaceRobotError:
         raise
     except Exception as error:  # of someone's law: its row says the same
