@@ -136,10 +136,9 @@ def rerun(
       space-robot campaign rerun campaigns/a 4711
       space-robot campaign rerun campaigns/a 4711 --law ctc=tuned --bag flights/4711
     """
-    from space_robot_msgs_py.errors import FlightError, SpaceRobotError
+    from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
     from ..campaign.flown import FlownCampaign
-    from ..campaign.row.row import one_line_of
     from ..flight.bag_path import check_bag_path
     from ..flight.terminal import echo_json
     from .report_display import show_report
@@ -148,10 +147,10 @@ def rerun(
         check_bag_path(bag)
     try:
         flown = FlownCampaign.open(folder, trust).rerun(run, law, bag)
-    except SpaceRobotError:
+    except InputError:
         raise
-    except Exception as error:  # of someone's law: its row says the same
-        raise FlightError(f"run {run}: {one_line_of(error)}") from None
+    except SpaceRobotError as error:  # of someone's law: its row says the same
+        raise FlightError(f"run {run}: {error}") from None
     if as_json:
         about = {"run": run, "law": flown.task.law, "same": flown.is_same, "digest": flown.digest}
         echo_json({**flown.report(), "campaign": about})

@@ -13,6 +13,7 @@ from abc import ABCMeta
 from functools import cache
 from inspect import isabstract
 
+from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.errors import InputError
 
 from .base import ControlLaw, LawGains, LawMemory, Signals, per_axis
@@ -55,8 +56,8 @@ def find_law(name: str) -> type[ControlLaw]:
         raise InputError(f"unknown controller {name!r}: {allowed}")
     try:
         law = getattr(importlib.import_module(module), attribute)
-    except Exception as error:  # the module is the user's, and may raise anything
-        why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    except (Exception, SystemExit) as error:  # the module is the user's, and may raise anything
+        why = one_line_of(error)
         raise InputError(f"controller {name!r} cannot be imported ({why}): {allowed}") from None
     if not _is_law(law):
         raise InputError(f"controller {name!r} is not a ControlLaw: {allowed}")

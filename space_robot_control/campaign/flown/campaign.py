@@ -9,7 +9,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import yaml
@@ -17,6 +16,7 @@ import yaml
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.config.yaml_text import read_file
 
+from ...flight.scratch_folder import ScratchFolder
 from ..runner import check_scheduler, cores
 from ..store.folder import MANIFEST, begin_or_resume, held_folder
 from ..store.recovery import open_journal
@@ -91,7 +91,7 @@ class Campaign:
         check_tables()
         asked = Preparation.of(self.study, seed, runs)
         manifest = asked.manifest
-        temporary = None if out is not None else TemporaryDirectory(prefix="space-robot-campaign-")
+        temporary = None if out is not None else ScratchFolder()
         folder = Path(temporary.name if temporary else str(out))
         if scheduler is not None and not (folder / MANIFEST).exists():
             check_scheduler(scheduler)  # else the folder would be begun for nothing
