@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
@@ -169,6 +170,13 @@ class Study(StrictModel):
         if not found:
             raise InputError(f"{self.where}: runs: missing: say there how many, or with --runs")
         return found
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """Return all but the number of runs, as JSON has it."""
+        content: dict[str, Any] = json.loads(self.model_dump_json(by_alias=True))
+        del content["runs"]
+        return content
 
     def named(self, where: str) -> Study:
         """Return the same study with its file's name for errors."""

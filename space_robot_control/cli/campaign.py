@@ -97,8 +97,9 @@ def run(
                 show(progress.done, progress.total, failed)
 
             flown = Campaign.load(file).run(
-                runs, seed, out, workers, scheduler, timeout_s, progress=told
-            )
+                runs, seed, out, workers, scheduler, timeout_s, progress=told,
+                warn=lambda text: click.echo(text, err=True),
+            )  # fmt: skip
     except KeyboardInterrupt:
         if latest:
             done = f"{latest[0].done} of {latest[0].total} flights are kept in {out}"
@@ -117,22 +118,28 @@ def run(
 @click.argument("run", type=click.IntRange(0), metavar="RUN")
 @click.option("--law", metavar="LAW", help="As the campaign's file has it [default: its first].")
 @click.option("--bag", type=click.Path(path_type=Path), help="Folder of the bag to write.")
+@click.option(
+    "--trust", is_flag=True,
+    help="Import the module:Class and read the files that the campaign names: runs its code.",
+)  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
-def rerun(folder: Path, run: int, law: str | None, bag: Path | None, as_json: bool) -> None:
+def rerun(
+    folder: Path, run: int, law: str | None, bag: Path | None, trust: bool, as_json: bool
+) -> None:
     """Fly a row's flight again, to the same bits, and see that it is the same.
 
     DIR is the campaign's folder, RUN the number of the run. Exit code 1 if the flight differs from
-    the row in a single bit; it then says what may be the reason.
+    the row in a single bit; it then says what may be the reason. Modules and files that the
+    campaign names are not opened without --trust.
 
     \b
     Examples:
       space-robot campaign rerun campaigns/a 4711
       space-robot campaign rerun campaigns/a 4711 --law ctc=tuned --bag flights/4711
     """
-    from space_robot_msgs_py.errors import FlightError, SpaceRobotError
+    from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
     from ..campaign.flown import FlownCampaign
-    from ..campaign.row.row import one_line_of
     from ..flight.bag_path import check_bag_path
     from ..flight.terminal import echo_json
     from .report_display import show_report
@@ -140,11 +147,11 @@ def rerun(folder: Path, run: int, law: str | None, bag: Path | None, as_json: bo
     if bag:
         check_bag_path(bag)
     try:
-        flown = FlownCampaign.open(folder).rerun(run, law, bag)
-    except SpaceRobotError:
+        flown = FlownCampaign.open(folder, trust).rerun(run, law, bag)
+    except InputError:
         raise
-    except Exception as error:  # of someone's law: its row says the same
-        raise FlightError(f"run {run}: {one_line_of(error)}") from None
+    except SpaceRobotError as error:  # of someone's law: its row says the same
+        raise FlightError(f"run {run}: {error}") from None
     if as_json:
         about = {"run": run, "law": flown.task.law, "same": flown.is_same, "digest": flown.digest}
         echo_json({**flown.report(), "campaign": about})

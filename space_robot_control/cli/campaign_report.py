@@ -18,20 +18,30 @@ from .options import file_option
     help="Compare the laws by this metric, as attitude_max; repeatable [default: RMS errors, "
     "the base's ripple, and what is required].",
 )  # fmt: skip
+@click.option(
+    "--study", type=click.Path(path_type=Path), metavar="FILE",
+    help="Judge by the requirements of this campaign's file [default: those that were flown].",
+)  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
 def report(
-    folder: Path, html: Path | None, markdown: Path | None, metrics: tuple[str, ...], as_json: bool
+    folder: Path,
+    html: Path | None,
+    markdown: Path | None,
+    metrics: tuple[str, ...],
+    study: Path | None,
+    as_json: bool,
 ) -> None:
     """What a campaign's flights say: requirements, laws, what drives the error, worst runs.
 
     DIR is the folder of `campaign run`, finished or not. docs/manual/campaigns.md says what the
-    numbers mean.
+    numbers mean. Files that are damaged are named.
 
     \b
     Examples:
       space-robot campaign report campaigns/a
       space-robot campaign report campaigns/a --html a.html
       space-robot campaign report campaigns/a --metric attitude_max --json
+      space-robot campaign report campaigns/a --study stricter.yaml
     """  # fmt: skip
     from ..analysis.figures.style import save_figure
     from ..analysis.files import check_free, write_text
@@ -39,12 +49,17 @@ def report(
     from ..campaign.report import console, page, record, subject
     from ..campaign.report.figures import summary_figure
     from ..campaign.report.findings import Findings
+    from ..campaign.study import read_study
     from ..flight.terminal import echo_json, terminal
 
     for path in (html, markdown):
         if path:
             check_free(path)
-    findings = Findings(subject.subject_of(FlownCampaign.open(folder)), metrics)
+    asked = None if study is None else read_study(study)
+    about = subject.subject_of(FlownCampaign.open(folder), asked)
+    for remark in about.remarks:
+        click.echo(remark, err=True)
+    findings = Findings(about, metrics)
     if html:
         write_text(page.render(findings), html)
         click.echo(f"wrote {html}", err=True)

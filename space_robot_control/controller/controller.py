@@ -18,6 +18,7 @@ from space_robot_sim.elementary.matrices import norm
 from space_robot_sim.robot import Robot
 
 from ..laws import ControlLaw, Signals
+from ..laws.checked import force_of
 from .allocation.allocation import Allocation, allocation_code
 from .allocation.diagnosis import Diagnosis, diagnose
 from .allocation.settings import AllocationSettings
@@ -155,6 +156,7 @@ class Controller:
             UnusableStateError: the state is not finite, beyond `LARGEST`, or its quaternion not
                 unit; nothing was remembered of it.
             SingularAttitudeError: the base has turned by 180 degrees.
+            LawError: the code of the law failed.
         """
         law, command = self._law, self.last_command
         status = compute_signals(
@@ -162,7 +164,8 @@ class Controller:
         )
         if status != USABLE:
             raise unusable(status, state.tick, state.quaternion)
-        apply_transfer(self.block, state.tick, law.force(self.signals), command.torque)
+        force = force_of(law, self.signals, state.tick)
+        apply_transfer(self.block, state.tick, force, command.torque)
         return self._share_out(state.tick)
 
     def share_out(self, state: RobotState, torque: Array) -> Command:

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.files import GIVEN, node_parameters
+from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.config.trees import Tree, nest
 from space_robot_msgs_py.config.validation import one_of, read_yaml, short
 from space_robot_msgs_py.config.yaml_text import check_file, is_folder
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.errors import InputError, SpaceRobotError
 from space_robot_sim.robot.find import new_command, robot_files
 
 from ..laws import ControlLaw, find_law, laws
@@ -182,7 +183,14 @@ def build_law(
         )
     if given:
         gains = check_gains({**gains, **given}, law, axes, PARAMETERS)
-    return law(gains, settings.period) if gains else law(gains, settings.period, axes)
+    try:
+        return law(gains, settings.period) if gains else law(gains, settings.period, axes)
+    except SpaceRobotError:
+        raise
+    except (Exception, SystemExit) as error:  # the law may be the user's
+        raise InputError(
+            f"controller {law.name!r} cannot be made ({one_line_of(error)})"
+        ) from error
 
 
 def build_laws(

@@ -10,7 +10,6 @@ import itertools
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -33,6 +32,7 @@ from ..controller.law_changes import LawChanges
 from .closed_loop import close_loop, measured_ticks
 from .message_loop import MessageLoop
 from .plan import Flight
+from .scratch_folder import ScratchFolder
 
 STRETCH_TICKS, STRETCH_OF_MESSAGES = 10_000, 1_000
 """Ticks flown between two looks at the world outside: in compiled code, message by message."""
@@ -243,7 +243,7 @@ def _flown_by_messages(
     flight: Flight, bag: Path | None, progress: Callable[[int], None]
 ) -> FlightLog:
     """Fly by `MessageLoop` into a bag, and read that."""
-    with TemporaryDirectory() as folder:
+    with ScratchFolder() as folder:
         path = bag or Path(folder) / "bag"
         try:
             with _recording(flight, path) as messages:

@@ -15,6 +15,7 @@ from functools import cache
 from inspect import isabstract
 
 from space_robot_msgs_py.config.choices import choices
+from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.errors import InputError
 
@@ -73,9 +74,8 @@ def find_law(name: str) -> type[ControlLaw]:
     except InputError as error:
         where = "" if file is None or file.is_absolute() else " (paths are from the current folder)"
         raise InputError(f"controller {short(name)}: {error}{where}") from None
-    except Exception as error:  # the module is the user's, and may raise anything
-        why = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-        why = " ".join(why.split())
+    except (Exception, SystemExit) as error:  # the module is the user's, and may raise anything
+        why = one_line_of(error)
         why = why if len(why) <= LONGEST_REASON else f"{why[:LONGEST_REASON]}..."
         advice = _advice(module, attribute, error) or advice
         raise InputError(f"controller {short(name)} cannot be imported ({why}): {advice}") from None
@@ -85,7 +85,7 @@ def find_law(name: str) -> type[ControlLaw]:
     return found
 
 
-def _advice(module: str, attribute: str, error: Exception) -> str:
+def _advice(module: str, attribute: str, error: BaseException) -> str:
     """Return what to do about a module that is not installed; empty if that is not the error."""
     if not isinstance(error, ModuleNotFoundError):
         return ""

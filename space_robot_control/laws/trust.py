@@ -1,7 +1,8 @@
-"""Whose word is followed: a bag may be anybody's, and its description may name files and modules.
+"""Which names are followed: a bag or a campaign's folder may be anybody's, and names files.
 
 Names of what is shipped are looked up whoever says them. A path to a file, or a ``module:Class`` or
-``file.py:Class`` that would be imported, is opened only if the user names it, or trusts the bag.
+``file.py:Class`` that would be imported, is opened only if the user names it, or trusts the bag or
+campaign.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ FILES = (".yaml", ".yml", ".urdf", ".xacro")
 
 
 class NotTrustedError(InputError):
-    """The bag names a file or module, which is opened only on the user's word."""
+    """A bag or campaign names a file or module, which is opened only if it is trusted."""
 
 
 def is_plain(name: str) -> bool:
@@ -24,27 +25,36 @@ def is_plain(name: str) -> bool:
     return name.isprintable() and not is_path and len(name) <= _LONGEST_NAME
 
 
-def check_file(what: str, name: str) -> None:
-    """See that a name out of a bag that is not trusted opens no file but those shipped.
+def check_file(what: str, name: str, where: str = "bag") -> None:
+    """See that a name out of something that is not trusted opens no file but those shipped.
+
+    Args:
+        what: the name is of.
+        name: to be checked.
+        where: the name was read, for the error.
 
     Raises:
         NotTrustedError: it is a path.
     """
     if not is_plain(name):
         raise NotTrustedError(
-            f"the bag names a file as its {what}, {_short(name)}: read only with --trust"
+            f"the {where} names a file as its {what}, {_short(name)}: read only with --trust"
         )
 
 
-def check_law(name: str) -> None:
-    """See that a law's name out of a bag that is not trusted imports nothing but what is shipped.
+def check_law(name: str, where: str = "bag") -> None:
+    """See that a law's name out of something that is not trusted imports only what is shipped.
+
+    Args:
+        name: of the law.
+        where: it was read, for the error.
 
     Raises:
         NotTrustedError: it is not the name of a shipped law.
     """
     if name not in laws():
         raise NotTrustedError(
-            f"the bag names the law {_short(name)}, which is none of those shipped: if it is "
+            f"the {where} names the law {_short(name)}, which is none of those shipped: if it is "
             "module:Class or file.py:Class, --trust imports it, which runs its code"
         )
 

@@ -6,3 +6,9 @@ from __future__ import annotations
 def printable(text: str) -> str:
     """Return a text as one line, whatever a broken bag had for names."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)
+
+
+def one_line_of(error: BaseException) -> str:
+    """Return the type of a program's error and its first words, in one line."""
+    text = printable(" ".join(str(error).split()))
+    return f"{type(error).__name__}: {text}"[:300].removesuffix(": ")

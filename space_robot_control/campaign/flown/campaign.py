@@ -6,9 +6,9 @@ found.table, found.verdicts, found.rerun(4711).log
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import yaml
@@ -16,9 +16,10 @@ import yaml
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.config.yaml_text import read_file
 
+from ...flight.scratch_folder import ScratchFolder
 from ..runner import check_scheduler, cores
-from ..store.folder import JOURNAL, MANIFEST, begin_or_resume, held_folder
-from ..store.journal import Journal
+from ..store.folder import MANIFEST, begin_or_resume, held_folder
+from ..store.recovery import open_journal
 from ..store.table import check_tables
 from ..study import Study, read_study
 from .bags import fly_bags
@@ -65,6 +66,7 @@ class Campaign:
         scheduler: str | None = None,
         timeout_s: float | None = None,
         progress: Callable[[Progress], object] | None = None,
+        warn: Callable[[str], object] = warnings.warn,
     ) -> FlownCampaign:
         """Fly the campaign, or what is left of it, to its table.
 
@@ -80,6 +82,8 @@ class Campaign:
             scheduler: address of a Dask scheduler whose workers fly instead.
             timeout_s: longest wall-clock time of a flight; its row says ``out_of_time`` then.
             progress: called at the beginning and after each flight.
+            warn: called with each line on what was damaged in the folder; what is lost is flown
+                again.
 
         Raises:
             InputError: something cannot be flown; the folder holds something else; disk full.
@@ -87,13 +91,16 @@ class Campaign:
         check_tables()
         asked = Preparation.of(self.study, seed, runs)
         manifest = asked.manifest
-        temporary = None if out is not None else TemporaryDirectory(prefix="space-robot-campaign-")
+        temporary = None if out is not None else ScratchFolder()
         folder = Path(temporary.name if temporary else str(out))
         if scheduler is not None and not (folder / MANIFEST).exists():
             check_scheduler(scheduler)  # else the folder would be begun for nothing
         with held_folder(folder):
-            begin_or_resume(folder, manifest, self._text or as_yaml(self.study))
-            with Journal(folder / JOURNAL, self.study.laws) as journal:
+            damage = begin_or_resume(folder, manifest, self._text or as_yaml(self.study))
+            journal, damage_of_rows = open_journal(folder, manifest)
+            with journal:
+                for line in (*damage, *damage_of_rows):
+                    warn(line)
                 flights = Flights(asked.flyer, asked.runs, journal)
                 processes = cores() if workers is None else workers
                 options = {"workers": processes, "scheduler": scheduler, "timeout_s": timeout_s}
@@ -104,9 +111,9 @@ class Campaign:
                         flights.fly(progress or (lambda told: None), options)
                 finally:  # whatever ended it: the rows that there are have their table
                     runs_of_table = flights.precision.stop
-                    write_if_older(folder, journal, manifest.table, runs_of_table)
+                    write_if_older(folder, journal, manifest, runs_of_table)
                 fly_bags(folder, asked.flyer, journal, runs_of_table, processes)
-        return FlownCampaign(folder, temporary, flights.kept)
+        return FlownCampaign(folder, True, temporary, flights.kept)
 
 
 def as_yaml(study: Study) -> str:

@@ -8,9 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from space_robot_msgs_py.config.text import one_line_of
+
 from ...flight.ending import FAILED
 from ..row.fly import RowFlyer
-from ..row.row import KILLED, OUT_OF_TIME, Row, Task, one_line_of
+from ..row.row import KILLED, OUT_OF_TIME, Row, Task
 from ..runner import OutOfTimeError, WorkerDiedError, run_many
 from ..store.journal import Journal
 from .precision import Precision
@@ -92,11 +94,12 @@ class Flights:
 
     def _unflown(self, task: Task, error: Exception | None) -> Row:
         """Return the row of a flight whose process brought none."""
-        outcome = FAILED
+        vary = self._flyer.draws.values(task.run)
         if isinstance(error, (WorkerDiedError, OutOfTimeError)):
             outcome = KILLED if isinstance(error, WorkerDiedError) else OUT_OF_TIME
-        reason = one_line_of(error) if outcome == FAILED and error else str(error)
-        return Row(task, outcome, reason, vary=self._flyer.draws.values(task.run))
+            return Row(task, outcome, str(error), vary=vary)
+        assert error is not None
+        return Row(task, FAILED, one_line_of(error), vary=vary).digested()
 
     def _count(self, row: Row) -> None:
         self.precision.add(row)

@@ -10,19 +10,20 @@ from typing import TYPE_CHECKING
 from typing_extensions import Self
 
 from space_robot_msgs_py.bag.blocks import blocks_of
-from space_robot_msgs_py.config.validation import one_of
+from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError
 
 from ...scenario.in_process import fly_in_process
 from ..row.fly import RowFlyer
 from ..row.row import Task
-from ..store.folder import MANIFEST, STUDY, TABLE
+from ..store.folder import MANIFEST, STUDY, TABLE, study_changes
 from ..store.manifest import Manifest, read_manifest
 from ..store.software import software
-from ..store.table import read_table
-from ..study import Study, read_study
+from ..store.table import check_table, read_table
+from ..study import Study
 from ..verdicts.requirements import Verdict, verdicts
 from .again import FlownAgain
+from .trust import check_study
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -32,31 +33,37 @@ class FlownCampaign:
     """What is in a campaign's folder."""
 
     def __init__(
-        self, folder: Path, temporary: TemporaryDirectory[str] | None = None, kept: int = 0
-    ) -> None:
+        self, folder: Path, trust: bool = False,
+        temporary: TemporaryDirectory[str] | None = None, kept: int = 0,
+    ) -> None:  # fmt: skip
         """Read the folder's manifest.
 
         Args:
             folder: of the campaign.
+            trust: see `open`.
             temporary: the same, if it is to go with this object.
             kept: flights that were there when it was flown on.
 
         Raises:
-            InputError: no campaign is there.
+            InputError: no campaign is there, or its manifest is damaged.
         """
         if not (folder / MANIFEST).is_file():
             raise InputError(f"{folder}: is no campaign's folder (it has no {MANIFEST})")
-        self.folder, self.kept, self._temporary = folder, kept, temporary
+        self.folder, self.kept, self._trust, self._temporary = folder, kept, trust, temporary
         self.manifest: Manifest = read_manifest(folder / MANIFEST)
 
     @classmethod
-    def open(cls, folder: str | Path) -> Self:
+    def open(cls, folder: str | Path, trust: bool = False) -> Self:
         """Return the campaign that was flown into a folder, to its end or not.
 
+        Args:
+            folder: of the campaign; it may be anybody's.
+            trust: let `rerun` import the ``module:Class`` and read the files that it names.
+
         Raises:
-            InputError: no campaign is there.
+            InputError: no campaign is there, or its manifest is damaged.
         """
-        return cls(Path(folder))
+        return cls(Path(folder), trust)
 
     @property
     def seed(self) -> int:
@@ -70,17 +77,25 @@ class FlownCampaign:
 
     @cached_property
     def study(self) -> Study:
-        """The campaign's file."""
-        return read_study((self.folder / STUDY).absolute())
+        """The study that was flown, whatever ``campaign.yaml`` says by now."""
+        where = str(self.folder / MANIFEST)
+        return validate(Study, self.manifest.study, f"{where}: study").named(where)
+
+    @property
+    def study_changes(self) -> str:
+        """How ``campaign.yaml`` differs from the study that was flown, in a line; or empty."""
+        return study_changes(self.folder / STUDY, self.study.content)
 
     @cached_property
     def table(self) -> DataFrame:
         """All rows: a flight each, by run, then by law.
 
         Raises:
-            InputError: it cannot be read.
+            InputError: it cannot be read, or is damaged.
         """
-        return read_table(self.folder / TABLE)
+        if self.manifest.has_digests:
+            check_table(self.folder / TABLE, self.manifest.campaign)
+        return read_table(self.folder / TABLE, self.manifest.table)
 
     @cached_property
     def verdicts(self) -> list[Verdict]:
@@ -97,7 +112,10 @@ class FlownCampaign:
 
         Raises:
             InputError: there is no such row, or its draws make no flight.
+            NotTrustedError: the campaign names a module or a file, and is not trusted, see `open`.
         """
+        if not self._trust:
+            check_study(self.study)
         task = Task(run, one_of(law or self.study.laws[0], self.study.laws, "law"))
         table = self.table
         rows = table[(table["run"] == task.run) & (table["law"] == task.law)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -69,8 +68,7 @@ class Preparation:
         where = self.study.where
         for flight in self.flights.values():
             check_requirements(flight, self.study.require, where)
-        study = json.loads(self.study.model_dump_json(by_alias=True))
-        del study["runs"]
+        study = self.study.content
         return Manifest(
             seed=self.seed, runs=self.runs, study=study,
             software=software(), commit=commit(), files=file_digests(study),

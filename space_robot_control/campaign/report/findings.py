@@ -131,7 +131,7 @@ class Findings:
     def remarks(self) -> list[str]:
         """Return what a reader must know of these rows, a sentence each."""
         subject, table = self.subject, self.subject.table
-        found, asked = [], subject.runs * len(subject.study.laws)
+        found, asked = [*subject.remarks], subject.runs * len(subject.study.laws)
         if len(table) < asked:
             found.append(
                 f"The campaign is not finished: {len(table)} of {asked} flights have been flown; "

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +13,7 @@ from space_robot_msgs_py.errors import InputError
 
 from ..flown import FlownCampaign
 from ..flown.current_table import recover_table
+from .other_study import judged_by
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -35,6 +35,8 @@ class Subject:
     """The rows that there are."""
     about: Mapping[str, str] = field(default_factory=dict)
     """Versions and the like, by what they are of."""
+    remarks: Sequence[str] = ()
+    """On the folder: what is damaged, or differs from what was flown, a line each."""
 
     @property
     def text(self) -> str:
@@ -49,21 +51,37 @@ class Subject:
         return float(complete.max()) if len(complete) else 0.0
 
 
-def subject_of(campaign: FlownCampaign) -> Subject:
+def subject_of(campaign: FlownCampaign, study: Study | None = None) -> Subject:
     """Return what a report on a campaign is about: all rows that have been flown.
 
+    Args:
+        campaign: that was flown.
+        study: whose requirements are judged (None: of the one that was flown).
+
     Raises:
-        InputError: its table cannot be read, or has no row.
+        InputError: the table cannot be read, or has no row; or ``study`` cannot be judged by it.
     """
-    with suppress(InputError):  # another process flies it, or it cannot be written: as it is
-        recover_table(campaign.folder, campaign.study)
+    manifest, remarks = campaign.manifest, []
+    if not manifest.has_digests:
+        remarks.append("The folder is of an older version, without digests: damage is not noticed.")
+    else:
+        try:
+            remarks += recover_table(campaign.folder, manifest, campaign.study)
+        except InputError as error:  # another process flies it, or it cannot be written: as it is
+            remarks.append(str(error))
     if campaign.table.empty:
-        raise InputError(f"{campaign.folder}: no flight has been flown yet")
-    manifest = campaign.manifest
+        raise InputError("; ".join([f"{campaign.folder}: no flight has been flown yet", *remarks]))
+    table = campaign.table
+    if study is not None:
+        table = judged_by(study, table, campaign.study)
+        remarks.append(f"The requirements are those of {study.where}.")
+    elif changes := campaign.study_changes:
+        remarks.append(f"{changes}; what was flown counts")
     about = {name: text for name, text in manifest.software.items() if text}
     if manifest.commit:
         about["commit"] = manifest.commit
     about |= {f"digest of {name}": digest[:16] for name, digest in manifest.files.items()}
     return Subject(
-        campaign.folder, campaign.study, campaign.seed, campaign.runs, campaign.table, about
-    )
+        campaign.folder, study or campaign.study, campaign.seed, campaign.runs, table, about,
+        remarks,
+    )  # fmt: skip

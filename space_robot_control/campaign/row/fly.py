@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.errors import FlightError, InputError
+from space_robot_msgs_py.config.text import one_line_of
+from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
 from ...flight.ending import FAILED, Ending
 from ...flight.plan import Flight
@@ -16,7 +17,7 @@ from ...flight.simulate import fly_blocks
 from ..draws import Draws
 from ..study import Study
 from .measure import Measure
-from .row import REFUSED, Row, Task, Value, one_line_of
+from .row import REFUSED, Row, Task, Value
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,9 @@ class RowFlyer:
             return self.row_of(task, vary, self.draws.scenario(task.run, task.law).check())
         except InputError as error:
             return Row(task, REFUSED, str(error), vary=vary).digested()
-        except Exception as error:  # a mistake in someone's law must not end a campaign
+        except SpaceRobotError as error:  # as a mistake in someone's law
+            return Row(task, FAILED, str(error), vary=vary).digested()
+        except Exception as error:  # one in the code here must not end a campaign either
             return Row(task, FAILED, one_line_of(error), vary=vary).digested()
 
     def row_of(self, task: Task, vary: dict[str, Value], flight: Flight) -> Row:

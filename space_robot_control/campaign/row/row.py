@@ -12,8 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from typing_extensions import Self
 
-from space_robot_msgs_py.config.text import printable
-
 from ...flight.ending import COMPLETE
 
 KILLED, OUT_OF_TIME, REFUSED = "killed", "out_of_time", "refused"
@@ -76,12 +74,6 @@ class Row:
             digest.update(name.encode() + b"\0" + band.astype("<f4").tobytes())
         digest.update(state)
         return replace(self, digest=digest.hexdigest()[:32])
-
-
-def one_line_of(error: BaseException) -> str:
-    """Tell an error of a program by its type and its first words, in one line."""
-    text = printable(" ".join(str(error).split()))
-    return f"{type(error).__name__}: {text}"[:300].removesuffix(": ")
 
 
 def _take(digest: hashlib._Hash, values: Mapping[str, Value]) -> None:

@@ -12,6 +12,7 @@ from space_robot_msgs_py.errors import InputError
 from .cluster import on_cluster
 from .done import Done, Item, Result
 from .processes import in_processes
+from .worker import as_exception
 
 
 def run_many(
@@ -87,8 +88,8 @@ def _in_this_process(
     for item in items:
         try:
             done = Done(item, function(item))
-        except Exception as error:
-            done = Done(item, None, error)
+        except (Exception, SystemExit) as error:
+            done = Done(item, None, as_exception(error))
         yield done
 
 

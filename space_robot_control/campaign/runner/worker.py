@@ -12,6 +12,8 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
 
+from space_robot_msgs_py.config.text import one_line_of
+
 PR_SET_PDEATHSIG = 1
 """Of prctl(2): the signal that a process gets when the one that forked it ends."""
 
@@ -43,7 +45,10 @@ def work(function: Callable[[Any], Any], connection: Connection, starter: int) -
             item = connection.recv_bytes()
         except (EOFError, OSError):
             return
-        connection.send_bytes(answer(function, item))
+        try:
+            connection.send_bytes(answer(function, item))
+        except OSError:  # whoever wanted it has been killed
+            return
         gc.collect(0)  # cycles that an item leaves, which may hold much memory, are in its youngest
 
 
@@ -51,14 +56,19 @@ def answer(function: Callable[[Any], Any], item: bytes) -> bytes:
     """Call the function with a pickled item and pickle its result, or its error."""
     try:
         return pickle.dumps((function(pickle.loads(item)), None, ""))
-    except Exception as error:
+    except BaseException as error:  # SystemExit and KeyboardInterrupt are the function's, too
         text = traceback.format_exc()
         try:
-            packed = pickle.dumps((None, error, text))
+            packed = pickle.dumps((None, as_exception(error), text))
             pickle.loads(packed)
         except Exception:  # an error that cannot travel: its text can
-            packed = pickle.dumps((None, RuntimeError(f"{type(error).__name__}: {error}"), text))
+            packed = pickle.dumps((None, RuntimeError(one_line_of(error)), text))
         return packed
+
+
+def as_exception(error: BaseException) -> Exception:
+    """Return an error of a function; one that would end the process that raises it, as a text."""
+    return error if isinstance(error, Exception) else RuntimeError(one_line_of(error))
 
 
 def unpacked(packed: bytes) -> tuple[Any, Exception | None]:

@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 
-from space_robot_msgs_py.config.validation import StrictModel, read_yaml, short, validate
+from space_robot_msgs_py.config.validation import StrictModel, short, validate
+from space_robot_msgs_py.config.yaml_text import read_file
 from space_robot_msgs_py.errors import InputError
 
+from ...analysis.files import whole_file
 from .schema import Schema
 
 NEW_FOLDER = "choose another folder for this one"
 NOT_TO_BE_EXTENDED = ("latin_hypercube", "saltelli")
 """Designs in which every run depends on how many there are."""
+WITHOUT_DIGESTS: Final = 1
+FORMAT: Final = 2
+"""Versions of the folder: in the first one nothing tells whether a file was damaged."""
+SHA256 = "sha256"
+"""Key of the digest of all else in the file."""
 
 
 class Manifest(StrictModel):
     """What was begun in a folder."""
 
-    format: Literal[1] = 1
+    format: Literal[1, 2] = FORMAT
     seed: Annotated[int, Field(ge=0)]
     runs: Annotated[int, Field(ge=1)]
     """To be flown; of a design they are all its points."""
@@ -38,6 +47,35 @@ class Manifest(StrictModel):
     table: Schema
     """The columns."""
 
+    @property
+    def laws(self) -> list[str]:
+        """Return the laws of the campaign, in their order."""
+        return [str(law) for law in self.study["laws"]]
+
+    @property
+    def has_digests(self) -> bool:
+        """Return False for a folder of an older version, whose files have none."""
+        return self.format != WITHOUT_DIGESTS
+
+    @property
+    def campaign(self) -> str:
+        """Return a digest of all that the rows depend on: more runs are the same campaign."""
+        content = self.model_dump(exclude={"format", "commit", "runs"})
+        if self.study.get("design") in NOT_TO_BE_EXTENDED:
+            content["runs"] = self.runs
+        return _digest(content)
+
+    def write(self, path: Path) -> None:
+        """Write it with its digest.
+
+        Raises:
+            InputError: it cannot be written.
+        """
+        content = self.model_dump()
+        text = json.dumps({**content, SHA256: _digest(content)}, indent=1)
+        with whole_file(path, replace=True) as file:
+            file.write(text.encode() + b"\n")
+
     def check_same(self, other: Manifest, where: Path) -> None:
         """See that ``other``, what is to be flown now, is what was begun, or more runs of it.
 
@@ -48,6 +86,8 @@ class Manifest(StrictModel):
         Raises:
             InputError: it is not; says in one line what differs.
         """
+        if not self.has_digests:
+            raise InputError(f"{where}: was begun by an older version: {NEW_FOLDER}")
         for what, before, now in (
             ("seed", self.seed, other.seed),
             ("file", self.study, other.study),
@@ -56,7 +96,7 @@ class Manifest(StrictModel):
             ("flight", self.flights, other.flights),
             ("columns", self.table.model_dump(), other.table.model_dump()),
         ):
-            for key, old, new in _differences(before, now):
+            for key, old, new in differences(before, now):
                 raise InputError(
                     f"{where}: was begun with another {what}: {key + ': ' if key else ''}"
                     f"{short(old)} then, {short(new)} now: {NEW_FOLDER}"
@@ -78,20 +118,39 @@ class Manifest(StrictModel):
 
 
 def read_manifest(path: Path) -> Manifest:
-    """Read a manifest.
+    """Read a manifest and check its digest.
 
     Raises:
-        InputError: it is not there, or is none of this version.
+        InputError: it is missing, damaged, or of another version.
     """
-    return validate(Manifest, read_yaml(path), str(path))
+    try:
+        content = json.loads(read_file(path))
+    except (ValueError, RecursionError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{path}: damaged: no JSON ({error})") from None
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: damaged: a mapping was expected, got {short(content)}")
+    sha256 = content.pop(SHA256, None)
+    is_old = sha256 is None and content.get("format") == WITHOUT_DIGESTS
+    if not is_old and sha256 != _digest(content):
+        raise InputError(f"{path}: damaged or edited: its content does not have its {SHA256}")
+    manifest = validate(Manifest, content, str(path))
+    if not manifest.study.get("laws"):
+        raise InputError(f"{path}: study.laws: missing")
+    return manifest
 
 
-def _differences(before: Any, now: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
+def _digest(content: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()
+
+
+def differences(before: Any, now: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
     """Yield the keys whose values differ, with both; None stands for one that is not there."""
     if isinstance(before, Mapping) and isinstance(now, Mapping):
         for name in dict.fromkeys((*before, *now)):
             inner = f"{key}.{name}" if key else str(name)
-            yield from _differences(before.get(name), now.get(name), inner)
+            yield from differences(before.get(name), now.get(name), inner)
         if list(before) != list(now) and sorted(before) == sorted(now):
             yield f"order of {key}", ", ".join(before), ", ".join(now)
     elif before != now:

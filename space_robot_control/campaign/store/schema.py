@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field
 
 from space_robot_msgs_py.config.validation import StrictModel
 
-from ..row.row import Row
+from ..row.row import Row, Task
 
 Kind = Literal["int64", "float64", "str", "float32s"]
 
@@ -45,3 +46,18 @@ class Schema(StrictModel):
         yield from (row.require.get(name) for name in self.require)
         yield from (row.bands.get(name) for name in self.bands)
         yield row.digest
+
+    def row(self, values: Mapping[str, Any]) -> Row:
+        """Return the row of which these are the values of each column, by name."""
+
+        def known(group: str, names: Iterable[str]) -> dict[str, Any]:
+            found = {name: values[f"{group}.{name}"] for name in names}
+            return {name: value for name, value in found.items() if value is not None}
+
+        bands = known("band", self.bands)
+        return Row(
+            Task(values["run"], values["law"]), values["outcome"], values["reason"],
+            values["ended_at_s"], known("vary", self.vary), known("metric", self.metrics),
+            known("require", self.require),
+            {name: np.array(band, np.float32) for name, band in bands.items()}, values["digest"],
+        )  # fmt: skip

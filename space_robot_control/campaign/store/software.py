@@ -20,6 +20,8 @@ OF_TABLES = "pyarrow"
 """The package that makes the table's bytes."""
 SUFFIXES = (".yaml", ".yml", ".urdf", ".xacro", ".py")
 """Of files that a campaign's file may name."""
+ROOT = Path(__file__).resolve().parents[3]
+"""Of the project's packages."""
 
 
 @cache
@@ -30,12 +32,13 @@ def software() -> dict[str, str | None]:
         tables: str | None = version(OF_TABLES)
     except PackageNotFoundError:
         tables = None
-    return {**{name: known[name] for name in DECIDE}, OF_TABLES: tables, "sources": _sources()}
+    found = {name: known[name] for name in DECIDE}
+    return {**found, OF_TABLES: tables, "sources": source_digest(ROOT)}
 
 
 def file_digests(values: Any) -> dict[str, str]:
     """Return the digest of every file that is named anywhere in a file's content, by its name."""
-    names = {str(law_file(text.partition("=")[0]) or text) for text in _texts(values)}
+    names = {str(law_file(text.partition("=")[0]) or text) for text in texts_of(values)}
     return {
         name: digest(Path(name).read_bytes())
         for name in sorted(names)
@@ -57,9 +60,8 @@ def digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:32]
 
 
-def _sources() -> str:
-    """Return a digest of the project's Python files, by their places in it."""
-    root = Path(__file__).resolve().parents[3]
+def source_digest(root: Path) -> str:
+    """Return a digest of the project's Python files below ``root``, by their places in it."""
     packages = ("space_robot_msgs_py", "space_robot_sim", "space_robot_control")
     files = sorted(file for name in packages for file in (root / name).rglob("*.py"))
     whole = hashlib.sha256()
@@ -68,13 +70,14 @@ def _sources() -> str:
     return whole.hexdigest()[:32]
 
 
-def _texts(value: Any) -> Iterator[str]:
+def texts_of(value: Any) -> Iterator[str]:
+    """Yield all texts in a file's content, the keys of its mappings included."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, dict):
         for key, inner in value.items():
-            yield from _texts(key)
-            yield from _texts(inner)
+            yield from texts_of(key)
+            yield from texts_of(inner)
     elif isinstance(value, list):
         for inner in value:
-            yield from _texts(inner)
+            yield from texts_of(inner)

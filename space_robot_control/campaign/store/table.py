@@ -1,10 +1,14 @@
-"""The table of a campaign as Parquet: the same rows give the same bytes."""
+"""The table of a campaign as Parquet: the same rows give the same bytes.
+
+Beside it stands its digest, with the campaign's; ``sha256sum -c`` reads it, too.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +24,8 @@ if TYPE_CHECKING:
 
 ROW_GROUP = 2000
 """Rows that are in memory at a time."""
+SHA256 = ".sha256"
+"""What the name of a table's digest ends with."""
 
 
 def check_tables() -> None:
@@ -37,12 +43,13 @@ def check_tables() -> None:
         ) from None
 
 
-def write_table(path: Path, schema: Schema, rows: Iterable[Row]) -> str:
-    """Write the rows, whole or not at all, over an older table.
+def write_table(path: Path, schema: Schema, campaign: str, rows: Iterable[Row]) -> str:
+    """Write the rows, whole or not at all, over an older table, and beside it the digest.
 
     Args:
         path: of the file.
         schema: its columns.
+        campaign: see `Manifest.campaign`.
         rows: in their order; a few of them are in memory at a time.
 
     Returns:
@@ -64,25 +71,68 @@ def write_table(path: Path, schema: Schema, rows: Iterable[Row]) -> str:
     ):  # fmt: skip
         while group := list(itertools.islice(remaining, ROW_GROUP)):
             writer.write_batch(_batch(group, schema, columns), row_group_size=ROW_GROUP)
-    return file_digest(path)
+    digest = file_digest(path)
+    with whole_file(_digest_of(path), replace=True) as file:
+        file.write(_digest_text(path, campaign, digest).encode())
+    return digest
 
 
-def read_table(path: Path) -> DataFrame:
-    """Read a table as a data frame.
+def check_table(path: Path, campaign: str) -> None:
+    """See that a table is as it was written, and of a campaign.
 
     Raises:
-        InputError: it is not there or cannot be read.
+        InputError: it is not, or is missing.
+    """
+    check_there(path)
+    digest = _digest_of(path)
+    with suppress(OSError, UnicodeDecodeError):
+        if digest.read_text("utf-8") == _digest_text(path, campaign, file_digest(path)):
+            return
+    raise InputError(
+        f"{path}: damaged, or of another campaign: does not have the digest in {digest.name}"
+    )
+
+
+def check_there(path: Path) -> None:
+    """See that a table was written.
+
+    Raises:
+        InputError: it was not.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file: the campaign has no table yet")
+
+
+def read_table(path: Path, schema: Schema) -> DataFrame:
+    """Read a table as a data frame.
+
+    Args:
+        path: of the file, see `check_table`.
+        schema: its columns.
+
+    Raises:
+        InputError: it is not there, cannot be read, or has other columns.
     """
     check_tables()
     from pandas import read_parquet
+    from pyarrow import ArrowException
 
-    if not path.is_file():
-        raise InputError(f"{path}: no such file: the campaign has no table yet")
+    check_there(path)
     try:
         found: DataFrame = read_parquet(path, engine="pyarrow")
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, ArrowException) as error:
         raise InputError(f"{path}: cannot be read ({' '.join(str(error).split())})") from None
+    if list(found) != [name for name, _ in schema.columns()]:
+        raise InputError(f"{path}: damaged: its columns are not those of the campaign")
     return found
+
+
+def table_rows(path: Path, schema: Schema) -> Iterator[Row]:
+    """Yield the rows of an undamaged table, with all their digits."""
+    from pyarrow.parquet import ParquetFile
+
+    for batch in ParquetFile(path).iter_batches(ROW_GROUP):
+        yield from map(schema.row, batch.to_pylist())
 
 
 def file_digest(path: Path) -> str:
@@ -94,6 +144,14 @@ def file_digest(path: Path) -> str:
         while part := file.read(2**20):
             digest.update(part)
     return digest.hexdigest()
+
+
+def _digest_of(path: Path) -> Path:
+    return path.with_name(path.name + SHA256)
+
+
+def _digest_text(path: Path, campaign: str, digest: str) -> str:
+    return f"# campaign {campaign}\n{digest}  {path.name}\n"
 
 
 def _arrow_schema(schema: Schema) -> pyarrow.Schema:

@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import click
@@ -24,6 +23,7 @@ from ..bag_path import check_bag_path
 from ..compilation import compile_kernels
 from ..interruption import handled_signals
 from ..plan import Flight
+from ..scratch_folder import ScratchFolder
 from .composed import NAME, composed_command
 from .domain import ros_domain
 from .following import follow
@@ -70,7 +70,7 @@ def fly(
                 _say(remark)
             parameters = flight_parameters(flight, bag)
             with (
-                TemporaryDirectory(prefix="space_robot_fly_") as folder,
+                ScratchFolder() as folder,
                 Graph(
                     _commands(flight, parameters, Path(folder)), node_environment(domain)
                 ) as graph,

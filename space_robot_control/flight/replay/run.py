@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -23,6 +22,7 @@ from ..graph.node_services import change_state, set_parameters
 from ..graph.orchestrator import require_ros, stop_signals
 from ..graph.processes import Graph, NodeProcess, node_command, node_environment
 from ..progress import FlightProgress, flight_progress
+from ..scratch_folder import ScratchFolder
 from .choice import ControllerChoice
 from .commands import CommandList, Commands, Ticks
 from .comparison import Comparison
@@ -42,7 +42,7 @@ def replay(options: Options) -> Replay:
         FlightError: the controller did not start.
     """
     recording = Recording(options.bag, options.remap, options.namespace)
-    with tempfile.TemporaryDirectory(prefix="space_robot_replay_") as folder:
+    with ScratchFolder() as folder:
         choice = ControllerChoice(
             recording.flight, Path(folder), options.controller, options.gains, options.parameters,
             options.trust,

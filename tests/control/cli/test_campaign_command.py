@@ -14,6 +14,8 @@ from click.testing import CliRunner
 
 from space_robot_control.campaign.flown import FlownCampaign
 from space_robot_control.campaign.runner import cluster
+from space_robot_control.campaign.store.manifest import read_manifest
+from space_robot_control.campaign.store.table import table_rows, write_table
 from space_robot_control.cli.main import cli
 from space_robot_msgs_py.errors import InputError
 
@@ -75,12 +77,12 @@ def test_rerun_says_that_the_digest_is_the_same_or_fails(flown: Path, tmp_path: 
     assert (tmp_path / "bag/metadata.yaml").is_file()
     other = flown.parent / "other"
     other.mkdir()
-    for name in ("campaign.yaml", "campaign.json", "table.parquet"):
-        (other / name).write_bytes((flown / name).read_bytes())
-    manifest = json.loads((other / "campaign.json").read_text())
-    manifest["seed"] += 1
-    manifest["software"]["numpy"] = "0.1"
-    (other / "campaign.json").write_text(json.dumps(manifest))
+    manifest = read_manifest(flown / "campaign.json")
+    rows = table_rows(flown / "table.parquet", manifest.table)
+    software = {**manifest.software, "numpy": "0.1"}
+    manifest = manifest.model_copy(update={"seed": manifest.seed + 1, "software": software})
+    manifest.write(other / "campaign.json")
+    write_table(other / "table.parquet", manifest.table, manifest.campaign, rows)
     found = [
         CliRunner().invoke(cli, ["campaign", "rerun", str(other), str(run)]) for run in range(4)
     ]

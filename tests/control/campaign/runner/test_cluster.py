@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
@@ -97,17 +98,26 @@ def test_other_versions_are_refused(dask: Any, monkeypatch: pytest.MonkeyPatch) 
         list(run_many(behave, [("", 1)], scheduler=dask.scheduler_address))
 
 
-def test_a_scheduler_that_goes_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_goes_is_noticed(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """By one line: what Dask would log of it, with tracebacks, is left out, as long as it runs."""
+    loggers = [logging.getLogger(f"distributed.{name}") for name in ("client", "core", "utils")]
+    monkeypatch.setattr(loggers[0], "propagate", True)
     monkeypatch.setattr(cluster, "CONNECT_S", 2.0)
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", **QUIET
     ) as local:  # fmt: skip
         running = run_many(behave, [("", 1), ("sleep", 2)], scheduler=local.scheduler_address)
         assert next(running).result == 1
+        for logger in loggers:
+            logger.critical("lost")
+        assert "lost" not in caplog.messages
         dask_worker.release(next(iter(dask_worker._pools))[0])
         local.close()
         with pytest.raises(ClusterError, match="connection to it is lost"):
             list(running)
+    assert all(logger.isEnabledFor(logging.CRITICAL) for logger in loggers)
 
 
 def test_a_cluster_without_workers_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from multiprocessing import Pipe, get_context
 from pathlib import Path
 
 import pytest
 
-from space_robot_control.campaign.runner import run_many
+from space_robot_control.campaign.runner import run_many, worker
 
 STARTER = """
 import os, time
-from space_robot_control.campaign.runner import run_many
+from space_robot_control.campaign.runner import run_many, worker
 
 def name(_):
     os.write(1, f"{os.getpid()} {os.getppid()}\\n".encode())
@@ -87,8 +89,19 @@ def test_workers_end_with_their_starter(
 ) -> None:
     process, pids = starter
     process.send_signal(number)
-    process.wait(20.0)
+    _, errors = process.communicate(timeout=20.0)
     wait_until_gone(pids)
+    assert "BrokenPipe" not in errors
+
+
+def test_a_worker_whose_answer_nobody_wants_ends_in_silence() -> None:
+    ours, theirs = Pipe()
+    ours.send_bytes(pickle.dumps(1))
+    ours.close()
+    child = get_context("fork").Process(target=worker.work, args=(str, theirs, os.getpid()))
+    child.start()
+    child.join()
+    assert child.exitcode == 0
 
 
 def test_ctrl_c_is_for_the_starter_alone(

@@ -11,12 +11,13 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot_control.campaign.runner import OutOfTimeError, WorkerDiedError, run_many
+from space_robot_control.campaign.runner import OutOfTimeError, WorkerDiedError, processes, run_many
 from space_robot_msgs_py.errors import DivergedError, InputError
 
 WORKERS = pytest.mark.parametrize("workers", [0, 1, 3])
@@ -111,6 +112,8 @@ def end_somehow(how: str) -> str:
             os.kill(os.getpid(), signal.SIGSEGV)
         case "system exit":
             raise SystemExit(3)
+        case "interrupt":
+            raise KeyboardInterrupt
         case "sleep":
             time.sleep(60.0)
         case "kill server":
@@ -133,16 +136,46 @@ def test_the_memory_of_workers_does_not_grow_with_items() -> None:
 
 
 def test_workers_that_die_are_replaced() -> None:
-    items = ["a", "exit", "b", "kill", "segfault", "c", "system exit", *"defg"]
+    items = ["a", "exit", "b", "kill", "segfault", "c", *"defg"]
     done = {d.item: d for d in run_many(end_somehow, items, workers=2, attempts=2)}
     assert done.keys() == set(items)
     before = "its process died in each of 2 attempts, the last time "
     assert {item: str(d.error) for item, d in done.items() if d.error} == {
         "exit": before + "with exit code 0", "kill": before + "by SIGKILL",
-        "segfault": before + "by SIGSEGV", "system exit": before + "with exit code 1",
+        "segfault": before + "by SIGSEGV",
     }  # fmt: skip
     assert all(d.result == item for item, d in done.items() if not d.error)
     assert all(isinstance(d.error, (WorkerDiedError, type(None))) for d in done.values())
+
+
+@WORKERS
+def test_what_would_end_a_process_is_an_error_of_its_item(
+    workers: int, capfd: pytest.CaptureFixture[str]
+) -> None:
+    expected = {"system exit": "SystemExit: 3", "interrupt": "KeyboardInterrupt"}
+    if not workers:  # here Ctrl-C is the user's
+        del expected["interrupt"]
+    done = run_many(end_somehow, list(expected), workers=workers)
+    assert {d.item: str(d.error) for d in done} == expected
+    assert capfd.readouterr().err == ""
+
+
+def test_the_clock_of_a_timeout_begins_anew_with_every_item(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """By a clock that stands while an item runs, and then goes on by 0.7 of the timeout."""
+    now = [0.0]
+    monkeypatch.setattr(processes, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    done = []
+    for one in run_many(sleep_shortly, range(6), workers=1, timeout_s=10.0):
+        done.append((one.item, one.error))
+        now[0] += 7.0
+    assert done == [(item, None) for item in range(6)]
+
+
+def sleep_shortly(item: int) -> int:
+    time.sleep(0.05)
+    return item
 
 
 def test_a_server_that_dies_is_replaced() -> None:

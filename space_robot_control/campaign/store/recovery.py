@@ -1,0 +1,66 @@
+"""The journal of a folder: made, or opened with what was damaged left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from itertools import chain
+from pathlib import Path
+
+from space_robot_msgs_py.errors import InputError
+
+from ..row.row import Row
+from .folder import JOURNAL, TABLE
+from .journal import Journal
+from .journal_codec import JournalCodec
+from .journal_file import SET_ASIDE, damage_of, whole_rows, write_journal
+from .manifest import Manifest
+from .table import check_table, table_rows
+
+MOST_NAMED = 3
+"""Damaged rows that a line names."""
+
+
+def open_journal(folder: Path, manifest: Manifest) -> tuple[Journal, list[str]]:
+    """Open the journal of a folder.
+
+    Of a damaged journal the whole rows are kept, and the table gives those that are lost, if it is
+    whole: nothing is flown again that is known.
+
+    Args:
+        folder: of a campaign, held.
+        manifest: of it.
+
+    Returns:
+        The journal, and what was damaged, a line each.
+
+    Raises:
+        InputError: the journal cannot be opened or written.
+    """
+    path, codec = folder / JOURNAL, JournalCodec(manifest.campaign, manifest.laws)
+    found = []
+    if (folder / TABLE).exists():
+        try:
+            check_table(folder / TABLE, manifest.campaign)
+        except InputError as error:
+            found.append(str(error))
+    if not path.exists():
+        count = write_journal(path, codec, _rows_of_table(folder, manifest))
+        if (folder / TABLE).exists():
+            found.append(f"{path}: is gone; {count} rows are taken from {TABLE}")
+    elif damage := damage_of(path, codec):
+        rows = chain(whole_rows(path, codec), _rows_of_table(folder, manifest))
+        count = write_journal(path, codec, rows)
+        more = f" and {len(damage) - MOST_NAMED} more" * (len(damage) > MOST_NAMED)
+        found.append(
+            f"{path}: damaged: {', '.join(damage[:MOST_NAMED])}{more}; {count} rows are kept, "
+            f"and the damaged file is {JOURNAL}{SET_ASIDE}"
+        )
+    return Journal(path, codec), found
+
+
+def _rows_of_table(folder: Path, manifest: Manifest) -> Iterator[Row]:
+    """Yield the rows of an undamaged table; none of any other."""
+    with suppress(InputError):
+        check_table(folder / TABLE, manifest.campaign)
+        yield from table_rows(folder / TABLE, manifest.table)
