@@ -69,6 +69,9 @@ class Preparation:
         where = self.study.where
         for flight in self.flights.values():
             check_requirements(flight, self.study.require, where)
+        if self.study.require:
+            for option, flight in self.flyer.draws.flights_of_options():
+                check_requirements(flight, self.study.require, where, option)
         study = json.loads(self.study.model_dump_json(by_alias=True))
         del study["runs"]
         return Manifest(

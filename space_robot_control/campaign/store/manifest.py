@@ -11,11 +11,10 @@ from pydantic import Field
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, short, validate
 from space_robot_msgs_py.errors import InputError
 
+from ..study import NOT_TO_BE_EXTENDED
 from .schema import Schema
 
 NEW_FOLDER = "choose another folder for this one"
-NOT_TO_BE_EXTENDED = ("latin_hypercube", "saltelli")
-"""Designs in which every run depends on how many there are."""
 
 
 class Manifest(StrictModel):
@@ -74,6 +73,11 @@ class Manifest(StrictModel):
             raise InputError(
                 f"{where}: was begun with {self.runs} runs, {runs} are asked for, and a "
                 f"{design} design cannot be extended: {NEW_FOLDER}"
+            )
+        if runs > self.runs and self.study.get("fixed_runs"):
+            raise InputError(
+                f"{where}: was begun with {self.runs} runs, {runs} are asked for, but its file has "
+                f"fixed_runs: true: {NEW_FOLDER}"
             )
 
 
