@@ -53,6 +53,11 @@ class Draws:
             self._check()
 
     @property
+    def grid(self) -> dict[str, int]:
+        """The number of values of each variable that is a grid, by its name."""
+        return {variable.name: len(_values(variable)) for variable in self._grids}
+
+    @property
     def blocks(self) -> Blocks | None:
         """How the runs make up Saltelli's design; None: they are of another one."""
         if self.study.design != "saltelli":

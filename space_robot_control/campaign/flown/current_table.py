@@ -32,7 +32,7 @@ def recover_table(folder: Path, study: Study) -> None:
     """
     manifest = read_manifest(folder / MANIFEST)
     with held_folder(folder), Journal(folder / JOURNAL, study.laws) as journal:
-        precision = Precision(study, manifest.runs, manifest.table.vary)
+        precision = Precision(study, manifest.runs, manifest.table.grid)
         for row in journal.rows(manifest.runs):
             precision.add(row)
         write_if_older(folder, journal, manifest.table, precision.stop)

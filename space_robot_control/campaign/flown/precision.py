@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Mapping
 
 import numpy as np
 
 from ..row.row import Row
 from ..study import Requirement, Study
-from ..verdicts.design import grid_points
 from ..verdicts.share_test import Sequential
 
 CHECKED_EVERY = 50
@@ -23,17 +23,17 @@ class Precision:
     The share must be known to the precision asked for under every law at every point of the grid.
     """
 
-    def __init__(self, study: Study, runs: int, names: Iterable[str]) -> None:
+    def __init__(self, study: Study, runs: int, grid: Mapping[str, int]) -> None:
         """Begin without rows.
 
         Args:
             study: the campaign's file.
             runs: of the whole campaign.
-            names: of all variables of the campaign.
+            grid: the number of values of each variable that is a grid.
         """
         self._require, self._until = study.require, study.until
         self._number = {law: number for number, law in enumerate(study.laws)}
-        self._points = grid_points(names, study.vary)
+        self._points = math.prod(grid.values())
         laws, demands = len(study.laws), len(study.require)
         self._flown = np.zeros((runs, laws), bool)
         self._met = np.zeros((runs, laws, demands), bool)

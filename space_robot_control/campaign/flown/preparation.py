@@ -93,6 +93,7 @@ class Preparation:
         first = draws.values(0)
         return Schema(
             vary={n: "str" if isinstance(first[n], str) else "float64" for n in draws.names},
+            grid=draws.grid,
             metrics=list(columns.metrics), require=list(self.study.require),
             bands=list(columns.names), bins=min(BINS, nominal.ticks),
         )  # fmt: skip

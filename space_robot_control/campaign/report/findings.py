@@ -12,7 +12,6 @@ from ..flown.precision import is_narrow
 from ..study import short_names
 from ..verdicts.design import (
     SALTELLI,
-    grid_names,
     independent_rows,
     saltelli_values,
     variables,
@@ -47,7 +46,7 @@ class Findings:
         self.subject = subject
         self.metrics = chosen(subject.table, subject.study.require, metrics)
         self.required = [of_requirement(*item) for item in subject.study.require.items()]
-        self.grid = grid_names(variables(subject.table), subject.study.vary)
+        self.grid = list(subject.grid)
         self.rows = independent_rows(subject.table, subject.study.design)
         """Those that can be taken for independent draws; all, unless the design is for indices."""
         self.parts: list[Part] = parts(self.rows, self.grid)
@@ -66,7 +65,7 @@ class Findings:
     @cached_property
     def verdicts(self) -> list[Verdict]:
         """Return the verdict on every requirement, law and point of the grid."""
-        return verdicts(self.subject.table, self.subject.study, self.subject.runs)
+        return verdicts(self.subject.table, self.subject.study, self.subject.runs, self.grid)
 
     @property
     def family_error(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,6 +33,8 @@ class Subject:
     """That were asked for."""
     table: DataFrame
     """The rows that there are."""
+    grid: Sequence[str] = ()
+    """Names of the variables that are grids."""
     about: Mapping[str, str] = field(default_factory=dict)
     """Versions and the like, by what they are of."""
 
@@ -65,5 +67,11 @@ def subject_of(campaign: FlownCampaign) -> Subject:
         about["commit"] = manifest.commit
     about |= {f"digest of {name}": digest[:16] for name, digest in manifest.files.items()}
     return Subject(
-        campaign.folder, campaign.study, campaign.seed, campaign.runs, campaign.table, about
+        campaign.folder,
+        campaign.study,
+        campaign.seed,
+        campaign.runs,
+        campaign.table,
+        list(manifest.table.grid),
+        about,
     )

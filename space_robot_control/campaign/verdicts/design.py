@@ -1,16 +1,12 @@
-"""What a campaign's design makes of its rows: points of a grid, rows that count as independent."""
+"""What a campaign's design makes of its rows: which are independent, which belong together."""
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..draws.fault_variables import EACH
 from .values import measured, of_law
 
 if TYPE_CHECKING:
@@ -25,44 +21,6 @@ def variables(table: DataFrame) -> list[str]:
     """Return the names of all variables of a table, in the file's order."""
     names = (str(column) for column in table)
     return [name.removeprefix("vary.") for name in names if name.startswith("vary.")]
-
-
-def grid_names(names: Iterable[str], vary: Mapping[str, Any]) -> list[str]:
-    """Return the names of the variables that are grids.
-
-    Args:
-        names: of all variables of the campaign.
-        vary: what its file varies.
-    """
-    return list(_grids(names, vary))
-
-
-def grid_points(names: Iterable[str], vary: Mapping[str, Any]) -> int:
-    """Return the number of points of the grid; 1 if there is none. Arguments as of `grid_names`."""
-    return math.prod(_grids(names, vary).values())
-
-
-def _grids(names: Iterable[str], vary: Mapping[str, Any]) -> dict[str, int]:
-    """Return the number of values of each variable that is a grid."""
-    inner = vary.get("faults")
-    faults = {f"faults.{key}": v for key, v in inner.items()} if isinstance(inner, dict) else {}
-    keys = {**vary, **faults}
-    counts = {k: len(v["grid"]) for k, v in keys.items() if isinstance(v, dict) and "grid" in v}
-    patterns = {key: _pattern(key) for key in counts}
-    values = {}
-    for name in names:
-        own = [name] if name in keys else [k for k, p in patterns.items() if p.fullmatch(name)]
-        for key in counts.keys() & own:
-            values[name] = counts[key]
-    return values
-
-
-def _pattern(key: str) -> re.Pattern[str]:
-    """Return what the names of the variables of a key look like, elements by their own names."""
-    if key.endswith(EACH):
-        return re.compile(re.escape(key.removesuffix(EACH)) + ":[^:=]+")
-    named = re.sub(r"\\\[[^\]]*\\\]", r"\\[[^\\]]*\\]", re.escape(key))
-    return re.compile(named + r"(\[[^\]]*\])?")  # an element that need not be written: all
 
 
 def independent_rows(table: DataFrame, design: str) -> DataFrame:

@@ -8,7 +8,8 @@ import numpy as np
 
 from .share_test import MOST_RUNS, Sequential, first, log_evidence
 
-_CHUNK = 4096
+_STEPS = 32
+"""That are looked at together first; then twice as many, and so on."""
 
 
 class ProjectedDecision(NamedTuple):
@@ -49,9 +50,9 @@ def projected_decision(test: Sequential, failures: int, runs: int) -> ProjectedD
         return bool(log_evidence(events, n, share) >= level - 1e-6)
 
     start = first(may_be_decided, runs, MOST_RUNS + 1)
-    step = max(failures, failures * start // runs)
+    step, count = max(failures, failures * start // runs), _STEPS
     while step * runs // failures <= MOST_RUNS:
-        steps = np.arange(step, step + _CHUNK)
+        steps = np.arange(step, step + count)
         # failures stay whole and alike from one end to the next: the last run before a step speaks
         # most for "met", the first run of a step most for "not met"
         ends = steps * runs // failures if met else -(-steps * runs // failures)
@@ -59,10 +60,10 @@ def projected_decision(test: Sequential, failures: int, runs: int) -> ProjectedD
         decided &= ends >= runs
         if decided.any():
             index = int(np.argmax(decided))
-            end, count = int(ends[index]), int(steps[index])
+            end = int(ends[index])
             if met:  # with as many failures fewer runs may do
-                fewest = test.runs_needed(count) or end
-                end = max(runs, fewest, (count - 1) * runs // failures + 1)
+                fewest = test.runs_needed(int(steps[index])) or end
+                end = max(runs, fewest, (int(steps[index]) - 1) * runs // failures + 1)
             return ProjectedDecision(end, met) if end <= MOST_RUNS else None
-        step += _CHUNK
+        step, count = step + count, 2 * count
     return None

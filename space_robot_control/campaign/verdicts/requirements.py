@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .design import grid_names, independent_rows, variables
+from .design import independent_rows
 from .projection import ProjectedDecision, projected_decision
 from .share_test import FixedSample, Sequential, ShareTest
 from .shares import Interval
@@ -73,13 +74,14 @@ class Verdict:
         return self.met / self.runs if self.runs else float("nan")
 
 
-def verdicts(table: DataFrame, study: Study, runs: int) -> list[Verdict]:
+def verdicts(table: DataFrame, study: Study, runs: int, grid: Sequence[str] = ()) -> list[Verdict]:
     """Judge every law by every requirement, at every point of the grid.
 
     Args:
         table: rows of the campaign; ``require.<name>`` are the requirements' columns.
         study: its file.
         runs: of the campaign. If their number is fixed, nothing is judged before all are flown.
+        grid: names of the variables that are grids.
     """
     rows = independent_rows(table, study.design)
     test: type[ShareTest] | None = Sequential
@@ -88,7 +90,7 @@ def verdicts(table: DataFrame, study: Study, runs: int) -> list[Verdict]:
     return [
         verdict(name, demand, of_law(part.table, law), test, law, part.point)
         for name, demand in study.require.items()
-        for part in parts(rows, grid_names(variables(rows), study.vary))
+        for part in parts(rows, grid)
         for law in laws_of(part.table)
     ]
 
