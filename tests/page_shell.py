@@ -66,6 +66,7 @@ NOT_RUN = {
     r"nft\b": "the machine's firewall",
     r"dask\b|.*--scheduler": "a cluster: tests/control/campaign/runner/test_cluster.py has one",
     r"python docs/law_league.py": "4,000 flights",
+    r"python docs/campaign_statistics.py": "a minute: test_share_test.py compares its table",
     r"python tests/hostile": "half an hour",
     r"python docs/view_picture.py": "a browser: tests/control/view has one",
     r"space-robot (sim|fly --paused)\b": "two terminals: test_pause_and_step.py flies and steps",

@@ -19,6 +19,8 @@ from ..flight.options import FlightPlan
 from ..scenario.scenario import OF_THE_GRAPH
 
 Design = Literal["independent", "latin_hypercube", "sobol", "saltelli"]
+NOT_TO_BE_EXTENDED = ("latin_hypercube", "saltelli")
+"""Designs in which every run depends on how many there are."""
 MOST_RUNS = 10_000_000
 OF_THE_CAMPAIGN = {
     "controller": "name laws",
@@ -121,6 +123,9 @@ class Study(StrictModel):
     until: Until | None = None
     design: Design = "independent"
     runs: Annotated[int, Field(ge=1, le=MOST_RUNS)] | None = None
+    fixed_runs: bool = False
+    """The number of runs is chosen before the first one flies: none can be added, and verdicts are
+    reached once, after the last. Otherwise they hold whenever one looks, and need more runs."""
 
     _where: str = PrivateAttr("campaign")
 
@@ -156,9 +161,21 @@ class Study(StrictModel):
     @field_validator("design", mode="after")
     @classmethod
     def _can_stop_early(cls, design: Design, info: ValidationInfo) -> Design:
-        if info.data.get("until") and design in ("latin_hypercube", "saltelli"):
+        if info.data.get("until") and design in NOT_TO_BE_EXTENDED:
             raise ValueError("is whole only with all runs, and cannot stop early: leave out until")
         return design
+
+    @field_validator("fixed_runs", mode="after")
+    @classmethod
+    def _cannot_stop_early(cls, fixed_runs: bool, info: ValidationInfo) -> bool:
+        if fixed_runs and info.data.get("until"):
+            raise ValueError("until chooses the number of runs: leave one of them out")
+        return fixed_runs
+
+    @property
+    def has_fixed_runs(self) -> bool:
+        """True if no runs can be added to those that a campaign was begun with."""
+        return self.fixed_runs or self.design in NOT_TO_BE_EXTENDED
 
     def runs_asked(self, runs: int | None = None) -> int:
         """Return how many runs are to be flown: ``runs`` if given, else what the file says.

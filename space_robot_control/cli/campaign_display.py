@@ -56,7 +56,7 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
                 [
                     [
                         f"{v.requirement}, {v.point}" if v.point else v.requirement,
-                        names[v.law], f"{v.runs - v.failures} of {v.runs}", v.limits.low,
+                        names[v.law], f"{v.met} of {v.runs}", v.limits.low,
                         Judged("", v.word, TONES[v.word]),
                     ]
                     for v in found

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from space_robot_msgs_py.errors import InputError
 
+from ...flight.plan import Flight
 from ...scenario import Scenario
 from ..study import Law, Study
 from .changes import Changes, Nominal
@@ -52,6 +53,11 @@ class Draws:
             self._check()
 
     @property
+    def grid(self) -> dict[str, int]:
+        """The number of values of each variable that is a grid, by its name."""
+        return {variable.name: len(_values(variable)) for variable in self._grids}
+
+    @property
     def blocks(self) -> Blocks | None:
         """How the runs make up Saltelli's design; None: they are of another one."""
         if self.study.design != "saltelli":
@@ -87,6 +93,14 @@ class Draws:
     def nominal(self, law: str) -> Scenario:
         """Return what a law flies when nothing is varied."""
         return self._nominal(law, {}).scenario
+
+    def flights_of_options(self) -> Iterator[tuple[str, Flight]]:
+        """Yield the flight with each varied option of the scenario at its ends, and their text."""
+        for variable in self._variables:
+            if isinstance(variable, OfScenario):
+                for value in variable.distribution.ends:
+                    changes = self._changes(self.study.laws[0], [(variable, value)])
+                    yield f"{variable.name}: {_shown(value)}", changes.scenario().check()
 
     def _place(self, run: int) -> Place:
         if not 0 <= run < self.runs:

@@ -42,7 +42,7 @@ def recover_table(folder: Path, manifest: Manifest, study: Study) -> list[str]:
     with held_folder(folder):
         journal, damage = open_journal(folder, manifest)
         with journal:
-            precision = Precision(study, manifest.runs)
+            precision = Precision(study, manifest.runs, manifest.table.grid)
             for row in journal.rows(manifest.runs):
                 precision.add(row)
             write_if_older(folder, journal, manifest, precision.stop)

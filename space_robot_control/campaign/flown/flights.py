@@ -46,7 +46,7 @@ class Flights:
         self._laws = flyer.study.laws
         self._done = np.zeros((runs, len(self._laws)), bool)
         self._failed = 0
-        self.precision = Precision(flyer.study, runs)
+        self.precision = Precision(flyer.study, runs, flyer.draws.grid)
         for row in journal.rows(runs):
             if row.is_final:  # what chance or the machine had a part in is tried again
                 self._count(row)

@@ -100,7 +100,7 @@ class FlownCampaign:
     @cached_property
     def verdicts(self) -> list[Verdict]:
         """What the table says about each requirement, law by law."""
-        return verdicts(self.table, self.study)
+        return verdicts(self.table, self.study, self.runs, list(self.manifest.table.grid))
 
     def rerun(self, run: int, law: str | None = None, bag: str | Path | None = None) -> FlownAgain:
         """Fly a row's flight again, to the same bits, with its whole log.

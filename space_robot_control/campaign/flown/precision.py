@@ -2,28 +2,42 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..row.row import Row
 from ..study import Requirement, Study
-from ..verdicts.shares import share_interval
+from ..verdicts.share_test import Sequential
 
 CHECKED_EVERY = 50
-"""Runs between two looks. They are at fixed numbers of runs, all of them flown by every law, so
-that neither workers nor kills have a say in where a campaign stops."""
+"""Draws between two looks. A draw is flown by every law at every point of the grid, and looks are
+at fixed numbers of draws, so that neither workers nor kills have a say in where a campaign stops.
+"""
 
 
 class Precision:
-    """Counts the runs that met each requirement, and finds the number of runs at which to stop."""
+    """Counts the runs that met each requirement, and finds the number of runs at which to stop.
 
-    def __init__(self, study: Study, runs: int) -> None:
-        """Begin without rows; ``runs``: of the whole campaign."""
+    The share must be known to the precision asked for under every law at every point of the grid.
+    """
+
+    def __init__(self, study: Study, runs: int, grid: Mapping[str, int]) -> None:
+        """Begin without rows.
+
+        Args:
+            study: the campaign's file.
+            runs: of the whole campaign.
+            grid: the number of values of each variable that is a grid.
+        """
         self._require, self._until = study.require, study.until
         self._number = {law: number for number, law in enumerate(study.laws)}
+        self._points = math.prod(grid.values())
         laws, demands = len(study.laws), len(study.require)
         self._flown = np.zeros((runs, laws), bool)
         self._met = np.zeros((runs, laws, demands), bool)
-        self._counts = np.zeros((laws, demands), np.int64)
+        self._counts = np.zeros((self._points, laws, demands), np.int64)
         self._whole = 0
         """Runs from the first on that all laws have flown."""
         self.stop = runs
@@ -38,19 +52,25 @@ class Precision:
         self._flown[run, law] = True
         self._met[run, law] = [is_met(row, self._require, name) for name in self._require]
         while not self.is_reached and self._whole < self.stop and self._flown[self._whole].all():
-            self._counts += self._met[self._whole]
+            self._counts[self._whole % self._points] += self._met[self._whole]
             self._whole += 1
-            if self._whole % CHECKED_EVERY == 0 and self._is_narrow():
+            if self._whole % (CHECKED_EVERY * self._points) == 0 and self._is_narrow():
                 self.stop, self.is_reached = self._whole, True
 
     def _is_narrow(self) -> bool:
         assert self._until is not None
+        half_width, draws = self._until.half_width, self._whole // self._points
         return all(
-            share_interval(int(count), self._whole, demand.confidence).half_width
-            <= self._until.half_width
-            for demand, counts in zip(self._require.values(), self._counts.T, strict=True)
-            for count in counts
+            is_narrow(self._require[name], draws - int(met), draws, half_width)
+            for name, counts in zip(self._require, np.moveaxis(self._counts, -1, 0), strict=True)
+            for met in counts.flat
         )
+
+
+def is_narrow(demand: Requirement, failures: int, runs: int, half_width: float) -> bool:
+    """Return True if the interval of the share of runs that meet a requirement is that narrow."""
+    test = Sequential(demand.share, demand.confidence)
+    return test.interval(failures, runs).half_width <= half_width
 
 
 def is_met(row: Row, require: dict[str, Requirement], name: str) -> bool:

@@ -68,6 +68,9 @@ class Preparation:
         where = self.study.where
         for flight in self.flights.values():
             check_requirements(flight, self.study.require, where)
+        if self.study.require:
+            for option, flight in self.flyer.draws.flights_of_options():
+                check_requirements(flight, self.study.require, where, option)
         study = self.study.content
         return Manifest(
             seed=self.seed, runs=self.runs, study=study,
@@ -88,6 +91,7 @@ class Preparation:
         first = draws.values(0)
         return Schema(
             vary={n: "str" if isinstance(first[n], str) else "float64" for n in draws.names},
+            grid=draws.grid,
             metrics=list(columns.metrics), require=list(self.study.require),
             bands=list(columns.names), bins=min(BINS, nominal.ticks),
         )  # fmt: skip

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..flown.precision import is_narrow
 from ..study import short_names
 from ..verdicts.design import (
     SALTELLI,
-    grid_names,
     independent_rows,
     saltelli_values,
     variables,
 )
 from ..verdicts.league import League, league
-from ..verdicts.requirements import Verdict, verdicts
+from ..verdicts.requirements import Verdict, family_error, verdicts
 from ..verdicts.sensitivity import Sensitivity, sensitivity
 from ..verdicts.sobol import SobolIndices, sobol_indices
 from ..verdicts.values import Part, ended, is_known, laws_of, measured, of_law, parts, turned
@@ -46,7 +46,7 @@ class Findings:
         self.subject = subject
         self.metrics = chosen(subject.table, subject.study.require, metrics)
         self.required = [of_requirement(*item) for item in subject.study.require.items()]
-        self.grid = grid_names(subject.table, subject.study.vary)
+        self.grid = list(subject.grid)
         self.rows = independent_rows(subject.table, subject.study.design)
         """Those that can be taken for independent draws; all, unless the design is for indices."""
         self.parts: list[Part] = parts(self.rows, self.grid)
@@ -65,7 +65,12 @@ class Findings:
     @cached_property
     def verdicts(self) -> list[Verdict]:
         """Return the verdict on every requirement, law and point of the grid."""
-        return verdicts(self.subject.table, self.subject.study)
+        return verdicts(self.subject.table, self.subject.study, self.subject.runs, self.grid)
+
+    @property
+    def family_error(self) -> float:
+        """Return the largest probability that any of the verdicts is false."""
+        return family_error(self.subject.study, self.verdicts)
 
     @cached_property
     def leagues(self) -> list[tuple[Part, Quantity, League]]:
@@ -108,7 +113,9 @@ class Findings:
         if law:
             rows = of_law(rows, law)
         times = rows["ended_at_s"].to_numpy(np.float64, na_value=0.0)
-        order = np.lexsort((rows["run"], times, -measured(rows, quantity.column)))
+        values = measured(rows, quantity.column)
+        values[np.isinf(values) & ended(rows)] = -np.inf  # it has no number: neither good nor bad
+        order = np.lexsort((rows["run"], times, -values))
         return part.table.loc[rows.index[order[:count]]]
 
     @cached_property
@@ -128,14 +135,25 @@ class Findings:
         return [each for each in found if each]
 
     @property
+    def _is_precise(self) -> bool:
+        """Return True if the campaign stopped at the precision that its file asks for."""
+        study = self.subject.study
+        return study.until is not None and all(
+            is_narrow(study.require[v.requirement], v.runs - v.met, v.runs, study.until.half_width)
+            for v in self.verdicts
+        )
+
+    @property
     def remarks(self) -> list[str]:
         """Return what a reader must know of these rows, a sentence each."""
         subject, table = self.subject, self.subject.table
         found, asked = [*subject.remarks], subject.runs * len(subject.study.laws)
-        if len(table) < asked:
+        if len(table) < asked and not self._is_precise:
             found.append(
                 f"The campaign is not finished: {len(table)} of {asked} flights have been flown; "
                 "all numbers are of these."
+                + " The number of runs is fixed: there are no verdicts before all are flown."
+                * (subject.study.has_fixed_runs and bool(self.required))
             )
         counts = table["outcome"].value_counts()
         foreign = [f"{counts[o]} {o}" for o in ("killed", "out_of_time", "refused") if o in counts]

@@ -15,7 +15,7 @@ from .findings import Findings
 from .flown_tables import flown_table, outcome_table
 from .league_tables import RANKS, choice_tables, league_table, pair_table
 from .sensitivity_tables import sensitivity_table, sobol_table
-from .verdict_tables import TONES, demanded, verdict_grid, verdict_table, worst_table
+from .verdict_tables import TONES, demanded, method, verdict_grid, verdict_table, worst_table
 
 
 def render(findings: Findings) -> str:
@@ -35,6 +35,7 @@ def render(findings: Findings) -> str:
         outcomes=outcome_table(findings),
         remarks=findings.remarks,
         summaries=_summaries(findings),
+        method=method(findings),
         verdicts=verdict_table(findings) if findings.required else None,
         verdict_grids=[verdict_grid(findings, q) for q in findings.required] if has_grid else [],
         league=choice_tables(findings) if has_grid else [league_table(findings)],

@@ -21,6 +21,7 @@ def record(findings: Findings) -> dict[str, Any]:
             for law, rows in subject.table.groupby("law", sort=False)
         },
         "requirements": [{**plain(v), "share": v.share} for v in findings.verdicts],
+        "any_verdict_false_at_most": findings.family_error,
         "leagues": [
             {
                 "point": part.point, "metric": metric.name, "standings": plain(found.standings),

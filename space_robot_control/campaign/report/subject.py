@@ -33,6 +33,8 @@ class Subject:
     """That were asked for."""
     table: DataFrame
     """The rows that there are."""
+    grid: Sequence[str] = ()
+    """Names of the variables that are grids."""
     about: Mapping[str, str] = field(default_factory=dict)
     """Versions and the like, by what they are of."""
     remarks: Sequence[str] = ()
@@ -82,6 +84,6 @@ def subject_of(campaign: FlownCampaign, study: Study | None = None) -> Subject:
         about["commit"] = manifest.commit
     about |= {f"digest of {name}": digest[:16] for name, digest in manifest.files.items()}
     return Subject(
-        campaign.folder, study or campaign.study, campaign.seed, campaign.runs, table, about,
-        remarks,
+        campaign.folder, study or campaign.study, campaign.seed, campaign.runs, table,
+        list(manifest.table.grid), about, remarks,
     )  # fmt: skip

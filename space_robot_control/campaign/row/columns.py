@@ -13,6 +13,7 @@ from space_robot_msgs_py.config.validation import one_of
 
 from ...analysis.attitude_drift import controls_base
 from ...analysis.metrics import AxisIndex, error_columns, largest_of_columns, torque_columns
+from ...analysis.ripple import FAST, SHORTEST_S, SLOWEST
 from ...flight.plan import Flight
 
 Array = NDArray[np.float64]
@@ -89,6 +90,24 @@ class Columns(NamedTuple):
             for values, columns in ((error, self.errors), (log.applied_torque, self.torques))
             for name, axes in columns.items()
         }
+
+
+def missing_for_ripple(metric: str, ticks: int, period: float) -> str:
+    """Return what a metric of ripple needs and a flight does not have; empty if nothing.
+
+    Args:
+        metric: any metric's name.
+        ticks: of the flight, or of a window in it.
+        period: s.
+    """
+    if not metric.startswith((RIPPLE, FAST_RIPPLE)):
+        return ""
+    above = FAST if metric.startswith(FAST_RIPPLE) else SLOWEST
+    if 0.5 / period <= above:
+        return f"needs ticks less than {0.5 / above:g} s apart, they are {period:g} s apart"
+    if ticks * period < SHORTEST_S * (1.0 - 1e-9):
+        return f"needs {SHORTEST_S:g} s of flight, there are {ticks * period:g} s"
+    return ""
 
 
 def _norms(values: Array) -> Array:

@@ -14,7 +14,7 @@ from ...analysis.metrics import tracking_error
 from ...flight.plan import Flight
 from ..study import Requirement
 from .bands import Bands
-from .columns import Columns
+from .columns import Columns, missing_for_ripple
 from .window import Window, WindowMetrics
 
 
@@ -59,25 +59,41 @@ class Measure:
         return self._bands.result()
 
 
-def check_requirements(flight: Flight, require: Mapping[str, Requirement], where: str) -> None:
-    """See that a flight has what is required of it.
+def check_requirements(
+    flight: Flight, require: Mapping[str, Requirement], where: str, context: str = ""
+) -> None:
+    """Check that a flight has the numbers that are required of it.
 
     Args:
-        flight: the nominal one.
+        flight: the nominal one, or one with an option that is varied.
         require: the requirements by name.
         where: the file, for errors.
+        context: what differs from the nominal flight, for errors.
 
     Raises:
-        InputError: a metric that there is not, or a window that begins after the flight.
+        InputError: an unknown metric, a window without ticks, or one too short for the metric.
     """
     columns, end = Columns.of_flight(flight), flight.ticks * flight.period
+    context = context and f" ({context})"
     for name, demand in require.items():
-        columns.check(demand.metric, f"{where}: require.{name}.metric")
+        key = f"{where}: require.{name}"
+        try:
+            columns.check(demand.metric, f"{key}.metric")
+        except InputError as error:
+            raise InputError(f"{error}{context}") from None
         if demand.from_s >= end:
             raise InputError(
-                f"{where}: require.{name}.from_s: must be before the end of the flight "
-                f"({end:g} s), got {demand.from_s:g}"
+                f"{key}.from_s: must be before the end of the flight ({end:g} s), "
+                f"got {demand.from_s:g}{context}"
             )
+        ticks = len(_window(demand).ticks(flight.ticks, flight.period))
+        if not ticks:
+            raise InputError(
+                f"{key}.to_s: no tick is from {demand.from_s:g} to {demand.to_s:g} s, "
+                f"ticks are {flight.period:g} s apart{context}"
+            )
+        if lacking := missing_for_ripple(demand.metric, ticks, flight.period):
+            raise InputError(f"{key}.metric: {demand.metric} {lacking}{context}")
 
 
 def _window(demand: Requirement) -> Window:

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_msgs_py.errors import InputError
 from space_robot_sim.robot import Robot
 
 from ...analysis.metrics import AxisRms
 from ...analysis.ripple import Ripple
-from .columns import FAST_RIPPLE, RIPPLE, Columns
+from .columns import FAST_RIPPLE, RIPPLE, Columns, missing_for_ripple
 
 Array = NDArray[np.float64]
 
@@ -26,14 +25,23 @@ class Window(NamedTuple):
     to_s: float | None = None
     """None: to the end of the flight."""
 
+    def ticks(self, ticks: int, period: float) -> range:
+        """Return the ticks of a flight of so many that are within.
+
+        Args:
+            ticks: of the flight.
+            period: s.
+        """
+        start, stop = int(np.ceil(self.from_s / period - 1e-6)), ticks
+        if self.to_s is not None:
+            stop = int(np.floor(self.to_s / period + 1e-6)) + 1
+        return range(min(max(start, 0), ticks), min(max(stop, 0), ticks))
+
     def rows(self, log: FlightLog) -> slice:
         """Return the rows of a block that are within."""
-        period, first = log.timebase.period, log.first_tick
-        start = int(np.ceil(self.from_s / period - 1e-6)) - first
-        stop = log.ticks
-        if self.to_s is not None:
-            stop = int(np.floor(self.to_s / period + 1e-6)) + 1 - first
-        return slice(min(max(start, 0), log.ticks), min(max(stop, 0), log.ticks))
+        first = log.first_tick
+        within = self.ticks(first + log.ticks, log.timebase.period)
+        return slice(max(within.start - first, 0), max(within.stop - first, 0))
 
 
 class WindowMetrics:
@@ -51,6 +59,7 @@ class WindowMetrics:
         self._rms: tuple[AxisRms, AxisRms] | None = None
         self._largest: dict[str, float] = {}
         self._ripple: Ripple | None = None
+        self._ticks, self._period = 0, 0.0
         self._has_ripple = any(name.startswith((RIPPLE, FAST_RIPPLE)) for name in wanted)
         self._has_rms = any(name.endswith("_rms") for name in wanted)
 
@@ -80,6 +89,8 @@ class WindowMetrics:
         if self._has_ripple:
             self._ripple = self._ripple or Ripple(log, robot)
             self._ripple.add(log, error)
+            self._ticks += log.ticks
+            self._period = log.timebase.period
 
     def result(self) -> dict[str, float]:
         """Return the metrics that this flight has, by name."""
@@ -92,14 +103,16 @@ class WindowMetrics:
         return {name: found[name] for name in self._wanted if np.isfinite(found.get(name, np.nan))}
 
     def _ripples(self) -> dict[str, float]:
-        if self._ripple is None:
+        if self._ripple is None or missing_for_ripple(RIPPLE, self._ticks, self._period):
             return {}
-        try:
-            ripple = self._ripple.result()
-        except InputError:  # too few rows
-            return {}
-        return {
+        ripple = self._ripple.result()
+        values = {
             f"{prefix}{name}": value
             for prefix, bands in ((RIPPLE, ripple), (FAST_RIPPLE, ripple["fast"]))
             for name, value in bands["rms"].items()
+        }
+        return {
+            name: value
+            for name, value in values.items()
+            if not missing_for_ripple(name, self._ticks, self._period)
         }

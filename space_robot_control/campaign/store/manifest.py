@@ -15,11 +15,10 @@ from space_robot_msgs_py.config.yaml_text import read_file
 from space_robot_msgs_py.errors import InputError
 
 from ...analysis.files import whole_file
+from ..study import NOT_TO_BE_EXTENDED
 from .schema import Schema
 
 NEW_FOLDER = "choose another folder for this one"
-NOT_TO_BE_EXTENDED = ("latin_hypercube", "saltelli")
-"""Designs in which every run depends on how many there are."""
 WITHOUT_DIGESTS: Final = 1
 FORMAT: Final = 2
 """Versions of the folder: in the first one nothing tells whether a file was damaged."""
@@ -114,6 +113,11 @@ class Manifest(StrictModel):
             raise InputError(
                 f"{where}: was begun with {self.runs} runs, {runs} are asked for, and a "
                 f"{design} design cannot be extended: {NEW_FOLDER}"
+            )
+        if runs > self.runs and self.study.get("fixed_runs"):
+            raise InputError(
+                f"{where}: was begun with {self.runs} runs, {runs} are asked for, but its file has "
+                f"fixed_runs: true: {NEW_FOLDER}"
             )
 
 

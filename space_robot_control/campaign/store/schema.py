@@ -20,6 +20,8 @@ class Schema(StrictModel):
 
     vary: dict[str, Literal["float64", "str"]]
     """The kind of each variable."""
+    grid: dict[str, int]
+    """The number of values of each variable that is a grid."""
     metrics: list[str]
     require: list[str]
     bands: list[str]

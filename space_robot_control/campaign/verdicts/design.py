@@ -1,10 +1,8 @@
-"""What a campaign's design makes of its rows: points of a grid, rows that count as independent."""
+"""What a campaign's design makes of its rows: which are independent, which belong together."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,20 +21,6 @@ def variables(table: DataFrame) -> list[str]:
     """Return the names of all variables of a table, in the file's order."""
     names = (str(column) for column in table)
     return [name.removeprefix("vary.") for name in names if name.startswith("vary.")]
-
-
-def grid_names(table: DataFrame, vary: Mapping[str, Any]) -> list[str]:
-    """Return the names of the variables that are grids.
-
-    Args:
-        table: rows of the campaign.
-        vary: what its file varies.
-    """
-    inner = vary.get("faults")
-    faults = {f"faults.{key}": v for key, v in inner.items()} if isinstance(inner, dict) else {}
-    keys = [k for k, v in {**vary, **faults}.items() if isinstance(v, dict) and "grid" in v]
-    patterns = [re.sub(r"\\\[[^\]]*\\\]", r"\\[[^\\]]*\\]", re.escape(key)) for key in keys]
-    return [name for name in variables(table) if any(re.fullmatch(p, name) for p in patterns)]
 
 
 def independent_rows(table: DataFrame, design: str) -> DataFrame:

@@ -1,16 +1,18 @@
-"""Requirements: met, not met or undecided, by order statistics."""
+"""Requirements: met, not met, undecided or not measured."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .design import grid_names, independent_rows
-from .order_statistics import Outlook, bound_rank, is_met, is_missed, outlook, runs_needed
-from .shares import Interval, share_limits
+from .design import independent_rows
+from .projection import ProjectedDecision, projected_decision
+from .share_test import FixedSample, Sequential, ShareTest
+from .shares import Interval
 from .values import NOT_OF_THE_LAW, ended, laws_of, measured, of_law, parts, turned
 
 if TYPE_CHECKING:
@@ -19,12 +21,15 @@ if TYPE_CHECKING:
     from ..study import Requirement, Study
 
 Array = NDArray[np.float64]
-Word = Literal["met", "not met", "undecided"]
+Word = Literal["met", "not met", "undecided", "not measured"]
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the runs of a law say about a requirement."""
+    """What the runs of a law say about a requirement.
+
+    A word that is false comes with a probability of at most 1 - the requirement's confidence.
+    """
 
     requirement: str
     law: str
@@ -38,6 +43,11 @@ class Verdict:
     """Of the failures: flights that did not come to their end."""
     not_of_the_law: int
     """Of those: killed, out of time or refused."""
+    not_measured: int
+    """Runs that came to their end without the number that is required.
+
+    They speak against every verdict: as failures against "met", as successes against "not met".
+    """
     limits: Interval
     """The share of cases that meet it is at least and at most this: each at the confidence."""
     bound: float | None
@@ -46,34 +56,52 @@ class Verdict:
     Infinite: too many flights failed. None: there are too few runs to say.
     """
     needed_without_failure: int | None
-    """Further runs that would show it met if none of them failed."""
-    outlook: Outlook | None
-    """When it would be decided if failures go on as they did; None if it is, or cannot be said."""
+    """Further runs that would show it met if none of them failed; None of a fixed sample."""
+    projected_decision: ProjectedDecision | None
+    """When it would be decided if failures go on as they did.
+
+    None if it is decided, if it cannot be said, and of a fixed sample.
+    """
+
+    @property
+    def met(self) -> int:
+        """The number of runs that met it."""
+        return self.runs - self.failures - self.not_measured
 
     @property
     def share(self) -> float:
         """The share of the runs that met it; NaN of no runs."""
-        return 1.0 - self.failures / self.runs if self.runs else float("nan")
+        return self.met / self.runs if self.runs else float("nan")
 
 
-def verdicts(table: DataFrame, study: Study) -> list[Verdict]:
+def verdicts(table: DataFrame, study: Study, runs: int, grid: Sequence[str] = ()) -> list[Verdict]:
     """Judge every law by every requirement, at every point of the grid.
 
     Args:
         table: rows of the campaign; ``require.<name>`` are the requirements' columns.
         study: its file.
+        runs: of the campaign. If their number is fixed, nothing is judged before all are flown.
+        grid: names of the variables that are grids.
     """
     rows = independent_rows(table, study.design)
+    test: type[ShareTest] | None = Sequential
+    if study.has_fixed_runs:
+        test = FixedSample if len(table) >= runs * len(study.laws) else None
     return [
-        verdict(name, demand, of_law(part.table, law), law, part.point)
+        verdict(name, demand, of_law(part.table, law), test, law, part.point)
         for name, demand in study.require.items()
-        for part in parts(rows, grid_names(table, study.vary))
+        for part in parts(rows, grid)
         for law in laws_of(part.table)
     ]
 
 
 def verdict(
-    name: str, demand: Requirement, rows: DataFrame, law: str = "", point: str = ""
+    name: str,
+    demand: Requirement,
+    rows: DataFrame,
+    kind: type[ShareTest] | None = Sequential,
+    law: str = "",
+    point: str = "",
 ) -> Verdict:
     """Judge the rows of one law by one requirement.
 
@@ -81,25 +109,41 @@ def verdict(
         name: of the requirement.
         demand: what it asks for.
         rows: one a run.
+        kind: of test; None: of a fixed sample that is not complete, which shows nothing yet.
         law: for the verdict.
         point: for the verdict.
     """
     sign, column = demand.sign, f"require.{name}"
     badness = measured(turned(rows, column, sign), column)
-    runs, failures = len(badness), int(np.sum(~(badness < sign * demand.bound)))
-    share, confidence = demand.share, demand.confidence
-    word: Word = "undecided"
-    if runs and is_met(failures, runs, share, confidence):
-        word = "met"
-    elif runs and is_missed(failures, runs, share, confidence):
-        word = "not met"
-    needed = runs_needed(failures, share, confidence)
-    rank = bound_rank(runs, share, confidence) if runs else None
-    bound = None if rank is None else sign * float(np.sort(badness)[rank - 1])
+    has_ended = ended(rows)
+    is_unmeasured = has_ended & np.isinf(badness)
+    runs, not_measured = len(badness), int(np.sum(is_unmeasured))
+    failures = int(np.sum(~(badness < sign * demand.bound) & ~is_unmeasured))
+    word: Word = "not measured" if not_measured else "undecided"
+    limits, bound, needed, projected = Interval(0.0, 1.0), None, None, None
+    if kind is not None and runs:
+        test = kind(demand.share, demand.confidence)
+        if test.is_met(failures + not_measured, runs):
+            word = "met"
+        elif test.is_missed(failures, runs):
+            word = "not met"
+        low, high = (test.limits(f, runs) for f in (failures + not_measured, failures))
+        limits = Interval(low.low, high.high)
+        rank = test.bound_rank(runs)
+        bound = None if rank is None else sign * float(np.sort(badness)[rank - 1])
+    if kind is Sequential:
+        sequential = Sequential(demand.share, demand.confidence)
+        total = sequential.runs_needed(failures + not_measured)
+        needed = None if total is None else max(0, total - runs)
+        if runs and word == "undecided":
+            projected = projected_decision(sequential, failures, runs)
     return Verdict(
         name, law, point, word, runs, failures,
-        int(np.sum(~ended(rows))), int(rows["outcome"].isin(NOT_OF_THE_LAW).sum()),
-        share_limits(runs - failures, runs, confidence), bound,
-        None if needed is None else max(0, needed - runs),
-        outlook(failures, runs, share, confidence) if runs and word == "undecided" else None,
+        int(np.sum(~has_ended)), int(rows["outcome"].isin(NOT_OF_THE_LAW).sum()), not_measured,
+        limits, bound, needed, projected,
     )  # fmt: skip
+
+
+def family_error(study: Study, found: list[Verdict]) -> float:
+    """Return the largest probability that any of some verdicts is false (Bonferroni)."""
+    return min(1.0, sum(1.0 - study.require[v.requirement].confidence for v in found))

@@ -12,8 +12,10 @@ from typing import Any
 
 import pytest
 
-from space_robot_control.campaign.flown import Campaign, FlownCampaign, bags, flights
+from space_robot_control.campaign.flown import Campaign, FlownCampaign, bags, flights, precision
 from space_robot_control.campaign.flown.flights import Progress
+from space_robot_control.campaign.report.findings import Findings
+from space_robot_control.campaign.report.subject import subject_of
 from space_robot_control.campaign.row.row import Task
 from space_robot_control.campaign.runner import Done, WorkerDiedError, run_many
 from space_robot_control.campaign.study import Study
@@ -162,14 +164,20 @@ def test_a_flight_whose_worker_died_is_a_row_and_is_tried_again(
     assert table_of(tmp_path / "a") == table_of(undisturbed.folder)
 
 
-def test_it_stops_at_a_precision_whoever_flies_it(tmp_path: Path) -> None:
-    content = {**CONTENT, "laws": ["tde_stc"], "scenario": {"duration": 0.02}}
+def test_it_stops_at_a_precision_whoever_flies_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = {**CONTENT, "laws": ["tde_stc"], "scenario": {"duration": 0.005}}
     content["require"] = {"p": {"metric": "attitude_max", "below": 1.0, "in": 0.9}}
-    content["until"] = {"half_width": 0.05, "runs": 500}
+    content["vary"] = {"scenario.case": {"grid": ["1", "2"]}}
+    content["until"] = {"half_width": 0.4, "runs": 50}
+    monkeypatch.setattr(precision, "CHECKED_EVERY", 5)
     asked = Campaign(Study.model_validate(content))
     one = asked.run(out=tmp_path / "one", workers=0)
     asked.run(out=tmp_path / "two", workers=2)
-    assert len(one.table) == 50
+    assert one.table["vary.scenario.case"].value_counts().tolist() == [5, 5]
+    remarks = Findings(subject_of(one)).remarks
+    assert not any("not finished" in remark for remark in remarks)
     assert table_of(tmp_path / "one") == table_of(tmp_path / "two")
 
 
@@ -209,6 +217,17 @@ def test_without_a_folder_it_lasts_as_long_as_the_object() -> None:
         (
             {"require": {"p": {"metric": "atitude_max", "below": 1.0, "in": 0.9}}},
             "campaign: require.p.metric: .*attitude_max",
+        ),
+        (
+            {"require": {"p": {"metric": "ripple_base_torque", "below": 1.0, "in": 0.9}}},
+            "campaign: require.p.metric: ripple_base_torque needs 1 s of flight, there are 0.2 s",
+        ),
+        (
+            {
+                "require": {"p": {"metric": "attitude_max", "below": 1.0, "in": 0.9}},
+                "vary": {"scenario.actuators": {"grid": ["ideal", "none"]}},
+            },
+            r"campaign: require.p.metric: .*\(scenario.actuators: none\)",
         ),
     ],
 )

@@ -2,58 +2,68 @@
 
 from __future__ import annotations
 
+import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import binomtest
 
 from space_robot_control.campaign.flown.precision import CHECKED_EVERY, Precision
 from space_robot_control.campaign.row.row import Row, Task
 from space_robot_control.campaign.study import Study
+from space_robot_control.campaign.verdicts.share_test import Sequential
 
-RUNS = 4 * CHECKED_EVERY
+LAWS, SENSORS = ("tde_stc", "ctc"), ("fine", "coarse", "ideal")
+DRAWS = 3 * CHECKED_EVERY
+BOUNDS = {"p": 1.0, "q": 2.0}
 
 
-def study(half_width: float) -> Study:
+def study(half_width: float, points: int) -> Study:
     return Study.model_validate({
-        "laws": ["tde_stc", "ctc"],
-        "require": {"p": {"metric": "attitude_max", "below": 1.0, "in": 0.9}},
-        "until": {"half_width": half_width, "runs": RUNS},
+        "laws": LAWS,
+        "vary": {"scenario.sensors": {"grid": SENSORS[:points]}},
+        "require": {
+            name: {"metric": "attitude_max", "below": bound, "in": 0.9}
+            for name, bound in BOUNDS.items()
+        },
+        "until": {"half_width": half_width, "runs": points * DRAWS},
     })  # fmt: skip
 
 
-@settings(max_examples=20)
+@settings(max_examples=12, deadline=None)
 @given(
-    st.lists(st.booleans(), min_size=2 * RUNS, max_size=2 * RUNS),
-    st.sampled_from([0.05, 0.08, 0.12]),
-    st.randoms(use_true_random=False),
-)
-def test_the_stop_is_the_first_look_at_which_all_are_narrow(
-    met: list[bool], half_width: float, random: object
+    st.integers(1, 3), st.sampled_from([0.07, 0.1, 0.13]), st.integers(0, 2**32 - 1),
+    st.lists(st.sampled_from([0.5, 0.9, 1.0]), min_size=6, max_size=6),
+)  # fmt: skip
+def test_the_stop_is_the_first_look_at_which_all_are_narrow_at_each_point(
+    points: int, half_width: float, seed: int, rates: list[float]
 ) -> None:
+    """In whole draws: every point and every law has flown as often."""
+    runs, rng = points * DRAWS, np.random.default_rng(seed)
+    frequency = np.resize(rates, (points, 2))
+    met = rng.uniform(size=(DRAWS, points, 2)) < frequency
+    values = np.where(met, 0.5, np.where(rng.uniform(size=met.shape) < 0.5, 1.5, 2.5))
     rows = [
-        Row(Task(run, law), "complete", require={"p": 0.5 if met[2 * run + k] else 1.5})
-        for run in range(RUNS)
-        for k, law in enumerate(("tde_stc", "ctc"))
+        Row(Task(draw * points + point, law), "complete", require=dict.fromkeys(BOUNDS, value))
+        for draw in range(DRAWS)
+        for point in range(points)
+        for law, value in zip(LAWS, values[draw, point].tolist(), strict=True)
     ]
-    random.shuffle(rows)  # type: ignore[attr-defined]
-    precision = Precision(study(half_width), RUNS)
-    for row in rows:
-        precision.add(row)
-    expected = RUNS
-    for runs in range(CHECKED_EVERY, RUNS + 1, CHECKED_EVERY):
-        widths = []
-        for k in (0, 1):
-            found = binomtest(sum(met[k : 2 * runs : 2]), runs).proportion_ci(0.9)
-            widths.append((found.high - found.low) / 2)
-        if max(widths) <= half_width:
-            expected = runs
+    precision = Precision(study(half_width, points), runs, {"scenario.sensors": points})
+    for index in rng.permutation(len(rows)).tolist():
+        precision.add(rows[index])
+    expected = runs
+    for draws in range(CHECKED_EVERY, DRAWS + 1, CHECKED_EVERY):
+        failures = [(values[:draws] >= bound).sum(axis=0) for bound in BOUNDS.values()]
+        intervals = [Sequential(0.9, 0.9).interval(int(k), draws) for k in np.ravel(failures)]
+        if max(interval.half_width for interval in intervals) <= half_width:
+            expected = draws * points
             break
     assert precision.stop == expected
+    assert precision.is_reached == (expected < runs) or expected == runs
 
 
 def test_a_flight_that_failed_meets_nothing() -> None:
-    precision = Precision(study(0.04), RUNS)
+    precision = Precision(study(0.06, 1), DRAWS, {})
     for run in range(CHECKED_EVERY):
-        for law in ("tde_stc", "ctc"):
-            precision.add(Row(Task(run, law), "diverged", require={"p": 0.5}))
+        for law in LAWS:
+            precision.add(Row(Task(run, law), "diverged", require={"p": 0.5, "q": 0.5}))
     assert precision.stop == CHECKED_EVERY  # none of 50: as narrow as all of 50

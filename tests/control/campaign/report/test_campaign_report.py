@@ -37,9 +37,10 @@ def found(
         "scenario": {"case": "3"}, "laws": list(table["law"].unique()), "require": REQUIRE,
         "vary": {"robot.base.mass": UNIFORM}, **changes,
     }  # fmt: skip
+    grid = [name for name, value in study["vary"].items() if "grid" in value]
     asked = runs or table["run"].nunique()
     return Findings(
-        Subject(Path("campaigns/a b"), Study.model_validate(study), 7, asked, table), metrics
+        Subject(Path("campaigns/a b"), Study.model_validate(study), 7, asked, table, grid), metrics
     )
 
 

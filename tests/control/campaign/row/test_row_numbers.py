@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,10 +14,12 @@ from hypothesis import strategies as st
 from space_robot_control import FlownFlight, Scenario
 from space_robot_control.analysis import tracking_error
 from space_robot_control.campaign.row.bands import Bands
-from space_robot_control.campaign.row.columns import Columns
+from space_robot_control.campaign.row.columns import Columns, missing_for_ripple
 from space_robot_control.campaign.row.measure import Measure, check_requirements
+from space_robot_control.campaign.row.window import Window, WindowMetrics
 from space_robot_control.campaign.study import Requirement
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import Timebase
 
 REQUIRE = {
     "late": Requirement.model_validate(
@@ -100,6 +104,18 @@ def test_bins_do_not_depend_on_blocks(case: tuple[int, list[int]]) -> None:
     [
         ({"metric": "attitude_mx"}, "my.yaml: require.p.metric: choose one of attitude_rms"),
         ({"metric": "attitude_max", "from_s": 1.2}, "from_s: must be before the end .*1.2 s"),
+        (
+            {"metric": "joints_1_3_rms", "from_s": 0.3001, "to_s": 0.3004},
+            r"my.yaml: require.p.to_s: no tick is from 0.3001 to 0.3004 s",
+        ),
+        (
+            {"metric": "ripple_base_torque", "from_s": 0.5},
+            "my.yaml: require.p.metric: ripple_base_torque needs 1 s of flight, there are 0.7 s",
+        ),
+        (
+            {"metric": "fast_ripple_base_torque", "to_s": 0.9},
+            "my.yaml: require.p.metric: fast_ripple_base_torque needs 1 s of flight",
+        ),
     ],
 )
 def test_what_no_flight_has_cannot_be_required(
@@ -108,3 +124,52 @@ def test_what_no_flight_has_cannot_be_required(
     require = {"p": Requirement.model_validate({**demand, "below": 1.0, "in": 0.9})}
     with pytest.raises(InputError, match=said):
         check_requirements(flown.flight, require, "my.yaml")
+
+
+@given(
+    st.integers(1, 3000), st.floats(0.0, 2.0), st.none() | st.floats(0.0, 2.0),
+    st.sampled_from([0.0005, 0.001, 0.0125]), st.lists(st.integers(1, 3000), max_size=3),
+)  # fmt: skip
+def test_the_ticks_of_a_window_are_those_of_its_rows(
+    ticks: int, from_s: float, to_s: float | None, period: float, cuts: list[int]
+) -> None:
+    """Counted before the flight and cut from the blocks of its log."""
+
+    class Block:
+        def __init__(self, first: int, stop: int) -> None:
+            self.first_tick, self.ticks = first, stop - first
+            self.timebase = SimpleNamespace(period=period)
+
+    window = Window(from_s, to_s)
+    edges = sorted({0, ticks, *(cut for cut in cuts if cut < ticks)})
+    rows: list[int] = []
+    for first, stop in pairwise(edges):
+        own = window.rows(Block(first, stop))  # type: ignore[arg-type]
+        rows += range(first, stop)[own]
+    time = np.arange(ticks) * period
+    end = np.inf if to_s is None else to_s
+    slack = 2e-6 * period
+    sure = np.flatnonzero((time >= from_s + slack) & (time <= end - slack))
+    possible = np.flatnonzero((time >= from_s - slack) & (time <= end + slack))
+    assert rows == list(window.ticks(ticks, period))
+    assert set(sure.tolist()) <= set(rows) <= set(possible.tolist())
+
+
+@pytest.mark.parametrize(
+    ("period", "ticks", "missing"),
+    [(0.0005, 2000, set()), (0.0005, 1999, {"ripple", "fast_ripple"}), (0.02, 80, {"fast_ripple"})],
+)
+def test_ripple_is_measured_exactly_where_it_is_said_to_be(
+    flown: FlownFlight, period: float, ticks: int, missing: set[str]
+) -> None:
+    """A second of flight; above 25 Hz, ticks less than 20 ms apart."""
+    log = replace(flown.log.rows(0, ticks), timebase=Timebase(round(period * 1e9)))
+    columns = Columns.of_flight(flown.flight)
+    window = WindowMetrics(Window(), columns.metrics, columns)
+    error = tracking_error(log)
+    window.add(log, error, columns.sizes(log, error), flown.flight.robot)
+    found = window.result()
+    for kind in ("ripple", "fast_ripple"):
+        name = f"{kind}_base_torque"
+        assert (name not in found) == (kind in missing)
+        assert bool(missing_for_ripple(name, ticks, period)) == (kind in missing)

@@ -34,7 +34,12 @@ from space_robot_msgs_py.errors import InputError
 pytest.importorskip("pyarrow")
 LAWS = ["tde_stc", "ctc=tuned"]
 SCHEMA = Schema(
-    vary={"mass": "float64", "word": "str"}, metrics=["m"], require=["r"], bands=["s"], bins=3
+    grid={},
+    vary={"mass": "float64", "word": "str"},
+    metrics=["m"],
+    require=["r"],
+    bands=["s"],
+    bins=3,
 )
 FLOATS = st.floats(allow_nan=False, allow_infinity=False)
 

@@ -10,7 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from space_robot_control.campaign.study import Requirement, Study
-from space_robot_control.campaign.verdicts.requirements import Verdict, verdict, verdicts
+from space_robot_control.campaign.verdicts.requirements import (
+    Verdict,
+    family_error,
+    verdict,
+    verdicts,
+)
+from space_robot_control.campaign.verdicts.share_test import FixedSample, Sequential, ShareTest
 
 
 def demand_of(
@@ -33,31 +39,76 @@ def rows(values: list[float], failed: int = 0, outcome: str = "diverged") -> pd.
     })  # fmt: skip
 
 
-def judge(demand: Requirement, table: pd.DataFrame) -> Verdict:
-    return verdict("x", demand, table)
+def judge(
+    demand: Requirement, table: pd.DataFrame, kind: type[ShareTest] | None = FixedSample
+) -> Verdict:
+    return verdict("x", demand, table, kind)
 
 
-def test_767_runs_without_failure_meet_997_at_90() -> None:
+def test_one_look_at_767_runs_without_failure_meets_997_at_90() -> None:
     assert judge(demand_of(1.0), rows([0.5] * 767)).word == "met"
     found = judge(demand_of(1.0), rows([0.5] * 766))
-    assert (found.word, found.needed_without_failure) == ("undecided", 1)
-    assert found.outlook is not None
-    assert (found.outlook.runs, found.outlook.met) == (767, True)
+    assert (found.word, found.needed_without_failure, found.projected_decision) == (
+        "undecided", None, None,
+    )  # fmt: skip
+    assert judge(demand_of(1.0), rows([0.5] * 950 + [2.0] * 50)).word == "not met"
 
 
-def test_one_failure_asks_for_1296_runs() -> None:
-    assert judge(demand_of(1.0), rows([0.5] * 1295, failed=1)).word == "met"
-    found = judge(demand_of(1.0), rows([0.5] * 1000, failed=1))
-    assert (found.word, found.needed_without_failure) == ("undecided", 295)
+def test_whoever_may_look_at_any_time_needs_994() -> None:
+    assert judge(demand_of(1.0), rows([0.5] * 994), Sequential).word == "met"
+    found = judge(demand_of(1.0), rows([0.5] * 900), Sequential)
+    assert (found.word, found.needed_without_failure) == ("undecided", 94)
+    assert found.projected_decision == (994, True)
 
 
-def test_many_failures_show_that_it_is_missed() -> None:
-    found = judge(demand_of(1.0), rows([0.5] * 950 + [2.0] * 50))
-    assert (found.word, found.failures, found.outlook) == ("not met", 50, None)
-    assert found.limits.high < 0.997
+def test_a_fixed_sample_shows_nothing_before_it_is_complete() -> None:
+    found = judge(demand_of(1.0), rows([0.5] * 5000), None)
+    assert (found.word, found.limits, found.bound) == ("undecided", (0.0, 1.0), None)
+    table = made_table(100, laws=("ctc",), failing=0.0)
+    require = {"pointing": {"metric": "attitude_max", "below": 1.0, "in": 0.9}}
+    for key, words in (
+        ({"fixed_runs": True}, ("undecided", "met")),
+        ({"design": "latin_hypercube"}, ("undecided", "met")),
+        ({}, ("met", "met")),
+    ):
+        study = Study.model_validate({"laws": ["ctc"], "require": require, **key})
+        some, whole = (verdicts(table, study, runs)[0].word for runs in (101, 100))
+        assert (some, whole) == words
 
 
-@pytest.mark.parametrize("value", [1.0, 2.0, np.nan, np.inf])
+def test_what_is_not_measured_speaks_against_every_verdict() -> None:
+    """A flight that came to its end without the number neither meets nor misses anything."""
+    demand = demand_of(1.0, share=0.9)
+    for kind in (FixedSample, Sequential):
+        found = judge(demand, rows([np.nan] * 50), kind)
+        assert (found.word, found.failures, found.not_measured, found.met) == (
+            "not measured", 0, 50, 0,
+        )  # fmt: skip
+        assert found.limits == (0.0, 1.0)
+        assert found.projected_decision is None
+        assert judge(demand, rows([0.5] * 200 + [np.nan] * 2), kind).word == "met"
+        assert judge(demand, rows([0.5] * 200 + [np.nan] * 20), kind).word == "not measured"
+        assert judge(demand, rows([2.0] * 50 + [np.nan] * 50), kind).word == "not met"
+        mixed = judge(demand, rows([0.5] * 30 + [np.nan] * 5, failed=3), kind)
+        assert (mixed.failures, mixed.not_measured, mixed.met) == (3, 5, 30)
+        low, high = (judge(demand, rows([0.5] * 30 + [v] * 5, failed=3), kind) for v in (2.0, 0.5))
+        assert mixed.limits == (low.limits.low, high.limits.high)
+
+
+def test_the_error_of_all_verdicts_is_the_sum_of_theirs() -> None:
+    requirement = {"metric": "attitude_max", "below": 1e-4, "in": 0.9}
+    study = Study.model_validate({
+        "laws": ["ctc"],
+        "require": {"pointing": requirement, "other": {**requirement, "confidence": 0.99}},
+    })  # fmt: skip
+    table = made_table(20).assign(**{"require.other": 1.0})
+    found = verdicts(table, study, 20)
+    assert len(found) == 6
+    assert family_error(study, found) == pytest.approx(3 * 0.1 + 3 * 0.01)
+    assert family_error(study, 10 * found) == 1.0
+
+
+@pytest.mark.parametrize("value", [1.0, 2.0])
 def test_what_is_not_below_the_limit_is_a_failure(value: float) -> None:
     assert judge(demand_of(1.0), rows([value])).failures == 1
 
@@ -90,7 +141,8 @@ def test_a_requirement_from_below_mirrors_one_from_above() -> None:
 
 def test_no_runs_decide_nothing() -> None:
     found = judge(demand_of(1.0), rows([]))
-    assert (found.word, found.runs, found.needed_without_failure) == ("undecided", 0, 767)
+    assert (found.word, found.runs, found.needed_without_failure) == ("undecided", 0, None)
+    assert judge(demand_of(1.0), rows([]), Sequential).needed_without_failure == 994
     assert found.limits == (0.0, 1.0)
     assert found.bound is None
 
@@ -98,12 +150,12 @@ def test_no_runs_decide_nothing() -> None:
 @settings(max_examples=60)
 @given(
     st.lists(st.floats(0.0, 2.0), min_size=1, max_size=200), st.integers(0, 5),
-    st.floats(0.5, 0.98), st.floats(0.55, 0.95),
+    st.floats(0.5, 0.98), st.floats(0.55, 0.95), st.sampled_from([FixedSample, Sequential]),
 )  # fmt: skip
 def test_bound_limits_and_verdict_say_the_same(
-    values: list[float], failed: int, share: float, confidence: float
+    values: list[float], failed: int, share: float, confidence: float, kind: type[ShareTest]
 ) -> None:
-    found = judge(demand_of(1.0, None, share, confidence), rows(values, failed))
+    found = judge(demand_of(1.0, None, share, confidence), rows(values, failed), kind)
     by_bound = found.bound is not None and found.bound < 1.0
     assert by_bound == (found.word == "met")
     if abs(found.limits.low - share) > 1e-9:
@@ -118,7 +170,7 @@ def test_every_law_at_every_point_of_the_grid_has_its_verdict() -> None:
         "laws": ["ctc"], "vary": {"scenario.sensors": {"grid": ["fine", "coarse"]}},
         "require": {"pointing": {"metric": "attitude_max", "below": 1e-4, "in": 0.9}},
     })  # fmt: skip
-    found = verdicts(table, study)
+    found = verdicts(table, study, 120, ["scenario.sensors"])
     assert [(v.point, v.law) for v in found] == [
         (f"sensors = {point}", law)
         for point in ("fine", "coarse")

@@ -9,11 +9,7 @@ from campaign_tables import made_table
 from scipy.stats import kruskal, qmc, rankdata, spearmanr
 from scipy.stats import sobol_indices as scipy_sobol
 
-from space_robot_control.campaign.verdicts.design import (
-    grid_names,
-    independent_rows,
-    saltelli_values,
-)
+from space_robot_control.campaign.verdicts.design import independent_rows, saltelli_values
 from space_robot_control.campaign.verdicts.sensitivity import rank_correlations, sensitivity
 from space_robot_control.campaign.verdicts.sobol import indices, sobol_indices
 
@@ -171,20 +167,3 @@ def test_a_table_of_the_design_becomes_its_rows() -> None:
     np.testing.assert_array_equal(found, [[0, 1, 2, np.inf, 4], [5, 6, np.nan, 8, 9]])
     assert sorted(independent_rows(table, "saltelli")["run"]) == [0, 4, 5, 9]
     assert len(independent_rows(table, "sobol")) == 9
-
-
-def test_grids_are_told_by_the_file() -> None:
-    table = pd.DataFrame(columns=[f"vary.{name}" for name in (
-        "scenario.sensors", "robot.links[joint1].mass", "robot.links[joint2].mass",
-        "robot.base.mass", "faults.torque_scale@0:all", "faults.torque_scale@0:joint1",
-    )])  # fmt: skip
-    grid, drawn = {"grid": [1, 2]}, {"uniform": [0, 1]}
-    vary = {
-        "scenario.sensors": grid, "robot.links[*].mass": grid, "robot.base.mass": drawn,
-        "faults": {"torque_scale@0:all": grid, "torque_scale@0:joint1": drawn},
-    }  # fmt: skip
-    assert grid_names(table, vary) == [
-        "scenario.sensors", "robot.links[joint1].mass", "robot.links[joint2].mass",
-        "faults.torque_scale@0:all",
-    ]  # fmt: skip
-    assert grid_names(table, {}) == []
