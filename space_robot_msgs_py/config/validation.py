@@ -112,6 +112,8 @@ def short(value: Any) -> str:
         text = repr(value)
     except ValueError:  # a whole number of more digits than Python likes to print
         text = f"a number of type {type(value).__name__}"
+    if "\n" in text:  # an array
+        text = " ".join(text.split())
     return text if len(text) <= 80 else text[:77] + "..."
 
 
