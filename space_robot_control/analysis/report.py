@@ -10,6 +10,7 @@ import numpy as np
 from space_robot_msgs_py.bag.blocks import Metric, blocks_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, within
+from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from .actuation import Latency, MissedDeadlines, Saturation, TorqueLimits
@@ -59,8 +60,10 @@ def analyze(log: FlightLog, actuators: ActuatorSet | None = None) -> dict[str, A
         actuators: of the base, for the sizing; None: those that flew.
 
     Raises:
-        InputError: no tick has both a state and a reference.
+        InputError: no tick has both a state and a reference, or ``log`` is no flight.
     """
+    if not isinstance(log, FlightLog):
+        raise InputError(f"log: a FlightLog was expected (load_bag reads one), got {short(log)}")
     analysis = Analysis(actuators)
     for block in blocks_of(_without_gaps(log)):
         analysis.add(block)

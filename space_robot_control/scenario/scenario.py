@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 from typing_extensions import Self
 
+from space_robot_msgs_py.config.arguments import as_path
 from space_robot_msgs_py.config.validation import one_line, one_of, short
 from space_robot_msgs_py.errors import InputError
 
@@ -112,7 +113,10 @@ class Scenario(FlightPlan):
         """
         if self.controller is None:
             raise InputError("controller is None, so there is nothing to fly: use bench()")
-        return fly_in_process(self.check(), None if bag is None else Path(bag), progress, keep_log)
+        if progress is not None and not callable(progress):
+            raise InputError(f"progress: a function was expected, got {short(progress)}")
+        path = None if bag is None else as_path(bag, "bag")
+        return fly_in_process(self.check(), path, progress, keep_log)
 
     def bench(self) -> Bench:
         """Return a bench that stands at the flight's first tick.

@@ -124,7 +124,7 @@ def one_of(given: str, allowed: Iterable[str], what: str, context: str = "") -> 
         InputError: naming what was given and what is allowed.
     """
     names = list(allowed)
-    if given not in names:
+    if not isinstance(given, str) or given not in names:
         raise InputError(
             f"unknown {what} {short(given)}{context}: choose one of {', '.join(names)}"
         )

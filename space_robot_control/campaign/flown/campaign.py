@@ -13,8 +13,9 @@ from typing import Any
 
 import yaml
 
-from space_robot_msgs_py.config.validation import validate
+from space_robot_msgs_py.config.validation import short, validate
 from space_robot_msgs_py.config.yaml_text import read_file
+from space_robot_msgs_py.errors import InputError
 
 from ..runner import check_scheduler, cores
 from ..store.folder import JOURNAL, MANIFEST, begin_or_resume, held_folder
@@ -32,7 +33,16 @@ class Campaign:
     """Many flights of what a study varies, under each of its laws."""
 
     def __init__(self, study: Study) -> None:
-        """Take a study; what it names is looked up by `run`."""
+        """Take a study; what it names is looked up by `run`.
+
+        Raises:
+            InputError: it is none.
+        """
+        if not isinstance(study, Study):
+            raise InputError(
+                f"study: a Study was expected, got {short(study)}; "
+                "Campaign.load reads a file, Campaign.of a mapping"
+            )
         self.study = study
         self._text = ""
 
@@ -54,7 +64,8 @@ class Campaign:
         Raises:
             InputError: in one line, naming the key.
         """
-        return cls(validate(Study, dict(content), "campaign"))
+        is_mapping = isinstance(content, Mapping)
+        return cls(validate(Study, dict(content) if is_mapping else content, "campaign"))
 
     def run(
         self,

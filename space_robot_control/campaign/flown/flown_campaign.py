@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from typing_extensions import Self
 
 from space_robot_msgs_py.bag.blocks import blocks_of
+from space_robot_msgs_py.config.arguments import as_path
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 
@@ -56,7 +57,7 @@ class FlownCampaign:
         Raises:
             InputError: no campaign is there.
         """
-        return cls(Path(folder))
+        return cls(as_path(folder, "folder"))
 
     @property
     def seed(self) -> int:
