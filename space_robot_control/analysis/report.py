@@ -25,6 +25,7 @@ from .described import (
     navigation_of,
     robot_of,
     sensors_of,
+    start_step_of,
     torque_limits,
 )
 from .estimate_error import EstimateError
@@ -125,6 +126,7 @@ class Analysis:
             **{key: block.flight.get(key) for key in DESCRIBED},
             "faults": [str(fault) for fault in block.flight.get("faults", ())],
             "events": event_labels(block),
+            "start_step": start_step_of(block),
             "sensors": sensors_of(block),
             "navigation": navigation_of(block),
             "actuators": actuators_of(block),

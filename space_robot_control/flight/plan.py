@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Any
 
 from space_robot_msgs_py.config.files import GIVEN
@@ -29,6 +30,7 @@ from .objects import law_given
 from .options import NO_FRICTION, FlightPlan
 from .robots import Robots
 from .software import commit, versions
+from .start_step import start_step
 
 __all__ = ["NO_FRICTION", "Flight", "FlightPlan"]
 
@@ -208,6 +210,18 @@ class Flight:
         found = [name for name, is_prismatic in kinds if is_prismatic]
         return {"prismatic_joints": found} if found else {}
 
+    @cached_property
+    def start_step(self) -> dict[str, Any] | None:
+        """What a start away from the mission's asks of the law; None: nothing worth a remark.
+
+        See `space_robot_control.flight.start_step.StartStep`.
+        """
+        step = start_step(
+            self.robot, self.plant_settings, self.mission, self.law, self.build_controller,
+            self.period, self.ticks,
+        )  # fmt: skip
+        return step and step._asdict()
+
     @property
     def description(self) -> dict[str, Any]:
         """The flight as a bag tells it; enough to fly it again.
@@ -239,6 +253,7 @@ class Flight:
             "parameters": self.parameters,
             "gains_used": self.gains_used,
             **self._prismatic_joints,
+            **({"start_step": self.start_step} if self.start_step else {}),
             **self._robots.description,
             "versions": versions(),
             "commit": commit(),

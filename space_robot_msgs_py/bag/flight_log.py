@@ -198,6 +198,11 @@ class FlightLog:
         return self.flight
 
     @property
+    def defects(self) -> tuple[str, ...]:
+        """What is wrong with the recording, a sentence each: `unfinished` and `damage`."""
+        return (self.unfinished, *self.damage) if self.unfinished else self.damage
+
+    @property
     def whole(self) -> NDArray[np.bool_]:
         """(N,) whether state and reference of a row are there and finite."""
         return self.finite(TOLD) & self.finite(REFERENCE)

@@ -134,7 +134,7 @@ def test_a_view_of_a_record_is_refused(bench: Bench) -> None:
 
     law = Kept(bench.flight.build_controller(bench.flight.laws["ctc"]).law.gain_values, 5e-4)
     for refused in (lambda: copy.deepcopy(law), law.save):
-        with pytest.raises(TypeError, match="Kept.force_of_before is a view of a record"):
+        with pytest.raises(TypeError, match=r"Kept\.force_of_before is a view of a record"):
             refused()
     for copied in COPIES.values():
         with pytest.raises(TypeError, match="copy the object that owns its block"):
