@@ -174,12 +174,12 @@ def _sizing(log: FlightLog, other: ActuatorSet | None) -> Sizing:
 
 
 _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
-    "rms": lambda log: Rms(log.axes, controls_base(log), log.prismatic),
-    "maxima": lambda log: Maxima(log.axes, controls_base(log), log.prismatic),
+    "rms": lambda log: Rms(log.axes, controls_base(log), log.prismatic, log.branches),
+    "maxima": lambda log: Maxima(log.axes, controls_base(log), log.prismatic, log.branches),
     "attitude_drift": AttitudeDrift,
     "navigation_error": NavigationError,
     "chatter": lambda log: Chatter(
-        log.axes, log.timebase.period, controls_base(log), log.prismatic
+        log.axes, log.timebase.period, controls_base(log), log.prismatic, log.branches
     ),
     "ripple": lambda log: Ripple(log, robot_of(log)),
     "settling": Settling,

@@ -253,6 +253,7 @@ class Flight:
             "parameters": self.parameters,
             "gains_used": self.gains_used,
             **self._prismatic_joints,
+            **({"branches": list(branches)} if len(branches := self.robot.branches) > 1 else {}),
             **({"start_step": self.start_step} if self.start_step else {}),
             **self._robots.description,
             "versions": versions(),

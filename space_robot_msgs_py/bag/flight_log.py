@@ -237,6 +237,13 @@ class FlightLog:
         return tuple(name in told for name in (*self.joint_names, *self.passive_names))
 
     @property
+    def branches(self) -> tuple[int, ...]:
+        """Number of joints with motors in each branch on the base; empty: there is one, or unknown."""
+        told = self.flight.get("branches", ())
+        is_list = isinstance(told, (list, tuple)) and all(type(c) is int and c > 0 for c in told)
+        return tuple(told) if is_list and sum(told) == len(self.joint_names) else ()
+
+    @property
     def axes(self) -> int:
         """Controlled coordinates, n+3."""
         return int(self.applied_torque.shape[1])
