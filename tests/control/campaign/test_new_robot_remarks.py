@@ -78,7 +78,7 @@ def test_joints_are_grouped_by_branch(branches: list[int]) -> None:
     n = sum(branches)
     groups = axis_groups(n, True, (), branches)
     axes = [np.arange(n + 3)[index].tolist() for index in groups.values()]
-    assert sum(axes, []) == list(range(n + 3))
+    assert [axis for group in axes for axis in group] == list(range(n + 3))
     assert [len(group) for group in axes] == [3, *branches]
     for name, group in list(zip(groups, axes, strict=True))[1:]:
         first, last = group[0] - 2, group[-1] - 2
