@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -174,6 +174,10 @@ class RobotState:
     def copy(self) -> RobotState:
         """The same state in memory of its own."""
         return RobotState(self.tick, self.block.copy())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle tick and block; the fields of the copy are views of its own block."""
+        return RobotState, (self.tick, self.block.copy())
 
 
 class Reference(Record):

@@ -57,5 +57,6 @@ def load_bag(
         InputError: no bag is there, or no flight in it; one line says why.
     """
     from space_robot_msgs_py.bag.reader import read_flight
+    from space_robot_msgs_py.config.arguments import as_path
 
-    return read_flight(Path(path), remap, namespace=namespace)
+    return read_flight(as_path(path, "path"), remap, namespace=namespace)

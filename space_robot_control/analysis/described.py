@@ -30,6 +30,7 @@ from space_robot_sim.robot.find import find_robot
 from ..controller.gains import build_law
 from ..controller.navigation.low_pass import low_pass_weight
 from ..controller.settings import ControllerNodeSettings
+from ..flight.start_step import StartStep
 from ..laws.trust import check_file, check_law, is_plain
 from .actuation import TorqueLimits
 from .estimate_error import HBar
@@ -46,6 +47,15 @@ DIRECT = "direct"
 
 class NotDescribedError(InputError):
     """The bag does not say what a metric needs; the message says what is missing."""
+
+
+def start_step_of(log: FlightLog) -> dict[str, Any] | None:
+    """Return the `StartStep` that the flight began with; None: none is described."""
+    step = log.flight.get("start_step")
+    zero = StartStep(0.0, "", 0.0, "", "", "", 0.0, 0.0)._asdict()
+    if not isinstance(step, dict) or set(step) != set(zero):
+        return None
+    return step if all(type(step[key]) is type(value) for key, value in zero.items()) else None
 
 
 def robot_of(log: FlightLog) -> Robot:

@@ -142,7 +142,7 @@ class EstimateError(Metric):
         self._errors = EstimateErrors(h_bar, smoothing, rest=log.first_tick == 0)
         self._laws: set[str] = set()
         self._has_estimate = False
-        self._groups = axis_groups(log.axes - 3, controls_base(log), log.prismatic)
+        self._groups = axis_groups(log.axes - 3, controls_base(log), log.prismatic, log.branches)
         self._rms, self._maximum = AxisRms(log.axes), AxisMaximum(log.axes)
 
     def add(self, log: FlightLog, error: Array) -> None:

@@ -31,19 +31,28 @@ UNITS = {
 
 
 def axis_groups(
-    n: int, controls_base: bool = True, prismatic: Sequence[bool] = ()
-) -> dict[str, AxisIndex]:
-    """Divide the n+3 axes into base, inner (1 to 3) and outer joints, by their keys' suffix.
+    n: int, controls_base: bool = True, prismatic: Sequence[bool] = (),
+    branches: Sequence[int] = (),
+) -> dict[str, AxisIndex]:  # fmt: skip
+    """Divide the n+3 axes into the base and groups of joints, by their keys' suffix.
 
-    Joints are divided by their kind instead if some are ``prismatic`` (of n joints at least, or
-    empty: none is), for no number may be of rad and of m. The base is no group of a flight in which
-    nothing turns it.
+    Those of one arm are inner (1 to 3) and outer joints; where there are several ``branches`` on
+    the base, each of so many joints, a branch is a group. Joints are divided by their kind instead
+    if some are ``prismatic`` (of n joints at least, or empty: none is), for no number may be of rad
+    and of m. The base is no group of a flight in which nothing turns it.
     """
     groups: dict[str, AxisIndex] = {"base": slice(0, 3)} if controls_base else {}
     if any(prismatic[:n]):
         for key, is_prismatic in (("revolute", False), ("prismatic", True)):
             found = [3 + joint for joint in range(n) if prismatic[joint] == is_prismatic]
             groups |= {key: found} if found else {}
+        return groups
+    if len(branches) > 1:
+        first = 1
+        for count in branches:
+            last = first + count - 1
+            groups[f"{first}_{last}" if count > 1 else f"{first}"] = slice(first + 2, last + 3)
+            first = last + 1
         return groups
     groups[f"1_{min(n, 3)}"] = slice(3, 3 + min(n, 3))
     if n > 3:
@@ -52,18 +61,20 @@ def axis_groups(
 
 
 def error_columns(
-    axes: int, controls_base: bool = True, prismatic: Sequence[bool] = ()
-) -> dict[str, AxisIndex]:
+    axes: int, controls_base: bool = True, prismatic: Sequence[bool] = (),
+    branches: Sequence[int] = (),
+) -> dict[str, AxisIndex]:  # fmt: skip
     """Return which of the m = n+3 axes each error column of Table V is of."""
-    groups = axis_groups(axes - 3, controls_base, prismatic)
+    groups = axis_groups(axes - 3, controls_base, prismatic, branches)
     return {"attitude" if k == "base" else f"joints_{k}": found for k, found in groups.items()}
 
 
 def torque_columns(
-    axes: int, controls_base: bool = True, prismatic: Sequence[bool] = ()
-) -> dict[str, AxisIndex]:
+    axes: int, controls_base: bool = True, prismatic: Sequence[bool] = (),
+    branches: Sequence[int] = (),
+) -> dict[str, AxisIndex]:  # fmt: skip
     """Return which of the m = n+3 axes each torque column of Table V is of."""
-    groups = axis_groups(axes - 3, controls_base, prismatic)
+    groups = axis_groups(axes - 3, controls_base, prismatic, branches)
     names = {"base": "base_torque", "prismatic": "force_prismatic"}
     return {names.get(k, f"torque_{k}"): found for k, found in groups.items()}
 
@@ -161,10 +172,11 @@ class Rms(Metric):
     """The RMS of errors and torques, by definition and column of Table V."""
 
     def __init__(
-        self, axes: int, controls_base: bool = True, prismatic: Sequence[bool] = ()
-    ) -> None:
+        self, axes: int, controls_base: bool = True, prismatic: Sequence[bool] = (),
+        branches: Sequence[int] = (),
+    ) -> None:  # fmt: skip
         self._error, self._torque = AxisRms(axes), AxisRms(axes)
-        self._kinds = controls_base, prismatic
+        self._kinds = controls_base, prismatic, branches
 
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
@@ -184,10 +196,11 @@ class Maxima(Metric):
     """Largest |error| and |torque| on any axis, by column of Table V."""
 
     def __init__(
-        self, axes: int, controls_base: bool = True, prismatic: Sequence[bool] = ()
-    ) -> None:
+        self, axes: int, controls_base: bool = True, prismatic: Sequence[bool] = (),
+        branches: Sequence[int] = (),
+    ) -> None:  # fmt: skip
         self._error, self._torque = AxisMaximum(axes), AxisMaximum(axes)
-        self._kinds = controls_base, prismatic
+        self._kinds = controls_base, prismatic, branches
 
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
@@ -203,9 +216,11 @@ class Chatter(Metric):
     """Measures how rough the applied torques are, by measure and column of Table V."""
 
     def __init__(
-        self, axes: int, period: float, controls_base: bool = True, prismatic: Sequence[bool] = ()
-    ) -> None:
-        self._period, self._columns = period, torque_columns(axes, controls_base, prismatic)
+        self, axes: int, period: float, controls_base: bool = True,
+        prismatic: Sequence[bool] = (), branches: Sequence[int] = (),
+    ) -> None:  # fmt: skip
+        self._period = period
+        self._columns = torque_columns(axes, controls_base, prismatic, branches)
         self._variation, self._power = TotalVariation(axes), PowerAbove(axes, period)
 
     def add(self, log: FlightLog, error: Array) -> None:
@@ -240,13 +255,14 @@ def _by_column(
     figure: Callable[[Array], Any],
     controls_base: bool,
     prismatic: Sequence[bool],
+    branches: Sequence[int],
 ) -> dict[str, float]:
     """Sum up the numbers of the axes, (m,) each, in every column of Table V."""
     return {
         name: float(figure(values[axes]))
         for values, columns in (
-            (error, error_columns(len(error), controls_base, prismatic)),
-            (torque, torque_columns(len(torque), controls_base, prismatic)),
+            (error, error_columns(len(error), controls_base, prismatic, branches)),
+            (torque, torque_columns(len(torque), controls_base, prismatic, branches)),
         )
         for name, axes in columns.items()
     }

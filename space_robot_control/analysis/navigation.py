@@ -28,7 +28,7 @@ class NavigationError(Metric):
 
     def __init__(self, log: FlightLog) -> None:
         """``log``: the first rows."""
-        self._columns = error_columns(log.axes, controls_base(log), log.prismatic)
+        self._columns = error_columns(log.axes, controls_base(log), log.prismatic, log.branches)
         self._rms, self._maximum = AxisRms(log.axes), AxisMaximum(log.axes)
 
     def add(self, log: FlightLog, error: Array) -> None:

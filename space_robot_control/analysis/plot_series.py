@@ -76,6 +76,8 @@ class PlotSeries(NamedTuple):
     """(K,) of every answer, by the wall clock; None for flights without any."""
     ripple: RippleSpectrum | None
     """None where the robot is not known, or the flight is too short."""
+    torque_axes: dict[str, AxisIndex]
+    """The axes that each column of ``torques`` is of."""
     events: Array
     """Times of what was captured and released, s."""
 
@@ -91,14 +93,16 @@ class PlotSeries(NamedTuple):
         if log.latency_s is not None:
             known = log.latency_s[np.isfinite(log.latency_s)]
             latency = 1e3 * known if len(known) else None
+        torque_axes = torque_columns(axes, of_base, log.prismatic, log.branches)
         return cls(
             tick_times(log),
-            _norms(error, error_columns(axes, of_base, log.prismatic)),
-            _norms(log.applied_torque, torque_columns(axes, of_base, log.prismatic)),
+            _norms(error, error_columns(axes, of_base, log.prismatic, log.branches)),
+            _norms(log.applied_torque, torque_axes),
             BaseTorque.of(log) if of_base else None,
             pointing,
             latency,
             ripple,
+            torque_axes,
             event_times(log),
         )
 

@@ -10,6 +10,7 @@ import numpy as np
 from space_robot_msgs_py.bag.blocks import Metric, blocks_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, within
+from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from .actuation import Latency, MissedDeadlines, Saturation, TorqueLimits
@@ -24,6 +25,7 @@ from .described import (
     navigation_of,
     robot_of,
     sensors_of,
+    start_step_of,
     torque_limits,
 )
 from .estimate_error import EstimateError
@@ -59,8 +61,10 @@ def analyze(log: FlightLog, actuators: ActuatorSet | None = None) -> dict[str, A
         actuators: of the base, for the sizing; None: those that flew.
 
     Raises:
-        InputError: no tick has both a state and a reference.
+        InputError: no tick has both a state and a reference, or ``log`` is no flight.
     """
+    if not isinstance(log, FlightLog):
+        raise InputError(f"log: a FlightLog was expected (load_bag reads one), got {short(log)}")
     analysis = Analysis(actuators)
     for block in blocks_of(_without_gaps(log)):
         analysis.add(block)
@@ -122,6 +126,7 @@ class Analysis:
             **{key: block.flight.get(key) for key in DESCRIBED},
             "faults": [str(fault) for fault in block.flight.get("faults", ())],
             "events": event_labels(block),
+            "start_step": start_step_of(block),
             "sensors": sensors_of(block),
             "navigation": navigation_of(block),
             "actuators": actuators_of(block),
@@ -169,12 +174,12 @@ def _sizing(log: FlightLog, other: ActuatorSet | None) -> Sizing:
 
 
 _METRICS: dict[str, Callable[[FlightLog], Metric]] = {
-    "rms": lambda log: Rms(log.axes, controls_base(log), log.prismatic),
-    "maxima": lambda log: Maxima(log.axes, controls_base(log), log.prismatic),
+    "rms": lambda log: Rms(log.axes, controls_base(log), log.prismatic, log.branches),
+    "maxima": lambda log: Maxima(log.axes, controls_base(log), log.prismatic, log.branches),
     "attitude_drift": AttitudeDrift,
     "navigation_error": NavigationError,
     "chatter": lambda log: Chatter(
-        log.axes, log.timebase.period, controls_base(log), log.prismatic
+        log.axes, log.timebase.period, controls_base(log), log.prismatic, log.branches
     ),
     "ripple": lambda log: Ripple(log, robot_of(log)),
     "settling": Settling,

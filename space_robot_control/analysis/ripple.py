@@ -97,7 +97,7 @@ class Ripple(Metric):
         if 0.5 / self._period <= SLOWEST:
             raise InputError(f"ticks less than {0.5 / SLOWEST:g} s apart are needed")
         self._names = (*BASE_AXES, *log.joint_names)
-        self._columns = torque_columns(log.axes, controls_base(log), log.prismatic)
+        self._columns = torque_columns(log.axes, controls_base(log), log.prismatic, log.branches)
         self._spectrum = PowerSpectrum(log.axes, self._period, round(SEGMENT_S / self._period))
         self._rows = 0
 

@@ -34,7 +34,7 @@ class Settling(Metric):
         """``log``: the first rows; ``band``: unit of the error, for the largest of the axes."""
         self._first_tick, self._period, self._band = log.first_tick, log.timebase.period, band
         self._waypoints = Waypoints()
-        self._columns = error_columns(log.axes, controls_base(log), log.prismatic)
+        self._columns = error_columns(log.axes, controls_base(log), log.prismatic, log.branches)
         self._outside = dict.fromkeys(self._columns, -1)
         """Last row outside the band, by column."""
 

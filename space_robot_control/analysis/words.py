@@ -7,6 +7,7 @@ from typing import Any
 
 from space_robot_msgs_py.bag.law_history import in_words
 
+from ..flight.start_step import sentence
 from .attitude_drift import FREE
 
 Report = dict[str, Any]
@@ -41,6 +42,8 @@ def remarks(report: Report) -> list[str]:
     """Say in sentences what was lost, damaged or left unanswered."""
     lost = {topic: count for topic, count in report["lost"].items() if count}
     found = [f"messages lost: {lost or 'none'}"]
+    if step := report.get("start_step"):
+        found.append(sentence(step))
     if report["events"]:
         found.append(f"events: {', '.join(report['events'])}")
     if drift := report["attitude_drift"]:

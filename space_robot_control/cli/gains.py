@@ -106,6 +106,7 @@ def tune(context: click.Context, /, output: Path, **options: Any) -> None:
     from ..campaign.gain_set import tuned_set, write_set
     from ..flight.terminal import terminal
     from ..tuning.method import Wishes
+    from ..tuning.warning import estimate_remark
 
     names = ("margin", "mass_uncertainty", "bandwidth", "ripple")
     wishes, cases = Wishes(*(options.pop(name) for name in names)), options.pop("cases")
@@ -113,6 +114,8 @@ def tune(context: click.Context, /, output: Path, **options: Any) -> None:
         tuned = tuned_set(options, cases, wishes, status.update)
     for path in write_set(tuned, _command(context), output):
         click.echo(f"wrote {path}", err=True)
+    if remark := estimate_remark(tuned):
+        click.echo(remark, err=True)
 
 
 def _command(context: click.Context) -> str:

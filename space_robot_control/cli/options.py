@@ -315,9 +315,11 @@ def plan_flight(**options: Any) -> Flight:
 def remarks_on(flight: Flight) -> list[str]:
     """Return what there is to say of a flight before it begins.
 
-    Of a robot's file that was repaired, of gains with too little margin (of default gains only
-    where hardware or a fault tries the margin), of joints that are asked too much.
+    Of a robot's file that was repaired, of a start away from the mission's, of gains with too
+    little margin (of default gains only where hardware or a fault tries the margin), of joints
+    that are asked too much.
     """
+    from ..flight.start_step import sentence
     from ..tuning.gain_check import pair_corner
     from ..tuning.warning import limit_remarks, margin_remarks
 
@@ -331,7 +333,10 @@ def remarks_on(flight: Flight) -> list[str]:
         on_thrusters=bool(names.thrusters and not names.wheels), on_thin_margin=tries_margin,
     )  # fmt: skip
     on_limits = limit_remarks(flight.plant.robot, flight.mission_settings)
-    return [*(f"repaired: {text}" for text in flight.robot.repairs), *on_gains, *on_limits]
+    step = flight.start_step
+    on_start = [f"warning: {sentence(step)}"] if step else []
+    repaired = [f"repaired: {text}" for text in flight.robot.repairs]
+    return [*repaired, *on_start, *on_gains, *on_limits]
 
 
 OUTPUT = file_option("--output", help="File to write the JSON to as well.")

@@ -23,15 +23,21 @@ COUNTS = {
     "skipped": "not answered in flight, not sent",
 }
 ALWAYS = ("played", "compared", "equal")
+MOST_STRETCHES = 10
+"""Of a damaged bag that are shown."""
 
 
 def print_replay(report: dict[str, Any], console: Console) -> None:
     """Print the report of `run.Replay`."""
     say(console, title(report))
     print_table(Table.of("", (Column(is_label=True), Column()), counts(report)), console)
-    if first := report["first_difference"]:
+    for text in filter(None, (report["unfinished"], *report["damage"])):
+        say(console, text)
+    if not report["whole"] and len(report["stretches"]) > 1:
+        _print_stretches(report["stretches"], console)
+    if (first := report["first_difference"]) and report["differs"]:
         _print_first(first, console)
-    if not report["identical"]:
+    if not report["identical"] and report["compared"]:
         _print_axes(report, console)
         for reason in report["reasons"] if report["judged"] else ():
             say(console, f"may differ: {reason}")
@@ -68,17 +74,40 @@ def verdict(report: dict[str, Any]) -> str:
     flown, first = report["recorded"], report["first_difference"]
     if not report["has_commands"]:
         return "the bag has no commands to compare with"
-    if report["identical"]:
+    if report["identical"] and (report["whole"] or not report["judged"]):
         return "the commands are the recorded ones, to the last bit"
     if not report["judged"]:
         return (
             f"{words_of(flown)} was flown: the differences are what the other would have "
             "commanded on the same history (open loop)"
         )
-    if first:
+    if first and report["differs"]:
         when = f"tick {first['tick']} (t = {first['time_s']:.4f} s)"
         return f"the commands are not the recorded ones: they differ from {when} on"
+    if first:
+        gap = report["first_gap_s"]
+        before = "the commands before it are the recorded ones, to the last bit; " if gap else ""
+        return (
+            f"the bag is not whole, from t = {gap:.4f} s on: {before}after a gap the controller "
+            "was not sent all that it was sent in flight"
+        )
+    if not report["whole"]:
+        return (
+            "the bag is not whole: the commands that are left are the recorded ones, to the last "
+            "bit, but some are missing"
+        )
     return "the commands are equal as far as they can be compared, but some are missing"
+
+
+def _print_stretches(stretches: list[dict[str, Any]], console: Console) -> None:
+    columns = (
+        Column("from, s", spec=".4f"), Column("to, s", spec=".4f"), Column("compared"),
+        Column("equal"),
+    )  # fmt: skip
+    shown = stretches[:MOST_STRETCHES]
+    rows = [[s["from_s"], s["to_s"], str(s["compared"]), str(s["equal"])] for s in shown]
+    more = "" if len(stretches) == len(shown) else f" (the first {len(shown)} of {len(stretches)})"
+    print_table(Table.of(f"whole stretches of the bag{more}", columns, rows), console)
 
 
 def _print_first(first: dict[str, Any], console: Console) -> None:

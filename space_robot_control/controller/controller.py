@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import RecordFunction
-from space_robot_msgs_py.compiled.records import Block, assign
+from space_robot_msgs_py.compiled.records import Block, RecordOwner, assign
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
@@ -56,12 +56,15 @@ class ControllerSnapshot(NamedTuple):
     """Of the last command."""
 
 
-class Controller:
+class Controller(RecordOwner):
     """Runs one law on a robot's nominal model; the law can be swapped between ticks.
 
     The time-delay pair is kept whatever the law, and a law takes over from the force it finds
     applied: neither a swap nor a controller that starts in the middle of a flight gives a jolt.
+    A copy, also one by `pickle`, has a copy of the law in force and answers the same.
     """
+
+    _views = ("_memory", "_address", "_actuators", "signals", "allocate")
 
     def __init__(
         self, robot: Robot, law: ControlLaw, period: float, acceleration_filter_hz: float = 0.0,
@@ -98,18 +101,26 @@ class Controller:
         if actuators.names:
             how = allocation or AllocationSettings()
             assign(memory, allocation=Allocation.build(robot.n, actuators, how, period))
-        self._memory = memory
-        allocated: Block = self.block["allocation"]
-        self._address = allocated.ctypes.data
-        self._actuators: Array = allocated["command"][0, : len(actuators.names)]
-        """What is asked of each of them."""
+        self._look_into_blocks()
         self.last_command = Command(-1, np.zeros(len(self.names.commanded)))
         """That of the last tick, overwritten by the next."""
         self.valves = slice(robot.n + 3 + actuators.wheel_count, None)
         """The part of a command that opens thrusters."""
+        self.law = law
+
+    def _look_into_blocks(self) -> None:
+        self._memory: ControllerMemory = self.block[0]
+        allocated: Block = self.block["allocation"]
+        self._address = allocated.ctypes.data
+        self._actuators: Array = allocated["command"][0, : len(self.names.actuators)]
+        """What is asked of each of them."""
         self.signals = Signals.view(self.block["signals"])
         """The signals that the law saw at the last tick."""
-        self.law = law
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take over attributes, and look into the block among them."""
+        ControllerMemory.dtype(len(state["names"].joints))  # that compiled code knows its layout
+        super().__setstate__(state)
 
     @property
     def law(self) -> ControlLaw:

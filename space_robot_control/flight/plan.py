@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Any
 
 from space_robot_msgs_py.config.files import GIVEN
@@ -31,6 +32,7 @@ from .objects import law_given
 from .options import NO_FRICTION, FlightPlan
 from .robots import Robots
 from .software import commit, versions
+from .start_step import start_step
 
 __all__ = ["NO_FRICTION", "Flight", "FlightPlan"]
 
@@ -196,6 +198,18 @@ class Flight:
         is_same = believed == actuators(self.plant_settings)
         return {} if is_same else {"controller_base_actuators": believed}
 
+    @cached_property
+    def start_step(self) -> dict[str, Any] | None:
+        """What a start away from the mission's asks of the law; None: nothing worth a remark.
+
+        See `space_robot_control.flight.start_step.StartStep`.
+        """
+        step = start_step(
+            self.robot, self.plant_settings, self.mission, self.law, self.build_controller,
+            self.period, self.ticks,
+        )  # fmt: skip
+        return step and step._asdict()
+
     @property
     def description(self) -> dict[str, Any]:
         """The flight as a bag tells it; enough to fly it again.
@@ -220,6 +234,7 @@ class Flight:
             **({"restart_controller": True} if self.plan.restart_controller else {}),
             "parameters": self.parameters,
             "gains_used": self.gains_used,
+            **({"start_step": self.start_step} if self.start_step else {}),
             **robots,
             "versions": versions(),
             "commit": commit(),

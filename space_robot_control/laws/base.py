@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.records import Field, Record, nested, shaped
+from space_robot_msgs_py.compiled.records import Field, Record, RecordOwner, nested, shaped
 from space_robot_msgs_py.samples import LawInForce
 from space_robot_sim.dynamics.rho_space import RhoSpaceModel
 
@@ -51,11 +51,11 @@ class LawMemory(Record):
     force: Array = per_axis("generalised force F_S", "N m")
 
 
-_BLOCKS, _VIEWS = ("gains_block", "memory_block"), ("gains", "memory", "h_bar")
-"""Attributes of a law: its memory, and those that look into it."""
+_BLOCKS = ("gains_block", "memory_block")
+"""Attributes of a law that hold its memory."""
 
 
-class ControlLaw(ABC):
+class ControlLaw(RecordOwner, ABC):
     """One control law on m = n+3 axes at a fixed period.
 
     A new law is a subclass with a ``name``, its gains, and `force` (or, as `CompiledLaw`, a
@@ -67,6 +67,7 @@ class ControlLaw(ABC):
     gains_type: ClassVar[type[LawGains]]
     memory_type: ClassVar[type[LawMemory]] = LawMemory
     uses_model: ClassVar[bool] = False
+    _views = ("gains", "memory", "h_bar")
 
     def __init__(self, gains: Mapping[str, Array], period: float, axes: int | None = None) -> None:
         """Begin with a memory of zeros.
@@ -91,15 +92,6 @@ class ControlLaw(ABC):
         """s and u of the last tick, and what the law remembers, as attributes."""
         self.h_bar: Array = getattr(self.gains, "h_bar", np.zeros(0))
         """(m,) h_bar of the time-delay estimate; empty if the law has none."""
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Copy and pickle a law without its views of its own memory."""
-        return {name: value for name, value in vars(self).items() if name not in _VIEWS}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Look into the memory that came."""
-        vars(self).update(state)
-        self._look_into_blocks()
 
     def save(self) -> dict[str, Any]:
         """Copy gains, memory and all other attributes, for `restore`."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from typing_extensions import Self
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.config.arguments import as_path
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 
@@ -142,11 +143,12 @@ class FlownFlight:
             InputError: there is no such figure, or it cannot be written.
         """
         drawings = self._figures.drawings()
+        file = None if path is None else as_path(path, "path")
         figure = drawings[one_of(name, drawings, "figure")].draw()
-        if path is not None:
+        if file is not None:
             from ..analysis.figures.style import save_figure  # slow to import
 
-            save_figure(figure, Path(path))
+            save_figure(figure, file)
         return figure
 
     def __repr__(self) -> str:

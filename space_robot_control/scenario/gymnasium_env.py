@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
+from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
 
@@ -75,15 +77,14 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
         if scenario is None:
             scenario = Scenario(controller=None)
         self._draw = None if isinstance(scenario, Scenario) else scenario
-        first = scenario if isinstance(scenario, Scenario) else scenario(np.random.default_rng(0))
+        first = scenario if isinstance(scenario, Scenario) else _drawn(scenario, 0)
+        self._ticks = as_whole_number(ticks_per_step, "ticks_per_step", 1)
+        scale = as_numbers(torque_scale, "torque_scale")
         self.bench = first.bench()
         m = self.bench.axes
-        if ticks_per_step < 1:
-            raise InputError(f"ticks_per_step: 1 or more is allowed, got {ticks_per_step}")
-        scale = np.asarray(torque_scale, dtype=np.float64)
         if scale.shape not in ((), (m,)) or not np.all((scale > 0.0) & np.isfinite(scale)):
             raise InputError(f"torque_scale: 1 or {m} numbers above 0 are allowed, got {scale}")
-        self._ticks, self._scale = ticks_per_step, scale
+        self._scale = scale
         self._high = np.full(3 * m - 3, LARGEST)
         self._high[:3] = 2.0
         self.observation_space = Box(-self._high, self._high, dtype=np.float64)
@@ -95,7 +96,7 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
         """Begin an episode; ``options`` has none."""
         super().reset(seed=seed)
         if self._draw is not None:
-            bench = self._draw(self.np_random).bench()
+            bench = _drawn(self._draw, self.np_random).bench()
             if bench.axes != self.bench.axes:
                 raise InputError(
                     f"scenario: {self.bench.axes} axes were expected, got {bench.axes}"
@@ -105,8 +106,16 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
         return self._observation(state), self._info()
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Hold an action over ``ticks_per_step`` ticks, fewer at the end of the mission."""
-        bench = self.bench
+        """Hold an action over ``ticks_per_step`` ticks, fewer at the end of the mission.
+
+        Raises:
+            InputError: the action is not m numbers, or the episode is over.
+        """
+        bench, action = self.bench, as_numbers(action, "action")
+        if action.shape != self.action_space.shape:
+            raise InputError(
+                f"action: {bench.axes} numbers were expected, got an array of shape {action.shape}"
+            )
         first, torque = bench.tick, self._scale * action
         for _ in range(self._ticks):
             bench.step(torque)
@@ -149,6 +158,21 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
     def _info(self) -> dict[str, Any]:
         bench = self.bench
         return {"time_s": bench.time, "outcome": bench.outcome, "reason": bench.reason}
+
+
+def _drawn(draw: ScenarioDraw, rng: np.random.Generator | int) -> Scenario:
+    """Return a scenario that a function draws.
+
+    Raises:
+        InputError: it is no function, or returns something else.
+    """
+    expected = "scenario: a Scenario, or a function of a random generator that returns one, was"
+    if not callable(draw):
+        raise InputError(f"{expected} expected, got {short(draw)}")
+    scenario = draw(np.random.default_rng(rng))
+    if not isinstance(scenario, Scenario):
+        raise InputError(f"{expected} expected, got a function that returned {short(scenario)}")
+    return scenario
 
 
 if NAME not in gymnasium.registry:

@@ -6,6 +6,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from space_robot_msgs_py.config.arguments import as_path
 from space_robot_msgs_py.config.validation import one_of
 
 from ..flight.replay.outcome import Options, Replay
@@ -29,4 +30,4 @@ def replay(bag: str | Path, **options: Any) -> Replay:
     allowed = [field.name for field in fields(Options) if field.name != "bag"]
     for name in options:
         one_of(name, allowed, "option", " of replay")
-    return run(Options(Path(bag), **options))
+    return run(Options(as_path(bag, "bag"), **options))

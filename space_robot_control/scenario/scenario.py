@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 from typing_extensions import Self
 
+from space_robot_msgs_py.config.arguments import as_path
 from space_robot_msgs_py.config.validation import one_line, one_of, short
 from space_robot_msgs_py.errors import InputError
 
@@ -16,6 +18,7 @@ from ..flight.bench import Bench
 from ..flight.compilation import compile_kernels
 from ..flight.options import FlightPlan
 from ..flight.plan import Flight
+from ..flight.start_step import sentence
 from .flown_flight import FlownFlight
 from .in_process import fly_in_process
 
@@ -100,7 +103,8 @@ class Scenario(FlightPlan):
         """Fly it in this process; the bits are those of ``simulate``, and of ``fly`` in lockstep.
 
         A flight that diverges is a result, too: see `FlownFlight.outcome`. The first flight on a
-        machine compiles what it needs.
+        machine compiles what it needs. A start away from the mission's, for which the law
+        commands far more than the mission asks for, is a `UserWarning`.
 
         Args:
             bag: folder to record to, which must not be there yet.
@@ -112,7 +116,12 @@ class Scenario(FlightPlan):
         """
         if self.controller is None:
             raise InputError("controller is None, so there is nothing to fly: use bench()")
-        return fly_in_process(self.check(), None if bag is None else Path(bag), progress, keep_log)
+        if progress is not None and not callable(progress):
+            raise InputError(f"progress: a function was expected, got {short(progress)}")
+        path, flight = None if bag is None else as_path(bag, "bag"), self.check()
+        if step := flight.start_step:
+            warnings.warn(sentence(step), stacklevel=2)
+        return fly_in_process(flight, path, progress, keep_log)
 
     def bench(self) -> Bench:
         """Return a bench that stands at the flight's first tick.

@@ -14,10 +14,13 @@ from ..laws import ControlLaw
 from ..mission.limits import too_fast, too_strong
 from ..mission.mission import Mission, MissionSettings
 from .inertia import inertia_along, sampled_reference, semi_floating_inertia
+from .method import Tuned
 from .spectrum import LEAST_MARGIN, spectrum
 
 A_LEG = 10
 """Configurations of each leg at least."""
+MUCH_SLOWER = 0.1
+"""Share of the bandwidth of the laws with a model below which a law is weak."""
 COARSE = 0.5
 """s between two configurations: nobody is to wait for a remark."""
 
@@ -67,6 +70,24 @@ def margin_remarks(
             continue
         remarks.append(f"warning: {name}: {why}; see space-robot gains check")
     return remarks
+
+
+def estimate_remark(tuned: Tuned) -> str:
+    """Return why the laws with time-delay estimation are weak in a set, and what to do; else empty.
+
+    They are where their bandwidth is less than a tenth of that of the laws with a model.
+    """
+    if tuned.bandwidth >= MUCH_SLOWER * tuned.model_bandwidth:
+        return ""
+    return (
+        f"The laws with time-delay estimation are weak: {tuned.bandwidth:.2g} rad/s, those with a "
+        f"model {tuned.model_bandwidth:.2g}. Eigenvalues of H_S^-1 h_bar are {tuned.smallest:.2g} "
+        f"to {tuned.largest:.3g} (no diagonal h_bar suits light and heavy directions at once), so "
+        f"the estimate needs a low-pass and lags by {tuned.delay * 1e3:.3g} ms. What helps: fly "
+        "ctc or ctc_smc; panels on hinges without motors as passive joints; a smaller margin or "
+        "mass uncertainty (gains tune --margin, --mass-uncertainty), where drives and masses are "
+        "known that well; a shorter period."
+    )
 
 
 def limit_remarks(robot: Robot, mission: MissionSettings) -> list[str]:

@@ -70,7 +70,7 @@ def flights_page(
     scene = film(flights, times, options.side_by_side or not of_one, options.dark, advance)
     return render(
         options.title or ", ".join(logs), scene,
-        [Shown(flight.name, flight.colour, _told(flight)) for flight in flights],
+        [Shown(f.name, f.colour, _told(f), f.log.defects) for f in flights],
         plots_of(logs, colours), shared_marks(logs), float(times[0]), options.dark,
     )  # fmt: skip
 
@@ -114,8 +114,9 @@ def shown_robot(log: FlightLog, given: str = "") -> Robot:
 
 
 def remarks_on(logs: Mapping[str, FlightLog], robots: Mapping[str, Robot]) -> list[str]:
-    """Return what there is to say of the shapes of some flights' robots, a line each."""
-    found = [line for robot in robots.values() for line in shown_shapes(robot).remarks]
+    """Return what is wrong with the recordings and the shapes of the robots, a line each."""
+    found = [f"{name}: {text}" for name, log in logs.items() for text in log.defects]
+    found += [line for robot in robots.values() for line in shown_shapes(robot).remarks]
     for name, log in logs.items():
         if (urdf := _urdf_of(log)) and not robots[name].visuals:
             found.append(f"a bag has no robot's shapes: --robot {urdf} draws those of that file")

@@ -43,6 +43,8 @@ class Shown(NamedTuple):
     name: str
     colour: str
     what: str
+    warnings: Sequence[str] = ()
+    """What is wrong with its recording, a sentence each."""
 
 
 def render(

@@ -69,7 +69,7 @@ def plots_of(flights: Mapping[str, FlightLog], colours: Sequence[str]) -> list[P
 
 def _columns(log: FlightLog) -> Iterator[tuple[str, tuple[Sequence[str], Array]]]:
     """Yield the columns of Table V: name, names of the axes, values."""
-    torques = torque_columns(log.axes, controls_base(log), log.prismatic)
+    torques = torque_columns(log.axes, controls_base(log), log.prismatic, log.branches)
     names = np.array([*AXES, *log.joint_names])
     for columns, values in (
         (_error_columns(log), tracking_error(log)), (torques, log.applied_torque),
@@ -79,7 +79,7 @@ def _columns(log: FlightLog) -> Iterator[tuple[str, tuple[Sequence[str], Array]]
 
 
 def _error_columns(log: FlightLog) -> Mapping[str, AxisIndex]:
-    return error_columns(log.axes, controls_base(log), log.prismatic)
+    return error_columns(log.axes, controls_base(log), log.prismatic, log.branches)
 
 
 def _extremes(log: FlightLog, values: Array, edges: Array) -> Array:

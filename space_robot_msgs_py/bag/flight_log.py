@@ -198,6 +198,11 @@ class FlightLog:
         return self.flight
 
     @property
+    def defects(self) -> tuple[str, ...]:
+        """What is wrong with the recording, a sentence each: `unfinished` and `damage`."""
+        return (self.unfinished, *self.damage) if self.unfinished else self.damage
+
+    @property
     def whole(self) -> NDArray[np.bool_]:
         """(N,) whether state and reference of a row are there and finite."""
         return self.finite(TOLD) & self.finite(REFERENCE)
@@ -230,6 +235,13 @@ class FlightLog:
         """Of the n joints with motors and then of the p without: True for those that slide."""
         told = self.flight.get("prismatic_joints", ())
         return tuple(name in told for name in (*self.joint_names, *self.passive_names))
+
+    @property
+    def branches(self) -> tuple[int, ...]:
+        """Number of joints with motors in each branch on the base; empty: one branch, or unknown."""
+        told = self.flight.get("branches", ())
+        is_list = isinstance(told, (list, tuple)) and all(type(c) is int and c > 0 for c in told)
+        return tuple(told) if is_list and sum(told) == len(self.joint_names) else ()
 
     @property
     def axes(self) -> int:

@@ -7,11 +7,12 @@ serves both: NumPy is given the layout for one n, Numba the formula for every n.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,13 +95,72 @@ class Record:
 
         They are written in place (``view.name[:] = ...``); fields without a shape are left out.
         """
-        found = SimpleNamespace(address=block.ctypes.data)
+        found = RecordView(address=block.ctypes.data)
         for name, field in cls.fields().items():
             if not isinstance(field, Field):
                 setattr(found, name, field.view(block[name]))
             elif block[name].ndim > 1:
                 setattr(found, name, block[name][0])
         return cast(Self, found)
+
+
+class RecordView(SimpleNamespace):
+    """What `Record.view` returns. It has an address in memory, so it is neither copied nor pickled.
+
+    Copy the object that owns the block instead: a `RecordOwner` makes its views anew.
+    """
+
+    def __reduce__(self) -> Any:
+        """Refuse.
+
+        Raises:
+            TypeError: always.
+        """
+        raise TypeError(
+            "a view of a record cannot be copied or pickled: copy the object that owns its block "
+            "(a law, a controller, a plant, a bench), and leave views out of its __getstate__"
+        )
+
+
+class RecordOwner:
+    """Base of classes that own blocks of records and have attributes that are views of them.
+
+    A copy, made by `copy` or `pickle`, has blocks of its own, and its attributes are views of
+    those; NumPy alone would copy block and views apart, and nothing would connect them.
+    """
+
+    _views: ClassVar[tuple[str, ...]]
+    """Names of the attributes that `_look_into_blocks` sets."""
+
+    def _look_into_blocks(self) -> None:
+        """Set the attributes that are views of the blocks."""
+        raise NotImplementedError
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all attributes but the views.
+
+        Raises:
+            TypeError: another attribute is a view of a block, too.
+        """
+        state = {name: value for name, value in vars(self).items() if name not in self._views}
+        arrays = {name: value for name, value in state.items() if isinstance(value, np.ndarray)}
+        blocks = [array for array in arrays.values() if array.dtype.names]
+        for name, array in arrays.items():
+            if any(array is not block and np.may_share_memory(array, block) for block in blocks):
+                raise TypeError(
+                    f"{type(self).__name__}.{name} is a view of a record, so the object cannot be "
+                    "copied or pickled: read the record where the numbers are needed"
+                )
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take over attributes, and look into the blocks among them."""
+        vars(self).update(state)
+        self._look_into_blocks()
+
+    def __copy__(self) -> Self:
+        """Return a whole copy, as `copy.deepcopy` does: a block has one owner."""
+        return copy.deepcopy(self)
 
 
 def prefix(block: Block, base: np.dtype[Any]) -> Block:

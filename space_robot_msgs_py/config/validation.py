@@ -113,6 +113,8 @@ def short(value: Any) -> str:
         text = repr(value)
     except ValueError:  # a whole number of more digits than Python likes to print
         text = f"a number of type {type(value).__name__}"
+    if "\n" in text:  # an array
+        text = " ".join(text.split())
     return text if len(text) <= 80 else text[:77] + "..."
 
 
@@ -132,7 +134,7 @@ def one_of(
         InputError: naming what was given and what is allowed.
     """
     names = list(allowed)
-    if name not in names:
+    if not isinstance(name, str) or name not in names:
         advice = choices(str(name), names, listing=listing)
         raise InputError(f"unknown {what} {short(name)}{context}: {advice}")
     return name

@@ -41,6 +41,7 @@ def plant_description(
         **({"faults": faults} if faults else {}),
         **({"events": events} if events else {}),
         **({"prismatic_joints": prismatic} if prismatic else {}),
+        **({"branches": list(branches)} if len(branches := robot.branches) > 1 else {}),
         "robot_file": dict(content),
     }
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
+from space_robot_msgs_py.compiled.records import Record, RecordOwner, assign, nested, shaped
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import MOST_WHEELS, Command, RobotState, State
 
@@ -92,13 +92,16 @@ class PlantSnapshot(NamedTuple):
     part_faults: PartFaults
 
 
-class Plant:
+class Plant(RecordOwner):
     """Integrates the robot at a fixed period; a command is held over one tick.
 
     `truth` is the true state at the current tick, `state` what the sensors tell of it; `step`
     applies a command until the next one. Parts fail as ``settings.faults`` says. Momentum and
-    energy follow from `truth` alone (`space_robot_sim.plant.conservation`).
+    energy follow from `truth` alone (`space_robot_sim.plant.conservation`). A copy, also one by
+    `pickle`, flies on to the same bits.
     """
+
+    _views = ("truth", "state", "_draws")
 
     def __init__(self, robot: Robot, settings: PlantSettings, period: float) -> None:
         """Place the robot at rest.
@@ -141,8 +144,7 @@ class Plant:
         memory.x[7 : 7 + robot.joint_count] = positions[list(robot.order)]
         speeds = memory.x[13 + 2 * robot.joint_count :][:MOST_WHEELS]
         mount_wheels(settings.wheels, memory.model, memory.environment.friction, speeds)
-        self.truth = RobotState(0, self.block["truth"])
-        self.state = RobotState(0, self.block["measured"])
+        self._look_into_blocks()
         # at rest: what `write_truth` would say, without waiting for compiled code
         self.truth.quaternion[:] = memory.x[3:7]
         self.truth.joint_positions[:] = positions[:n]
@@ -163,10 +165,29 @@ class Plant:
             and not self._part_faults.are_in("actuators") and not settings.has_message_faults
         )  # fmt: skip
         """True if what comes of `state` can never differ from `truth`."""
-        self._draws = Draws(settings.fault_seed, arrays_of_draws(memory.sensors))
+        self._draws.drawn = settings.fault_seed, -1
         self.next_change = math.inf
         """The first tick to come that needs `begin_tick`: compiled code may fly up to there."""
         self.begin_tick(0)
+
+    def _look_into_blocks(self) -> None:
+        self.truth = RobotState(0, self.block["truth"])
+        """The true state at the current tick."""
+        self.state = RobotState(0, self.block["measured"])
+        """What the sensors tell of it."""
+        self._draws = Draws(0, arrays_of_draws(self.memory.sensors))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all attributes but the views, and what these know beside the block."""
+        return {**super().__getstate__(), "_tick_and_drawn": (self.tick, self._draws.drawn)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take over attributes, and stand at their tick."""
+        PlantMemory.dtype(len(state["names"].joints))  # that compiled code knows the block's layout
+        super().__setstate__({k: v for k, v in state.items() if k != "_tick_and_drawn"})
+        tick, drawn = state["_tick_and_drawn"]
+        self.state.tick = self.truth.tick = tick
+        self._draws.drawn = drawn
 
     @property
     def tick(self) -> int:

@@ -7,6 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from space_robot_msgs_py.config.arguments import as_numbers
+from space_robot_msgs_py.config.validation import short
+from space_robot_msgs_py.errors import InputError
+
 from ..dynamics.aba import aba
 from ..dynamics.crba import crba
 from ..dynamics.free_floating import free_inverse_dynamics_along
@@ -26,9 +30,9 @@ Array = NDArray[np.float64]
 
 
 def _vector(value: ArrayLike, size: int, name: str) -> Array:
-    array = np.ascontiguousarray(value, dtype=np.float64)
+    array = np.ascontiguousarray(as_numbers(value, name))
     if array.shape != (size,):
-        raise ValueError(f"{name} must have shape ({size},), got {array.shape}")
+        raise InputError(f"{name} must have shape ({size},), got {array.shape}")
     return array
 
 
@@ -36,8 +40,16 @@ def _quaternion(value: ArrayLike) -> Array:
     array = _vector(value, 4, "quaternion_wxyz")
     length = norm(array)
     if not abs(length - 1.0) < 1e-6:
-        raise ValueError(f"quaternion_wxyz must have norm 1, got {length}")
+        raise InputError(f"quaternion_wxyz must have norm 1, got {length}")
     return array / length
+
+
+def _checked(robot: Robot) -> Robot:
+    from .robot import Robot
+
+    if not isinstance(robot, Robot):
+        raise InputError(f"robot: a Robot was expected, got {short(robot)}")
+    return robot
 
 
 def generalised_rows(robot: Robot) -> list[int]:
@@ -59,9 +71,9 @@ def mass_matrix(robot: Robot, quaternion_wxyz: ArrayLike, joint_positions: Array
         base part on inertial axes.
 
     Raises:
-        ValueError: an argument has the wrong shape, or the quaternion is not unit.
+        InputError: an argument has another type or shape, or the quaternion is not unit.
     """
-    n, order, rows = robot.joint_count, list(robot.order), generalised_rows(robot)
+    n, order, rows = _checked(robot).joint_count, list(robot.order), generalised_rows(robot)
     out, data = np.empty((n + 6, n + 6)), Data.allocate(n)
     positions = _vector(joint_positions, n, "joint_positions")[order]
     forward_kinematics(robot.model, _quaternion(quaternion_wxyz), positions, data)
@@ -89,9 +101,9 @@ def bias_force(
         (N+6,) force (N), moment about the base CoM (N m) on inertial axes, joint torques (N m).
 
     Raises:
-        ValueError: an argument has the wrong shape, or the quaternion is not unit.
+        InputError: an argument has another type or shape, or the quaternion is not unit.
     """
-    n, order, rows = robot.joint_count, list(robot.order), generalised_rows(robot)
+    n, order, rows = _checked(robot).joint_count, list(robot.order), generalised_rows(robot)
     out, data = np.empty(n + 6), Data.allocate(n)
     positions = _vector(joint_positions, n, "joint_positions")[order]
     velocities = _vector(joint_velocities, n, "joint_velocities")[order]
@@ -124,9 +136,9 @@ def forward_dynamics(
         (N+6,) m/s2 and rad/s2, base part on inertial axes.
 
     Raises:
-        ValueError: an argument has the wrong shape, or the quaternion is not unit.
+        InputError: an argument has another type or shape, or the quaternion is not unit.
     """
-    n, order, rows = robot.joint_count, list(robot.order), generalised_rows(robot)
+    n, order, rows = _checked(robot).joint_count, list(robot.order), generalised_rows(robot)
     out, data = np.empty(n + 6), Data.allocate(n)
     positions = _vector(joint_positions, n, "joint_positions")[order]
     velocities = _vector(joint_velocities, n, "joint_velocities")[order]

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from space_robot_msgs_py.config.validation import read_yaml, validate
+from space_robot_msgs_py.config.arguments import as_numbers, as_path
+from space_robot_msgs_py.config.validation import read_yaml, short, validate
+from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
 from ..dynamics.model import Model
@@ -47,7 +49,8 @@ class Robot(TreeArrays):
         Raises:
             InputError: naming file, key, value given and values allowed.
         """
-        return cls.from_dict(read_yaml(Path(path)), str(path), Path(path).parent)
+        file = as_path(path, "path")
+        return cls.from_dict(read_yaml(file), str(file), file.parent)
 
     @classmethod
     def from_dict(
@@ -56,9 +59,14 @@ class Robot(TreeArrays):
         """Build from the mapping a robot file holds (key ``robot`` at its top), or `content`.
 
         A URDF that it refers to is looked for in ``folder``, the working one if None.
+
+        Raises:
+            InputError: naming ``where``, key, value given and values allowed.
         """
         from .urdf_file import is_urdf, read_urdf_content
 
+        if not isinstance(content, dict):
+            raise InputError(f"{where}: a mapping was expected, got {short(content)}")
         if is_urdf(content):
             return cls._of_urdf(read_urdf_content(content, folder or Path(), where), where)
         if are_numbers(content):
@@ -81,7 +89,8 @@ class Robot(TreeArrays):
         """
         from .urdf import read_urdf
 
-        return cls._of_urdf(read_urdf(path, base, repair), str(path))
+        file = as_path(path, "path")
+        return cls._of_urdf(read_urdf(file, base, repair), str(file))
 
     @classmethod
     def _of_urdf(cls, found: UrdfRobot, where: str) -> Robot:
@@ -108,14 +117,26 @@ class Robot(TreeArrays):
         """Return positions of the n actuated joints in rad, and m of prismatic ones, as given.
 
         ``values`` (..., n) are in degrees, and in m of prismatic joints.
+
+        Raises:
+            InputError: they are no numbers, or not n.
         """
-        given, n = np.asarray(values, dtype=np.float64), self.n
+        given, n = self._of_joints(values), self.n
         return np.where(self.is_prismatic[:n], given, np.radians(given))
 
     def to_degrees(self, values: ArrayLike) -> Array:
         """Invert `from_degrees`."""
-        given, n = np.asarray(values, dtype=np.float64), self.n
+        given, n = self._of_joints(values), self.n
         return np.where(self.is_prismatic[:n], given, np.degrees(given))
+
+    def _of_joints(self, values: ArrayLike) -> Array:
+        numbers = as_numbers(values, "values")
+        if numbers.shape[-1:] != (self.n,):
+            raise InputError(
+                f"values: {self.n} numbers were expected, a joint each, "
+                f"got an array of shape {numbers.shape}"
+            )
+        return numbers
 
     def with_last_link(self, mass: float, inertia: list[float]) -> Robot:
         """Return the robot with a payload on the body that carries the tool, CoM kept.
@@ -123,7 +144,13 @@ class Robot(TreeArrays):
         Args:
             mass: mass of that body, kg.
             inertia: ``[Ixx, Iyy, Izz, Ixy, Ixz, Iyz]`` about its CoM on its axes, kg m2.
+
+        Raises:
+            InputError: they are not one number and six.
         """
+        for value, name, shape in ((mass, "mass", ()), (inertia, "inertia", (6,))):
+            if (got := as_numbers(value, name).shape) != shape:
+                raise InputError(f"{name}: shape {shape} was expected, got {got}")
         masses, tensors, last = self.mass.copy(), self.inertia.copy(), self.tool.body
         masses[last], tensors[last] = mass, inertia_tensor(inertia)
         return replace(self, mass=masses, inertia=tensors)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..metrics import torque_columns, unit_of
+from ..metrics import unit_of
 from ..plot_series import PlotSeries
 from .overlay import words
 from .style import Look, house_style, legend_above, page, scattered
@@ -23,10 +23,7 @@ def ripple(flights: Mapping[str, PlotSeries]) -> Figure:
     known = {name: s.ripple for name, s in flights.items() if s.ripple is not None}
     if not known:
         return page(12.0, "None of these flights has a known robot and is long enough for ripple.")
-    columns = [
-        torque_columns(spectrum.mean_square.shape[1], flights[name].base_torque is not None)
-        for name, spectrum in known.items()
-    ]
+    columns = [flights[name].torque_axes for name in known]
     groups = {key: axes for column in columns for key, axes in column.items()}
     figure = page(18.0 + 55.0 * len(groups))
     panels = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]

@@ -24,6 +24,8 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.errors import InputError
+
 from ..files import make_folder, whole_file
 
 Array = NDArray[np.float64]
@@ -217,6 +219,8 @@ def save_figure(figure: Figure, stem: Path, *, png: bool = True) -> tuple[Path, 
     Raises:
         InputError: they cannot be written.
     """
+    if not stem.name:
+        raise InputError(f"{stem}: is a folder; name the file, without its ending")
     make_folder(stem.parent)
     with warnings.catch_warnings():  # of letters that the font does not have: drawn as boxes
         warnings.filterwarnings("ignore", "Glyph .* missing")

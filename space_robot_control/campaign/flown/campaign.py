@@ -13,8 +13,9 @@ from typing import Any
 
 import yaml
 
-from space_robot_msgs_py.config.validation import validate
+from space_robot_msgs_py.config.validation import short, validate
 from space_robot_msgs_py.config.yaml_text import read_file
+from space_robot_msgs_py.errors import InputError
 
 from ...flight.scratch_folder import ScratchFolder
 from ..runner import check_scheduler, cores
@@ -33,7 +34,16 @@ class Campaign:
     """Many flights of what a study varies, under each of its laws."""
 
     def __init__(self, study: Study) -> None:
-        """Take a study; what it names is looked up by `run`."""
+        """Take a study; what it names is looked up by `run`.
+
+        Raises:
+            InputError: it is none.
+        """
+        if not isinstance(study, Study):
+            raise InputError(
+                f"study: a Study was expected, got {short(study)}; "
+                "Campaign.load reads a file, Campaign.of a mapping"
+            )
         self.study = study
         self._text = ""
 
@@ -55,7 +65,8 @@ class Campaign:
         Raises:
             InputError: in one line, naming the key.
         """
-        return cls(validate(Study, dict(content), "campaign"))
+        is_mapping = isinstance(content, Mapping)
+        return cls(validate(Study, dict(content) if is_mapping else content, "campaign"))
 
     def run(
         self,

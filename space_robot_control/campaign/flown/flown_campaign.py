@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from typing_extensions import Self
 
 from space_robot_msgs_py.bag.blocks import blocks_of
+from space_robot_msgs_py.config.arguments import as_path
 from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError
 
@@ -63,7 +64,7 @@ class FlownCampaign:
         Raises:
             InputError: no campaign is there, or its manifest is damaged.
         """
-        return cls(Path(folder), trust)
+        return cls(as_path(folder, "folder"), trust)
 
     @property
     def seed(self) -> int:

@@ -18,4 +18,5 @@ def rms_table(made: NewRobot) -> Table:
     ]
     seconds = made.mission.waypoint_times[-1]
     title = f"{made.robot.name}, {made.robot.n} joints, {seconds:g} s: RMS, mean of axes"
-    return Table.of(title, columns, rows)
+    table = Table.of(title, columns, rows)
+    return Table(table.title, table.columns, table.groups, made.remarks)

@@ -19,9 +19,11 @@ from ...flight.simulate import fly_blocks
 from ...laws import laws
 from ...mission.mission import MissionSettings
 from ...tuning.method import Wishes
+from ...tuning.warning import estimate_remark
 from ..gain_set import tuned_set, write_set
 from ..runner import cores, run_all
 from .folder import whole_folder
+from .hinges import hinge_remark
 from .motion import mission_text, rest_to_rest
 
 SET, CASE = "tuned", "1"
@@ -49,6 +51,8 @@ class NewRobot:
     mission: MissionSettings
     flights: dict[str, Outcome]
     """By law."""
+    remarks: tuple[str, ...] = ()
+    """Why laws are weak, which joints may be passive; a sentence or more each."""
 
     def report(self) -> dict[str, Any]:
         """Return it as data for JSON."""
@@ -58,6 +62,7 @@ class NewRobot:
             "joints": list(self.robot.joint_names),
             "passive_joints": list(self.robot.passive_names),
             "repaired": list(self.robot.repairs),
+            "remarks": list(self.remarks),
             "duration": self.mission.waypoint_times[-1],
             "laws": {
                 law: {"failure": flown.failure} if flown.failure else {"rms": flown.rms}
@@ -96,7 +101,8 @@ def make_robot(
         names = sorted(laws())
         step(f"flying {', '.join(names)}")
         outcomes = run_all(partial(_fly, place), names, cores())
-    return NewRobot(folder, robot, mission, dict(zip(names, outcomes, strict=True)))
+    remarks = tuple(filter(None, (estimate_remark(tuned), hinge_remark(robot))))
+    return NewRobot(folder, robot, mission, dict(zip(names, outcomes, strict=True)), remarks)
 
 
 def _fly(folder: Path, law: str) -> Outcome:

@@ -34,13 +34,13 @@ class Columns(NamedTuple):
     def of_flight(cls, flight: Flight) -> Columns:
         """Return those of a flight before it is flown."""
         robot = flight.robot
-        kinds = robot.n + 3, flight.controls_base, tuple(robot.is_prismatic)
+        kinds = robot.n + 3, flight.controls_base, tuple(robot.is_prismatic), robot.branches
         return cls(error_columns(*kinds), torque_columns(*kinds))
 
     @classmethod
     def of_log(cls, log: FlightLog) -> Columns:
         """Return those of a flight's rows."""
-        kinds = log.axes, controls_base(log), log.prismatic
+        kinds = log.axes, controls_base(log), log.prismatic, log.branches
         return cls(error_columns(*kinds), torque_columns(*kinds))
 
     @property

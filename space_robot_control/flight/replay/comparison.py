@@ -26,6 +26,20 @@ class Difference(NamedTuple):
         return self.replayed - self.recorded
 
 
+class Stretch(NamedTuple):
+    """Ticks one after the other, of which each was compared."""
+
+    first: int
+    last: int
+    equal: int
+    """Ticks whose commands are equal to the last bit."""
+
+    @property
+    def is_equal(self) -> bool:
+        """True if all are."""
+        return self.equal == self.last - self.first + 1
+
+
 class Comparison:
     """Commands of the ticks that were played."""
 
@@ -86,6 +100,18 @@ class Comparison:
         return bool(len(self.ticks) and self.equal.all() and not missing and not unreadable)
 
     @property
+    def stretches(self) -> list[Stretch]:
+        """The ticks compared, cut where one or more were not."""
+        if not len(self.ticks):
+            return []
+        cuts = np.flatnonzero(np.diff(self.ticks) > 1) + 1
+        parts = zip(np.split(self.ticks, cuts), np.split(self.equal, cuts), strict=True)
+        return [
+            Stretch(int(ticks[0]), int(ticks[-1]), int(np.count_nonzero(equal)))
+            for ticks, equal in parts
+        ]
+
+    @property
     def difference(self) -> Array:
         """(K, m) N m, replayed less recorded."""
         with np.errstate(invalid="ignore"):  # infinite ones
@@ -130,6 +156,15 @@ class Comparison:
                 "recorded": self._recorded.unreadable, "replayed": self._replayed.unreadable,
             },
             "identical": self.is_identical,
+            "stretches": [
+                {
+                    "from_s": round(stretch.first * period, 9),
+                    "to_s": round(stretch.last * period, 9),
+                    "compared": stretch.last - stretch.first + 1,
+                    "equal": stretch.equal,
+                }
+                for stretch in self.stretches
+            ],
             "first_difference": first and {
                 "tick": first[0],
                 "time_s": round(first[0] * period, 9),

@@ -66,8 +66,21 @@ class Replay:
 
     @property
     def has_passed(self) -> bool:
-        """True if nothing is other than expected; another law is not expected to agree."""
-        return self.error is None and (self.comparison.is_identical or not self.is_judged)
+        """True if nothing is other than expected; another law is not expected to agree.
+
+        A bag that is unfinished, or has lost something, does not pass.
+        """
+        is_same = self.comparison.is_identical and self.recording.is_whole
+        return self.error is None and (is_same or not self.is_judged)
+
+    @property
+    def differs(self) -> bool:
+        """True if a command differs though the controller was sent all that it was in flight.
+
+        After a gap in a damaged bag it was not, and may command something else.
+        """
+        first = self.comparison.first_difference()
+        return first is not None and first[0] < self.recording.first_gap
 
     def report(self) -> dict[str, Any]:
         """Everything, for JSON and the table."""
@@ -93,6 +106,11 @@ class Replay:
             **numbers,
             "has_commands": self.recording.has_commands,
             "judged": self.is_judged,
+            "differs": self.differs,
+            "first_gap_s": self._seconds(self.recording.first_gap),
+            "whole": self.recording.is_whole,
+            "unfinished": self.recording.unfinished,
+            "damage": list(self.recording.damage),
             "passed": self.has_passed,
             "reasons": [*self._reasons()],
             "skipped": self.skipped,
@@ -100,6 +118,9 @@ class Replay:
             "ticks_per_s": numbers["played"] / self.elapsed_s if self.elapsed_s else None,
             "error": str(self.error) if self.error else None,
         }
+
+    def _seconds(self, tick: float) -> float | None:
+        return round(tick * self.recording.timebase.period, 9) if math.isfinite(tick) else None
 
     def _reasons(self) -> Iterator[str]:
         """Yield what can keep an unchanged controller from giving the recorded bits again."""
@@ -127,5 +148,8 @@ class Replay:
             yield "the bag does not say what was flown: case, gains and swaps are a guess"
         elif "parameters" not in flight:
             yield "the bag is an older one: parameters changed with --set are not in it"
-        if not self.recording.is_finished:
-            yield "the bag was not finished: played up to its last command"
+        if not self.recording.is_whole:
+            yield (
+                "the bag is not whole: after a gap the controller has not been sent all that it "
+                "was sent in flight"
+            )

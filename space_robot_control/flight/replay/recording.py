@@ -9,13 +9,17 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.accounts import noted_accounts
 from space_robot_msgs_py.bag.description import read_description
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.message_accounting import message_tick, topics_with_allowed_gaps
-from space_robot_msgs_py.bag.reader import first_states, missing, timebase_of
+from space_robot_msgs_py.bag.reader import first_states, missing, read_flight, timebase_of
 from space_robot_msgs_py.bag.robots import REQUIRED
+from space_robot_msgs_py.bag.rows import stamps_of
 from space_robot_msgs_py.bag.selection import Selection
 from space_robot_msgs_py.config.text import printable
 from space_robot_msgs_py.errors import InputError, MessageError
@@ -24,6 +28,11 @@ from space_robot_msgs_py.topics import Topic
 from space_robot_msgs_py.wire.controller_law import LawCodec
 
 from .commands import CommandList, Commands
+
+COMPARED = (
+    *topics.STATES, topics.REFERENCE_JOINTS, topics.REFERENCE_BASE, topics.COMMAND, topics.LAW,
+)  # fmt: skip
+"""Topics of what a controller is sent and answers."""
 
 
 class StateMessages(NamedTuple):
@@ -65,8 +74,11 @@ class Recording:
             self._selection = Selection(self._bag, remap or {}, namespace)
             flight = read_description(self._bag.custom_data())
             counts: Counter[Topic] = Counter()
+            states = _Steps()
             for topic, batch in self._selection.batches():
                 counts[topic] += len(batch)
+                if topic is topics.JOINT_STATES:
+                    states.take(stamps_of(batch))
             for topic in REQUIRED:
                 if not counts[topic]:
                     raise missing(topic, self._bag, self._selection)
@@ -87,10 +99,25 @@ class Recording:
         self.lost_commands = account.missing if account else 0
         """Answers that the recorder knows to have missed: what was answered then is not known."""
         self.is_finished = self._bag.finished
-        self.answers_are_complete = bool(
-            flight
-        ) and topics.COMMAND.full_name not in topics_with_allowed_gaps(flight)
+        excused = topics_with_allowed_gaps(flight)
+        self.answers_are_complete = bool(flight) and topics.COMMAND.full_name not in excused
         """True if the controller has answered every state, so that no answer means a loss."""
+        self.unfinished, self.damage = "", tuple[str, ...]()
+        """As in `FlightLog`."""
+        self._whole: NDArray[np.bool_] | None = None
+        """(N,) whether state and reference of a tick can be read; None: whatever is there is
+        sent."""
+        recorded = self._selection.recorded() or {}
+        is_short = any(recorded.get(topic.full_name, 0) > counts[topic] for topic in COMPARED)
+        has_gaps = not (excused or states.are_even(self.timebase.period_ns, bool(flight)))
+        self.is_whole = not (is_short or has_gaps or self._bag.incomplete) and self.is_finished
+        """True if the bag holds all that the controller was sent and answered, as far as anybody
+        knows."""
+        if self._bag.damage or not self.is_whole:
+            log = read_flight(path, remap, namespace=namespace)
+            self.unfinished, self.damage = log.unfinished, log.damage
+            if "period" in flight and not excused:
+                self._whole = log.as_measured().whole
 
     def commands(self, names: tuple[str, ...]) -> Commands:
         """The recorded answers; ``names``: see `RobotNames.commanded`."""
@@ -112,7 +139,8 @@ class Recording:
     ) -> Iterator[StateMessages]:
         """States of the ticks from ``start`` to before ``stop``, as they were sent.
 
-        One of which any of the ``parts`` is missing, or whose stamp is none, is passed over.
+        One of which any of the ``parts`` is missing, or whose stamp is none, is passed over; of a
+        damaged bag also one without its reference, which the controller would wait for.
         """
         queues: dict[Topic, deque[tuple[int, bytes]]] = {topic: deque() for topic in parts}
         for topic, tick, data in self._of_ticks(*parts):
@@ -123,8 +151,21 @@ class Recording:
                     min(queues.values(), key=lambda queue: queue[0][0]).popleft()
                     continue
                 messages = tuple([queue.popleft()[1] for queue in queues.values()])
-                if start <= ticks[0] < stop:
+                if start <= ticks[0] < stop and self._is_whole(ticks[0]):
                     yield StateMessages(ticks[0], messages)
+
+    @property
+    def first_gap(self) -> float:
+        """The first tick that the controller was sent in flight and cannot be sent now.
+
+        Infinite if there is none, or if nobody knows.
+        """
+        whole = self._whole
+        return math.inf if whole is None else int(np.argmin([*whole, False]))
+
+    def _is_whole(self, tick: int) -> bool:
+        whole = self._whole
+        return whole is None or (tick < len(whole) and bool(whole[tick]))
 
     def references(self, topic: Topic, start: int = 0) -> Iterator[ReferenceMessage]:
         """Messages of half the reference, from the last one that begins by tick ``start``."""
@@ -163,3 +204,25 @@ class Recording:
         except OSError as error:
             why = error.strerror or error
             raise InputError(f"{self.path}: cannot be read ({why})") from None
+
+
+class _Steps:
+    """The steps between the stamps of a topic, which a gap makes uneven."""
+
+    def __init__(self) -> None:
+        self._first = self._last = -1
+        self._found: set[int] = set()
+
+    def take(self, stamps_ns: NDArray[np.int64]) -> None:
+        """Take the next stamps."""
+        if not len(stamps_ns):
+            return
+        if self._first < 0:
+            self._first = self._last = int(stamps_ns[0])
+            stamps_ns = stamps_ns[1:]
+        self._found |= set(np.unique(np.diff(stamps_ns, prepend=self._last)).tolist())
+        self._last = int(stamps_ns[-1]) if len(stamps_ns) else self._last
+
+    def are_even(self, period_ns: int, begins_at_zero: bool) -> bool:
+        """Return True if every tick has its stamp, from the first (or tick 0) on."""
+        return self._found <= {period_ns} and (self._first == 0 or not begins_at_zero)

@@ -70,6 +70,17 @@ class TreeArrays:
         return len(self.joint_names) + len(self.passive_names)
 
     @property
+    def branches(self) -> tuple[int, ...]:
+        """Number of actuated joints in each branch on the base that has any, in their order."""
+        counts: dict[int, int] = {}
+        for joint in range(self.n):
+            body = joint + 1
+            while self.parent[body - 1]:
+                body = int(self.parent[body - 1])
+            counts[body] = counts.get(body, 0) + 1
+        return tuple(counts.values())
+
+    @property
     def all_joint_names(self) -> tuple[str, ...]:
         """Names of all N joints."""
         return self.joint_names + self.passive_names

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import re
+import shutil
 from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
@@ -91,6 +92,26 @@ def test_the_plots_are_the_bags_errors(whole: Path, bags: tuple[Path, Path]) -> 
         assert min(known) == pytest.approx(np.min(error[:, axis + 6]), rel=1e-3)
     torque = by_title["base torque"]["series"][2]["values"]
     assert max(torque) == pytest.approx(np.max(log.applied_torque[:, 2]), rel=1e-3)
+
+
+def test_a_damaged_bag_is_told_on_the_page_and_beside_it(
+    view: Run, bags: tuple[Path, Path], tmp_path: Path
+) -> None:
+    """In the words of `analyze`; of a whole one nothing is said."""
+    cut = tmp_path / "cut"
+    shutil.copytree(bags[1], cut)
+    file = next(cut.glob("*.mcap"))
+    file.write_bytes(file.read_bytes()[: file.stat().st_size * 2 // 3])
+    result = view(bags[1], cut, "--no-open", "--out", tmp_path / "cut.html")
+    assert result.code == 0
+    page = (tmp_path / "cut.html").read_text("utf-8")
+    words = read_flight(cut).defects
+    assert words
+    assert re.findall('<div class="fault">(.*?)</div>', page) == [html.escape(w) for w in words]
+    assert [line for line in result.err.splitlines() if line.startswith("cut: ")] == [
+        f"cut: {text}" for text in words
+    ]
+    assert "short: " not in result.err
 
 
 def test_several_are_drawn_over_one_another_with_a_legend(

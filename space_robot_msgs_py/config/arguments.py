@@ -1,0 +1,60 @@
+"""Arguments of public functions, checked: one line that names the argument and what was given."""
+
+from __future__ import annotations
+
+import operator
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .validation import short
+
+Array = NDArray[np.float64]
+
+
+def as_path(value: Any, name: str) -> Path:
+    """Return a path.
+
+    Raises:
+        InputError: ``value`` is neither text nor a path.
+    """
+    if not isinstance(value, (str, os.PathLike)):
+        raise InputError(f"{name}: a path was expected, got {short(value)}")
+    return Path(value)
+
+
+def as_numbers(value: Any, name: str) -> Array:
+    """Return real numbers as an array of any shape, float64.
+
+    Raises:
+        InputError: ``value`` has anything else, or rows of several lengths.
+    """
+    try:
+        numbers = np.asarray(value)
+    except ValueError:
+        numbers = np.empty(0, dtype=object)
+    if numbers.dtype.kind not in "iuf":
+        raise InputError(f"{name}: numbers were expected, got {short(value)}")
+    return numbers.astype(np.float64)
+
+
+def as_whole_number(value: Any, name: str, least: int, most: int | None = None) -> int:
+    """Return a whole number in a range.
+
+    Raises:
+        InputError: ``value`` is none, or beyond the range.
+    """
+    allowed = f"{least} or more" if most is None else f"{least} to {most}"
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise InputError(f"{name}: a whole number was expected, got {short(value)}") from None
+    if isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{name}: a whole number was expected, got {value}")
+    if number < least or (most is not None and number > most):
+        raise InputError(f"{name}: {allowed} is allowed, got {number}")
+    return number
