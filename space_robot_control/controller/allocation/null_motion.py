@@ -25,7 +25,7 @@ from space_robot_msgs_py.samples import MOST_WHEELS
 
 from .settings import AllocationSettings
 from .wheel_set import LEAST_PART
-from .wheels import FULL, Wheels, room
+from .wheels import FULL, Wheels, momentum_room
 
 Array = NDArray[np.float64]
 
@@ -85,7 +85,8 @@ def add_null_motion(motion: NullMotion, wheels: Wheels) -> None:
         if torque == 0.0:
             continue
         side = 1.0 if torque > 0.0 else -1.0
-        left = max(room(wheels, k, side) - side * wheels.torque[k], 0.0)
+        most = min(wheels.max_torque[k], momentum_room(wheels, k, side))
+        left = max(most - side * wheels.torque[k], 0.0)
         scale = min(scale, min(motion.share * wheels.max_torque[k], left) / abs(torque))
     for k in range(count):
         wheels.torque[k] += scale * motion.torque[k]
