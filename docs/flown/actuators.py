@@ -48,7 +48,7 @@ def _modulated(law: str, gains: str) -> list[str | Text]:
             "actuators": "thrusters", "controller": law, "gains": gains,
             "parameters": {"controller": {"allocation.modulation": modulation}},
         }  # fmt: skip
-        shown = (Number(options, ATTITUDE), Number(options, impulse, ".0f"),
+        shown = (Number(options, ATTITUDE, ".1e"), Number(options, impulse, ".0f"),
                  Number(options, pulses, ".0f"))  # fmt: skip
         cells.append(Text("{}; {}; {}", shown))
     return cells
@@ -88,9 +88,12 @@ PAGE = Page(
             [_free(law) for law in LAWS],
         ),
         Sentence(
-            "the wheel that has most to do gives {} N m with the one, {} with the other.",
+            "the wheel that has most to do gives {} N m with the one, {} with the other, {} with "
+            "the null motion",
             tuple(Number(options, largest_wheel_torque, ".2f") for options in (
                 _on_wheels("tde_stc"),
+                _on_wheels("tde_stc", **{"allocation.wheels": "least_largest",
+                                         "allocation.null_gain": 0.0}),
                 _on_wheels("tde_stc", **{"allocation.wheels": "least_largest"}),
             )),
         ),
@@ -110,6 +113,12 @@ PAGE = Page(
             "with `tactical` {}.",
             (Number({**ON_THRUSTERS, "sensors": "fine"}, ATTITUDE),
              Number({**ON_THRUSTERS, "sensors": "tactical"}, ATTITUDE)),
+        ),
+        Sentence(
+            "a low-pass of 10 Hz (`acceleration_filter_hz`) makes it {}, one of 2 Hz {}",
+            tuple(Number({"actuators": "thrusters", "gains": "robust",
+                          "parameters": {"controller": {"acceleration_filter_hz": corner}}},
+                         ATTITUDE) for corner in (10.0, 2.0)),
         ),
         Sentence(
             "with the errors of ideal torque (tde_stc {}, ideal {})",

@@ -28,6 +28,7 @@ DOCS = Path(__file__).parents[1]
 BEGINNING_S = 0.1
 SAME = 1e-3
 """Relative to the largest of the torques: so much may switching laws make of a last bit."""
+NUMBER = r"(-?\d+(?:\.\d+)?(?:e-?\d+)?|-)"
 Quantity = str | Callable[[FlownFlight], float]
 """Path of a number in `FlownFlight.report`, as ``rms.mean_axis.attitude``, or what computes it."""
 Options = Mapping[str, Any]
@@ -89,7 +90,8 @@ class Table(NamedTuple):
             ValueError: it has no place for it.
         """
         rows = [[c if isinstance(c, str) else c.text(kept) for c in row] for row in self.rows]
-        lines = [f"| {' | '.join(row)} |" for row in (self.head, ["---"] * len(self.head), *rows)]
+        lines = [f"| {' | '.join(row)} |".replace("|  |", "| |") for row in (self.head, *rows)]
+        lines.insert(1, "|---" * len(self.head) + "|")
         place = re.compile(
             rf"(<!-- table {re.escape(self.name)} -->\n\n).*?(\n\n<!-- end -->)", re.S
         )
@@ -115,7 +117,7 @@ class Sentence(NamedTuple):
             ValueError: the words are not in the page, or more than once.
         """
         words = (re.escape(part).replace(r"\ ", r"\s+") for part in self.template.split("{}"))
-        found = list(re.finditer(r"(\S+?)".join(words), page))
+        found = list(re.finditer(NUMBER.join(words), page))
         if len(found) != 1:
             raise ValueError(f"{len(found)} times in the page: {self.template!r}")
         for group in range(len(self.numbers_), 0, -1):
@@ -228,8 +230,10 @@ def _value(flown: FlownFlight, quantity: Quantity) -> float | None:
     if not isinstance(quantity, str):
         return quantity(flown)
     value: Any = flown.report()
-    for part in quantity.split("."):
+    *parts, last = quantity.split(".")
+    for part in parts:
         value = None if value is None else value[part]
+    value = None if value is None else value.get(last)  # no attitude of a base that is free
     return None if value is None else float(f"{value:.6g}")
 
 

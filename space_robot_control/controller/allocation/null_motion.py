@@ -6,7 +6,8 @@ parts of z to zero, which balances the wheels:
 
     u = gain (c n - z)
 
-scaled as a whole to a share of the motors' torques, and to what the demand leaves of them.
+scaled as a whole to a share of the motors' torques, and to what the demand leaves of them: nothing
+in a tick in which it was scaled down itself.
 
 It is linear, so it does not chatter. c keeps each wheel's speed beyond a least one, as far as that
 can be had, and its momentum within `FULL`: it stays as it is until a wheel is about to come too
@@ -71,7 +72,7 @@ def add_null_motion(motion: NullMotion, wheels: Wheels) -> None:
     members = 0.0
     for k in range(count):
         members += healthy.takes_part[k]
-    if motion.gain == 0.0 or members <= healthy.rank:
+    if motion.gain == 0.0 or members <= healthy.rank or wheels.is_scaled == 1.0:
         return
     _find_stored(motion, wheels)
     _choose(motion, wheels)

@@ -51,6 +51,8 @@ class Wheels(Record):
     """Of the motors, asked for at the present tick, N m."""
     wanted: Array = shaped(lambda n: (3,))
     """Scratch: ``A torque`` that is wanted, N m."""
+    is_scaled: float = shaped(lambda n: ())
+    """1 if the demand of the present tick was beyond the motors' torques, else 0."""
     scaled_ticks: float = shaped(lambda n: ())
     """Ticks so far in which the demand was beyond the motors' torques."""
     full_ticks: float = shaped(lambda n: ())
@@ -92,9 +94,9 @@ def share_torque(wheels: Wheels, demand: Array) -> None:
         least_largest(wheels.healthy, count, wanted, torque)
     else:
         least_squares(wheels.healthy, count, wanted, torque)
-    if scale_down(wheels, torque):
-        wheels.scaled_ticks += 1.0
+    wheels.is_scaled = 1.0 if scale_down(wheels, torque) else 0.0
     if not _is_any_full(wheels):
+        wheels.scaled_ticks += wheels.is_scaled
         return
     wheels.full_ticks += 1.0
     free = wheels.free
@@ -111,7 +113,9 @@ def share_torque(wheels: Wheels, demand: Array) -> None:
             if free.takes_part[k] == 1.0:
                 row = free.inverse[k]
                 torque[k] = row[0] * wanted[0] + row[1] * wanted[1] + row[2] * wanted[2]
-        scale_down(wheels, torque)
+        if scale_down(wheels, torque):
+            wheels.is_scaled = 1.0
+    wheels.scaled_ticks += wheels.is_scaled
 
 
 @kernel

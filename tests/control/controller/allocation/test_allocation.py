@@ -129,13 +129,71 @@ def test_thrusters_unload_the_wheels_which_hold_the_base() -> None:
     assert bench.allocation.modulation.pulses.sum() == pulses
 
 
-def test_unloading_begins_above_its_threshold_only() -> None:
-    bench = AllocationBench(thrusters=THRUSTERS, momenta=[13.0, 0.0, -13.0, 0.0], null_gain=0.0)
-    bench.fly(np.zeros(3), 100)
-    assert bench.allocation.unloading.is_under_way == 0.0
-    bench.momenta[0] = 14.5
-    bench.fly(np.zeros(3), 100)
-    assert bench.allocation.unloading.is_under_way == 1.0
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("k", [0, 3])
+def test_unloading_lasts_from_one_threshold_to_the_other(k: int, side: float) -> None:
+    """Shares of each wheel's own largest momentum; the fullest wheel counts."""
+    limits = np.array([40.0, 30.0, 50.0, 20.0])
+    bench = AllocationBench(
+        thrusters=THRUSTERS, wheels={"max_momentum": limits.tolist()}, null_gain=0.0,
+        unload_above=0.7, unload_to=0.3,
+    )  # fmt: skip
+    for share, is_under_way in ((0.69, 0.0), (0.71, 1.0), (0.31, 1.0), (0.29, 0.0), (0.69, 0.0)):
+        bench.momenta[:] = 0.2 * limits
+        bench.momenta[k] = side * share * limits[k]
+        bench.step(np.zeros(3))
+        assert bench.allocation.unloading.is_under_way == is_under_way
+        assert np.any(bench.allocation.of_thrusters) == bool(is_under_way)
+
+
+@pytest.mark.parametrize("count", [3, 4, 6])
+def test_unloading_asks_what_half_of_the_wheels_torque_can_hold(count: int) -> None:
+    """Against the momentum, within the time constant where that leaves the wheels enough."""
+    rng, cut = np.random.default_rng(count), 0
+    for _ in range(20):
+        most = rng.uniform(0.3, 2.0, count)
+        bench = AllocationBench(
+            rng.normal(size=(count, 3)), THRUSTERS, momenta=rng.uniform(-19.0, 19.0, count),
+            wheels={"max_torque": most.tolist()}, unload_above=0.02, unload_to=0.01,
+            unload_time=40.0, null_gain=0.0,
+        )  # fmt: skip
+        wanted = -bench.axes.T @ bench.momenta / 40.0
+        shares = most[:, None] * np.linalg.pinv(bench.axes.T * most)
+        excess = max(1.0, np.max(np.abs(shares @ wanted) / (0.5 * most)))
+        bench.step(np.zeros(3))
+        np.testing.assert_allclose(bench.allocation.of_thrusters, wanted / excess, atol=1e-9)
+        cut += excess > 1.0
+    assert 0 < cut < 20
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_thrusters_are_asked_for_what_the_axes_left_cannot_give(seed: int) -> None:
+    """Any two wheels: the part of the demand that is across both; the wheels get all of it."""
+    rng = np.random.default_rng(seed)
+    bench = AllocationBench(rng.normal(size=(4, 3)), THRUSTERS, failure_ticks=5, null_gain=0.0)
+    bench.failed = set(rng.permutation(4)[:2].tolist())
+    demand = rng.normal(size=3) * 0.1
+    bench.fly(demand, 20)
+    left = bench.axes[sorted({0, 1, 2, 3} - bench.failed)]
+    across = demand - np.linalg.pinv(left) @ (left @ demand)
+    np.testing.assert_allclose(bench.allocation.of_thrusters, across, atol=1e-9)
+
+
+def test_wheels_hold_against_pulses_when_these_come() -> None:
+    """Valves are late by some ticks, each by its own; so is what the wheels do about them."""
+    delays = np.arange(12) % 5
+    bench = AllocationBench(
+        thrusters={**THRUSTERS, "force": [0.2], "delay": (delays * PERIOD).tolist()},
+        momenta=[15.0, 0.0, -15.0, 0.0], null_gain=0.0, unload_above=0.1, unload_to=0.05,
+    )  # fmt: skip
+    opened = []
+    for tick in range(200):
+        bench.step([0.05, -0.02, 0.03])
+        opened.append(bench.command[4:] > 0.0)
+        comes = [opened[tick - d][j] if tick >= d else False for j, d in enumerate(delays)]
+        given = -bench.command[:4] @ bench.axes + np.array(comes) @ bench.torques
+        np.testing.assert_allclose(given, [0.05, -0.02, 0.03], atol=1e-12)
+    assert np.any(opened)
 
 
 def test_ideal_base_has_no_allocation() -> None:

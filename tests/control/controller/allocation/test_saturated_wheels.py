@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from allocation_bench import PERIOD, AllocationBench
 from numpy.typing import NDArray
-from paths import CONFIG
 from scipy.optimize import linprog
-from wheel_layouts import PYRAMID
 
 from space_robot_control.controller.allocation.believed_actuators import believed_actuators
 from space_robot_control.controller.allocation.diagnosis import diagnose
@@ -52,18 +50,32 @@ def test_demand_beyond_the_motors_keeps_its_direction(paper_robot: Robot, sharin
             null_gain=0.0,
         )  # fmt: skip
         scaled = 0
-        for _ in range(100):
+        for k in range(60):
             demand = rng.normal(size=3) * most.max() * 10.0 ** rng.uniform(-1.0, 5.0)
             bench.momenta[:] = 0.0
             given = bench.step(demand)
-            share = largest_share(bench.axes, most, demand, sharing)
-            np.testing.assert_allclose(given, share * demand, rtol=0.0, atol=1e-9 * most.max())
+            share = given @ demand / (demand @ demand)
+            assert np.abs(given - share * demand).max() < 1e-13 * most.max()
             loads = np.abs(bench.command) / most
             assert np.all(np.abs(bench.command) <= most)
-            assert share == 1.0 or np.max(loads) == 1.0
-            scaled += share < 1.0
-        assert diagnose(bench.allocation).values["demand_scaled_ticks"] == scaled > 50
+            assert share > 1.0 - 1e-12 or np.max(loads) == 1.0
+            scaled += share < 1.0 - 1e-12
+            if k % 12 == 0:
+                expected = largest_share(bench.axes, most, demand, sharing)
+                assert share == pytest.approx(expected, rel=1e-9)
+        assert diagnose(bench.allocation).values["demand_scaled_ticks"] == scaled > 30
         assert diagnose(bench.allocation).values["wheel_full_ticks"] == 0
+
+
+def test_a_demand_beyond_the_motors_leaves_the_null_motion_nothing() -> None:
+    """So a motor that is asked for all it has is told as saturated."""
+    momenta = [8.0, -5.0, 8.0, -5.0]
+    bench = AllocationBench(momenta=momenta, null_gain=1.0, null_share=1.0)
+    alone = AllocationBench(momenta=momenta, null_gain=0.0)
+    for demand in ([30.0, -10.0, 5.0], [0.3, -0.1, 0.2], [-1e3, 0.0, 0.0]):
+        bench.step(demand)
+        alone.step(demand)
+        assert np.array_equal(bench.command, alone.command) is (demand[0] != 0.3)
 
 
 def test_a_wheel_without_a_limit_is_scaled_with_the_others() -> None:
