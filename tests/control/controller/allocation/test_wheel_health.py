@@ -109,8 +109,9 @@ def test_commands_that_do_not_arrive_blame_no_wheel() -> None:
 
 
 def test_a_failed_wheel_is_out_of_everything() -> None:
-    """Its momentum unloads nothing, the null motion does not move it, it is asked for nothing."""
-    bench = AllocationBench(np.vstack([np.eye(3), np.ones((2, 3))]), failure_ticks=5)
+    """Its momentum counts for nothing, and it is asked for nothing, whichever others are full."""
+    axes = np.vstack([np.eye(3), np.ones((2, 3))])
+    bench = AllocationBench(axes, failure_ticks=5, null_gain=0.0)
     bench.failed = {3}
     bench.fly(DEMAND, 20)
     bench.momenta[3] = 15.0
@@ -118,3 +119,7 @@ def test_a_failed_wheel_is_out_of_everything() -> None:
     np.testing.assert_allclose(given, DEMAND, atol=1e-12)
     assert bench.command[3] == 0.0
     assert bench.allocation.wheels.momentum[3] == 0.0
+    bench.momenta[:3] = -19.8  # all the others but one are full, too
+    bench.step(np.array([0.1, 0.1, 0.1]))
+    assert bench.command[3] == 0.0
+    assert abs(bench.command[4]) == pytest.approx(0.1 * np.sqrt(3.0))
