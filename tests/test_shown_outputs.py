@@ -173,27 +173,6 @@ def test_the_page_on_navigation_has_what_its_commands_give() -> None:
     assert page.count("diverges at 0.1 s") == 3
 
 
-def test_the_page_on_bases_has_what_its_commands_give() -> None:
-    """Two laws' rows on three bases, and the row of `robust` gains on thrusters."""
-    page = (ROOT / "docs/explanation/base_actuators.md").read_text("utf-8")
-    sets = [f"--actuators={name}" for name in ("wheels", "small_wheels", "none")]
-    studies = {
-        "": (*sets, "--law=ctc_smc", "--law=tde_stc"),
-        ", `robust`": ("--actuators=thrusters", "--law=tde_stc=robust"),
-    }
-    for suffix, options in studies.items():
-        for cell in json.loads(run("sweep", "--json", *options))["cells"]:
-            title = re.escape(f"{cell['actuators']}{suffix}")
-            row = re.search(rf"^\| {title} \| {cell['controller']} \|(.*)\|$", page, re.MULTILINE)
-            assert row is not None
-            for name, text in zip(SWEPT, row.group(1).split("|"), strict=True):
-                if name in cell["metrics"]:
-                    found = cell["metrics"][name]["median"]
-                    assert float(text) == pytest.approx(found, rel=0.06)
-                else:
-                    assert text.strip() == "-"
-
-
 def test_the_page_on_campaigns_has_what_its_commands_print(tmp_path: Path) -> None:
     """The shipped campaign of 20 runs, and one of its flights again."""
     folder = str(tmp_path / "a")

@@ -43,8 +43,14 @@ def largest_momentum(wheels: WheelSettings) -> Array:
 
 
 def wheel_shares(wheels: WheelSettings) -> Array:
-    """(W, 3) what each wheel has of a torque or momentum by the pseudo-inverse of their axes."""
-    return np.asarray(np.linalg.pinv(wheels.unit_axes.T))
+    """(W, 3) what each wheel has of a torque or momentum by least squares of the loads.
+
+    As the allocation shares it: a load is a torque over the motor's largest one; where a motor has
+    no limit, all count alike.
+    """
+    limit = wheels.limits("max_torque")
+    load = limit if np.all(np.isfinite(limit)) else np.ones(wheels.count)
+    return np.asarray(load[:, None] * np.linalg.pinv(wheels.unit_axes.T * load))
 
 
 def _largest(columns: Array, low: Array, high: Array) -> Array:

@@ -1,7 +1,7 @@
 """What is asked of each part of a set of actuators: of those that flew, or of others.
 
 Of those that flew their own columns tell. Of others it follows from the demand on the base: wheels
-share it by the pseudo-inverse of their axes, thrusters as the least propellant asks.
+share it by least squares of their loads, thrusters as the least propellant asks.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.samples import MOST_THRUSTERS
 
 from .settings import AllocationSettings
-from .thrusters import Thrusters, along, find_times, within_reach
+from .thrusters import Thrusters, along, find_times, forget_missed, within_reach
 
 Array = NDArray[np.float64]
 
@@ -101,6 +101,7 @@ def modulate(modulation: Modulation, thrusters: Thrusters, tick: int, demand: Ar
         modulation.slot_left = 0.0
         open_for[:] = 0.0
         thrusters.is_open[:] = 0.0
+        forget_missed(thrusters, int(modulation.tick), tick)
     modulation.tick = tick
     for i in range(3):
         modulation.demand[i] = demand[i]

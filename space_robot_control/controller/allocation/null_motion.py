@@ -6,7 +6,8 @@ parts of z to zero, which balances the wheels:
 
     u = gain (c n - z)
 
-scaled as a whole to a share of the motors' torques, and to what the demand leaves of them.
+scaled as a whole to a share of the motors' torques, and to what the demand leaves of them: nothing
+in a tick in which it was scaled down itself.
 
 It is linear, so it does not chatter. c keeps each wheel's speed beyond a least one, as far as that
 can be had, and its momentum within `FULL`: it stays as it is until a wheel is about to come too
@@ -25,7 +26,7 @@ from space_robot_msgs_py.samples import MOST_WHEELS
 
 from .settings import AllocationSettings
 from .wheel_set import LEAST_PART
-from .wheels import FULL, Wheels, room
+from .wheels import FULL, Wheels, momentum_room
 
 Array = NDArray[np.float64]
 
@@ -71,7 +72,7 @@ def add_null_motion(motion: NullMotion, wheels: Wheels) -> None:
     members = 0.0
     for k in range(count):
         members += healthy.takes_part[k]
-    if motion.gain == 0.0 or members <= healthy.rank:
+    if motion.gain == 0.0 or members <= healthy.rank or wheels.is_scaled == 1.0:
         return
     _find_stored(motion, wheels)
     _choose(motion, wheels)
@@ -85,7 +86,8 @@ def add_null_motion(motion: NullMotion, wheels: Wheels) -> None:
         if torque == 0.0:
             continue
         side = 1.0 if torque > 0.0 else -1.0
-        left = max(room(wheels, k, side) - side * wheels.torque[k], 0.0)
+        most = min(wheels.max_torque[k], momentum_room(wheels, k, side))
+        left = max(most - side * wheels.torque[k], 0.0)
         scale = min(scale, min(motion.share * wheels.max_torque[k], left) / abs(torque))
     for k in range(count):
         wheels.torque[k] += scale * motion.torque[k]

@@ -126,3 +126,16 @@ def expect_torque(thrusters: Thrusters, tick: int, torque: Array) -> None:
     for i in range(3):
         torque[i] = due[i]
         due[i] = 0.0
+
+
+@kernel
+def forget_missed(thrusters: Thrusters, last: int, tick: int) -> None:
+    """Clear the torque expected between the ``last`` tick and ``tick``, for nobody took it.
+
+    What is commanded and comes later stays; of a clock that goes back all is cleared.
+    """
+    missed = min(tick - last - 1, LONGEST_DELAY) if tick > last else LONGEST_DELAY
+    for k in range(missed):
+        row = thrusters.expected[(tick - 1 - k) % LONGEST_DELAY]
+        for i in range(3):
+            row[i] = 0.0

@@ -51,6 +51,8 @@ class Wheels(Record):
     """Of the motors, asked for at the present tick, N m."""
     wanted: Array = shaped(lambda n: (3,))
     """Scratch: ``A torque`` that is wanted, N m."""
+    is_scaled: float = shaped(lambda n: ())
+    """1 if the demand of the present tick was beyond the motors' torques, else 0."""
     scaled_ticks: float = shaped(lambda n: ())
     """Ticks so far in which the demand was beyond the motors' torques."""
     full_ticks: float = shaped(lambda n: ())
@@ -92,9 +94,9 @@ def share_torque(wheels: Wheels, demand: Array) -> None:
         least_largest(wheels.healthy, count, wanted, torque)
     else:
         least_squares(wheels.healthy, count, wanted, torque)
-    if scale_down(wheels, torque):
-        wheels.scaled_ticks += 1.0
+    wheels.is_scaled = 1.0 if scale_down(wheels, torque) else 0.0
     if not _is_any_full(wheels):
+        wheels.scaled_ticks += wheels.is_scaled
         return
     wheels.full_ticks += 1.0
     free = wheels.free
@@ -111,7 +113,9 @@ def share_torque(wheels: Wheels, demand: Array) -> None:
             if free.takes_part[k] == 1.0:
                 row = free.inverse[k]
                 torque[k] = row[0] * wanted[0] + row[1] * wanted[1] + row[2] * wanted[2]
-        scale_down(wheels, torque)
+        if scale_down(wheels, torque):
+            wheels.is_scaled = 1.0
+    wheels.scaled_ticks += wheels.is_scaled
 
 
 @kernel
@@ -124,28 +128,39 @@ def least_squares(wheels: WheelSet, count: int, wanted: Array, torque: Array) ->
 
 @kernel
 def scale_down(wheels: Wheels, torque: Array) -> bool:
-    """Scale all torques to what the motors can give; return whether they could not."""
+    """Scale all torques to what the motors can give; return whether they could not.
+
+    No torque is above its limit by so much as a rounding, and the largest one is exactly at it.
+    """
     excess = 1.0
     for k in range(int(wheels.count)):
         excess = max(excess, abs(torque[k]) / wheels.max_torque[k])
     if excess > 1.0:
         for k in range(int(wheels.count)):
-            torque[k] /= excess
+            load = torque[k] / wheels.max_torque[k]
+            if load != 0.0:
+                torque[k] = load / excess * wheels.max_torque[k]
+            else:  # no limit
+                torque[k] /= excess
     return excess > 1.0
 
 
 @kernel
-def room(wheels: Wheels, k: int, side: float) -> float:
-    """Return the largest torque on wheel ``k`` in the direction ``side`` (1 or -1), N m."""
+def momentum_room(wheels: Wheels, k: int, side: float) -> float:
+    """Return the torque that fills wheel ``k`` up to `FULL` within a tick, N m.
+
+    ``side``: direction of the torque, 1 or -1. The motor's largest torque is not looked at.
+    """
     left = (FULL * wheels.max_momentum[k] - side * wheels.momentum[k]) / wheels.period
-    most: float = min(wheels.max_torque[k], max(left, 0.0))
-    return most
+    room: float = max(left, 0.0)
+    return room
 
 
 @subroutine
 def _is_any_full(wheels: Wheels) -> bool:
     for k in range(int(wheels.count)):
-        if abs(wheels.torque[k]) > room(wheels, k, 1.0 if wheels.torque[k] > 0.0 else -1.0):
+        side = 1.0 if wheels.torque[k] > 0.0 else -1.0
+        if abs(wheels.torque[k]) > momentum_room(wheels, k, side):
             return True
     return False
 
@@ -156,7 +171,7 @@ def _take_out_full(wheels: Wheels) -> bool:
     is_any = False
     for k in range(int(wheels.count)):
         side = 1.0 if wheels.torque[k] > 0.0 else -1.0
-        left = room(wheels, k, side)
+        left = momentum_room(wheels, k, side)
         if wheels.free.takes_part[k] == 1.0 and abs(wheels.torque[k]) > left:
             wheels.torque[k] = side * left
             wheels.free.takes_part[k] = 0.0

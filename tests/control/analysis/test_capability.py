@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 from actuator_sets import PYRAMID, flat, hardware, random_thrusters
+from allocation_bench import AllocationBench
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
@@ -92,3 +93,18 @@ def test_a_torque_at_the_edge_is_the_whole_share() -> None:
     np.testing.assert_allclose(
         found.propellant(torque), rate * np.array([1.0, 1.0, 1.0, 0.5, 0.5, 0.5, 3.0])
     )
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(3, 8))
+def test_wheels_share_as_the_allocation_does(seed: int, count: int) -> None:
+    """Motors of unequal torques: `allocate` by least squares, and what sizing says of them."""
+    rng = np.random.default_rng(seed)
+    most, demand = rng.uniform(0.1, 5.0, count), rng.normal(size=3) * 1e-3
+    bench = AllocationBench(
+        rng.normal(size=(count, 3)), null_gain=0.0, wheels={"max_torque": most.tolist()}
+    )
+    bench.step(demand)
+    shares = wheel_shares(hardware(wheels={
+        "axes": flat(bench.axes), "max_torque": most.tolist(),
+    }).wheels)  # fmt: skip
+    np.testing.assert_allclose(-shares @ demand, bench.command, rtol=1e-6, atol=1e-12)

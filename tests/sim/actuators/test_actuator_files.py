@@ -115,8 +115,11 @@ def test_a_bad_number_is_one_line_with_file_and_key(tmp_path: Path, text: str, w
          "wheels.rotor_inertia: the base's inertia must be larger than its rotors', without them "
          "its smallest principal moment is -1 kg m2$"),
         (HARDWARE + f"wheels: {{axes: {CROSS}, rotor_inertia: [0.1], max_momentum: [1], "
-         "initial_speed: [5, 20, 5]}", "wheels.initial_speed stores 2 N m s in wheel_2, "
+         "initial_speed: [5, -20, 5]}", "wheels.initial_speed stores 2 N m s in wheel_2, "
          "max_momentum is 1$"),
+        (HARDWARE + f"wheels: {{axes: {CROSS}, rotor_inertia: [0.1, 0.1, 0.3], max_momentum: "
+         "[0, 1, 2], initial_speed: [99, -10, 8]}", "wheels.initial_speed stores 2.4 N m s in "
+         "wheel_3, max_momentum is 2$"),
         (HARDWARE + "thrusters: {positions: [1, 0, 0], directions: [1, 0, 0, 0, 1, 0]}",
          "thrusters.directions are those of 2 thrusters, thrusters.positions of 1$"),
         (HARDWARE + "thrusters: {positions: [1, 0, 0], directions: [1, 0, 0]}",

@@ -6,115 +6,29 @@ from typing import Any
 
 import numpy as np
 import pytest
+from allocation_bench import INERTIA, PERIOD, AllocationBench
 from numpy.typing import NDArray
 from wheel_layouts import PYRAMID
 
-from space_robot_control.controller.allocation.allocation import Allocation, allocate
+from space_robot_control.controller.allocation.allocation import Allocation
 from space_robot_control.controller.allocation.settings import AllocationSettings
-from space_robot_msgs_py.samples import State
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
 
 Array = NDArray[np.float64]
 
-PERIOD = 5e-4
-INERTIA = 0.02
 
-
-class Bench:
-    """A base that does not turn, whose wheels do: momentum is inertia times speed."""
-
-    def __init__(
-        self, axes: Any = PYRAMID, thrusters: Any = None, momenta: Any = 0.0, latency: int = 0,
-        wheels: Any = None, **settings: Any,
-    ) -> None:  # fmt: skip
-        hardware: dict[str, Any] = {"base_actuation": "hardware"}
-        if axes is not None:
-            hardware["wheels"] = {
-                "axes": np.ravel(axes).tolist(), "rotor_inertia": [INERTIA], "max_torque": [1.0],
-                "max_momentum": [20.0], **(wheels or {}),
-            }  # fmt: skip
-        if thrusters:
-            hardware["thrusters"] = thrusters
-        believed = BaseActuatorSettings(**hardware)
-        self.count, self.thruster_count = believed.wheel_count, believed.thruster_count
-        self.axes, self.torques = believed.wheels.unit_axes, believed.thrusters.torques
-        self.allocation = Allocation.build(
-            1, believed, AllocationSettings(**{"least_speed": 0.0, **settings}), PERIOD
-        )
-        self.state = State.allocate(1)
-        self.momenta = np.zeros(self.count) + momenta
-        self.failed: set[int] = set()
-        self.tick = 0
-        self._late = [np.zeros(self.count)] * latency
-
-    def step(self, demand: Any) -> Array:
-        """Return the torque that the base got over a tick."""
-        state = self.state
-        state.wheel_velocities[: self.count] = self.momenta / INERTIA
-        allocation = self.allocation
-        allocation.reported_speeds[:] = state.wheel_velocities
-        allocation.reported_torques[:] = state.wheel_torques
-        allocation.demand[:] = demand
-        allocate(allocation, float(self.tick))
-        self.command = command = allocation.command[: self.count + self.thruster_count].copy()
-        self._late.append(command[: self.count].copy())
-        given = self._late.pop(0)
-        given[list(self.failed)] = 0.0
-        self.momenta += given * PERIOD
-        state.wheel_torques[: self.count] = given
-        self.tick += 1
-        opened = command[self.count :] > 0.0
-        return np.asarray(opened @ self.torques - given @ self.axes)
-
-    def fly(self, demand: Any, ticks: int) -> Array:
-        return np.array([self.step(demand) for _ in range(ticks)])
-
-
-@pytest.mark.parametrize("wheels", ["pseudo_inverse", "least_largest"])
-def test_wheels_give_the_torque(wheels: str) -> None:
+@pytest.mark.parametrize("sharing", ["pseudo_inverse", "least_largest"])
+def test_wheels_give_the_torque(sharing: str) -> None:
     rng = np.random.default_rng(1)
     for axes in (PYRAMID, np.eye(3), rng.normal(size=(8, 3))):
-        bench = Bench(axes, wheels=None, null_gain=0.0, **{"failure_ticks": 100})
-        bench.allocation.wheels.is_least_largest = float(wheels == "least_largest")
+        bench = AllocationBench(axes, sharing=sharing, null_gain=0.0)
         for _ in range(10):
             demand = rng.normal(size=3) * 0.1
             np.testing.assert_allclose(bench.step(demand), demand, atol=1e-13)
 
 
-@pytest.mark.parametrize("is_least_largest", [0.0, 1.0])
-def test_demand_beyond_the_motors_keeps_its_direction(is_least_largest: float) -> None:
-    bench, demand = Bench(null_gain=0.0), np.array([30.0, -10.0, 5.0])
-    bench.allocation.wheels.is_least_largest = is_least_largest
-    given = bench.step(demand)
-    assert np.abs(bench.command).max() == pytest.approx(1.0)
-    np.testing.assert_allclose(np.cross(given, demand), 0.0, atol=1e-12)
-    assert given @ demand > 0.0
-    assert bench.allocation.wheels.scaled_ticks == 1.0
-
-
-def test_full_wheel_leaves_its_axis_alone() -> None:
-    """Of three wheels one is full: the other axes lose nothing, and it can be slowed down."""
-    bench = Bench(np.eye(3), momenta=[-19.8, 0.0, 0.0])
-    np.testing.assert_allclose(bench.step([0.5, 0.3, -0.2]), [0.0, 0.3, -0.2], atol=1e-12)
-    np.testing.assert_allclose(bench.step([-0.5, 0.3, -0.2]), [-0.5, 0.3, -0.2], atol=1e-12)
-    assert bench.allocation.wheels.full_ticks == 1.0
-
-
-def test_others_take_over_from_a_full_wheel() -> None:
-    bench = Bench(momenta=[-19.8, 0.0, 19.8, 0.0], null_gain=0.0)
-    demand = np.array([0.0, 0.2, 0.1])
-    np.testing.assert_allclose(bench.step(demand), demand, atol=1e-12)
-
-
-def test_momentum_never_exceeds_the_limit() -> None:
-    bench = Bench(null_gain=0.5)
-    bench.fly([1.2, 0.3, -0.4], 80000)
-    assert np.abs(bench.momenta).max() <= 20.0
-    assert np.abs(bench.momenta).max() > 19.7
-
-
 def test_null_motion_balances_and_the_base_feels_nothing() -> None:
-    bench = Bench(momenta=[8.0, -5.0, 8.0, -5.0], null_gain=1.0, null_share=1.0)
+    bench = AllocationBench(momenta=[8.0, -5.0, 8.0, -5.0], null_gain=1.0, null_share=1.0)
     given = bench.fly(np.zeros(3), 20000)
     np.testing.assert_allclose(given, 0.0, atol=1e-13)
     stored = np.linalg.pinv(bench.axes.T) @ bench.axes.T @ [8.0, -5.0, 8.0, -5.0]
@@ -123,14 +37,14 @@ def test_null_motion_balances_and_the_base_feels_nothing() -> None:
 
 @pytest.mark.parametrize("start", [0.0, [8.0, -3.0, -8.0, 1.0]])
 def test_wheels_are_kept_from_zero_speed(start: Any) -> None:
-    bench = Bench(momenta=start, null_gain=1.0, least_speed=50.0)
+    bench = AllocationBench(momenta=start, null_gain=1.0, least_speed=50.0)
     bench.fly(np.zeros(3), 12000)
     assert np.abs(bench.momenta / INERTIA).min() > 50.0
 
 
 def test_wheel_that_must_cross_zero_does_so_at_once() -> None:
     """A ramp through the stored momentum: 4 N m s are stored and taken out again and again."""
-    bench = Bench(null_gain=5.0, least_speed=30.0)
+    bench = AllocationBench(null_gain=5.0, least_speed=30.0)
     bench.fly(np.zeros(3), 6000)
     slow, turns = 0, 0
     last = bench.momenta.copy()
@@ -145,47 +59,20 @@ def test_wheel_that_must_cross_zero_does_so_at_once() -> None:
 
 
 def test_null_motion_leaves_the_demand_what_it_needs() -> None:
-    bench = Bench(momenta=[15.0, -15.0, 15.0, -15.0], null_gain=1e3, null_share=1.0)
+    bench = AllocationBench(momenta=[15.0, -15.0, 15.0, -15.0], null_gain=1e3, null_share=1.0)
     given = bench.fly([0.9, 0.0, 0.0], 5)
     np.testing.assert_allclose(given, np.tile([0.9, 0.0, 0.0], (5, 1)), atol=1e-12)
     assert np.abs(bench.command).max() <= 1.0 + 1e-12
 
 
 def test_three_wheels_have_no_null_motion() -> None:
-    bench = Bench(np.eye(3), momenta=[5.0, 4.0, 3.0], null_gain=10.0, least_speed=100.0)
+    bench = AllocationBench(np.eye(3), momenta=[5.0, 4.0, 3.0], null_gain=10.0, least_speed=100.0)
     bench.step(np.zeros(3))
     np.testing.assert_array_equal(bench.command, 0.0)
 
 
-@pytest.mark.parametrize("latency", [0, 7])
-def test_failed_wheel_is_found_and_taken_out(latency: int) -> None:
-    bench, demand = Bench(latency=latency, failure_ticks=50), np.array([0.3, 0.2, 0.1])
-    bench.fly(demand, 200)
-    assert bench.allocation.wheels.healthy.takes_part[:4].sum() == 4.0
-    bench.failed = {2}
-    wrong = bench.fly(demand, 49)
-    assert np.abs(wrong[latency:] - demand).max() > 0.05
-    right = bench.fly(demand, 100)
-    np.testing.assert_allclose(right[-50:], np.tile(demand, (50, 1)), atol=1e-12)
-    assert bench.allocation.wheels.healthy.takes_part[2] == 0.0
-
-
-def test_demand_that_alternates_blames_no_late_wheel() -> None:
-    bench, rng = Bench(latency=5, failure_ticks=50), np.random.default_rng(4)
-    for _ in range(3000):
-        bench.step(rng.normal(size=3) * 0.3)
-    assert bench.allocation.wheels.healthy.takes_part[:4].sum() == 4.0
-
-
-def test_commands_that_do_not_arrive_blame_no_wheel() -> None:
-    bench = Bench(failure_ticks=50)
-    bench.failed = {0, 1, 2, 3}
-    bench.fly([0.3, 0.2, 0.1], 1000)
-    assert bench.allocation.wheels.healthy.takes_part[:4].sum() == 4.0
-
-
 def test_two_failed_wheels_of_four_leave_two_axes() -> None:
-    bench = Bench(failure_ticks=50)
+    bench = AllocationBench(failure_ticks=50)
     bench.fly([0.3, 0.2, 0.1], 100)
     bench.failed = {1, 3}
     bench.fly([0.3, 0.2, 0.1], 200)
@@ -204,7 +91,7 @@ THRUSTERS = {
 
 
 def test_thrusters_take_the_axis_that_wheels_cannot_give() -> None:
-    bench = Bench(thrusters=THRUSTERS, failure_ticks=50)
+    bench = AllocationBench(thrusters=THRUSTERS, failure_ticks=50)
     bench.fly([0.3, 0.2, 0.1], 100)
     assert np.all(bench.command[4:] == 0.0)
     bench.failed = {1, 3}
@@ -214,13 +101,13 @@ def test_thrusters_take_the_axis_that_wheels_cannot_give() -> None:
 
 
 def test_thrusters_alone_take_all() -> None:
-    given = Bench(None, thrusters=THRUSTERS).fly([0.3, -0.2, 0.1], 8000)
+    given = AllocationBench(None, thrusters=THRUSTERS).fly([0.3, -0.2, 0.1], 8000)
     np.testing.assert_allclose(given.mean(axis=0), [0.3, -0.2, 0.1], atol=5e-3)
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf])
 def test_demand_that_is_no_number_is_not_owed(wrong: float) -> None:
-    bench = Bench(thrusters=THRUSTERS, null_gain=0.0)
+    bench = AllocationBench(thrusters=THRUSTERS, null_gain=0.0)
     bench.allocation.wheels.healthy.beyond[:] = np.eye(3)  # as without wheels
     bench.allocation.wheels.healthy.rank = 0.0
     bench.step([0.3, wrong, 0.1])
@@ -229,7 +116,7 @@ def test_demand_that_is_no_number_is_not_owed(wrong: float) -> None:
 
 
 def test_thrusters_unload_the_wheels_which_hold_the_base() -> None:
-    bench = Bench(
+    bench = AllocationBench(
         thrusters={**THRUSTERS, "force": [0.4]}, momenta=[14.2, 0.0, -14.2, 0.0], unload_above=0.7,
         unload_to=0.3, unload_time=10.0, null_gain=0.0,
     )  # fmt: skip
@@ -242,13 +129,71 @@ def test_thrusters_unload_the_wheels_which_hold_the_base() -> None:
     assert bench.allocation.modulation.pulses.sum() == pulses
 
 
-def test_unloading_begins_above_its_threshold_only() -> None:
-    bench = Bench(thrusters=THRUSTERS, momenta=[13.0, 0.0, -13.0, 0.0], null_gain=0.0)
-    bench.fly(np.zeros(3), 100)
-    assert bench.allocation.unloading.is_under_way == 0.0
-    bench.momenta[0] = 14.5
-    bench.fly(np.zeros(3), 100)
-    assert bench.allocation.unloading.is_under_way == 1.0
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("k", [0, 3])
+def test_unloading_lasts_from_one_threshold_to_the_other(k: int, side: float) -> None:
+    """Shares of each wheel's own largest momentum; the fullest wheel counts."""
+    limits = np.array([40.0, 30.0, 50.0, 20.0])
+    bench = AllocationBench(
+        thrusters=THRUSTERS, wheels={"max_momentum": limits.tolist()}, null_gain=0.0,
+        unload_above=0.7, unload_to=0.3,
+    )  # fmt: skip
+    for share, is_under_way in ((0.69, 0.0), (0.71, 1.0), (0.31, 1.0), (0.29, 0.0), (0.69, 0.0)):
+        bench.momenta[:] = 0.2 * limits
+        bench.momenta[k] = side * share * limits[k]
+        bench.step(np.zeros(3))
+        assert bench.allocation.unloading.is_under_way == is_under_way
+        assert np.any(bench.allocation.of_thrusters) == bool(is_under_way)
+
+
+@pytest.mark.parametrize("count", [3, 4, 6])
+def test_unloading_asks_what_half_of_the_wheels_torque_can_hold(count: int) -> None:
+    """Against the momentum, within the time constant where that leaves the wheels enough."""
+    rng, cut = np.random.default_rng(count), 0
+    for _ in range(20):
+        most = rng.uniform(0.3, 2.0, count)
+        bench = AllocationBench(
+            rng.normal(size=(count, 3)), THRUSTERS, momenta=rng.uniform(-19.0, 19.0, count),
+            wheels={"max_torque": most.tolist()}, unload_above=0.02, unload_to=0.01,
+            unload_time=40.0, null_gain=0.0,
+        )  # fmt: skip
+        wanted = -bench.axes.T @ bench.momenta / 40.0
+        shares = most[:, None] * np.linalg.pinv(bench.axes.T * most)
+        excess = max(1.0, np.max(np.abs(shares @ wanted) / (0.5 * most)))
+        bench.step(np.zeros(3))
+        np.testing.assert_allclose(bench.allocation.of_thrusters, wanted / excess, atol=1e-9)
+        cut += excess > 1.0
+    assert 0 < cut < 20
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_thrusters_are_asked_for_what_the_axes_left_cannot_give(seed: int) -> None:
+    """Any two wheels: the part of the demand that is across both; the wheels get all of it."""
+    rng = np.random.default_rng(seed)
+    bench = AllocationBench(rng.normal(size=(4, 3)), THRUSTERS, failure_ticks=5, null_gain=0.0)
+    bench.failed = set(rng.permutation(4)[:2].tolist())
+    demand = rng.normal(size=3) * 0.1
+    bench.fly(demand, 20)
+    left = bench.axes[sorted({0, 1, 2, 3} - bench.failed)]
+    across = demand - np.linalg.pinv(left) @ (left @ demand)
+    np.testing.assert_allclose(bench.allocation.of_thrusters, across, atol=1e-9)
+
+
+def test_wheels_hold_against_pulses_when_these_come() -> None:
+    """Valves are late by some ticks, each by its own; so is what the wheels do about them."""
+    delays = np.arange(12) % 5
+    bench = AllocationBench(
+        thrusters={**THRUSTERS, "force": [0.2], "delay": (delays * PERIOD).tolist()},
+        momenta=[15.0, 0.0, -15.0, 0.0], null_gain=0.0, unload_above=0.1, unload_to=0.05,
+    )  # fmt: skip
+    opened = []
+    for tick in range(200):
+        bench.step([0.05, -0.02, 0.03])
+        opened.append(bench.command[4:] > 0.0)
+        comes = [opened[tick - d][j] if tick >= d else False for j, d in enumerate(delays)]
+        given = -bench.command[:4] @ bench.axes + np.array(comes) @ bench.torques
+        np.testing.assert_allclose(given, [0.05, -0.02, 0.03], atol=1e-12)
+    assert np.any(opened)
 
 
 def test_ideal_base_has_no_allocation() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from space_robot_control.controller.allocation.modulation import Modulation, modulate
 from space_robot_control.controller.allocation.settings import AllocationSettings
@@ -14,6 +15,7 @@ from space_robot_control.controller.allocation.thrusters import (
     Thrusters,
     expect_torque,
     find_times,
+    within_reach,
 )
 from space_robot_sim.actuators.thrusters import ThrusterSettings
 
@@ -55,10 +57,10 @@ class Bench:
         self.thrusters = Thrusters.build(1, believed, settings, PERIOD)
         self.modulation = Modulation.build(1, self.thrusters, settings, PERIOD)
 
-    def fly(self, demands: Array) -> Array:
-        """(ticks, T), 1 where open."""
+    def fly(self, demands: Array, first: int = 0) -> Array:
+        """(ticks, T), 1 where open, from a tick on."""
         rows = []
-        for tick, demand in enumerate(demands):
+        for tick, demand in enumerate(demands, first):
             modulate(self.modulation, self.thrusters, tick, demand)
             rows.append(self.thrusters.is_open[: self.count].copy())
         return np.array(rows)
@@ -124,12 +126,69 @@ def test_demand_beyond_all_thrusters_is_not_owed(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_after_a_gap_nothing_is_owed(kind: str) -> None:
-    bench = Bench(kind)
-    bench.fly(np.full((250, 3), 3.0))
-    modulate(bench.modulation, bench.thrusters, 5000, np.zeros(3))
-    assert bench.thrusters.is_open.sum() == 0.0
-    np.testing.assert_array_equal(bench.modulation.owed, 0.0)
+@pytest.mark.parametrize("gap", [300, -50, 0])
+def test_after_a_gap_all_begins_anew(kind: str, gap: int) -> None:
+    """As from the first tick: nothing is owed, no pulse goes on, no decision is waited for.
+
+    Ticks that are skipped, a clock that goes back, the same tick again.
+    """
+    rng = np.random.default_rng(3)
+    demands = np.repeat(rng.normal(size=(100, 3)) * 8.0 + 4.0, 6, axis=0)
+    later = rng.normal(size=(400, 3)) * 4.0
+    bench, fresh = Bench(kind), Bench(kind)
+    last = 99
+    while last < 180 or not np.any(bench.modulation.open_for > 0.0):  # amid a pulse
+        last += 1
+        bench.fly(demands[last - 100 : last - 99], first=last)
+    pulses = bench.modulation.pulses.copy()
+    opened = bench.fly(later, first=last + gap)
+    np.testing.assert_array_equal(opened, fresh.fly(later))
+    np.testing.assert_array_equal(bench.modulation.owed, fresh.modulation.owed)
+    np.testing.assert_array_equal(bench.modulation.pulses - pulses, fresh.modulation.pulses)
+
+
+@pytest.mark.parametrize("after", [1, 20, 300])
+def test_after_a_gap_what_is_under_way_is_expected_and_nothing_else(after: int) -> None:
+    """Pulses commanded before the gap come a valve's delay later, also in it, and never again."""
+    delay, first = 12, 300
+    bench, torque = Bench("pwm", delay=delay * PERIOD), np.zeros(3)
+    given: dict[int, Array] = {}
+    ticks = [*range(60), *range(60 + after, 60 + after + first)]
+    for tick in ticks:
+        demand = np.array([12.0, -8.0, 5.0]) if tick < 60 else np.zeros(3)
+        modulate(bench.modulation, bench.thrusters, tick, demand)
+        expect_torque(bench.thrusters, tick, torque)
+        given[tick + delay] = bench.thrusters.is_open[: bench.count] @ bench.torques
+        np.testing.assert_allclose(torque, given.get(tick, np.zeros(3)), atol=1e-12)
+
+
+def test_an_impulse_beyond_a_period_is_cut_in_its_direction_and_forgotten() -> None:
+    """Pulse width: 50 N m s are owed, a period of 0.1 s pays 2 N m s of them."""
+    bench = Bench("pwm")
+    bench.fly(np.zeros((1, 3)))
+    bench.modulation.slot_left = 0.0
+    bench.modulation.owed[:3] = [50.0, -25.0, 5.0]
+    opened = bench.fly(np.zeros((600, 3)), first=1)
+    np.testing.assert_allclose(opened[:200].sum(axis=0) @ bench.torques * PERIOD, [2, -1, 0.2])
+    assert opened[200:].sum() == 0.0
+    np.testing.assert_allclose(bench.modulation.owed, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("layout", [couples, slanted])
+def test_within_reach_is_what_scipys_least_squares_say(kind: str, layout: Any) -> None:
+    """A demand is cut by the thruster that would be open for longer than there is time."""
+    rng, bench = np.random.default_rng(8), Bench(kind, layout)
+    columns = bench.thrusters.wrench[: bench.count].T
+    cut = 0
+    for _ in range(40):
+        demand = np.append(rng.normal(size=3) * 10.0 ** rng.uniform(-0.5, 2.0), np.zeros(3))
+        peak = np.max(nnls(columns, demand)[0])
+        assert within_reach(bench.thrusters, demand) == pytest.approx(
+            min(1.0, 1.0 / peak), rel=1e-6
+        )
+        cut += peak > 1.0
+    assert 5 < cut < 40
 
 
 def test_schmitt_trigger_has_hysteresis() -> None:

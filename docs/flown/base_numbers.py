@@ -1,0 +1,80 @@
+"""Numbers of flights that the pages on actuators of the base show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from space_robot_control.analysis import analyze
+from space_robot_control.analysis.described import robot_of
+from space_robot_control.analysis.metrics import tracking_error
+from space_robot_control.analysis.sizing import ActuatorSet
+from space_robot_control.controller.allocation.believed_actuators import believed_actuators
+from space_robot_control.scenario.flown_flight import FlownFlight
+
+ATTITUDE = "rms.mean_axis.attitude"
+JOINTS_1_3 = "rms.mean_axis.joints_1_3"
+JOINTS_4_6 = "rms.mean_axis.joints_4_6"
+OF_SWEEPS = (ATTITUDE, JOINTS_1_3, JOINTS_4_6, "ripple.rms.base_torque", "ripple.rms.torque_4_6")
+"""Columns of the tables of `space-robot sweep`."""
+LAWS = ("ctc", "ctc_smc", "tde_smc", "tde_tsmc", "tde_stc")
+DRIFT = "attitude_drift.end_deg"
+PEAKS = tuple(f"sizing.axes.base_{axis}.peak_torque_n_m" for axis in "xyz")
+MOMENTA = tuple(f"sizing.axes.base_{axis}.peak_momentum_n_m_s" for axis in "xyz")
+
+
+def largest_wheel_torque(flown: FlownFlight) -> float:
+    """Return the largest torque that a wheel's motor gave, N m."""
+    return float(np.max(np.abs(flown.log.wheel_torques)))
+
+
+def impulse(flown: FlownFlight) -> float:
+    """Return the sum of all thrusters' impulses, N s."""
+    return float(np.sum(flown.log.thrusts)) * flown.log.timebase.period
+
+
+def pulses(flown: FlownFlight) -> float:
+    """Return how often a valve opened."""
+    is_open = np.pad(flown.log.thrusts > 0.0, ((1, 0), (0, 0)))
+    return float(np.count_nonzero(is_open[1:] & ~is_open[:-1]))
+
+
+def propellant(flown: FlownFlight) -> float:
+    """Return the propellant burnt, kg."""
+    return float(sum(a["propellant_kg"] for a in flown.report()["sizing"]["axes"].values()))
+
+
+def largest_attitude_error(flown: FlownFlight) -> float:
+    """Return the largest error of an axis of the vector part from 10 s on."""
+    return float(np.max(np.abs(tracking_error(flown.log)[flown.log.time >= 10.0, :3])))
+
+
+def attitude_error_at(time: float) -> Callable[[FlownFlight], float]:
+    """Return the largest error of an axis of the quaternion's vector part at a time, s."""
+
+    def error(flown: FlownFlight) -> float:
+        row = min(round(time / flown.log.timebase.period), flown.log.ticks - 1)
+        return float(np.max(np.abs(tracking_error(flown.log)[row, :3])))
+
+    error.__name__ = f"attitude_error_at_{time:g}_s"
+    return error
+
+
+def first_at_limit(flown: FlownFlight) -> float:
+    """Return the time at which a wheel was first at a limit, s."""
+    wheels = flown.report()["wheel_saturation"]["wheels"].values()
+    return float(min(w["first_s"] for w in wheels if w["first_s"] is not None))
+
+
+def asked_of_a_wheel(quantity: str) -> Callable[[FlownFlight], float]:
+    """Return the most that the flight asks of one of the wheels of `wheels`."""
+
+    def asked(flown: FlownFlight) -> float:
+        wheels = ActuatorSet("wheels", believed_actuators("wheels", robot_of(flown.log)))
+        requirements = analyze(flown.log, wheels)["sizing"]["requirements"]
+        of_wheels = [r for r in requirements if r["part"].startswith("wheel_")]
+        return float(max(r["asked"] for r in of_wheels if r["quantity"] == quantity))
+
+    asked.__name__ = f"{quantity.replace(' ', '_')}_of_a_wheel"
+    return asked

@@ -1,0 +1,53 @@
+"""Tables and numbers of the pages that `python docs/flown` makes are those of today's flights.
+
+Nothing is flown to its end: what was flown is kept in docs/flown, with digests of its settings and
+the torques of its beginning.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+from paths import DOCS
+
+sys.path.append(str(DOCS / "flown"))
+
+from flown_tables import Page, Sentence, Table, is_same, pages
+
+PAGES: dict[str, Page] = pages()
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_shows_what_was_flown(name: str) -> None:
+    """And every table of flights in it is one that the command makes."""
+    page = PAGES[name]
+    text = (DOCS / page.path).read_text("utf-8")
+    assert page.written() == text, f"run `python docs/flown {name}`"
+    tables = [part for part in page.parts if isinstance(part, Table)]
+    assert text.count("<!-- table ") == len(tables)
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_what_was_flown_is_what_would_be_flown_today(name: str) -> None:
+    assert PAGES[name].stale() == [], f"run `python docs/flown {name}`"
+    assert PAGES[name].kept().keys() == PAGES[name].flights().keys()
+
+
+def test_a_flight_with_other_gains_noise_or_hardware_is_stale() -> None:
+    (kept, options) = next(
+        (PAGES["actuators"].kept()[key], options)
+        for key, (options, _) in PAGES["actuators"].flights().items()
+        if options.get("sensors") == "fine"
+    )
+    assert is_same(kept, options)
+    assert not is_same(kept, {**options, "gains": "tuned"})
+    assert not is_same(kept, {**options, "actuators": "wheels"})
+    louder = {name: value * 1.01 for name, value in enumerate(kept["beginning"])}
+    assert not is_same({**kept, "beginning": list(louder.values())}, options)
+
+
+def test_numbers_in_sentences_are_replaced_where_they_stand() -> None:
+    sentence = Sentence("the {} of {} turns by {}°, then", ())
+    with pytest.raises(ValueError, match="0 times in the page"):
+        sentence.put_into("nothing of the kind", {})
