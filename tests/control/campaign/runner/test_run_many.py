@@ -69,6 +69,7 @@ def diverge(tick: int) -> None:
 class SilentError(Exception):
     def __init__(self, one: int, other: int) -> None:
         super().__init__(f"{one} and {other}")
+        self.lock = threading.Lock()
 
 
 def raise_silent(_: int) -> None:
@@ -84,7 +85,7 @@ def test_errors_come_as_they_are_with_their_traceback() -> None:
 
 def test_an_error_that_cannot_be_pickled_comes_as_its_text() -> None:
     with pytest.raises(TypeError):
-        pickle.loads(pickle.dumps(SilentError(1, 2)))
+        pickle.dumps(SilentError(1, 2))
     (done,) = run_many(raise_silent, [7])
     assert str(done.error) == "SilentError: 1 and 2"
 
