@@ -80,10 +80,10 @@ class Bench:
         settings = ControllerNodeSettings.resolve(
             {"telemetry_decimation": DECIMATION, "longest_jump": 50}
         )
-        choice = LawChoice(
+        self.choice = LawChoice(
             self.controller.law, [(tick, law_of(name)) for name, tick in swaps.items()]
         )
-        self.answering = Answering(self.controller, choice, self.references, settings)
+        self.answering = Answering(self.controller, self.choice, self.references, settings)
         self._codec = CommandCodec(self.controller.names.commanded, settings.timebase)
         self._state = RobotState.allocate(robot.n)
         self._state.quaternion[:] = [0.9, 0.3, -0.1, 0.3]
@@ -134,3 +134,18 @@ def test_the_law_is_told_before_the_command_and_telemetry_after_it(
         assert bench.controller.law.name == ("ctc" if tick < first + 3 else "tde_stc")
         if tick == first + 3:
             np.testing.assert_allclose(command.torque, 0.1, atol=1e-9)
+
+
+def test_other_gains_leave_a_law_its_memory(paper_robot: Robot) -> None:
+    """It goes on, and takes nothing over."""
+    bench = Bench(paper_robot, tde_stc=0)
+    for tick in range(5):
+        bench.answer(tick)
+    law = bench.controller.law
+    before = law.memory.psi.copy()
+    assert before.any()
+    law.gain_values = {**law.gain_values, "k_2": np.zeros(9)}  # so that it stands
+    bench.choice.choose(law)
+    assert topics.LAW in bench.answer(5)[0]
+    np.testing.assert_array_equal(law.memory.psi, before)
+    assert bench.controller.block[0].transfer_left == 0.0

@@ -265,7 +265,7 @@ def test_divergence_is_an_error_with_its_tick(paper_robot: Robot, torque: float,
     assert "tick 8 (t = 0.0040 s)" in str(caught.value)
 
 
-@pytest.mark.parametrize("saved_at", [3, 250, 300])
+@pytest.mark.parametrize("saved_at", [3, 250, 330])
 def test_a_plant_that_goes_back_flies_the_same_bits_again(
     paper_robot: Robot, saved_at: int
 ) -> None:
