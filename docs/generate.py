@@ -170,7 +170,8 @@ def topic_page() -> str:
     return "\n\n".join([
         "# Topics", MADE,
         "All are reliable and keep the last messages. Fields, units, frames and rates are in"
-        " [bags](../manual/bags.md#topics). Every topic but the last four is recorded; what the plant flies is noted with the bag. These are"
+        " [bags](../manual/bags.md#topics). Every topic but the last four is recorded; what the"
+        " plant flies is noted with the bag. These are"
         " the names of nodes without a namespace; in one, as `/sat1`, all but `/diagnostics` begin"
         " with it: `/sat1/joint_states`; so do the frames in `/tf`, but for `inertial`. `/tf` and"
         " `/tf_static` themselves are sent by a plant that finds tf2_msgs installed.",
