@@ -164,12 +164,14 @@ def topic_page() -> str:
         )
         for topic in (
             *topics.RECORDED, topics.MARKERS, topics.DIAGNOSTICS, topics.SIMULATION_PAUSED,
+            topics.PLANT_DESCRIPTION,
         )
     )  # fmt: skip
     return "\n\n".join([
         "# Topics", MADE,
         "All are reliable and keep the last messages. Fields, units, frames and rates are in"
-        " [bags](../manual/bags.md#topics). Every topic but the last three is recorded. These are"
+        " [bags](../manual/bags.md#topics). Every topic but the last four is recorded; what the"
+        " plant flies is noted with the bag. These are"
         " the names of nodes without a namespace; in one, as `/sat1`, all but `/diagnostics` begin"
         " with it: `/sat1/joint_states`; so do the frames in `/tf`, but for `inertial`. `/tf` and"
         " `/tf_static` themselves are sent by a plant that finds tf2_msgs installed.",
@@ -182,7 +184,7 @@ def _type(topic: topics.Topic) -> str:
 
 
 def _occasion(topic: topics.Topic) -> str:
-    if topic in topics.SCENE and topic.is_latched:
+    if topic in (*topics.SCENE, topics.PLANT_DESCRIPTION) and topic.is_latched:
         return "once"
     if topic is topics.MARKERS:
         return "every 33 ms or more, while somebody listens"

@@ -118,6 +118,6 @@ def test_security_policy_has_one_publisher_a_topic_and_all_listeners() -> None:
             if topic in [item.text for item in profile.iterfind(f"topics[@{access}='ALLOW']/topic")]
         ]
 
-    for topic in topics.RECORDED:
+    for topic in (*topics.RECORDED, topics.PLANT_DESCRIPTION):
         assert len(nodes("publish", topic.full_name)) == 1, topic.full_name
         assert nodes("subscribe", topic.full_name) == list(LISTENERS[topic]), topic.full_name

@@ -68,7 +68,8 @@ class ControllerNodeSettings(NodeSettings):
         "config/actuators, or a path to their YAML",
     )
     telemetry_decimation: Annotated[int, Field(ge=1, le=10**6)] = Field(
-        20, description="ticks between two messages on /controller/telemetry and /controller/signals"
+        20,
+        description="ticks between two messages on /controller/telemetry and /controller/signals",
     )
     swaps: Texts = Field(
         [""], description="laws to swap to in flight, each as T:LAW with T in simulated seconds"

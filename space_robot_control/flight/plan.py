@@ -217,9 +217,7 @@ class Flight:
         The same plan with the same software gives the same one: it tells no time and no machine.
         """
         controller, robots = self.controller_settings, self._robots.description
-        plant = plant_description(
-            self.robot, robots["robot_file"], self.plant, self.plant_settings
-        )
+        plant = plant_description(self.robot, robots["robot_file"], self.plant, self.plant_settings)
         swaps = [text for text in controller.swaps if text.strip()]
         return {
             "controller": self.law.name,

@@ -1,7 +1,8 @@
 """What viewers need to show the robot: its description once, its pose now and then. Knows no ROS.
 
-Names of frames are those of the description, in a namespace with that before them (``sat1/base_link``),
-as robot_state_publisher's ``frame_prefix`` does it. All robots share the inertial frame.
+Names of frames are those of the description, in a namespace with that before them
+(``sat1/base_link``), as robot_state_publisher's ``frame_prefix`` does it. All robots share the
+inertial frame.
 """
 
 from __future__ import annotations

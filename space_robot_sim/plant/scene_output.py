@@ -51,7 +51,7 @@ class SceneOutput:
             self._markers.send(truth)
 
     def show(self, truth: RobotState) -> None:
-        """Send viewers, not the recorder, the poses of a true state, whether they are due or not."""
+        """Send viewers, not the recorder, the poses of a true state, due or not."""
         for topic, data in self._writer.poses(truth):
             if topic in self._shared:
                 self._shared[topic].publish(unwrap(data))

@@ -65,7 +65,7 @@ def set_parameters(
         parameters=[make(n, value=v).to_parameter_msg() for n, v in parameters.items()]
     )
     service = f"{name}/set_parameters_atomically"
-    (answer,) = _call(node, SetParametersAtomically, [service], request, check)
+    (answer,) = _call(node, SetParametersAtomically, [service], request, check, may_repeat=True)
     if not answer.result.successful:
         raise FlightError(f"{name} refused to change its parameters: {answer.result.reason}")
 
@@ -86,7 +86,8 @@ def get_parameters(node: Any, name: str, parameters: Sequence[str], check: Check
     from rclpy.parameter import parameter_value_to_python
 
     request = GetParameters.Request(names=list(parameters))
-    (answer,) = _call(node, GetParameters, [f"{name}/get_parameters"], request, check)
+    service = f"{name}/get_parameters"
+    (answer,) = _call(node, GetParameters, [service], request, check, may_repeat=True)
     values = [parameter_value_to_python(value) for value in answer.values]
     return values or [None] * len(parameters)
 
@@ -107,62 +108,76 @@ def call_trigger(node: Any, service: str, check: Check) -> tuple[bool, str]:
 
 def _call(
     node: Any, kind: Any, services: Sequence[str], request: Any, check: Check,
-    timeout_s: float = TIMEOUT_S,
+    timeout_s: float = TIMEOUT_S, may_repeat: bool = False,
 ) -> list[Any]:  # fmt: skip
-    """Call services of one kind at the same time, each once; return their answers."""
+    """Call services of one kind at the same time; return their answers.
+
+    An answer may be lost: see `_Repeated`. A call that ``may_repeat`` is then made again; any other is
+    made once, when its answer is known to arrive.
+    """
+    from lifecycle_msgs.srv import GetState
     from rclpy.executors import SingleThreadedExecutor
 
-    clients = {service: node.create_client(kind, service) for service in services}
-    probes = {service: _Probe(node, service.rpartition("/")[0]) for service in services}
+    calls = {service: _Repeated(node, kind, service, request) for service in services}
+    states = {} if may_repeat else {s: f"{s.rpartition('/')[0]}/get_state" for s in services}
+    probes = {s: _Repeated(node, GetState, states[s], GetState.Request()) for s in states}
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
-    answers: dict[str, Any] = {}
     until = time.monotonic() + timeout_s
     try:
-        while len(answers) < len(clients) or not all(a.done() for a in answers.values()):
+        while not all(call.is_answered for call in calls.values()):
             check()
-            for service, client in clients.items():
-                if service in answers or not client.service_is_ready():
-                    continue
-                if probes[service].is_answered():
-                    answers[service] = client.call_async(request)
+            for service, call in calls.items():
+                if service in probes and not probes[service].is_answered:
+                    probes[service].ask()
+                elif may_repeat or not call.is_asked:
+                    call.ask()
             if time.monotonic() > until:
-                silent = [s for s in services if s not in answers or not answers[s].done()]
+                silent = [service for service, call in calls.items() if not call.is_answered]
                 raise FlightError(f"no answer of {', '.join(silent)} for {timeout_s:.0f} s")
             executor.spin_once(timeout_sec=POLL_S)
-        return [answers[service].result() for service in services]
+        return [calls[service].answer for service in services]
     finally:
         executor.shutdown()
-        for client in clients.values():
-            node.destroy_client(client)
-        for probe in probes.values():
-            probe.close()
+        for call in (*calls.values(), *probes.values()):
+            call.close()
 
 
-class _Probe:
-    """Finds out whether a node's answers arrive here.
+class _Repeated:
+    """A call of a service that is repeated until an answer arrives.
 
     A node that has not discovered a caller yet drops its answer after 0.1 s, which a loaded machine
     may take; the caller cannot see that. Discovery is in order: once the answer to a client that
     was made after another one arrives, those to the other do, too.
     """
 
-    def __init__(self, node: Any, name: str) -> None:
-        """``name``: the lifecycle node that is asked for its state, in the namespace of ``node``."""
-        from lifecycle_msgs.srv import GetState
-
-        self._node, self._request = node, GetState.Request()
-        self._client = node.create_client(GetState, f"{name}/get_state")
-        self._answers: list[Any] = []
+    def __init__(self, node: Any, kind: Any, service: str, request: Any) -> None:
+        self._node, self._request = node, request
+        self._client = node.create_client(kind, service)
+        self._futures: list[Any] = []
         self._ask_at = 0.0
 
-    def is_answered(self) -> bool:
-        """Tell whether an answer has come; else ask, if it is time again."""
+    def ask(self) -> None:
+        """Call the service if it is there, and if it is time again."""
         now = time.monotonic()
-        if now >= self._ask_at and self._client.service_is_ready():
+        if not self.is_answered and now >= self._ask_at and self._client.service_is_ready():
             self._ask_at = now + ASK_AGAIN_S
-            self._answers.append(self._client.call_async(self._request))
-        return any(answer.done() for answer in self._answers)
+            self._futures.append(self._client.call_async(self._request))
+
+    @property
+    def is_asked(self) -> bool:
+        """True if it has been called."""
+        return bool(self._futures)
+
+    @property
+    def is_answered(self) -> bool:
+        """True if an answer has come."""
+        return any(future.done() for future in self._futures)
+
+    @property
+    def answer(self) -> Any:
+        """The first answer."""
+        return next(future.result() for future in self._futures if future.done())
 
     def close(self) -> None:
         """Ask no more."""

@@ -167,7 +167,7 @@ def _check(report: dict[str, Any], flight: Flight) -> None:
 
 @contextmanager
 def stop_signals() -> Iterator[list[int]]:
-    """Collect the signals that end a command in a list; the nodes, in their own groups, get none."""
+    """Collect signals that end a command in a list; the nodes, in groups of their own, get none."""
     arrived: list[int] = []
     with handled_signals(lambda number, frame: arrived.append(number)):
         yield arrived

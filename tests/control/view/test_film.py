@@ -119,7 +119,9 @@ def test_side_by_side_nobody_is_in_anothers_place(flown) -> None:  # type: ignor
     for left, right in itertools.pairwise(reach):
         assert max(x for x, _, _ in left) < min(x for x, _, _ in right)
     for root in roots:
-        np.testing.assert_allclose(together[root].position, apart["/a/base_link"].position, atol=1e-8)
+        np.testing.assert_allclose(
+            together[root].position, apart["/a/base_link"].position, atol=1e-8
+        )
         np.testing.assert_allclose(
             apart[root].position[1:], apart["/a/base_link"].position[1:], atol=1e-8
         )

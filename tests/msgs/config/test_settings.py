@@ -60,7 +60,11 @@ def test_a_node_waits_for_listeners_to_what_it_sends_alone() -> None:
             "joint_states, base/state, clock, truth/joints, truth/base, wheels/state, "
             "thrusters/state, _transforms, _transforms/static, robot_description",
         ),
-        (ControllerNodeSettings, "plant_node:", "command, controller/telemetry, controller/signals, controller/law"),
+        (
+            ControllerNodeSettings,
+            "plant_node:",
+            "command, controller/telemetry, controller/signals, controller/law",
+        ),
     ):
         with pytest.raises(InputError) as error:
             schema.resolve({"wait_for": ["recorder_node", entry]})

@@ -131,7 +131,9 @@ def test_shipped_robots(name: str) -> None:
     assert_same_robot(read_back(robot), robot)
     text = urdf_text(robot)
     assert text == urdf_text(find_robot(name)), "the same for the same robot"
-    oracle = TreeOracle(pinocchio_model(text), frame_names(robot).bodies[0], robot.all_joint_names, 1)
+    oracle = TreeOracle(
+        pinocchio_model(text), frame_names(robot).bodies[0], robot.all_joint_names, 1
+    )
     assert_same_dynamics(robot, oracle, 1)
     assert_frames_of_transforms(robot, oracle)
     model = mujoco.MjModel.from_xml_string(text)

@@ -102,7 +102,10 @@ def check_names(bag: Path, namespace: str) -> None:
     names = decode(first[topics.JOINT_STATES], topics.JOINT_STATES.type).name
     prefix = namespace.lstrip("/")
     frames = [(t.header.frame_id, t.child_frame_id) for t in transforms(first[topics.TF])]
-    assert frames[:2] == [("inertial", f"{prefix}/base_link"), (f"{prefix}/base_link", f"{prefix}/link1")]
+    assert frames[:2] == [
+        ("inertial", f"{prefix}/base_link"),
+        (f"{prefix}/base_link", f"{prefix}/link1"),
+    ]
     assert transforms(first[topics.TF_STATIC])[0].child_frame_id == f"{prefix}/tool"
     passive = ["panel"] if namespace == "/fleet/sat2" else []
     assert names == [*(f"joint{i}" for i in range(1, 7)), *passive]
