@@ -13,8 +13,9 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.robot import Robot
 
 from .frames import Frames
+from .local_server import local_server
 from .scene import Look, RobotScene, rgb
-from .stage import extent, set_stage, silent_server
+from .stage import extent, set_stage
 from .targets import held_targets
 from .trails import Move, trails
 
@@ -58,7 +59,7 @@ def film(
     Raises:
         InputError: viser is not installed, or a flight has no state.
     """
-    with silent_server() as server:
+    with local_server() as server:
         moves = add_flights(server, flights, times, side_by_side, dark)
         recorder, done = server.get_scene_serializer(), advance(len(times))
         for k, time in enumerate(times):

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
@@ -43,30 +40,6 @@ def check_viser() -> None:
     """
     if find_spec("viser") is None:
         raise InputError("view needs viser: pip install 'space_robot[view]'")
-
-
-@contextmanager
-def silent_server(port: int = 0) -> Iterator[ViserServer]:
-    """Start a server of viser that only this machine hears, and nothing on standard output.
-
-    Args:
-        port: to listen to; the next free one if it is taken. 0: any.
-    """
-    from rich import get_console
-    from viser import ViserServer
-
-    # a browser that opens a connection and does not use it is no error
-    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
-    console = get_console()
-    was_quiet, console.quiet = console.quiet, True
-    try:
-        server = ViserServer(host="127.0.0.1", port=port, verbose=False)
-        try:
-            yield server
-        finally:
-            server.stop()
-    finally:
-        console.quiet = was_quiet
 
 
 def set_stage(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from space_robot_msgs_py.errors import FlightError
 
 from ...flight.graph.monitor import Event
-from ..stage import silent_server
+from ..local_server import local_server
 from .finder import Finder, Place
 from .listener import Listener
 from .view import LiveView
@@ -62,7 +62,7 @@ def serve(options: LiveOptions, say: Callable[[str], None], ready: Callable[[str
     """
     with (
         closing(Finder(options.domain, options.namespace)) as finder,
-        silent_server(options.port) as server,
+        local_server(options.port) as server,
     ):
         # no button to share: that would lead through a server somewhere
         server.gui.configure_theme(
