@@ -14,7 +14,7 @@ from ..analysis.plot_series import tick_times
 from .browser import FRAME_TIMEOUT_S, headless_browser
 from .film import Flown, add_flights
 from .local_server import local_server
-from .page import Plot
+from .plots import Plot
 
 if TYPE_CHECKING:
     from PIL.Image import Image

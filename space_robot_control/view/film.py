@@ -16,7 +16,7 @@ from .frames import Frames
 from .local_server import local_server
 from .scene import Look, RobotScene, rgb
 from .stage import extent, set_stage
-from .targets import held_targets
+from .targets import targets
 from .trails import Move, trails
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def add_flights(
         robot = RobotScene(scene, root, flight.robot, look)
         moves.append(_moving(robot, of))
         moves += trails(scene, root, of, rgb(flight.colour), 0.0035 * size)
-        moves += held_targets(robot, flight.log, flight.robot, times)
+        moves += targets(scene, root, robot, flight.log, flight.robot, times)
     return moves
 
 

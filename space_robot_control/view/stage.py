@@ -16,7 +16,8 @@ from space_robot_sim.robot.frames import body_frames
 from space_robot_sim.robot.transforms import wxyz
 from space_robot_sim.robot.tree import Visual
 
-from .meshes import Mesh, shown_shapes
+from .mesh import Mesh
+from .meshes import shown_shapes
 
 if TYPE_CHECKING:
     from viser import SceneApi, ViserServer
