@@ -12,6 +12,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.events import Capture
 from space_robot_sim.environment.grasp import Grasp
+from space_robot_sim.faults.schedule import tick_from
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.shapes import Colour, even_box
 
@@ -56,7 +57,9 @@ def targets(
         free = before_capture(event, log, robot)
         if free is not None and start > 0:
             path = f"{root}/free_target_{number}"
-            moves.append(_drifting(scene, path, grasp, free, times[:start] - event.time_s))
+            period = log.timebase.period
+            moment = tick_from(event.time_s, period) * period
+            moves.append(_drifting(scene, path, grasp, free, times[:start] - moment))
     return moves
 
 
@@ -75,7 +78,8 @@ def _holding(scene: RobotScene, name: str, grasp: Grasp, start: int, stop: int) 
 def _drifting(scene: SceneApi, path: str, grasp: Grasp, free: FreeBody, times: Array) -> Move:
     """Draw a target up to its capture, at times (K,) s before it."""
     frame = scene.add_frame(path, show_axes=False)
-    add_shape(scene, f"{path}/box", even_box(grasp.mass, grasp.inertia, np.zeros(3), 0, COLOUR), Look())
+    box = even_box(grasp.mass, grasp.inertia, np.zeros(3), 0, COLOUR)
+    add_shape(scene, f"{path}/box", box, Look())
     positions, quaternions = free.poses(times)
 
     def drift(k: int) -> None:
