@@ -25,7 +25,7 @@ MOST_BYTES = 2_000_000_000
 MOST_SECONDS = 60
 """Processor time for each file."""
 MOST_WAIT_S = 180
-"""Time for each file by the wall clock: one that refers to a pipe would never be read to its end."""
+"""Time for each file by the wall clock: one that refers to a pipe is never read to its end."""
 MOST_READ = 2_000_000
 """Vertices, and faces, of a file."""
 

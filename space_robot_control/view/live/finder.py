@@ -12,7 +12,6 @@ from ...flight.graph.domain import domain_asked_for
 from ...flight.graph.node_names import PLANT
 from ...flight.graph.temporary_node import TemporaryNode
 
-
 MOST_NAMES = 5
 """Of nodes that are named."""
 

@@ -15,6 +15,7 @@ import trimesh
 from scene_pages import Scene
 
 from space_robot_control.view import mesh_process, meshes
+from space_robot_control.view.local_server import local_server
 from space_robot_control.view.mesh import simplify
 from space_robot_control.view.mesh_process import (
     MOST_BYTES,
@@ -24,7 +25,6 @@ from space_robot_control.view.mesh_process import (
 )
 from space_robot_control.view.meshes import read_meshes, shown_shapes
 from space_robot_control.view.scene import RobotScene
-from space_robot_control.view.local_server import local_server
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.tree import Visual
 
@@ -116,10 +116,10 @@ def test_more_vertices_or_faces_than_allowed(ball: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(mesh_process, "MOST_READ", 20_480)
     assert len(read_mesh(str(ball)).faces) == 20_480
     monkeypatch.setattr(mesh_process, "MOST_READ", 20_479)
-    with pytest.raises(UnreadableMeshError, match="^20480 faces, at most 20479 are allowed$"):
+    with pytest.raises(UnreadableMeshError, match=r"^20480 faces, at most 20479 are allowed$"):
         read_mesh(str(ball))
     monkeypatch.setattr(mesh_process, "MOST_READ", 10_000)
-    with pytest.raises(UnreadableMeshError, match="^10242 vertices, "):
+    with pytest.raises(UnreadableMeshError, match=r"^10242 vertices, "):
         read_mesh(str(ball))
 
 
@@ -137,7 +137,11 @@ def test_a_file_whose_reader_is_killed_is_refused_and_what_follows_is_read(
     for name in ("evil.stl", "evil2.stl"):
         shutil.copy(ball, tmp_path / name)
     files = [str(tmp_path / "evil.stl"), str(ball), str(tmp_path / "evil2.stl")]
-    assert [r.reason for r in read_meshes(tuple(files), 9)] == [TOO_MUCH, "of the stand-in", TOO_MUCH]
+    assert [r.reason for r in read_meshes(tuple(files), 9)] == [
+        TOO_MUCH,
+        "of the stand-in",
+        TOO_MUCH,
+    ]
 
 
 def test_a_mesh_is_drawn_in_its_size_and_a_mirrored_one_looks_outwards(
