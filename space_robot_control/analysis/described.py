@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import laws_of
+from space_robot_msgs_py.config.text import shortened
 from space_robot_msgs_py.config.validation import short, validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
@@ -41,6 +42,8 @@ Array = NDArray[np.float64]
 
 IDEAL = "ideal"
 """The sensors that tell the truth."""
+MOST_LETTERS = 400
+"""Of the joints' names in an error."""
 DIRECT = "direct"
 """The navigation that takes the states for what they are."""
 
@@ -83,10 +86,9 @@ def check_joints(robot: Robot, log: FlightLog) -> None:
         NotDescribedError: it has others.
     """
     if (robot.joint_names, robot.passive_names) != (log.joint_names, log.passive_names):
-        raise NotDescribedError(
-            f"robot {robot.name!r} has the joints {', '.join(robot.all_joint_names)}, "
-            f"the bag {', '.join((*log.joint_names, *log.passive_names))}"
-        )
+        own = shortened(", ".join(robot.all_joint_names), MOST_LETTERS)
+        of_bag = shortened(", ".join((*log.joint_names, *log.passive_names)), MOST_LETTERS)
+        raise NotDescribedError(f"robot {robot.name!r} has the joints {own}, the bag {of_bag}")
 
 
 def torque_limits(log: FlightLog) -> TorqueLimits:

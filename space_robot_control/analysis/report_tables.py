@@ -54,6 +54,9 @@ DEFINITIONS = {
 }
 """The meaning of each group of metrics, for someone who sees it for the first time."""
 
+WIDE = 1e6
+"""Torques from which on a number is written with an exponent: of diverged flights."""
+
 
 class Line(NamedTuple):
     """One metric of each report."""
@@ -87,10 +90,14 @@ def rms_table(report: Report) -> Table:
     rough = *report["chatter"].values(), (report["ripple"] or {}).get("rms", {})
     rows: list[list[Any]] = []
     for key, value in report["rms"]["mean_axis"].items():
-        spec = ".4f" if unit_of(key).startswith("N") else ".3e"
-        rms = f"{value:{spec}}", beside[key] and f"{beside[key]:{spec}}"
+        is_torque = unit_of(key).startswith("N")
+        rms = _rms(value, is_torque), beside[key] and _rms(beside[key], is_torque)
         rows.append([key, unit_of(key), *rms, *(measure.get(key, "") for measure in rough)])
     return Table(title, columns, [Group(rows)], remarks(report))
+
+
+def _rms(value: float, is_torque: bool) -> str:
+    return f"{value:.4f}" if is_torque and value < WIDE else f"{value:.3e}"
 
 
 def metrics_table(report: Report) -> Table:

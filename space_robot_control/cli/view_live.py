@@ -38,6 +38,7 @@ def serve_live(
     domain: int | None, namespace: str | None, robot: str, port: int, light: bool, opens: bool
 ) -> None:
     """Serve the scene until the user ends it; its arguments are the command's options."""
+    click.echo("starting the scene ...", err=True)  # where much else runs, that takes a while
     from space_robot_sim.robot.find import robot_as_path
 
     from ..flight.interruption import Interrupted
@@ -50,8 +51,8 @@ def serve_live(
         say(f"the scene is at {address}; Ctrl-C ends")
         if opens:
             webbrowser.open(address)
+        os.nice(NICENESS)
 
-    os.nice(NICENESS)
     named = robot_as_path(robot) if robot else ""
     try:
         serve(LiveOptions(domain, namespace or "", named, port, not light), say, ready)

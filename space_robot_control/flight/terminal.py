@@ -94,8 +94,9 @@ def _words(column: Column) -> set[str]:
 
 def _print_lines(table: Table, numbers: list[Column], console: Console) -> None:
     """Each row's labels, and below them a line for each of its numbers."""
-    if table.title:
-        say(console, _plain(table.title))
+    for line in str(table.title or "").split("\n"):
+        if line:
+            say(console, _plain(line))
     cells = {id(column): [_plain(cell) for cell in column.cells] for column in table.columns}
     labels = [column for column in table.columns if column not in numbers]
     group = ""
@@ -106,7 +107,7 @@ def _print_lines(table: Table, numbers: list[Column], console: Console) -> None:
             say(console, label)
         for column in numbers:
             if value := cells[id(column)][row]:
-                header = _plain(column.header)
+                header = _plain(str(column.header).replace("-\n", ""))  # a word in two lines
                 say(console, f"  {header}: {value}" if header else f"  {value}")
 
 

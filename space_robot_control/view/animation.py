@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ..analysis.plot_series import tick_times
 from .browser import FRAME_TIMEOUT_S, headless_browser
 from .film import Flown, add_flights
-from .page import Plot
-from .stage import silent_server
+from .local_server import local_server
+from .plots import Plot
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -59,7 +59,7 @@ def animate(
     ground = Image.fromarray(_gradient(width, height))
     overlay = _Overlay(plots, times, caption)
     found = []
-    with silent_server() as server:
+    with local_server() as server:
         moves = add_flights(server, [flight], times, False, True, shadows=False)
         pose = _camera(server.initial_camera.position, server.initial_camera.look_at)
         fov = float(server.initial_camera.fov)

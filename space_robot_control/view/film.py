@@ -13,9 +13,10 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.robot import Robot
 
 from .frames import Frames
+from .local_server import local_server
 from .scene import Look, RobotScene, rgb
-from .stage import extent, set_stage, silent_server
-from .targets import held_targets
+from .stage import extent, set_stage
+from .targets import targets
 from .trails import Move, trails
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def film(
     Raises:
         InputError: viser is not installed, or a flight has no state.
     """
-    with silent_server() as server:
+    with local_server() as server:
         moves = add_flights(server, flights, times, side_by_side, dark)
         recorder, done = server.get_scene_serializer(), advance(len(times))
         for k, time in enumerate(times):
@@ -103,7 +104,7 @@ def add_flights(
         robot = RobotScene(scene, root, flight.robot, look)
         moves.append(_moving(robot, of))
         moves += trails(scene, root, of, rgb(flight.colour), 0.0035 * size)
-        moves += held_targets(robot, flight.log, flight.robot, times)
+        moves += targets(scene, root, robot, flight.log, flight.robot, times)
     return moves
 
 

@@ -27,8 +27,8 @@ ON_DARK = ("#56B4E9", "#E98FC0", "#2CC295", "#E69F00", "#F0E442", "#FF7F41")
 ON_WHITE = ("#0072B2", "#CC79A7", "#009E73", "#E69F00", "#8A7F00", "#D55E00")
 """Okabe's and Ito's colours, brighter or darker where the page asks for it."""
 OF_TRAIL = "#FFB000"
-PICTURED, MOST_PLOTS = ("attitude", "base", "torque"), 3
-"""Beside an animated picture."""
+PICTURED, MOST_PLOTS = ("attitude", "base torque", "torque"), 3
+"""Beginnings of the titles of plots beside an animated picture."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def flights_page(
     return render(
         options.title or ", ".join(logs), scene,
         [Shown(f.name, f.colour, _told(f), f.log.defects) for f in flights],
-        plots_of(logs, colours), shared_marks(logs), float(times[0]), options.dark,
+        plots_of(logs, robots, colours), shared_marks(logs), float(times[0]), options.dark,
     )  # fmt: skip
 
 
@@ -96,7 +96,7 @@ def picture_of(
         raise InputError(f"{file}: an animated picture shows one flight, got {len(logs)} bags")
     ((name, log),) = logs.items()
     flight = Flown(name, log, robots[name], _law(log), OF_TRAIL)
-    shown = [p for p in plots_of(logs, ON_DARK) if p.title.split()[0] in PICTURED]
+    shown = [p for p in plots_of(logs, robots, ON_DARK) if p.title.startswith(PICTURED)]
     return encoded(animate(flight, shown[:MOST_PLOTS], title or _told(flight), advance), file)
 
 

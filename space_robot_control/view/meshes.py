@@ -2,32 +2,34 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
 from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.ros.run_module import clean_environment, module_command
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.shapes import drawn_shapes, shapes_of
 from space_robot_sim.robot.tree import Visual
 
-Array = NDArray[np.float64]
+from . import mesh_process
+from .mesh import Mesh
 
 MOST_FACES = 60_000
 """Of all meshes of a robot: some 0.7 MB of a page."""
-FINEST, COARSER = 400.0, 0.8
-"""Cells along a mesh's longest edge to which its corners are moved, and how many fewer next."""
 
 
-class Mesh(NamedTuple):
-    """Triangles."""
+class ReadMesh(NamedTuple):
+    """A mesh file as it is drawn, or the reason why it is not."""
 
-    vertices: Array
-    """(V, 3) in the file's unit."""
-    faces: NDArray[np.int64]
-    """(F, 3) numbers of vertices."""
+    mesh: Mesh | None
+    whole: int = 0
+    """Faces that the file has."""
+    reason: str = ""
 
 
 class Shapes(NamedTuple):
@@ -47,60 +49,57 @@ def shown_shapes(robot: Robot) -> Shapes:
     and mass. One of too many faces is drawn with fewer.
     """
     shapes = shapes_of(robot)
-    files = dict.fromkeys(shape.mesh for shape in shapes if shape.shape == "mesh")
-    share = MOST_FACES // max(1, len(files))
+    files = tuple(dict.fromkeys(shape.mesh for shape in shapes if shape.shape == "mesh"))
     meshes, remarks = {}, []
-    for file in files:
-        try:
-            whole = read_mesh(file)
-        except InputError as error:
-            remarks.append(str(error))
+    for file, read in zip(files, read_meshes(files, MOST_FACES), strict=True):
+        if read.mesh is None:
+            remarks.append(f"mesh {file}: cannot be drawn ({read.reason})")
             continue
-        meshes[file] = simpler(whole, share)
-        if len(whole.faces) > share:
-            of_all = f"{len(meshes[file].faces)} of its {len(whole.faces)} faces"
+        meshes[file] = read.mesh
+        if len(read.mesh.faces) < read.whole:
+            of_all = f"{len(read.mesh.faces)} of its {read.whole} faces"
             remarks.append(f"{file}: drawn with {of_all}, to keep the page small")
-    found = [shape for shape in shapes if shape.shape != "mesh" or shape.mesh in meshes]
-    bare = {shape.body for shape in shapes} - {shape.body for shape in found}
+    drawn = [shape for shape in shapes if shape.shape != "mesh" or shape.mesh in meshes]
+    bare = {shape.body for shape in shapes} - {shape.body for shape in drawn}
     if bare:
-        found += [shape for shape in drawn_shapes(robot) if shape.body in bare]
-    return Shapes(tuple(found), meshes, tuple(remarks))
+        drawn += [shape for shape in drawn_shapes(robot) if shape.body in bare]
+    return Shapes(tuple(drawn), meshes, tuple(remarks))
 
 
-@lru_cache(maxsize=128)
-def read_mesh(file: str) -> Mesh:
-    """Read a mesh file of any format that trimesh reads.
+@lru_cache(maxsize=32)
+def read_meshes(files: tuple[str, ...], most: int) -> tuple[ReadMesh, ...]:
+    """Read mesh files, of any format that trimesh reads, in processes with limits.
 
-    Raises:
-        InputError: it is not there, or cannot be read; in one line.
+    Args:
+        files: their paths.
+        most: faces of all of them together; those of a file with more than its share are reduced.
     """
-    import trimesh
-
-    try:
-        read = trimesh.load_mesh(file)
-        vertices, faces = np.asarray(read.vertices, dtype=np.float64), np.asarray(read.faces)
-    except Exception as error:  # of as many kinds as there are formats
-        why = str(error).strip().split("\n")[0] or type(error).__name__
-        raise InputError(f"mesh {file}: cannot be drawn ({why})") from None
-    if not len(faces) or not np.isfinite(vertices).all():
-        raise InputError(f"mesh {file}: cannot be drawn (no faces with finite corners)")
-    return Mesh(vertices, faces)
+    read: list[ReadMesh] = []
+    while len(read) < len(files):  # a process ends at a file that takes too much
+        read += _read_in_process(files[len(read) :], most // len(files))
+    return tuple(read)
 
 
-def simpler(mesh: Mesh, most: int) -> Mesh:
-    """Return a mesh of ``most`` faces or fewer: corners that lie near one another become one."""
-    low, size = mesh.vertices.min(axis=0), float(np.ptp(mesh.vertices, axis=0).max())
-    cells, found = FINEST, mesh
-    while len(found.faces) > most and cells > 1.0:
-        at = np.floor((mesh.vertices - low) / size * cells)
-        _, number, count = np.unique(at, axis=0, return_inverse=True, return_counts=True)
-        number = number.reshape(-1)
-        vertices = np.zeros((len(count), 3))
-        np.add.at(vertices, number, mesh.vertices)
-        faces = number[mesh.faces]
-        a, b, c = faces.T
-        faces = faces[(a != b) & (b != c) & (c != a)]
-        _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
-        found = Mesh(vertices / count[:, np.newaxis], faces[np.sort(first)])
-        cells *= COARSER
-    return found
+def _read_in_process(files: tuple[str, ...], most: int) -> list[ReadMesh]:
+    """Read files up to the first one at which the process ends, at least one."""
+    # each thread of BLAS would reserve memory, and nothing here is computed by it
+    environment = {**clean_environment(), "OPENBLAS_NUM_THREADS": "1"}
+    read: list[ReadMesh] = []
+    with TemporaryDirectory() as folder:
+        subprocess.run(
+            module_command(mesh_process.__name__, str(most), folder), env=environment,
+            input=json.dumps(files).encode(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            check=False,
+        )  # fmt: skip
+        for number in range(len(files)):
+            result = Path(folder) / f"{number}.npz"
+            reason = result.with_suffix(".txt")
+            if result.is_file():
+                with np.load(result) as data:
+                    mesh = Mesh(data["vertices"], data["faces"])
+                    read.append(ReadMesh(mesh, int(data["whole"])))
+            elif reason.is_file():
+                read.append(ReadMesh(None, reason=reason.read_text("utf-8")))
+            else:
+                return [*read, ReadMesh(None, reason=mesh_process.TOO_MUCH)]
+    return read

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from importlib.resources import files
@@ -13,28 +12,9 @@ from numpy.typing import NDArray
 
 from ..analysis.template import template
 from .marks import Mark
+from .plots import Plot
 
 Array = NDArray[np.float64]
-
-
-class Series(NamedTuple):
-    """A line of a plot."""
-
-    label: str
-    colour: str
-    values: Array
-    """(K,)"""
-
-
-class Plot(NamedTuple):
-    """A plot over time."""
-
-    title: str
-    unit: str
-    time: Array
-    """(K,) s."""
-    series: Sequence[Series]
-    is_logarithmic: bool = False
 
 
 class Shown(NamedTuple):
@@ -72,6 +52,7 @@ def render(
         "plots": [
             {
                 "title": plot.title, "unit": plot.unit, "logarithmic": plot.is_logarithmic,
+                "pulses": plot.are_pulses,
                 "time": _short(plot.time, 4),
                 "series": [
                     {
@@ -96,7 +77,7 @@ def render(
         uplot_css=folder.joinpath("uPlot.min.css").read_text("utf-8"),
         css=folder.joinpath("view.css").read_text("utf-8"),
         script=folder.joinpath("view.js").read_text("utf-8"),
-        data=json.dumps(data, separators=(",", ":")).replace("</", "<\\/"),
+        data=data,
     )  # fmt: skip
 
 

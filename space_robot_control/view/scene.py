@@ -13,7 +13,8 @@ from space_robot_sim.robot.frame_names import frame_names
 from space_robot_sim.robot.transforms import Transform, joint_transforms, tool_transforms, wxyz
 from space_robot_sim.robot.tree import Visual
 
-from .meshes import Mesh, shown_shapes
+from .mesh import Mesh
+from .meshes import shown_shapes
 
 if TYPE_CHECKING:
     from viser import FrameHandle, SceneApi, SceneNodeHandle
@@ -83,7 +84,7 @@ class RobotScene:
             mesh: of a shape that is one.
         """
         path = f"{self._paths[self._names[shape.body]]}/{name}"
-        return _add_shape(self._scene, path, shape, self._look, mesh)
+        return add_shape(self._scene, path, shape, self._look, mesh)
 
     def move(self, position: Array, quaternion: Array, moved: Sequence[Transform], k: int) -> None:
         """Move base and joints.
@@ -94,17 +95,17 @@ class RobotScene:
             moved: of `joint_transforms`.
             k: which of their rows.
         """
-        _place(self.base, "position", position)
-        _place(self.base, "wxyz", quaternion)
+        set_pose(self.base, "position", position)
+        set_pose(self.base, "wxyz", quaternion)
         for link in moved:
             frame = self._frames[link.child]
             if len(link.quaternion) > 1:
-                _place(frame, "wxyz", link.quaternion[k])
+                set_pose(frame, "wxyz", link.quaternion[k])
             if len(link.position) > 1:
-                _place(frame, "position", link.position[k])
+                set_pose(frame, "position", link.position[k])
 
 
-def _place(frame: FrameHandle, what: str, value: Array) -> None:
+def set_pose(frame: FrameHandle, what: str, value: Array) -> None:
     """Set a frame's pose to the last bit.
 
     viser takes what is close by `numpy.allclose`, 1e-5 of it, for no change and leaves it out.
@@ -115,9 +116,18 @@ def _place(frame: FrameHandle, what: str, value: Array) -> None:
         setattr(frame, what, value)
 
 
-def _add_shape(
-    scene: SceneApi, path: str, shape: Visual, look: Look, mesh: Mesh | None
+def add_shape(
+    scene: SceneApi, path: str, shape: Visual, look: Look, mesh: Mesh | None = None
 ) -> SceneNodeHandle:
+    """Draw a shape below a node of the scene.
+
+    Args:
+        scene: of a server.
+        path: of the shape.
+        shape: what it is; its body does not matter.
+        look: how it is drawn.
+        mesh: of a shape that is one.
+    """
     *own, alpha = shape.colour or GREY
     red, green, blue = (round(255 * value) for value in own)
     colour = rgb(look.tint) if look.tint else (red, green, blue)

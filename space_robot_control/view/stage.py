@@ -1,10 +1,7 @@
-"""What stands about the robots in a scene: the floor's grid, the light, the first camera."""
+"""What surrounds the robots in a scene: stars, inertial axes, light, the first camera."""
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Iterator
-from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
@@ -19,7 +16,8 @@ from space_robot_sim.robot.frames import body_frames
 from space_robot_sim.robot.transforms import wxyz
 from space_robot_sim.robot.tree import Visual
 
-from .meshes import Mesh, shown_shapes
+from .mesh import Mesh
+from .meshes import shown_shapes
 
 if TYPE_CHECKING:
     from viser import SceneApi, ViserServer
@@ -32,6 +30,11 @@ DIRECTION = np.array([0.62, -1.0, 0.42])
 SKY = 1.4
 LAMPS = (((0.2, -0.7, 1.0), 2.3), ((-0.8, -0.6, 0.3), 0.6))
 """From where light comes, and how strong."""
+STARS, STAR_SEED = 500, 1
+STARS_AT, STAR = 40.0, 0.0025
+"""Distance of the stars by the size of what is seen, and their size by that distance."""
+STAR_DARK, STAR_LIGHT = (130, 136, 150), (205, 209, 216)
+"""Their colours on dark and on light pages."""
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 
 
@@ -45,34 +48,10 @@ def check_viser() -> None:
         raise InputError("view needs viser: pip install 'space_robot[view]'")
 
 
-@contextmanager
-def silent_server(port: int = 0) -> Iterator[ViserServer]:
-    """Start a server of viser that only this machine hears, and nothing on standard output.
-
-    Args:
-        port: to listen to; the next free one if it is taken. 0: any.
-    """
-    from rich import get_console
-    from viser import ViserServer
-
-    # a browser that opens a connection and does not use it is no error
-    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
-    console = get_console()
-    was_quiet, console.quiet = console.quiet, True
-    try:
-        server = ViserServer(host="127.0.0.1", port=port, verbose=False)
-        try:
-            yield server
-        finally:
-            server.stop()
-    finally:
-        console.quiet = was_quiet
-
-
 def set_stage(
     server: ViserServer, points: Array, dark: bool, shadows: bool = True
 ) -> None:  # fmt: skip
-    """Put grid, light and camera about some points.
+    """Put stars, axes, light and camera about some points.
 
     Args:
         server: whose scene is set.
@@ -85,18 +64,28 @@ def set_stage(
     scene.world_axes.visible = False
     low, high = points.min(axis=0), points.max(axis=0)
     middle, size = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 0.1)
-    cell = 10.0 ** np.floor(np.log10(0.5 * size))
-    shades = ((42, 46, 56), (64, 70, 84)) if dark else ((226, 228, 232), (196, 200, 208))
-    scene.add_grid(
-        "/grid", infinite_grid=True, cell_size=cell, section_size=5.0 * cell,
-        cell_color=shades[0], section_color=shades[1], fade_distance=4.0 * size, fade_from="origin",
-        position=(middle[0], middle[1], low[2] - 0.08 * size), shadow_opacity=0.2,
-    )  # fmt: skip
+    _surround(scene, middle, size, low, dark)
     _light(scene, shadows)
     camera.fov, camera.near, camera.far = float(FIELD_OF_VIEW), 0.01 * size, 100.0 * size
     back = DIRECTION / np.linalg.norm(DIRECTION)
     camera.look_at = middle
     camera.position = middle + _distance(points - middle, back) * back
+
+
+def _surround(scene: SceneApi, middle: Array, size: float, low: Array, dark: bool) -> None:
+    """Draw what shows that a robot drifts and turns: inertial axes of a round length, and stars."""
+    length = 10.0 ** np.floor(np.log10(0.5 * size))
+    scene.add_frame(
+        "/inertial", axes_length=length, axes_radius=0.002 * size, origin_radius=0.004 * size,
+        position=low - 0.05 * size,
+    )  # fmt: skip
+    scene.add_label("/inertial/length", f"{length:g} m", position=(length, 0.0, 0.0))
+    directions = np.random.default_rng(STAR_SEED).normal(size=(STARS, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    scene.add_point_cloud(
+        "/stars", middle + STARS_AT * size * directions, STAR_DARK if dark else STAR_LIGHT,
+        point_size=STAR * STARS_AT * size, point_shape="circle",
+    )  # fmt: skip
 
 
 def _light(scene: SceneApi, shadows: bool) -> None:

@@ -1,8 +1,9 @@
-"""What a robot has captured, drawn in its hand for as long as it is held."""
+"""Targets: before they are captured where they drift and turn, then in the hand that holds them."""
 
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,39 +12,55 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.events import Capture
 from space_robot_sim.environment.grasp import Grasp
+from space_robot_sim.faults.schedule import tick_from
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.shapes import Colour, even_box
 
 from ..analysis.described import events_of
-from .scene import RobotScene
+from .free_body import FreeBody, before_capture
+from .scene import Look, RobotScene, add_shape, set_pose
 from .trails import Move
+
+if TYPE_CHECKING:
+    from viser import SceneApi
 
 Array = NDArray[np.float64]
 
 COLOUR: Colour = (0.85, 0.38, 0.22, 1.0)
 
 
-def held_targets(scene: RobotScene, log: FlightLog, robot: Robot, times: Array) -> list[Move]:
+def targets(
+    scene: SceneApi, root: str, robot_scene: RobotScene, log: FlightLog, robot: Robot, times: Array
+) -> list[Move]:
     """Draw each target of a flight as a box of even density; none where the bag tells none.
 
     Args:
-        scene: the robot that holds it.
+        scene: of a server.
+        root: name of the robot in the scene.
+        robot_scene: the robot that holds it.
         log: the flight.
         robot: that flew.
         times: (K,) s, of the frames.
     """
     try:
-        held = [
-            (Grasp.of(robot, event.target), event.time_s, after.time_s if after else np.inf)
+        captures = [
+            (event, Grasp.of(robot, event.target), after.time_s if after else np.inf)
             for event, after in pairwise([*events_of(log), None])
             if isinstance(event, Capture)
         ]
     except InputError:
         return []
-    return [
-        _holding(scene, f"target_{number}", grasp, _first(times, start), _first(times, stop))
-        for number, (grasp, start, stop) in enumerate(held)
-    ]
+    moves: list[Move] = []
+    for number, (event, grasp, stop) in enumerate(captures):
+        start = _first(times, event.time_s)
+        moves.append(_holding(robot_scene, f"target_{number}", grasp, start, _first(times, stop)))
+        free = before_capture(event, log, robot)
+        if free is not None and start > 0:
+            path = f"{root}/free_target_{number}"
+            period = log.timebase.period
+            moment = tick_from(event.time_s, period) * period
+            moves.append(_drifting(scene, path, grasp, free, times[:start] - moment))
+    return moves
 
 
 def _holding(scene: RobotScene, name: str, grasp: Grasp, start: int, stop: int) -> Move:
@@ -56,6 +73,23 @@ def _holding(scene: RobotScene, name: str, grasp: Grasp, start: int, stop: int) 
             shape.visible = k == start
 
     return hold
+
+
+def _drifting(scene: SceneApi, path: str, grasp: Grasp, free: FreeBody, times: Array) -> Move:
+    """Draw a target up to its capture, at times (K,) s before it."""
+    frame = scene.add_frame(path, show_axes=False)
+    box = even_box(grasp.mass, grasp.inertia, np.zeros(3), 0, COLOUR)
+    add_shape(scene, f"{path}/box", box, Look())
+    positions, quaternions = free.poses(times)
+
+    def drift(k: int) -> None:
+        if k < len(times):
+            set_pose(frame, "position", positions[k])
+            set_pose(frame, "wxyz", quaternions[k])
+        elif k == len(times):
+            frame.visible = False
+
+    return drift
 
 
 def _first(times: Array, event: float) -> int:

@@ -24,6 +24,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from space_robot_msgs_py.config.text import shortened
 from space_robot_msgs_py.errors import InputError
 
 from ..files import make_folder, whole_file
@@ -31,6 +32,8 @@ from ..files import make_folder, whole_file
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
+MOST_LETTERS = 40
+"""Of a name in a legend: layout of long texts takes minutes."""
 RESOLUTION = 150
 """dpi of a PNG."""
 PAGE_WIDTH = 180.0
@@ -71,7 +74,7 @@ def page(height: float, title: str = "") -> Figure:
     """Make an empty page of ``height`` mm, with a title if there is one."""
     figure = Figure(figsize=(PAGE_WIDTH / 25.4, height / 25.4), dpi=RESOLUTION)
     if title:
-        figure.suptitle(plain(textwrap.fill(title, 95)))
+        figure.suptitle(plain(textwrap.fill(shortened(title, 5 * MOST_LETTERS), 95)))
     return figure
 
 
@@ -166,6 +169,7 @@ def legend_above(
         dashed: as in `plot_lines`.
         width: mm that there are.
     """
+    names = [shortened(name, MOST_LETTERS) for name in names]
     looks = [Look.of(index) for index in range(len(names))]
     handles = [
         Line2D([], [], color=x.colour, marker=x.marker, linestyle=x.dashes if dashed else "-")

@@ -12,6 +12,9 @@ from ...flight.graph.domain import domain_asked_for
 from ...flight.graph.node_names import PLANT
 from ...flight.graph.temporary_node import TemporaryNode
 
+MOST_NAMES = 5
+"""Of nodes that are named."""
+
 
 class Place(NamedTuple):
     """A namespace of a ROS domain."""
@@ -53,6 +56,17 @@ class Finder:
             return Place(self._domain, found[0]) if found else None
         newest = newest_node(PLANT, self._namespace)
         return Place(*newest) if newest else None
+
+    def describe(self) -> str:
+        """Say where is looked, and what is there."""
+        if self._domain is None:
+            return "no plant runs on this machine"
+        assert self._node is not None
+        own = self._node.node.get_name()
+        names = sorted({name for name in self._node.node.get_node_names() if name != own})
+        nodes = ", ".join(names[:MOST_NAMES]) + (", ..." if len(names) > MOST_NAMES else "")
+        seen = f"nodes {nodes}, but nobody sends base/state" if names else "no other node"
+        return f"ROS domain {self._domain} has {seen}"
 
     def is_there(self, place: Place) -> bool:
         """Tell whether a plant that was found still is."""

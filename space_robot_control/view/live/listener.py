@@ -67,18 +67,22 @@ class Listener:
         from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
 
         self._monitor = Monitor(place.domain, place.namespace, "viewer")
+        self._group = PolledCallbackGroup()
+        self._topics: dict[type[MessageDescription], StateTopic] = {}
         try:
-            self.robot, period = self._ask_plant(robot, check)
-            self._group = PolledCallbackGroup()
+            # before the plant is asked: a short flight may be over when it has answered
+            for kind in (*MEASURED, *TRUE):
+                self._topics[kind] = StateTopic(self._monitor.node, self._group, kind)
             self._law = RawSubscription(self._monitor.node, topics.LAW, self._group)
+            self.robot, period = self._ask_plant(robot, check)
         except BaseException:
             self.close()
             raise
         self._timebase = Timebase(round(period * 1e9))
         self._names = RobotNames.of(self.robot.joint_names, passive=self.robot.passive_names)
+        for topic in self._topics.values():
+            topic.describe(self._names, self._timebase)
         self._state = RobotState.allocate(self.robot.n)
-        self._kinds: tuple[type[MessageDescription], ...] = ()
-        self._topics: list[StateTopic] = []
         self._stamp_ns: int | None = None
         """The newest sample's time."""
         self.law = ""
@@ -111,7 +115,7 @@ class Listener:
         if stamp_ns is None or stamp_ns == self._stamp_ns:
             return None
         self._stamp_ns = stamp_ns
-        for topic in self._topics:
+        for topic in self._topics.values():
             topic.fill(self._state, stamp_ns)
         state, passive = self._state, len(self._names.passive)
         angles = np.concatenate([state.joint_positions, state.passive_positions[:passive]])
@@ -133,23 +137,23 @@ class Listener:
         return {**faults, **self._monitor.complaints}
 
     def _choose_topics(self, with_states: bool) -> None:
-        node = self._monitor.node
-        kinds = TRUE if node.count_publishers(topics.TRUTH_BASE.name) else MEASURED
-        kinds = kinds if with_states else ()
-        if kinds == self._kinds:
-            return
-        for topic in self._topics:
-            topic.close()
-        self._kinds = kinds
-        self._topics = [
-            StateTopic(node, self._group, kind, self._names, self._timebase) for kind in kinds
-        ]
+        """Listen to the truth where it is sent, else to what the sensors tell, or to neither."""
+        for topic in self._topics.values():
+            topic.take()
+        heard = TruthBase in self._topics and bool(self._topics[TruthBase].rows)
+        is_sent = bool(self._monitor.node.count_publishers(topics.TRUTH_BASE.name))
+        kinds = (TRUE if is_sent or heard else MEASURED) if with_states else ()
+        for kind in [kind for kind in self._topics if kind not in kinds]:
+            self._topics.pop(kind).close()
+        for kind in kinds:
+            if kind not in self._topics:
+                topic = StateTopic(self._monitor.node, self._group, kind)
+                topic.describe(self._names, self._timebase)
+                self._topics[kind] = topic
 
     def _newest_of_all(self) -> int | None:
         """Return the newest time for which each topic has a row: base and arm of one tick."""
-        for topic in self._topics:
-            topic.take()
-        times = [set(topic.rows) for topic in self._topics]
+        times = [set(topic.rows) for topic in self._topics.values()]
         return max(set.intersection(*times), default=None) if times else None
 
     def _read_law(self, data: bytes) -> list[Event]:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from space_robot_msgs_py.errors import FlightError
 
 from ...flight.graph.monitor import Event
-from ..stage import silent_server
+from ..local_server import local_server
 from .finder import Finder, Place
-from .listener import Listener
+from .listener import Listener, Sample
 from .view import LiveView
 
 if TYPE_CHECKING:
@@ -23,9 +23,16 @@ RATE_HZ = 30.0
 """Frames a second at most, by the wall clock."""
 TELL_S = 0.2
 """How often words and curves are shown anew."""
+FIRST_S = 0.02
+"""How often the first state is looked for."""
 LOOK_S = 0.5
 """How often a plant is looked for."""
+SAY_S = 20.0
+"""How often it is said that there is still no flight."""
+UNWATCHED_S = 60.0
+"""Of a flight that states are listened to without a browser, for one that opens late."""
 WAITING, OVER = "waiting for a flight", "the flight is over"
+MISSED = "the flight was over before it could be shown; view shows its bag"
 
 
 @dataclass(frozen=True)
@@ -62,7 +69,7 @@ def serve(options: LiveOptions, say: Callable[[str], None], ready: Callable[[str
     """
     with (
         closing(Finder(options.domain, options.namespace)) as finder,
-        silent_server(options.port) as server,
+        local_server(options.port) as server,
     ):
         # no button to share: that would lead through a server somewhere
         server.gui.configure_theme(
@@ -72,14 +79,24 @@ def serve(options: LiveOptions, say: Callable[[str], None], ready: Callable[[str
         ready(f"http://127.0.0.1:{server.get_port()}")
         follower = Follower(server, finder, options)
         while True:
-            say(WAITING)
-            while (place := finder.find()) is None:
-                time.sleep(LOOK_S)
+            place = _wait(finder, say)
             say(f"following the flight in {place}")
             try:
-                follower.follow(place)
+                follower.follow(place, say)
             except FlightError as error:
                 say(str(error))
+
+
+def _wait(finder: Finder, say: Callable[[str], None]) -> Place:
+    """Wait for a flight, and say from time to time what is there instead."""
+    say(WAITING)
+    say_at = time.monotonic() + SAY_S
+    while (place := finder.find()) is None:
+        time.sleep(LOOK_S)
+        if time.monotonic() >= say_at:
+            say(f"still {WAITING}: {finder.describe()}")
+            say_at = time.monotonic() + SAY_S
+    return place
 
 
 class Follower:
@@ -89,9 +106,15 @@ class Follower:
         self._server, self._finder, self._options = server, finder, options
         self._waiting = server.gui.add_markdown("Waiting for a flight.")
         self._view: LiveView | None = None
+        self._began = 0.0
+        """When the flight was first shown, by the monotonic clock."""
 
-    def follow(self, place: Place) -> None:
+    def follow(self, place: Place, say: Callable[[str], None]) -> None:
         """Show the flight in a place to its end.
+
+        Args:
+            place: where it is.
+            say: told what is waited for.
 
         Raises:
             OverError: it is over.
@@ -103,22 +126,45 @@ class Follower:
             if not self._finder.is_there(place):
                 raise OverError(OVER)
 
-        with closing(Listener(place, self._options.robot, check)) as listener:
+        self._waiting.content = f"Joining the flight in {place}."
+        with closing(self._join(place, check)) as listener:
+            say(f"its robot is {listener.robot.name}; waiting for its first state")
             events: list[Event] = []
-            while (sample := listener.poll(self._is_watched, events)) is None:
-                check()
-                time.sleep(TELL_S)
+            sample = self._first_sample(listener, events, check)
             with self._server.atomic():
                 if self._view:
                     self._view.close()
                 self._waiting.visible = False
                 self._view = LiveView(self._server, listener.robot, sample, self._options.dark)
+            say(f"showing it from {sample.time:.2f} s on")
+            self._began = time.monotonic()
             self._view.note(events)
             try:
                 self._show(listener, self._view, check)
             except OverError as over:
                 self._view.tell(listener, 0.0, str(over))
                 raise
+
+    def _join(self, place: Place, check: Callable[[], None]) -> Listener:
+        try:
+            return Listener(place, self._options.robot, check)
+        except OverError:
+            raise OverError(MISSED) from None
+
+    def _first_sample(
+        self, listener: Listener, events: list[Event], check: Callable[[], None]
+    ) -> Sample:
+        """Return the first sample; of a flight that is over by then what has come of it."""
+        while True:
+            if sample := listener.poll(True, events):
+                return sample
+            try:
+                check()
+            except OverError:
+                if sample := listener.poll(True, events):
+                    return sample
+                raise OverError(MISSED) from None
+            time.sleep(FIRST_S)
 
     def _show(self, listener: Listener, view: LiveView, check: Callable[[], None]) -> None:
         flown = tell_at = look_at = 0.0
@@ -129,7 +175,7 @@ class Follower:
                 check()
                 look_at = began + LOOK_S
             events: list[Event] = []
-            sample = listener.poll(self._is_watched, events)
+            sample = listener.poll(self._is_wanted, events)
             view.note(events)
             if listener.time < flown:  # by the clock: faults may send old states
                 raise OverError("the flight has begun anew")
@@ -141,6 +187,10 @@ class Follower:
                 view.tell(listener, speed)
                 tell_at, told = began + TELL_S, (began, listener.time)
             time.sleep(max(0.0, began + 1.0 / RATE_HZ - time.monotonic()))
+
+    @property
+    def _is_wanted(self) -> bool:
+        return self._is_watched or time.monotonic() < self._began + UNWATCHED_S
 
     @property
     def _is_watched(self) -> bool:

@@ -31,19 +31,24 @@ class StateTopic:
         node: Node,
         group: PolledCallbackGroup,
         kind: type[MessageDescription],
-        names: RobotNames,
-        timebase: Timebase,
     ) -> None:
-        """Subscribe to the messages of a kind as they come, never waited for."""
+        """Subscribe to the messages of a kind as they come; they are never waited for.
+
+        They can be taken once `describe` has been called. Those that come before are kept.
+        """
         from space_robot_msgs_py.ros.endpoints import RawSubscription
 
-        self._describe = kind.of_robot(names, timebase)
-        self._codec = Codec(self._describe)
-        self._width = sum(column.length for column in self._describe.columns)
-        self._period_ns = timebase.period_ns
+        self._kind = kind
         self._subscription = RawSubscription(node, kind.topic, group, KEPT, best_effort=True)
         self.rows: dict[int, Array] = {}
         """The last row of each of the newest messages, by its time in ns."""
+
+    def describe(self, names: RobotNames, timebase: Timebase) -> None:
+        """Set the robot that the messages are of, and the period of its ticks."""
+        self._describe = self._kind.of_robot(names, timebase)
+        self._codec = Codec(self._describe)
+        self._width = sum(column.length for column in self._describe.columns)
+        self._period_ns = timebase.period_ns
 
     def take(self) -> None:
         """Take what has come; messages that are not of this robot are passed over."""

@@ -62,7 +62,25 @@ function drawTime(u) {
 const sync = uPlot.sync("flight");
 const place = document.getElementById("plots");
 const axis = { stroke: colourOf("faint"), grid: { stroke: colourOf("line"), width: 1 }, ticks: { stroke: colourOf("line") } };
-const vertical = { ...axis, size: 58, values: (_, v) => v.map(number) };
+const vertical = { ...axis, size: 58, space: 18, values: (_, v) => v.map(number) };
+
+// Of pulses each series has a row, numbered from the top, and fills it while it is open.
+const ROW = 0.8;
+const share = (plot, k) => (_, v) => number(v == null || !plot.pulses ? v : (v + k) / ROW);
+const curve = (plot, k) => (plot.pulses ? plot.series[k].values.map((v) => (v == null ? v : ROW * v - k)) : plot.series[k].values);
+const heightOf = (plot) => (plot.pulses ? Math.max(150, 50 + 12 * plot.series.length) : 150);
+
+function scaleOf(plot) {
+  if (plot.logarithmic) return { distr: 3 };
+  return plot.pulses ? { range: [1 - plot.series.length - 0.2, 1] } : {};
+}
+
+function axisOf(plot) {
+  if (plot.logarithmic) return { ...vertical, splits: decades, filter: (_, v) => v };
+  if (!plot.pulses) return vertical;
+  return { ...vertical, splits: plot.series.map((_, k) => -k).reverse(), filter: (_, v) => v, values: (_, v) => v.map((row) => `${1 - row}`) };
+}
+
 let zooming = false;
 const drawn = plots.map((plot) => {
   const heading = document.createElement("h2");
@@ -76,20 +94,17 @@ const drawn = plots.map((plot) => {
   };
   const u = new uPlot(
     {
-      width: place.clientWidth, height: 150,
-      scales: { x: { time: false }, y: { distr: plot.logarithmic ? 3 : 1 } },
+      width: place.clientWidth, height: heightOf(plot),
+      scales: { x: { time: false }, y: scaleOf(plot) },
       cursor: { sync: { key: sync.key } },
-      axes: [
-        { ...axis, size: 24, values: (_, v) => v.map((x) => `${x}`) },
-        plot.logarithmic ? { ...vertical, splits: decades, filter: (_, v) => v } : vertical,
-      ],
+      axes: [{ ...axis, size: 24, values: (_, v) => v.map((x) => `${x}`) }, axisOf(plot)],
       series: [
         { label: "s", value: (_, v) => number(v) },
-        ...plot.series.map((s) => ({ label: s.label, stroke: s.colour, width: 1, value: (_, v) => number(v) })),
+        ...plot.series.map((s, k) => ({ label: s.label, stroke: s.colour, width: 1, value: share(plot, k) })),
       ],
       hooks: { drawAxes: [drawMarks], draw: [drawTime], setScale: [zoomed] },
     },
-    [plot.time, ...plot.series.map((s) => s.values)],
+    [plot.time, ...plot.series.map((_, k) => curve(plot, k))],
     place,
   );
   let pressed = 0;
@@ -99,7 +114,7 @@ const drawn = plots.map((plot) => {
   });
   return u;
 });
-new ResizeObserver(() => drawn.forEach((u) => u.setSize({ width: place.clientWidth, height: 150 }))).observe(place);
+new ResizeObserver(() => drawn.forEach((u) => u.setSize({ width: place.clientWidth, height: u.height }))).observe(place);
 
 function buttonOf(mark) {
   const button = document.createElement("button");

@@ -93,3 +93,12 @@ def test_a_bag_that_does_not_say_what_flew_has_a_title_without_none(
     text = shown(100, lambda console: print_table(rms_table(foreign), console))
     assert text.startswith("unknown law: 100 ticks, 0.05 s")
     assert "None" not in text
+
+
+def test_the_lines_of_a_title_and_words_in_two_lines_stay_what_they_are() -> None:
+    """Of a table that becomes lines, as one of a diverged flight in a narrow terminal."""
+    table = Table(title="tde_stc\nsensors ideal")
+    table.add_column("naviga-\ntion RMS", justify="right")
+    table.add_row(f"{1e90:.4f}")
+    lines = shown(60, lambda console: show(table, console)).splitlines()
+    assert lines == ["tde_stc", "sensors ideal", f"  navigation RMS: {1e90:.4f}"]

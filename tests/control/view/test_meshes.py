@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import os
+import shutil
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,10 +14,17 @@ import pytest
 import trimesh
 from scene_pages import Scene
 
-from space_robot_control.view import meshes
-from space_robot_control.view.meshes import read_mesh, shown_shapes, simpler
+from space_robot_control.view import mesh_process, meshes
+from space_robot_control.view.local_server import local_server
+from space_robot_control.view.mesh import simplify
+from space_robot_control.view.mesh_process import (
+    MOST_BYTES,
+    TOO_MUCH,
+    UnreadableMeshError,
+    read_mesh,
+)
+from space_robot_control.view.meshes import read_meshes, shown_shapes
 from space_robot_control.view.scene import RobotScene
-from space_robot_control.view.stage import silent_server
 from space_robot_sim.robot import Robot
 from space_robot_sim.robot.tree import Visual
 
@@ -34,7 +45,7 @@ def test_a_large_mesh_keeps_its_form_with_fewer_faces(
 ) -> None:
     whole = read_mesh(str(ball))
     assert len(whole.faces) == 20_480
-    assert simpler(whole, 20_480) is whole
+    assert simplify(whole, 20_480) is whole
     monkeypatch.setattr(meshes, "MOST_FACES", 2_000)
     found = shown_shapes(replace(paper_robot, visuals=(visual(ball),)))
     small = found.meshes[str(ball)]
@@ -66,13 +77,80 @@ def test_a_body_whose_meshes_cannot_be_read_is_drawn_from_its_numbers(
     assert all("\n" not in remark for remark in found.remarks)
 
 
+def gltf_of(count: int) -> bytes:
+    """A mesh of so many vertices that are not stored: all are zero."""
+    content = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "bufferViews": [],
+        "accessors": [
+            {"componentType": 5126, "count": count, "type": "VEC3"},
+            {"componentType": 5125, "count": count, "type": "SCALAR"},
+        ],
+    }  # fmt: skip
+    return json.dumps(content).encode()
+
+
+def test_what_unpacks_to_too_much_is_refused_and_what_follows_is_read(
+    ball: Path, tmp_path: Path
+) -> None:
+    """An archive by what it states, memory by what is used; a pipe is never read."""
+    archive, pipe = tmp_path / "archive.zip", tmp_path / "pipe.stl"
+    with zipfile.ZipFile(archive, "w") as written:
+        written.write(ball, "ball.stl")
+    content = bytearray(archive.read_bytes())
+    at = content.rindex(b"PK\x01\x02") + 24  # the size in the directory
+    content[at : at + 4] = (MOST_BYTES + 10**9).to_bytes(4, "little")
+    archive.write_bytes(content)
+    os.mkfifo(pipe)
+    zeros = tmp_path / "zeros.gltf"
+    zeros.write_bytes(gltf_of(MOST_BYTES // 12 + 1))
+    files = [archive, pipe, zeros, ball, tmp_path / "lacking.stl"]
+    read = read_meshes(tuple(map(str, files)), 5 * 30_000)
+    assert [result.mesh is not None for result in read] == [file == ball for file in files]
+    assert read[0].reason == "unpacks to 3 GB, at most 2 GB are allowed"
+    assert [r.reason for r in read[1:3] + read[4:]] == ["not a file", TOO_MUCH, "no such file"]
+
+
+def test_more_vertices_or_faces_than_allowed(ball: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mesh_process, "MOST_READ", 20_480)
+    assert len(read_mesh(str(ball)).faces) == 20_480
+    monkeypatch.setattr(mesh_process, "MOST_READ", 20_479)
+    with pytest.raises(UnreadableMeshError, match=r"^20480 faces, at most 20479 are allowed$"):
+        read_mesh(str(ball))
+    monkeypatch.setattr(mesh_process, "MOST_READ", 10_000)
+    with pytest.raises(UnreadableMeshError, match=r"^10242 vertices, "):
+        read_mesh(str(ball))
+
+
+def test_a_file_whose_reader_is_killed_is_refused_and_what_follows_is_read(
+    ball: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As by a limit of its time: a library that loops does not come back to tell."""
+    killer = tmp_path / "trimesh"
+    killer.mkdir()
+    (killer / "__init__.py").write_text(
+        "import os, signal\ndef load_mesh(file):\n    if 'evil' in file:\n"
+        "        os.kill(os.getpid(), signal.SIGXCPU)\n    raise ValueError('of the stand-in')\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    for name in ("evil.stl", "evil2.stl"):
+        shutil.copy(ball, tmp_path / name)
+    files = [str(tmp_path / "evil.stl"), str(ball), str(tmp_path / "evil2.stl")]
+    assert [r.reason for r in read_meshes(tuple(files), 9)] == [
+        TOO_MUCH,
+        "of the stand-in",
+        TOO_MUCH,
+    ]
+
+
 def test_a_mesh_is_drawn_in_its_size_and_a_mirrored_one_looks_outwards(
     paper_robot: Robot, tmp_path: Path
 ) -> None:
     file = tmp_path / "box.obj"
     trimesh.creation.box((1.0, 2.0, 3.0)).export(file)
     told = (visual(file, 0, (0.1, 0.1, 0.1)), visual(file, 0, (-0.1, 0.1, 0.1)))
-    with silent_server() as server:
+    with local_server() as server:
         scene = RobotScene(server.scene, "/robot", replace(paper_robot, visuals=told))
         page = server.get_scene_serializer().as_html()
     assert scene.base.name == "/robot/base_link"
