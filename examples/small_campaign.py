@@ -2,9 +2,9 @@
 
 Masses are off by up to 20 %, sensors are fine ones, and the navigation filters. Two laws fly the
 same draws. Required is that the quaternion's error stays below 2e-5 (8 arcsec) in 80 % of all
-such cases, at 90 % confidence. Eleven runs, fixed beforehand, are the fewest that can say so: were the
-share 80 %, all of eleven would be met with a probability of 0.8^11, 8.6 %. A verdict holds for what
-was varied, as it was varied, and for nothing else: here for the first second of case 3.
+such cases, at 90 % confidence. Eleven runs, fixed beforehand, are the fewest that can say so: were
+the share 80 %, all of eleven would be met with a probability of 0.8^11, 8.6 %. A verdict holds for
+what was varied, as it was varied, and for nothing else: here for the first second of case 3.
 
     python examples/small_campaign.py
 

@@ -80,23 +80,6 @@ class Comparison:
             return 0
         return 1 if self.failed < self.other_failed else -1
 
-    def turned(self) -> Comparison:
-        """Return the same comparison, seen from the other law."""
-        share, ratio = self.better_share, self.ratio
-        runs = max(self.runs, 1)
-        return replace(
-            self, law=self.other, other=self.law, better=self.worse, worse=self.better,
-            failed=self.other_failed, other_failed=self.failed,
-            better_share=share_interval(self.worse, runs, self.level) if self.runs else share,
-            ratio=Estimate(*(_inverse(x) for x in (ratio.value, ratio.high, ratio.low))),
-        )  # fmt: skip
-
-
-def _inverse(ratio: float) -> float:
-    if ratio == 0.0:
-        return np.inf
-    return 1.0 / ratio if ratio > 0.0 else -np.inf if ratio == np.inf else ratio
-
 
 def compare_all(table: DataFrame, column: str, confidence: float = 0.95) -> list[Comparison]:
     """Compare every law with every one after it, over the runs that both flew.

@@ -129,7 +129,7 @@ def rank_correlations(
             inverse = np.linalg.pinv(matrix)
             scale = np.sqrt(np.diag(inverse))
             held = -inverse[:-1, -1] / (scale[:-1] * scale[-1])
-        partial = [_interval(float(r), free - 2, confidence) for r in held]
+        partial = [_interval(float(r), free - 1, confidence) for r in held]
     explained = float(matrix[-1, :-1] @ np.linalg.pinv(matrix[:-1, :-1]) @ matrix[-1, :-1])
     return plain, partial, max(0.0, 1.0 - (1.0 - explained) * (runs - 1) / free)
 

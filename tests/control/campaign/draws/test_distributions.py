@@ -23,6 +23,9 @@ KNOWN: list[tuple[dict[str, Any], Any]] = [
     ({"normal": 3.0, "sigma": 0.5}, stats.norm(3.0, 0.5)),
     ({"normal": 0.0, "sigma": 2.0, "low": -1.0}, stats.truncnorm(-0.5, np.inf, 0.0, 2.0)),
     ({"normal": 0.0, "sigma": 2.0, "low": -3.0, "high": 1.0}, stats.truncnorm(-1.5, 0.5, 0.0, 2.0)),
+    ({"normal": 3.0, "sigma": 0.5, "low": 2.8}, stats.truncnorm(-0.4, np.inf, 3.0, 0.5)),
+    ({"normal": 3.0, "sigma": 0.5, "high": 3.2}, stats.truncnorm(-np.inf, 0.4, 3.0, 0.5)),
+    ({"normal": -3.0, "sigma": 0.5, "low": -2.0, "high": -1.5}, stats.truncnorm(2, 3, -3.0, 0.5)),
     ({"uniform": [-2.0, 5.0]}, stats.uniform(-2.0, 7.0)),
     ({"log_uniform": [1e-3, 10.0]}, stats.loguniform(1e-3, 10.0)),
 ]
@@ -51,6 +54,23 @@ def test_bounds_hold(u: float) -> None:
     assert 0.1 <= float(flat.quantile(u)) <= 0.3
     log = read_distribution({"log_uniform": [0.1, 0.3]}, "here")
     assert 0.1 <= float(log.quantile(u)) <= 0.3
+
+
+@given(
+    st.floats(-5.0, 5.0), st.floats(0.1, 3.0), st.none() | st.floats(-2.0, 0.0),
+    st.none() | st.floats(0.5, 2.0), st.floats(-2.0, 0.4), st.floats(0.001, 0.999),
+)  # fmt: skip
+def test_what_must_stay_above_a_number_is_truncated_there_too(
+    mean: float, sigma: float, low: float | None, high: float | None, least: float, u: float
+) -> None:
+    """Bounds in sigmas from the mean; the greater of the two lower ones counts."""
+    told = {"normal": mean, "sigma": sigma}
+    bounds = {"low": low, "high": high}
+    told |= {name: mean + sigma * bound for name, bound in bounds.items() if bound is not None}
+    cut = read_distribution(told, "here").at_least(mean + sigma * least)
+    ends = max(least, -np.inf if low is None else low), np.inf if high is None else high
+    expected = stats.truncnorm(*ends, mean, sigma).ppf(u)
+    assert cut.quantile(u) == pytest.approx(expected, rel=1e-7, abs=1e-7 * sigma)
 
 
 def test_choices_have_their_weights_and_their_types() -> None:

@@ -11,9 +11,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.stats import qmc
+from scipy.stats import qmc, truncnorm
 
 from space_robot_control.campaign.draws import Draws
+from space_robot_control.campaign.draws.designs import shifted
 from space_robot_control.campaign.draws.principal import principal, rotation, spread
 from space_robot_control.campaign.study import Study
 from space_robot_control.scenario import Scenario
@@ -103,6 +104,11 @@ def test_settings_and_gains_change_from_their_nominal_values() -> None:
 
 
 def test_faults_of_each_axis_and_times() -> None:
+    grid = {"faults": {"torque_scale@0:[*]": {"grid": [0.9, 1.0]}}}
+    assert Draws(study(grid), 0, 2**9, check=False).grid == {
+        f"faults.torque_scale@0:{axis}": 2
+        for axis in ("base_x", "base_y", "base_z", *(f"joint{k}" for k in range(1, 7)))
+    }
     vary = {"faults": {
         "torque_scale@0:[*]": {"uniform": [0.9, 1.1]},
         "stuck_joint@T:joint1=5": {"uniform": [1, 9]},
@@ -122,6 +128,7 @@ def test_a_grid_is_flown_point_by_point_under_the_same_draws() -> None:
     draws = Draws(study(vary), 0, 12)
     rows = [draws.values(run) for run in range(12)]
     points = [(row["scenario.case"], row["scenario.substeps"]) for row in rows]
+    assert draws.grid == {"scenario.case": 2, "scenario.substeps": 3}
     assert points == 2 * [(case, steps) for case in (1, 3) for steps in (1, 2, 3)]
     name = "plant.friction.coulomb"
     assert [len({row[name] for row in part}) for part in (rows[:6], rows[6:], rows)] == [1, 1, 2]
@@ -129,20 +136,41 @@ def test_a_grid_is_flown_point_by_point_under_the_same_draws() -> None:
     assert draws.scenario(5, "ctc").substeps == 3
 
 
-def test_a_latin_hypercube_has_one_number_in_every_stratum() -> None:
+def test_a_latin_hypercube_has_one_number_in_every_stratum_each_in_its_own_order() -> None:
     draws = Draws(study(VARY, design="latin_hypercube"), 3, 40, check=False)
-    strata = np.sort((numbers(draws)[:, -6:] + 2.0) / 4.0 * 40 // 1, axis=0)
-    assert np.array_equal(strata, np.repeat(np.arange(40)[:, np.newaxis], 6, axis=1))
+    scaled = (numbers(draws)[:, -6:] + 2.0) / 4.0 * 40
+    strata = scaled.astype(int)
+    assert np.array_equal(np.sort(strata, axis=0), np.tile(np.arange(40)[:, None], 6))
+    for other in (strata, scaled - strata):  # places of the strata, and within them
+        correlation = np.corrcoef(other.T) - np.eye(6)
+        assert np.abs(correlation).max() < 0.55  # 3.4 sigma of 40
+    again = Draws(study(VARY, design="latin_hypercube"), 4, 40, check=False)
+    assert not np.any(numbers(again)[:, -6:] == numbers(draws)[:, -6:])
     assert draws.needs_all_runs
 
 
-def test_sobol_points_are_spread_more_evenly_than_random_ones() -> None:
+def test_sobol_points_are_scipys_with_their_bits_shifted() -> None:
+    """Whatever the block of points and the variable: the shift alone is ours."""
+    count, indices = 4096, [0, 1, 2, 1022, 1023, 1024, 1025, 2047, 2048, 3071, 3072, 4095]
+    for dimension in (0, 1, 15, 16, 40):
+        sequence = qmc.Sobol(dimension + 1, scramble=False, bits=30)
+        expected = (sequence.random(count)[:, dimension] * 2**30).astype(np.int64)
+        ours = [int(shifted(3, "x", index, dimension) * 2**30) for index in indices]
+        differences = {a ^ int(expected[i]) for a, i in zip(ours, indices, strict=True)}
+        assert len(differences) == 1
+    points = np.array(
+        [[shifted(3, name, i, k) for k, name in enumerate("abc")] for i in range(count)]
+    )
+    assert len(np.unique(points, axis=0)) == count
+    strata = np.sort((points * count).astype(int), axis=0)
+    assert np.array_equal(strata, np.tile(np.arange(count)[:, None], 3))
+    assert len({shifted(3, name, 0, 0) for name in "abcdef"}) == 6
+
+
+def test_a_longer_sobol_campaign_has_the_same_points() -> None:
     vary = {"mission.start_deg": {"uniform": [0, 1]}}
-    spreads = {}
-    for design in ("independent", "sobol"):
-        draws = Draws(study(vary, design=design), 3, 256, check=False)
-        spreads[design] = qmc.discrepancy(numbers(draws))
-    assert spreads["sobol"] < 0.2 * spreads["independent"]
+    draws = Draws(study(vary, design="sobol"), 3, 256, check=False)
+    assert qmc.discrepancy(numbers(draws)) < 2e-3
     longer = Draws(study({**vary, **OTHER}, design="sobol"), 3, 1500, check=False)
     shorter = Draws(study(vary, design="sobol"), 3, 1200, check=False)
     assert shorter.values(1100).items() <= longer.values(1100).items()
@@ -165,6 +193,20 @@ def test_saltellis_rows_take_one_variable_from_the_other_point() -> None:
     seeds = [draws.scenario(run, "ctc").seed for run in range(8)]
     assert len(set(seeds[:7])) == 1
     assert seeds[7] != seeds[0]
+
+
+def test_what_must_stay_positive_is_a_truncated_normal() -> None:
+    """Relative, absolute or an offset: a hundredth of the nominal mass is left at least."""
+    nominal, u = float(find_robot("paper").mass[1]), [0.001, 0.02, 0.5, 0.97]
+    for told, mean, sigma, least in (
+        ({"normal": 0.5, "sigma": 0.5, "relative": True}, 0.5, 0.5, 0.01),
+        ({"normal": 10.0, "sigma": 15.0}, 10.0, 15.0, 0.01 * nominal),
+        ({"normal": -5.0, "sigma": 10.0, "offset": True}, -5.0, 10.0, -0.99 * nominal),
+    ):
+        vary = {"robot.links[1].mass": told}
+        (variable,) = Draws(study(vary), 0, 1, check=False)._variables
+        expected = truncnorm((least - mean) / sigma, np.inf, mean, sigma).ppf(u)
+        assert [variable.distribution.quantile(x) for x in u] == pytest.approx(expected, rel=1e-6)
 
 
 @settings(max_examples=25, deadline=None)

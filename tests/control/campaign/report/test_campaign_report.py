@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +14,14 @@ from campaign_tables import made_table
 from pandas import DataFrame
 from rich.console import Console
 
+from space_robot_control.campaign.report import page as page_module
 from space_robot_control.campaign.report.console import markdown, print_report
-from space_robot_control.campaign.report.figures import summary_figure
+from space_robot_control.campaign.report.figures import drawings, summary_figure
 from space_robot_control.campaign.report.findings import Findings
 from space_robot_control.campaign.report.page import lean, render
 from space_robot_control.campaign.report.record import record
 from space_robot_control.campaign.report.subject import Subject
-from space_robot_control.campaign.report.verdict_tables import command
+from space_robot_control.campaign.report.verdict_tables import command, verdict_table
 from space_robot_control.campaign.study import Study
 from space_robot_msgs_py.errors import InputError
 
@@ -77,11 +79,19 @@ def test_the_page_has_every_section(page: str) -> None:
     assert len(page) < 2_000_000
 
 
-def test_the_page_is_the_same_every_time() -> None:
+@pytest.fixture
+def no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where it is about the page's text: figures take seconds."""
+    monkeypatch.setattr(page_module, "drawings", lambda findings: iter(()))
+
+
+def test_the_page_is_the_same_every_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(page_module, "drawings", lambda findings: islice(drawings(findings), 1))
     table = made_table(10, bands=False)
     assert render(found(table)) == render(found(table))
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_what_a_campaign_is_called_is_escaped() -> None:
     findings = found(made_table(5, bands=False), scenario={"case": "3", "robot": "<b>&"})
     text = render(findings)
@@ -142,11 +152,42 @@ def test_a_campaign_of_failed_flights_gives_a_report(failing: float) -> None:
     assert "diverged" in printed(findings)
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_an_unfinished_campaign_says_so() -> None:
     table = made_table(20, bands=False).iloc[:31]  # one law has a run more
     findings = found(table, runs=100)
     assert "31 of 300 flights have been flown" in findings.remarks[0]
     assert findings.remarks[0] in render(findings)
+    fixed = found(table, runs=100, fixed_runs=True)
+    assert "no verdicts before all are flown" in fixed.remarks[0]
+    assert {v.word for v in fixed.verdicts} == {"undecided"}
+
+
+@pytest.mark.parametrize("fixed", [False, True])
+def test_the_table_says_how_often_verdicts_are_false(fixed: bool) -> None:
+    """Three laws at 90 %: 0.3 in all; who may look at any time has a column more."""
+    findings = found(made_table(60, bands=False), fixed_runs=fixed)
+    table = verdict_table(findings)
+    assert (
+        findings.family_error == record(findings)["any_verdict_false_at_most"] == pytest.approx(0.3)
+    )
+    assert "any of these 3 with at most 0.3" in " ".join(table.notes)
+    columns = [column.name for column in table.columns]
+    assert ("more runs" in columns) != fixed
+    assert all(len(row) == len(columns) for row in table.groups[0].rows)
+
+
+def test_a_number_that_is_not_there_is_neither_missed_nor_the_worst() -> None:
+    table = made_table(60, laws=("ctc",), failing=0.0, bands=False)
+    table.loc[:9, "require.pointing"] = np.nan
+    findings = found(table)
+    (verdict,) = findings.verdicts
+    assert (verdict.word, verdict.not_measured) == ("not measured", 10)
+    assert "10 not measured" in printed(findings)
+    worst = findings.worst(findings.whole, findings.required[0], count=60)
+    assert worst["require.pointing"].iloc[:50].notna().all()
+    table["require.pointing"] = np.nan
+    printed(found(table))
 
 
 def test_a_single_row_gives_a_report() -> None:
@@ -186,6 +227,7 @@ def test_the_metrics_asked_for_are_shown_and_others_refused() -> None:
         found(made_table(20), ("x",))
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_saltelli_has_indices_and_verdicts_of_independent_points() -> None:
     """Three variables: five runs a row, of which two points count."""
     findings = found(made_table(100, bands=False), design="saltelli")

@@ -269,6 +269,10 @@ def test_more_runs_extend_unless_the_design_forbids(tmp_path: Path) -> None:
                 continue
             with pytest.raises(InputError, match="latin_hypercube design cannot be extended"):
                 begin_or_resume(tmp_path / name, manifest(study=study, runs=40), "")
+    with held_folder(tmp_path / "c"):
+        begin_or_resume(tmp_path / "c", manifest(study={"fixed_runs": True}), "")
+        with pytest.raises(InputError, match="its file has fixed_runs: true"):
+            begin_or_resume(tmp_path / "c", manifest(study={"fixed_runs": True}, runs=40), "")
 
 
 def test_one_process_at_a_time(tmp_path: Path) -> None:

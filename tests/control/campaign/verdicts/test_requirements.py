@@ -147,7 +147,7 @@ def test_no_runs_decide_nothing() -> None:
     assert found.bound is None
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(
     st.lists(st.floats(0.0, 2.0), min_size=1, max_size=200), st.integers(0, 5),
     st.floats(0.5, 0.98), st.floats(0.55, 0.95), st.sampled_from([FixedSample, Sequential]),

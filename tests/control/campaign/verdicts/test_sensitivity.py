@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from campaign_tables import made_table
-from scipy.stats import kruskal, qmc, rankdata, spearmanr
+from scipy.stats import kruskal, norm, qmc, rankdata, spearmanr
 from scipy.stats import sobol_indices as scipy_sobol
 
 from space_robot_control.campaign.verdicts.design import independent_rows, saltelli_values
@@ -21,28 +21,43 @@ def table_of(variables: dict[str, object], metric: np.ndarray) -> pd.DataFrame:
     })  # fmt: skip
 
 
-def test_the_correlation_is_spearmans() -> None:
-    rng = np.random.default_rng(2)
-    x, y = rng.normal(size=(2, 300))
-    z = np.exp(x + 0.5 * y)
-    plain, _, _ = rank_correlations([x, y], rankdata(z))
-    assert [r.value for r in plain] == pytest.approx([spearmanr(x, z)[0], spearmanr(y, z)[0]])
+def test_partial_correlations_are_those_of_residuals_for_every_variable() -> None:
+    """Variables that go together, with texts between them; intervals and R squared by hand."""
+    rng, runs = np.random.default_rng(2), 120
+    x, y, w = rng.normal(size=(3, runs))
+    numbers = {"x": x, "y": 0.7 * x + y, "w": w - 0.5 * y}
+    z = x - 1.5 * y + 0.3 * w + rng.normal(size=runs)
+    kind = rng.choice(["a", "b", "c"], runs)
+    variables = {"x": numbers["x"], "kind": kind, "y": numbers["y"], "w": numbers["w"]}
+    found = sensitivity(table_of(variables, z), "ctc", "metric.x", 0.9)
+    assert found is not None
+    ranks = {name: rankdata(values) for name, values in numbers.items()}
+    ranked = rankdata(z)
 
+    def residuals(of: np.ndarray, names: list[str]) -> np.ndarray:
+        others = np.column_stack([np.ones(runs), *(ranks[name] for name in names)])
+        left: np.ndarray = of - others @ np.linalg.lstsq(others, of, rcond=None)[0]
+        return left
 
-def test_the_partial_correlation_is_that_of_residuals() -> None:
-    rng = np.random.default_rng(2)
-    x, y, w = rng.normal(size=(3, 200))
-    z = x + 0.5 * y + 0.3 * w
-    ranks = [rankdata(v) for v in (x, y, w, z)]
-    others = np.column_stack([np.ones(200), ranks[1], ranks[2]])
-    residuals = [
-        v - others @ np.linalg.lstsq(others, v, rcond=None)[0] for v in (ranks[0], ranks[3])
-    ]
-    _, partial, explained = rank_correlations([x, y, w], ranks[3])
-    assert partial[0] is not None
-    assert partial[0].value == pytest.approx(np.corrcoef(*residuals)[0, 1])
-    assert explained is not None
-    assert 0.9 < explained <= 1.0
+    def interval(r: float, held: int) -> tuple[float, float]:
+        half = norm.ppf(0.95) * np.sqrt((1.0 + r**2 / 2.0) / (runs - 3 - held))
+        return float(np.tanh(np.arctanh(r) - half)), float(np.tanh(np.arctanh(r) + half))
+
+    by_name = {i.variable: i for i in found.influences}
+    for name in numbers:
+        others = [other for other in numbers if other != name]
+        partial, plain = by_name[name].partial, by_name[name].correlation
+        assert partial is not None
+        assert plain is not None
+        r = np.corrcoef(residuals(ranks[name], others), residuals(ranked, others))[0, 1]
+        assert partial.value == pytest.approx(r)
+        assert partial[1:] == pytest.approx(interval(r, len(others)))
+        assert plain.value == pytest.approx(spearmanr(numbers[name], z)[0])
+        assert plain[1:] == pytest.approx(interval(plain.value, 0))
+    assert by_name["kind"].partial is None
+    left = residuals(ranked, list(numbers))
+    r_squared = 1.0 - left.var() / ranked.var()
+    assert found.explained == pytest.approx(1.0 - (1.0 - r_squared) * (runs - 1) / (runs - 4))
 
 
 def test_a_variable_that_others_determine_has_no_partial_correlation() -> None:

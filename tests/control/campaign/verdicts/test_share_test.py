@@ -150,7 +150,7 @@ def test_the_page_on_campaigns_has_the_exact_probabilities() -> None:
     """The rows that take little time."""
     page = (DOCS / "explanation/campaign_statistics.md").read_text("utf-8")
     before, now = (exact.rules(kind(exact.SHARE, exact.CONFIDENCE)) for kind in KINDS)
-    for name in before:
+    for name in [name for name in before if "until:" not in name and "every run" not in name]:
         errors = [*before[name](), *now[name]()]
         assert " | ".join([f"| {name}", *(f"{100.0 * e:.1f} %" for e in errors)]) in page, name
 
