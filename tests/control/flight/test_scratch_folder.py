@@ -37,7 +37,7 @@ def wait_for_the_end(end: Any) -> None:
 def test_the_folder_of_a_killed_process_goes_when_another_one_is_made() -> None:
     context = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe()
-    process = context.Process(target=wait_for_the_end, args=(theirs,))
+    process = context.Process(target=wait_for_the_end, args=(theirs,), daemon=True)
     process.start()
     folder = Path(ours.recv())
     with ScratchFolder():
