@@ -94,8 +94,7 @@ class FlownCampaign:
         Raises:
             InputError: it cannot be read, or is damaged.
         """
-        if self.manifest.has_digests:
-            check_table(self.folder / TABLE, self.manifest.campaign)
+        check_table(self.folder / TABLE, self.manifest.campaign)
         return read_table(self.folder / TABLE, self.manifest.table)
 
     @cached_property

@@ -63,14 +63,11 @@ def subject_of(campaign: FlownCampaign, study: Study | None = None) -> Subject:
     Raises:
         InputError: the table cannot be read, or has no row; or ``study`` cannot be judged by it.
     """
-    manifest, remarks = campaign.manifest, []
-    if not manifest.has_digests:
-        remarks.append("The folder is of an older version, without digests: damage is not noticed.")
-    else:
-        try:
-            remarks += recover_table(campaign.folder, manifest, campaign.study)
-        except InputError as error:  # another process flies it, or it cannot be written: as it is
-            remarks.append(str(error))
+    manifest = campaign.manifest
+    try:
+        remarks = recover_table(campaign.folder, manifest, campaign.study)
+    except InputError as error:  # another process flies it, or it cannot be written: as it is
+        remarks = [str(error)]
     if campaign.table.empty:
         raise InputError("; ".join([f"{campaign.folder}: no flight has been flown yet", *remarks]))
     table = campaign.table

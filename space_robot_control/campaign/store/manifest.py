@@ -19,9 +19,8 @@ from ..study import NOT_TO_BE_EXTENDED
 from .schema import Schema
 
 NEW_FOLDER = "choose another folder for this one"
-WITHOUT_DIGESTS: Final = 1
 FORMAT: Final = 2
-"""Versions of the folder: in the first one nothing tells whether a file was damaged."""
+"""Version of the folder; the first one had neither digests nor the grid."""
 SHA256 = "sha256"
 """Key of the digest of all else in the file."""
 
@@ -29,7 +28,7 @@ SHA256 = "sha256"
 class Manifest(StrictModel):
     """What was begun in a folder."""
 
-    format: Literal[1, 2] = FORMAT
+    format: Literal[2] = FORMAT
     seed: Annotated[int, Field(ge=0)]
     runs: Annotated[int, Field(ge=1)]
     """To be flown; of a design they are all its points."""
@@ -50,11 +49,6 @@ class Manifest(StrictModel):
     def laws(self) -> list[str]:
         """Return the laws of the campaign, in their order."""
         return [str(law) for law in self.study["laws"]]
-
-    @property
-    def has_digests(self) -> bool:
-        """Return False for a folder of an older version, whose files have none."""
-        return self.format != WITHOUT_DIGESTS
 
     @property
     def campaign(self) -> str:
@@ -85,8 +79,6 @@ class Manifest(StrictModel):
         Raises:
             InputError: it is not; says in one line what differs.
         """
-        if not self.has_digests:
-            raise InputError(f"{where}: was begun by an older version: {NEW_FOLDER}")
         for what, before, now in (
             ("seed", self.seed, other.seed),
             ("file", self.study, other.study),
@@ -136,8 +128,9 @@ def read_manifest(path: Path) -> Manifest:
     if not isinstance(content, dict):
         raise InputError(f"{path}: damaged: a mapping was expected, got {short(content)}")
     sha256 = content.pop(SHA256, None)
-    is_old = sha256 is None and content.get("format") == WITHOUT_DIGESTS
-    if not is_old and sha256 != _digest(content):
+    if content.get("format") == FORMAT - 1:
+        raise InputError(f"{path}: of version 0.7 or older, which can read it: {NEW_FOLDER}")
+    if sha256 != _digest(content):
         raise InputError(f"{path}: damaged or edited: its content does not have its {SHA256}")
     manifest = validate(Manifest, content, str(path))
     if not manifest.study.get("laws"):

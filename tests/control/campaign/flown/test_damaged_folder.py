@@ -180,16 +180,16 @@ def test_rows_of_another_campaign_are_never_flown_over(copy: Path) -> None:
     assert {path.name: path.read_bytes() for path in copy.iterdir()} == before
 
 
-def test_a_folder_of_an_older_version_is_read_with_a_remark(copy: Path, reported: str) -> None:
+def test_a_folder_of_an_older_version_is_refused_and_left_alone(copy: Path) -> None:
+    """Its manifest had neither a digest nor the grid."""
     content = json.loads((copy / "campaign.json").read_text())
-    del content["sha256"]
+    del content["sha256"], content["table"]["grid"]
     (copy / "campaign.json").write_text(json.dumps({**content, "format": 1}))
-    (copy / "table.parquet.sha256").unlink()
-    found, remarks = numbers(copy)
-    assert found == reported
-    assert "older version, without digests" in remarks[0]
-    with pytest.raises(InputError, match="begun by an older version"):
-        run(copy)
+    before = {path.name: path.read_bytes() for path in copy.iterdir()}
+    for use in (numbers, run):
+        with pytest.raises(InputError, match=r"campaign\.json: of version 0\.7 or older"):
+            use(copy)
+    assert {path.name: path.read_bytes() for path in copy.iterdir()} == before
 
 
 def test_the_study_that_was_flown_counts(copy: Path, reported: str) -> None:
