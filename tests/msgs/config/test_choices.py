@@ -21,6 +21,7 @@ def test_one_slip_of_the_finger_suggests_the_name_that_was_meant(meant: str) -> 
             assert nearest(slip, names)[0] == meant
     assert nearest("wheel_1", names) == ["Wheel_1"]
     assert nearest("qqqq", names) == []
+    assert nearest("drop", names) == ["drop_state"], "a part of it"
 
 
 @settings(max_examples=20)
