@@ -42,3 +42,9 @@ def test_an_error_is_one_line_of_bounded_length(
 def test_the_longest_names_cost_no_time(count: int) -> None:
     with pytest.raises(InputError, match="unknown link"):
         one_of("a" * 100_000, [f"{k}_{'a' * 1000}" for k in range(count)], "link")
+
+
+def test_as_many_names_as_may_be_listed_are_listed() -> None:
+    names = [f"name_{k}" for k in range(MOST_LISTED + 1)]
+    assert all(name in choices("x", names[:-1]) for name in names[:-1])
+    assert names[-1] not in choices("x", names)
