@@ -10,6 +10,8 @@ MOST_LISTED = 20
 """Names that an error lists; of more it names the nearest ones."""
 MOST_NEAR = 3
 """Names suggested in the place of an unknown one."""
+SHORTEST_PART = 3
+"""Characters of a part of a name that names it."""
 LONGEST_SHOWN = 80
 """Characters of a name."""
 LONGEST_COMPARED, MOST_COMPARED = 60, 2_000
@@ -46,7 +48,7 @@ def _shown(name: str) -> str:
 
 
 def nearest(name: str, allowed: Sequence[str]) -> list[str]:
-    """Return the allowed names that are spelt most like ``name``, the nearest first."""
+    """Return the allowed names that are spelt most like ``name``, or else contain it."""
     from difflib import get_close_matches  # wanted for errors only
 
     if len(name) > LONGEST_COMPARED:
@@ -58,4 +60,6 @@ def nearest(name: str, allowed: Sequence[str]) -> list[str]:
     if name.lower() in by_spelling:
         return [by_spelling[name.lower()]]
     near = get_close_matches(name.lower(), by_spelling, MOST_NEAR)
+    if not near and len(name) >= SHORTEST_PART:
+        near = [spelling for spelling in by_spelling if name.lower() in spelling][:MOST_NEAR]
     return [by_spelling[spelling] for spelling in near]

@@ -21,6 +21,7 @@ def test_one_slip_of_the_finger_suggests_the_name_that_was_meant(meant: str) -> 
             assert nearest(slip, names)[0] == meant
     assert nearest("wheel_1", names) == ["Wheel_1"]
     assert nearest("qqqq", names) == []
+    assert nearest("drop", names) == ["drop_state"], "a part of it"
 
 
 @settings(max_examples=20)
@@ -41,3 +42,10 @@ def test_an_error_is_one_line_of_bounded_length(
 def test_the_longest_names_cost_no_time(count: int) -> None:
     with pytest.raises(InputError, match="unknown link"):
         one_of("a" * 100_000, [f"{k}_{'a' * 1000}" for k in range(count)], "link")
+
+
+def test_as_many_names_as_may_be_listed_are_listed() -> None:
+    names = [f"name_{k}" for k in range(MOST_LISTED + 1)]
+    for listing in ("", "--all"):
+        assert choices("x", names[:-1], listing=listing) == f"choose one of {', '.join(names[:-1])}"
+    assert names[-1] not in choices("x", names)

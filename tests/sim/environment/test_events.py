@@ -77,7 +77,7 @@ def test_a_target_is_a_shipped_one_or_a_file(
         (["grab@1:small_satellite"], "choose one of capture, release"),
         (["capture"], r"capture@T:TARGET or release@T\[:SPEED\] expected"),
         (["capture@-1:small_satellite"], "expected, as capture@10:small_satellite"),
-        (["capture@1e999:small_satellite"], "T must be a number of seconds, got 1e999"),
+        (["capture@1e999:small_satellite"], "T must be from 0 to "),
         (["capture@1"], "a target is needed"),
         (["capture@1:moon"], "choose one of small_satellite, tumbling_satellite"),
         (["capture@1:no/such.yaml"], "no/such.yaml"),
