@@ -166,6 +166,11 @@ def test_of_a_damaged_journal_every_row_that_is_whole_is_kept(tmp_path: Path) ->
             assert damage
         if place > 2 * 4096:  # not the pages of the schema and of the root
             assert len(kept) >= len(all_rows) - 30
+    middle = len(data) // 2 // 4096 * 4096
+    path.write_bytes(data[:middle] + bytes(4096) + data[middle + 4096 :])
+    kept = {row.task for row in whole_rows(path, CODEC)}  # before the lost page, and behind it
+    assert {all_rows[0].task, all_rows[-1].task} < kept
+    assert len(all_rows) - 30 <= len(kept) < len(all_rows)
     path.write_bytes(data[: len(data) // 2])
     assert damage_of(path, CODEC)
     path.write_text("no database at all" * 100)
@@ -257,6 +262,25 @@ def test_another_campaign_is_refused_in_a_line(
     assert said in str(refused.value)
     assert "\n" not in str(refused.value)
     assert read_manifest(folder / "campaign.json") == manifest()
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [('"seed": 7', '"seed": 5'), ("1.0", "9.0"), ('"numpy": "2', '"numpy": "3'), ("[", "[ ")],
+)
+def test_a_value_of_the_manifest_that_was_changed_is_noticed(
+    tmp_path: Path, before: str, after: str
+) -> None:
+    path = tmp_path / "campaign.json"
+    manifest().write(path)
+    text = path.read_text()
+    assert before in text
+    path.write_text(text.replace(before, after, 1))
+    if after.strip() == before:  # a blank changes no value
+        assert read_manifest(path) == manifest()
+        return
+    with pytest.raises(InputError, match=r"campaign\.json: damaged or edited"):
+        read_manifest(path)
 
 
 def test_more_runs_extend_unless_the_design_forbids(tmp_path: Path) -> None:
