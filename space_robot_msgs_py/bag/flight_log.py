@@ -238,7 +238,7 @@ class FlightLog:
 
     @property
     def branches(self) -> tuple[int, ...]:
-        """Number of joints with motors in each branch on the base; empty: one branch, or unknown."""
+        """Joints with motors in each branch on the base; empty: there is one branch, or unknown."""
         told = self.flight.get("branches", ())
         is_list = isinstance(told, (list, tuple)) and all(type(c) is int and c > 0 for c in told)
         return tuple(told) if is_list and sum(told) == len(self.joint_names) else ()
