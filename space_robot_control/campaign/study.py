@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 from typing_extensions import Self
 
-from space_robot_msgs_py.config.arguments import as_path
+from space_robot_msgs_py.config.arguments import path_text
 from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.validation import StrictModel, read_yaml, short, validate
@@ -222,5 +222,5 @@ def read_study(path: str | Path) -> Study:
     Raises:
         InputError: in one line, naming file and key.
     """
-    file = named_file("campaigns", str(as_path(path, "path")))
+    file = named_file("campaigns", path_text(path, "path"))
     return validate(Study, read_yaml(file), str(file)).named(str(file))

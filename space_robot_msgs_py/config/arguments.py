@@ -27,6 +27,16 @@ def as_path(value: Any, name: str) -> Path:
     return Path(value)
 
 
+def path_text(value: Any, name: str) -> str:
+    """Return a path as it is written: `pathlib` makes ``./one`` a plain name.
+
+    Raises:
+        InputError: ``value`` is neither text nor a path.
+    """
+    as_path(value, name)
+    return str(value)
+
+
 def as_numbers(value: Any, name: str) -> Array:
     """Return real numbers as an array of any shape, float64.
 

@@ -19,7 +19,7 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-from space_robot_msgs_py.config.arguments import as_path
+from space_robot_msgs_py.config.arguments import path_text
 from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.files import GIVEN, config_directory, is_named, named_file
 from space_robot_msgs_py.config.validation import short
@@ -89,7 +89,7 @@ def find_robot(robot: str, base: str | None = None, repair: bool = False) -> Rob
     Raises:
         InputError: there is no such robot, or its file is wrong.
     """
-    return robot_source(str(as_path(robot, "robot")), base, repair).robot
+    return robot_source(path_text(robot, "robot"), base, repair).robot
 
 
 def robot_source(robot: str, base: str | None = None, repair: bool = False) -> RobotSource:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import pickle
 from typing import Any
 
@@ -127,6 +128,24 @@ def test_the_same_torques_give_the_same_bits(plain: Bench, seed: int) -> None:
         plain.step(torque).block.tobytes() == kept.block.tobytes()
         for torque, kept in zip(torques, first, strict=False)
     )
+
+
+@pytest.mark.parametrize("unanswered", [1, 2, 7])
+@pytest.mark.parametrize("law", ["tde_stc", "ctc_smc"])
+def test_after_ticks_without_it_the_law_takes_over(law: str, unanswered: int) -> None:
+    """Against a controller that takes over there; one that goes on commands something else."""
+    bench = Scenario(controller=law, case="3", duration=0.05).bench()
+    fly_on(bench, 20)
+    fly_on(bench, unanswered, np.zeros(9))
+    goes_on, takes_over = copy.deepcopy(bench.controller), copy.deepcopy(bench.controller)
+    takes_over.engage()
+    for tick in range(20 + unanswered, 60):
+        reference = bench.flight.mission.chunk(tick, 1).references()
+        expected = takes_over.update(bench.state, reference).torque.tobytes()
+        if tick == 20 + unanswered:
+            assert goes_on.update(bench.state, reference).torque.tobytes() != expected
+        assert bench.command().torque.tobytes() == expected
+        bench.step()
 
 
 def test_a_seed_is_that_of_a_scenario(rich: Bench) -> None:

@@ -85,6 +85,26 @@ def test_observation_and_reward_are_as_documented(env: SpaceRobotEnv) -> None:
     np.testing.assert_allclose(reward, -cost * 0.01, rtol=1e-12)
 
 
+def test_a_quaternion_and_its_negative_are_one_attitude() -> None:
+    """Of the mission and of the robot: the errors are those of the nearer one."""
+    half = float(np.sqrt(0.5))
+    episodes = []
+    for wanted, placed in ((1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)):
+        turned = [half, 0.0, half, 0.0]
+        away = [half * np.cos(0.05), half * np.sin(0.05), half * np.cos(0.05), 0.0]
+        parameters = {
+            "mission": {"base_quaternion": [wanted * q for q in turned]},
+            "plant": {"initial_quaternion": [placed * q for q in away]},
+        }
+        env = SpaceRobotEnv(Scenario(controller=None, duration=0.1, parameters=parameters))
+        episodes.append(fly(env, 1, np.full(9, 0.1)))
+    for episode in episodes[1:]:
+        for one, other in zip(episodes[0], episode, strict=True):
+            np.testing.assert_allclose(np.abs(other[0]), np.abs(one[0]), rtol=1e-9, atol=1e-12)
+            np.testing.assert_allclose(other[1], one[1], rtol=1e-9)
+    assert 0.01 < np.linalg.norm(episodes[0][0][0][:3]) < 0.1
+
+
 @pytest.mark.parametrize("scale", [1e3, 1e9])
 def test_an_early_end_costs_all_that_is_left(scale: float) -> None:
     """Lost or diverged: at no time is it better than the dearest episode that goes on."""

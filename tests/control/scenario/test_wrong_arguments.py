@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from paths import CONFIG
 
 from space_robot_control import Bench, Campaign, FlownCampaign, Scenario, replay
 from space_robot_control.analysis import analyze
@@ -55,6 +57,14 @@ def refused(call: Callable[..., Any], *arguments: Any, **options: Any) -> str:
 def test_what_is_no_robot_no_bag_and_no_study(call: Callable[[Any], Any]) -> None:
     for junk in JUNK:
         refused(call, junk)
+
+
+def test_a_path_stays_as_it_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A name without a slash is one of those shipped, ``./`` is the folder here."""
+    (tmp_path / "robot.yaml").write_bytes((CONFIG / "robots/ets_vii.yaml").read_bytes())
+    monkeypatch.chdir(tmp_path)
+    assert find_robot("./").name == find_robot("ets_vii").name
+    refused(find_robot, ".")
 
 
 def test_what_is_no_number(bench: Bench, env: SpaceRobotEnv) -> None:

@@ -133,6 +133,26 @@ def test_what_is_sent_in_a_pause_is_passed_over(graph: Graph) -> None:
     assert (sources.holes, sources.passed_over) == (2, 6)
 
 
+@given(st.integers(0, 5), st.booleans(), st.integers(1, 20), st.integers(1, 20))
+def test_who_is_first_heard_after_a_pause_has_lost_nothing(
+    before: int, pauses: bool, first: int, after: int
+) -> None:
+    """What it sent until then was not to be recorded; without a pause it is lost."""
+    graph = Graph()
+    graph.claim = Claimed((OURS, AGAIN), True)
+    sources = Sources(TOPIC, graph)
+    for sequence in range(1, before + 1):
+        sources.take(OURS, sequence)
+    if pauses:
+        sources.pause()
+    for sequence in range(first, first + after):
+        assert sources.take(AGAIN, sequence)
+    passed = first - 1
+    assert (sources.holes, sources.passed_over) == ((0, passed) if pauses else (passed, 0))
+    assert sources.take(AGAIN, first + after + 2)
+    assert sources.holes == (2 if pauses else passed + 2)
+
+
 def test_nothing_has_come_of_what_was_told(graph: Graph) -> None:
     sources = Sources(TOPIC, graph)
     sources.note_sent(FOREIGN[:PARTICIPANT_BYTES], 1000)

@@ -41,7 +41,7 @@ CAMPAIGN = Campaign.of(CONTENT)
 def numbers(folder: Path, study: Study | None = None) -> tuple[str, list[str]]:
     """All that a report is made of, and its remarks on the folder."""
     subject = subject_of(FlownCampaign.open(folder), study)
-    judged = verdicts(subject.table, subject.study)
+    judged = verdicts(subject.table, subject.study, subject.runs)
     text = f"{subject.table.to_dict('list')} {judged} {subject.seed} {subject.runs} {subject.about}"
     return text, list(subject.remarks)
 
