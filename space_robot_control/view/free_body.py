@@ -70,7 +70,7 @@ class FreeBody(NamedTuple):
                 rate, (0.0, farthest), start.as_quat(), dense_output=True, rtol=ACCURACY,
                 atol=ACCURACY,
             )  # fmt: skip
-            assert solved.sol is not None, "of dense_output"
+            assert solved.sol is not None  # it is dense
             quaternions = solved.sol(times).T
         quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
         return quaternions[:, [3, 0, 1, 2]]

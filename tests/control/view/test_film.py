@@ -135,14 +135,20 @@ def test_different_robots_stand_side_by_side_of_themselves(flown) -> None:  # ty
     assert poses["/boom"].position[0] > 1.0
 
 
-def test_a_target_is_seen_while_it_is_held(flown) -> None:  # type: ignore[no-untyped-def]
+def test_a_target_waits_where_it_is_grasped_and_is_seen_while_it_is_held(flown) -> None:  # type: ignore[no-untyped-def]
     log = flown("held", events=["capture@0.2:small_satellite", "release@0.6"])
     robot = shown_robot(log)
     scene = Scene(flights_page({"one": log}, {"one": robot}, Options(rate=100.0), quiet))
-    (path,) = (name for name in scene.names() if name.endswith("target_0"))
-    seen = [scene.visible(time)[path] for time in (0.0, 0.18, 0.21, 0.59, 0.62, 0.99)]
-    assert seen == [False, False, True, True, False, False]
-    assert path.count("/") == 3 + robot.tool.body  # on the body that carries the tool
+    free, held = "/one/free_target_0", next(n for n in scene.names() if n.endswith("/target_0"))
+    times = (0.0, 0.18, 0.21, 0.59, 0.62, 0.99)
+    seen = [(scene.visible(t).get(free, True), scene.visible(t)[held]) for t in times]
+    before, during, after = (True, False), (False, True), (False, False)
+    assert seen == [before, before, during, during, after, after]
+    assert held.count("/") == 3 + robot.tool.body  # on the body that carries the tool
+    # the last frame before: it stands still in the hand, so it moves as the hand does
+    place, hand = scene.poses(0.1901)[f"{free}/box"], scene.poses(0.1901)[held]
+    np.testing.assert_allclose(place.position, hand.position, atol=1e-5)
+    np.testing.assert_allclose(place.rotation, hand.rotation, atol=1e-4)
 
 
 def test_the_trail_grows_and_is_the_tools_way(flown) -> None:  # type: ignore[no-untyped-def]
