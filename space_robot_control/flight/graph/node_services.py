@@ -112,8 +112,8 @@ def _call(
 ) -> list[Any]:  # fmt: skip
     """Call services of one kind at the same time; return their answers.
 
-    An answer may be lost: see `_Repeated`. A call that ``may_repeat`` is then made again; any other is
-    made once, when its answer is known to arrive.
+    An answer may be lost: see `_Repeated`. A call that ``may_repeat`` is then made again; any other
+    is made once, when its answer is known to arrive.
     """
     from lifecycle_msgs.srv import GetState
     from rclpy.executors import SingleThreadedExecutor
