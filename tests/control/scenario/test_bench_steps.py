@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import pickle
-from typing import Any
 
 import numpy as np
 import pytest
@@ -177,19 +176,10 @@ def test_a_diverged_flight_is_done(plain: Bench) -> None:
     assert "diverged" in repr(plain)
 
 
-@pytest.mark.parametrize(
-    ("act", "said"),
-    [
-        (lambda bench: bench.step(), "controller is None: give every step a torque"),
-        (lambda bench: bench.step(np.zeros((9, 1))), "torque: 9 numbers were expected"),
-        (lambda bench: bench.reset(-1), "seed: 0 to 2147483647 is allowed, got -1"),
-    ],
-)
-def test_wrong_use_is_told_in_one_line(plain: Bench, act: Any, said: str) -> None:
+def test_without_a_law_every_step_needs_a_torque(plain: Bench) -> None:
     plain.reset()
-    with pytest.raises(InputError) as caught:
-        act(plain)
-    assert said in str(caught.value)
+    with pytest.raises(InputError, match="controller is None: give every step a torque"):
+        plain.step()
 
 
 def test_faults_of_messages_are_refused() -> None:

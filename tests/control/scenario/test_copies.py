@@ -61,6 +61,7 @@ def memory_map(thing: Any) -> dict[str, tuple[str, int]]:
 def bench() -> Bench:
     """In the middle of a fault, with commands on their way and a target in hand."""
     bench = RICH.bench()
+    bench.reset(11)
     fly_on(bench, 45)
     return bench
 
@@ -113,7 +114,7 @@ def test_a_copied_state_is_a_state() -> None:
 
 def test_benches_of_one_flight_do_not_disturb_one_another() -> None:
     """Each has laws of its own: these remember."""
-    flight = Scenario(controller="ctc_smc", case="3", duration=0.05).check()
+    flight = Scenario(controller="tde_stc", case="3", duration=0.05).check()
     alone = fly_on(Bench(flight), 40)
     one, other = Bench(flight), Bench(flight)
     fly_on(other, 7)
