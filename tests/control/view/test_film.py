@@ -140,7 +140,7 @@ def test_a_target_waits_where_it_is_grasped_and_is_seen_while_it_is_held(flown) 
     robot = shown_robot(log)
     scene = Scene(flights_page({"one": log}, {"one": robot}, Options(rate=100.0), quiet))
     free, held = "/one/free_target_0", next(n for n in scene.names() if n.endswith("/target_0"))
-    times = (0.0, 0.18, 0.21, 0.59, 0.62, 0.99)
+    times = (0.0, 0.1901, 0.2001, 0.5901, 0.6001, 0.99)  # of frames, and a little later
     seen = [(scene.visible(t).get(free, True), scene.visible(t)[held]) for t in times]
     before, during, after = (True, False), (False, True), (False, False)
     assert seen == [before, before, during, during, after, after]

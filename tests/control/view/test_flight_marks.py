@@ -39,6 +39,7 @@ def test_events_faults_and_laws_are_marked_by_time(log: FlightLog) -> None:
 
 def test_of_an_excerpt_only_what_goes_on_in_it(log: FlightLog) -> None:
     assert marks_of(excerpt(log, 0.16, 0.24)) == [SCALE, STICK]
+    assert marks_of(excerpt(log, 0.1, 0.14)) == [CAPTURE]  # it begins with the excerpt
 
 
 def test_what_makes_no_sense_is_left_out(log: FlightLog) -> None:

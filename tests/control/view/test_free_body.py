@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -74,10 +76,12 @@ def test_what_stands_still_in_the_hand_is_in_it_a_tick_before(paper_robot: Robot
 
 
 def test_what_moves_in_the_tools_axes_and_in_inertial_ones(paper_robot: Robot) -> None:
-    log = moving_log(paper_robot, 12, first_tick=3)
+    turned = Rotation.from_rotvec([0.3, -0.5, 0.8]).as_matrix()
+    robot = replace(paper_robot, tools=(replace(paper_robot.tool, rotation=turned),))
+    log = moving_log(robot, 12, first_tick=3)
     velocity, rate = [0.1, 0.2, -0.3], [0.4, -0.5, 0.6]
     still, moved, inertial = (
-        before_capture(capture(*motion), log, paper_robot)
+        before_capture(capture(*motion), log, robot)
         for motion in (
             ("tool", [0.0] * 3, [0.0] * 3), ("tool", velocity, rate), ("inertial", velocity, rate),
         )
@@ -87,7 +91,7 @@ def test_what_moves_in_the_tools_axes_and_in_inertial_ones(paper_robot: Robot) -
     assert inertial
     np.testing.assert_array_equal(inertial.velocity, velocity)
     np.testing.assert_array_equal(inertial.angular_velocity, rate)
-    tool = still.rotation @ paper_robot.tool.rotation
+    tool = still.rotation @ turned
     np.testing.assert_allclose(moved.velocity - still.velocity, tool @ velocity, atol=1e-9)
     added = moved.angular_velocity - still.angular_velocity
     np.testing.assert_allclose(added, tool @ rate, atol=1e-9)

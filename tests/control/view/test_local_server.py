@@ -68,7 +68,8 @@ def test_the_page_and_its_websocket_are_for_pages_from_here() -> None:
 
 
 @pytest.mark.parametrize("sent", [b"", b"GET / HTTP/1.1\r\nHost: ", os.urandom(300)])
-def test_it_stops_whatever_is_connected(sent: bytes) -> None:
+def test_it_stops_whatever_is_connected(sent: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "OPENING_S", 300.0)
     with local_server() as server:
         connected = []
         for _ in range(module.MOST_CONNECTIONS + 20):

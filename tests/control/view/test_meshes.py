@@ -106,8 +106,11 @@ def test_what_unpacks_to_too_much_is_refused_and_what_follows_is_read(
     zeros = tmp_path / "zeros.gltf"
     zeros.write_bytes(gltf_of(MOST_BYTES // 12 + 1))
     files = [archive, pipe, zeros, ball, tmp_path / "lacking.stl"]
-    read = read_meshes(tuple(map(str, files)), 5 * 30_000)
+    read = read_meshes(tuple(map(str, files)), 5 * 2_000)
     assert [result.mesh is not None for result in read] == [file == ball for file in files]
+    assert read[3].whole == 20_480
+    assert read[3].mesh is not None
+    assert 500 < len(read[3].mesh.faces) <= 2_000  # its share
     assert read[0].reason == "unpacks to 3 GB, at most 2 GB are allowed"
     assert [r.reason for r in read[1:3] + read[4:]] == ["not a file", TOO_MUCH, "no such file"]
 
