@@ -437,4 +437,5 @@ def test_a_topic_of_the_type_that_is_missing_is_named_first(
         for t, data in messages_of(recorded.folder)
     ]
     _write(tmp_path / "x.mcap", entries)
-    assert "no messages on /joint_states (it has /command, /zz/arm, " in _error(tmp_path / "x.mcap")
+    text = _error(tmp_path / "x.mcap")
+    assert "no messages on /joint_states (it has /command, /controller/signals, /zz/arm, " in text
