@@ -67,7 +67,7 @@ def run(
 
     FILE is a YAML file, or a name of config/campaigns; docs/manual/campaigns.md has what is in it.
     The table in the folder depends on file, seed, runs and software alone. Exit code 0 also if
-    flights fail: the table says which, and why. More --runs extend a campaign.
+    flights fail: the table says which, and why. More --runs extend a campaign without fixed_runs.
 
     \b
     Examples:

@@ -62,8 +62,7 @@ def projected_decision(test: Sequential, failures: int, runs: int) -> ProjectedD
             index = int(np.argmax(decided))
             end = int(ends[index])
             if met:  # with as many failures fewer runs may do
-                fewest = test.runs_needed(int(steps[index])) or end
-                end = max(runs, fewest, (int(steps[index]) - 1) * runs // failures + 1)
+                end = max(runs, test.runs_needed(int(steps[index])) or end)
             return ProjectedDecision(end, met) if end <= MOST_RUNS else None
         step, count = step + count, 2 * count
     return None

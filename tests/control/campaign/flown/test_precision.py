@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from space_robot_control.campaign.flown.precision import CHECKED_EVERY, Precision
@@ -33,6 +33,9 @@ def study(half_width: float, points: int) -> Study:
     st.integers(1, 3), st.sampled_from([0.07, 0.1, 0.13]), st.integers(0, 2**32 - 1),
     st.lists(st.sampled_from([0.5, 0.9, 1.0]), min_size=6, max_size=6),
 )  # fmt: skip
+@example(3, 0.1, 0, [0.5, 0.5, 1.0, 1.0, 1.0, 1.0])
+@example(3, 0.1, 0, [1.0, 1.0, 1.0, 0.5, 1.0, 1.0])
+@example(3, 0.1, 0, [1.0, 1.0, 1.0, 1.0, 0.5, 1.0])
 def test_the_stop_is_the_first_look_at_which_all_are_narrow_at_each_point(
     points: int, half_width: float, seed: int, rates: list[float]
 ) -> None:
