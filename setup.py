@@ -108,10 +108,11 @@ setup(
             "types-PyYAML",
             "types-psutil",
             "viser>=1.1",
+            "websockets>=13",
             "xacro",
             "ziamath",
         ],
-        "view": ["trimesh>=4", "viser>=1.1"],  # `view`
+        "view": ["trimesh>=4", "viser>=1.1", "websockets>=13"],  # `view`
         "xacro": ["xacro"],  # robots in files that end in .xacro
     },
     entry_points={"console_scripts": ["space-robot = space_robot_control.cli.main:main"]},

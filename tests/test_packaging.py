@@ -36,7 +36,8 @@ PYPI = {
 """Names on PyPI of modules that are not called as their package."""
 OF_EXTRAS = {
     "distributed": "dask", "gymnasium": "gym", "pandas": "campaign", "psutil": "soak",
-    "pyarrow": "parquet", "trimesh": "view", "viser": "view", "xacro": "xacro",
+    "pyarrow": "parquet", "trimesh": "view", "viser": "view",
+    "websockets": "view", "xacro": "xacro",
 }  # fmt: skip
 """Packages that one command needs, and their extra."""
 ROSDEP = {"pillow": "pil", "pyyaml": "yaml", "rosbags": "rosbags-pip"}

@@ -102,7 +102,8 @@ def test_bad_input_is_told(options: tuple[str, ...], said: str) -> None:
 
 def test_a_flight_says_it_on_standard_error_alone() -> None:
     runner = CliRunner()
-    result = runner.invoke(cli, ["simulate", "--duration", "0.01", "--json"])
+    options = ("--gains", "printed", "--duration", "0.01", "--json")
+    result = runner.invoke(cli, ["simulate", *options])
     assert result.exit_code == 0
     json.loads(result.stdout)
     assert "warning: tde_stc: h_bar leaves 0.31% of margin" in result.stderr

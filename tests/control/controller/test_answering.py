@@ -127,7 +127,7 @@ def test_the_law_is_told_before_the_command_and_telemetry_after_it(
     for tick in range(first, first + 8):
         sent, command = bench.answer(tick)
         is_news = tick in (first, first + 3)
-        telemetry = [topics.TELEMETRY] if tick % DECIMATION == 0 else []
+        telemetry = [topics.TELEMETRY, topics.SIGNALS] if tick % DECIMATION == 0 else []
         assert sent == [*([topics.LAW] if is_news else []), topics.COMMAND, *telemetry]
         assert (bench.answering.change is not None) == is_news
         assert (command.tick, bench.answering.answered) == (tick, tick)

@@ -39,6 +39,8 @@ STEP_S = 5e-6
 class Topic:
     """Publisher or subscription: what was sent, and what is to be taken."""
 
+    listener_count = 1
+
     def __init__(self, node: Bench, topic: topics.Topic, *_: object) -> None:
         self._node, self.topic, self.full_name = node, topic, topic.name
         self.sent: list[bytes] = []

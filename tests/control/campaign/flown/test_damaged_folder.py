@@ -186,9 +186,8 @@ def test_a_folder_of_an_older_version_is_refused_and_left_alone(copy: Path) -> N
     del content["sha256"], content["table"]["grid"]
     (copy / "campaign.json").write_text(json.dumps({**content, "format": 1}))
     before = {path.name: path.read_bytes() for path in copy.iterdir()}
-    for use in (numbers, run):
-        with pytest.raises(InputError, match=r"campaign\.json: of version 0\.7 or older"):
-            use(copy)
+    with pytest.raises(InputError, match=r"campaign\.json: of version 0\.7 or older"):
+        numbers(copy)
     assert {path.name: path.read_bytes() for path in copy.iterdir()} == before
 
 

@@ -293,10 +293,11 @@ def test_more_runs_extend_unless_the_design_forbids(tmp_path: Path) -> None:
                 continue
             with pytest.raises(InputError, match="latin_hypercube design cannot be extended"):
                 begin_or_resume(tmp_path / name, manifest(study=study, runs=40), "")
+    fixed = content_of({"laws": LAWS, "fixed_runs": True})
     with held_folder(tmp_path / "c"):
-        begin_or_resume(tmp_path / "c", manifest(study={"fixed_runs": True}), "")
+        begin_or_resume(tmp_path / "c", manifest(study=fixed), "")
         with pytest.raises(InputError, match="its file has fixed_runs: true"):
-            begin_or_resume(tmp_path / "c", manifest(study={"fixed_runs": True}, runs=40), "")
+            begin_or_resume(tmp_path / "c", manifest(study=fixed, runs=40), "")
 
 
 def test_one_process_at_a_time(tmp_path: Path) -> None:
