@@ -9,12 +9,15 @@ file does not, and all processes share what one compiled.
 from __future__ import annotations
 
 import ctypes
+import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core.errors import NumbaError
 
+from ..errors import InputError
 from . import block_type  # noqa: F401  (what Numba makes of a block)
 from .cache import cache_directory
 from .record_type import RecordType
@@ -25,6 +28,8 @@ _njit: Any = numba.njit
 config: Any = numba.config
 _FunctionType: Any = numba.types.WrapperAddressProtocol
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+_COLOURS = re.compile(r"\x1b\[\d*m")
+"""Of a terminal, which Numba puts into its errors."""
 
 
 def kernel(function: _Function) -> _Function:
@@ -63,7 +68,16 @@ class RecordFunction(_FunctionType):  # type: ignore[misc]
         self, function: Callable[..., Any], records: Iterable[type[Record]],
         seen_as: Iterable[type[Record]],
     ) -> None:  # fmt: skip
-        """``records``: the kernel's; ``seen_as``: those that a loop passes in their place."""
+        """Compile a kernel.
+
+        Args:
+            function: the kernel.
+            records: of its arguments.
+            seen_as: those that a loop passes in their place.
+
+        Raises:
+            InputError: it cannot be compiled; with the reason and the line in one line.
+        """
         compiled: Any = function
         own, self._signature = _signature(records), _signature(seen_as)
         with _our_cache():
@@ -71,6 +85,9 @@ class RecordFunction(_FunctionType):  # type: ignore[misc]
                 self._code = numba.cfunc(own, cache=True, error_model="numpy")(compiled.py_func)
             except OSError:  # no room in the cache
                 self._code = numba.cfunc(own, error_model="numpy")(compiled.py_func)
+            except NumbaError as error:
+                name = function.__qualname__
+                raise InputError(f"{name} cannot be compiled: {_reason(error)}") from error
         self._address = int(self._code.address or 0)
         arguments = [ctypes.c_void_p, ctypes.c_ssize_t] * (len(own.args) - 1)
         self.call = ctypes.CFUNCTYPE(None, *arguments, ctypes.c_double)(self._address)
@@ -83,6 +100,15 @@ class RecordFunction(_FunctionType):  # type: ignore[misc]
     def signature(self) -> Any:
         """The type that a loop sees, for Numba."""
         return self._signature
+
+
+def _reason(error: NumbaError) -> str:
+    """Return the line of Numba's many that says what is wrong, and where that is."""
+    lines = [line.strip() for line in _COLOURS.sub("", str(error)).splitlines()]
+    reasons = [line for line in lines if line and not line.startswith(("Failed in", "File "))]
+    place = re.search(r'File "(.+?)", (line \d+)', "\n".join(lines))
+    where = f" ({place[1]}, {place[2]})" if place else ""
+    return f"{reasons[0] if reasons else type(error).__name__}{where}"
 
 
 def _signature(records: Iterable[type[Record]]) -> Any:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.records import Record, assign, nested, prefix, shaped
+from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -87,3 +88,17 @@ def test_a_view_is_the_same_memory() -> None:
     assert block[0].inner.matrix[2, 0] == 6.0
     assert view.address == block.ctypes.data
     assert not hasattr(view, "scalar"), "a copy of it would not be the same memory"
+
+
+@kernel
+def misspelt(record: Inner, period: float) -> None:
+    record.matrices[0, 0] = period  # type: ignore[attr-defined]
+
+
+def test_a_kernel_that_cannot_be_compiled_is_one_line_with_its_place() -> None:
+    with pytest.raises(InputError) as error:
+        RecordFunction(misspelt, (Inner,), (Inner,))
+    line = misspelt.py_func.__code__.co_firstlineno + 2  # type: ignore[attr-defined]
+    assert str(error.value).startswith("misspelt cannot be compiled: Unknown attribute 'matrices'")
+    assert str(error.value).endswith(f"test_records.py, line {line})")
+    assert "\n" not in str(error.value)
