@@ -8,10 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
-from shown import NUMBER, ROOT, block, check, differences, run, step
+from shown import ROOT, block, check, differences, run
 
-from space_robot_control.cli.main import cli
 from space_robot_sim import load_bag
 
 
@@ -141,36 +139,6 @@ def test_the_page_on_real_spacecraft_has_what_its_commands_give(tmp_path: Path) 
         shown = [float(text) for text in row.group(1).split("|")]
         found = [cell["metrics"][name]["median"] for name in SWEPT]
         np.testing.assert_allclose(shown, found, rtol=0.06)
-
-
-def test_the_page_on_navigation_has_what_its_commands_give() -> None:
-    """Three flights of its table: one that diverges, one that loses its attitude, a sound one."""
-    page = (ROOT / "docs/manual/navigation.md").read_text("utf-8")
-    _, *lines = block("docs/manual/navigation.md", "| | direct | filtered |", "`coarse`: ctc")
-    rows = {line.split("|")[1].strip(" `"): line.split("|")[2:5] for line in lines[1:]}
-    smooth = ("--set", "controller.acceleration_filter_hz=100")
-
-    def flown(law: str, sensors: str, *more: str) -> list[float]:
-        """Attitude error and ripple of base and joints 1-3, or when the flight diverged, s."""
-        options = ("simulate", "--controller", law, "--sensors", sensors, "--json", *more)
-        report = json.loads(CliRunner().invoke(cli, options).stdout)
-        if report["outcome"] == "diverged":
-            return [report["ended_at_s"]]
-        ripple = report["ripple"]["rms"]
-        return [
-            report["rms"]["mean_axis"]["attitude"], ripple["base_torque"], ripple["torque_1_3"]
-        ]  # fmt: skip
-
-    for row, column, found in (
-        ("fine`: ctc", 0, flown("ctc", "fine")),
-        ("ctc_smc", 1, flown("ctc_smc", "tactical", "--navigation", "filtered")),
-        ("tde_tsmc", 2, flown("tde_tsmc", "tactical", "--navigation", "filtered", *smooth)),
-    ):
-        shown = NUMBER.findall(rows[row][column])
-        assert len(shown) == len(found)
-        for text, number in zip(shown, found, strict=True):
-            assert abs(float(text) - number) < 1.01 * step(text), (row, column, text, number)
-    assert page.count("diverges at 0.1 s") == 3
 
 
 def test_the_page_on_campaigns_has_what_its_commands_print(tmp_path: Path) -> None:

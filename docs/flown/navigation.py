@@ -1,0 +1,68 @@
+"""What is flown for docs/manual/navigation.md."""
+
+from __future__ import annotations
+
+from base_numbers import ATTITUDE, LAWS
+from flown_tables import Number, Options, Page, Table, Text
+
+GRADES = ("fine", "tactical", "coarse")
+BASE, JOINTS = "ripple.rms.base_torque", "ripple.rms.torque_1_3"
+SMOOTH = {"controller": {"acceleration_filter_hz": 100.0}}
+DIVERGE = {
+    ("fine", "ctc"), ("tactical", "ctc"), ("coarse", "tde_smc"), ("coarse", "tde_tsmc"),
+    ("coarse", "tde_stc"),
+}  # fmt: skip
+"""Without the filter."""
+CORNERS_HZ = ((200.0, 300.0), (50.0, 75.0), (20.0, 30.0), (10.0, 15.0))
+
+
+def _cell(options: Options) -> Text:
+    ripple = (Number(options, BASE), Number(options, JOINTS))
+    return Text("{}; {}, {}", (Number(options, ATTITUDE, ".1e"), *ripple))
+
+
+def _direct(sensors: str, law: str) -> Text | Number:
+    options: Options = {"sensors": sensors, "controller": law}
+    if (sensors, law) in DIVERGE:
+        return Text("diverges at {} s", (Number(options, "ended_at_s", ".1f"),))
+    if (sensors, law) == ("coarse", "ctc"):  # its ripple is of no use: the attitude is lost
+        return Number(options, ATTITUDE, ".1e")
+    return _cell(options)
+
+
+def _row(sensors: str, law: str) -> list[str | Text | Number]:
+    filtered: Options = {"sensors": sensors, "controller": law, "navigation": "filtered"}
+    smooth = _cell({**filtered, "parameters": SMOOTH}) if law.startswith("tde") else ""
+    label = f"`{sensors}`: {law}" if law == LAWS[0] else law
+    return [label, _direct(sensors, law), _cell(filtered), smooth]
+
+
+def _corners(rate_hz: float, joints_hz: float) -> list[str | Text]:
+    corners = {
+        "navigation_filter.rate_filter_hz": rate_hz,
+        "navigation_filter.joint_bandwidth_hz": joints_hz,
+    }
+    options: Options = {
+        "sensors": "fine", "navigation": "filtered", "duration": 10.0,
+        "parameters": {"controller": corners},
+    }  # fmt: skip
+    laws = ("tde_stc", "tde_smc")
+    return [
+        f"{rate_hz:g}, {joints_hz:g}", *(_cell({**options, "controller": law}) for law in laws)
+    ]  # fmt: skip
+
+
+PAGE = Page(
+    "navigation",
+    "manual/navigation.md",
+    (
+        Table(
+            "grades", ("", "direct", "filtered", "filtered + 100 Hz"),
+            [_row(sensors, law) for sensors in GRADES for law in LAWS],
+        ),
+        Table(
+            "corners", ("rate, joints, Hz", "`fine`, tde_stc", "`fine`, tde_smc"),
+            [_corners(*corners) for corners in CORNERS_HZ],
+        ),
+    ),
+)  # fmt: skip
