@@ -140,13 +140,15 @@ def test_a_target_waits_where_it_is_grasped_and_is_seen_while_it_is_held(flown) 
     robot = shown_robot(log)
     scene = Scene(flights_page({"one": log}, {"one": robot}, Options(rate=100.0), quiet))
     free, held = "/one/free_target_0", next(n for n in scene.names() if n.endswith("/target_0"))
-    times = (0.0, 0.1901, 0.2001, 0.5901, 0.6001, 0.99)  # of frames, and a little later
-    seen = [(scene.visible(t).get(free, True), scene.visible(t)[held]) for t in times]
-    before, during, after = (True, False), (False, True), (False, False)
-    assert seen == [before, before, during, during, after, after]
+    times = shown_times([log], 100.0)
+    for time in times:
+        shown = scene.visible(time + 1e-4)
+        is_free, is_held = time < 0.2 - 1e-9, 0.2 - 1e-9 <= time < 0.6 - 1e-9
+        assert (shown[free], shown[held]) == (is_free, is_held), time
     assert held.count("/") == 3 + robot.tool.body  # on the body that carries the tool
     # the last frame before: it stands still in the hand, so it moves as the hand does
-    place, hand = scene.poses(0.1901)[f"{free}/box"], scene.poses(0.1901)[held]
+    poses = scene.poses(times[times < 0.2 - 1e-9][-1] + 1e-4)
+    place, hand = poses[f"{free}/box"], poses[held]
     np.testing.assert_allclose(place.position, hand.position, atol=1e-5)
     np.testing.assert_allclose(place.rotation, hand.rotation, atol=1e-4)
 
