@@ -7,6 +7,7 @@ given to another by the scheduler (until ``distributed.scheduler.allowed-failure
 
 from __future__ import annotations
 
+import gc
 import itertools
 import logging
 import time
@@ -170,10 +171,16 @@ def _connected(address: str) -> Iterator[Client]:
     except ImportError:
         raise InputError("a scheduler needs Dask: pip install 'space_robot[dask]'") from None
     with _quiet():
+        client, failure = None, ""
         try:
             client = Client(address, timeout=CONNECT_S, set_as_default=False)
         except (OSError, TimeoutError, ValueError, RuntimeError, TypeError) as error:
-            raise InputError(f"scheduler {address!r}: {_line(error)}") from None
+            failure = _line(error)
+        if client is None:
+            # a client that has failed closes itself when it is collected: now, for where Dask
+            # holds its lock of event loops that would wait for ever
+            gc.collect()
+            raise InputError(f"scheduler {address!r}: {failure}")
         try:
             yield client
         finally:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import signal
@@ -132,8 +133,11 @@ def test_a_cluster_without_workers_is_not_waited_for(monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense", "foo://127.0.0.1:9"])
 def test_a_scheduler_that_is_not_there(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "CONNECT_S", 0.5)
-    with pytest.raises(InputError, match=f"scheduler '{address}': [^\n]+$"):
+    with pytest.raises(InputError, match=f"scheduler '{address}': [^\n]+$") as error:
         run_many(behave, [("", 1)], scheduler=address)
+    left = [each for each in gc.get_objects() if type(each) is distributed.Client]
+    assert not left, "it would close itself at any time, within a lock of Dask, too"
+    assert error.value.__context__ is None
 
 
 def test_without_dask_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
