@@ -11,7 +11,8 @@ import signal
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
-from typing import Any, Generic, NamedTuple, NoReturn, TypeVar
+from dataclasses import dataclass
+from typing import Any, Generic, NoReturn, TypeVar
 
 from .process_environment import set_defaults
 
@@ -33,7 +34,8 @@ Schema = TypeVar("Schema", bound=NodeSettings)
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
-class NodeKind(NamedTuple, Generic[Schema]):
+@dataclass(frozen=True)
+class NodeKind(Generic[Schema]):
     """How a node is made."""
 
     schema: type[Schema]
