@@ -113,7 +113,7 @@ constraints: $(VENV)/.made
 	  $(addprefix --extra ,$(CONSTRAINED)) setup.py -
 
 clean:
-	rm -rf $(VENV) build install log site *.egg-info .coverage .coverage.* .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) .venv-newest build install log site *.egg-info .coverage .coverage.* .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find $(PACKAGES) tests -name __pycache__ -prune -exec rm -rf {} +
 
 # Stamps: what is installed in .venv, renewed when the packaging changes.
