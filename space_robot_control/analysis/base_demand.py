@@ -42,7 +42,7 @@ class BaseDemand:
         """(3, 3, 1) the base's axes at the last row."""
         self._command = np.full((1, 3), np.nan)
         """The answer to the last row."""
-        self._taken = np.zeros((3, 1))
+        self._taken: Array = np.zeros((3, 1))
         """N m s, inertial axes: what the base was given so far."""
 
     def add(self, log: FlightLog) -> Demand:

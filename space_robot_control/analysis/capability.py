@@ -62,10 +62,13 @@ def _largest(columns: Array, low: Array, high: Array) -> Array:
     for side, i in np.ndindex(2, 3):
         wanted = np.zeros((3, 1))
         wanted[i] = 1.0 if side else -1.0
+        bounds: Any = [*zip(low, high, strict=True), (0.0, None)]
         solved: Any = linprog(
-            np.append(np.zeros(count), -1.0), A_eq=np.hstack([columns, -wanted]), b_eq=np.zeros(3),
-            bounds=[*zip(low, high, strict=True), (0.0, None)],
-        )  # fmt: skip
+            np.append(np.zeros(count), -1.0),
+            A_eq=np.hstack([columns, -wanted]),
+            b_eq=np.zeros(3),
+            bounds=bounds,
+        )
         found[side, i] = np.inf if solved.status == 3 else -solved.fun if solved.success else 0.0
     both: Array = found.min(axis=0)
     return both

@@ -250,7 +250,7 @@ def navigation_of(log: FlightLog) -> str:
 def recorded_h_bar(log: FlightLog) -> Array:
     """Return h_bar of the laws in force in the rows of ``log``, see `HBar`."""
     laws, none = laws_of(log), np.full(log.axes, np.nan)
-    rows = [none]
+    rows: list[Array] = [none]
     for law in laws:
         values = law.gains.get("h_bar", ())
         rows.append(np.broadcast_to(values, log.axes) if len(values) in (1, log.axes) else none)

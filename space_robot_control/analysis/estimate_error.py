@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,10 +63,11 @@ class DelayedEstimate:
         if self._state is None:
             before = np.zeros_like(neglected[:1]) if self._rest else neglected[:1]
             self._state = (1.0 - smoothing) * before
-        estimate: Array
-        estimate, self._state = lfilter(
+        filtered: Any = lfilter(
             [smoothing], [1.0, smoothing - 1.0], neglected, axis=0, zi=self._state
         )
+        estimate: Array
+        estimate, self._state = filtered
         return estimate
 
 

@@ -139,7 +139,7 @@ class ThrusterLoad(Load):
         self._main = np.argmax(torques >= (1.0 - ROUNDING) * torques.max(axis=1)[:, None], axis=1)
         """(T,) the axis that each thruster turns the base about most."""
         self._parts = torques / np.maximum(torques.sum(axis=1, keepdims=True), TINY)
-        self._open = np.zeros((1, thrusters.count), dtype=bool)
+        self._open: NDArray[np.bool_] = np.zeros((1, thrusters.count), dtype=bool)
         self._pulses = np.zeros(3, dtype=np.intp)
 
     def add(self, log: FlightLog, demand: Demand) -> None:

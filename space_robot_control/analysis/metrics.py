@@ -152,7 +152,7 @@ class TotalVariation:
 
     def __init__(self, axes: int) -> None:
         self._variation, self._rows = np.zeros(axes), 0
-        self._last = np.empty((0, axes))
+        self._last: Array = np.empty((0, axes))
 
     def add(self, values: Array) -> None:
         """Take further rows (N, axes); the step from the last row before counts."""

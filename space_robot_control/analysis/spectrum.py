@@ -36,7 +36,7 @@ class Segments:
             step: rows from the first of a segment to the first of the next.
         """
         self._length, self._step = length, step
-        self._rows = np.empty((0, axes))
+        self._rows: Array = np.empty((0, axes))
         """The last ones, as many as a segment has."""
         self._next = 0
         """Index in them at which the next segment begins."""
@@ -86,7 +86,7 @@ class PowerAbove:
         """
         self._period, self._frequency = period, frequency
         self._segments = Segments(axes, segment, segment // 2)
-        self._power = np.zeros((2, axes))
+        self._power: Array = np.zeros((2, axes))
         """Above the frequency, and of all frequencies, of the segments so far."""
 
     def add(self, values: Array) -> None:

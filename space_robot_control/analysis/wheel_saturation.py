@@ -66,7 +66,7 @@ class WheelSaturation(Metric):
         self._limits = [wheels.limits(f"max_{key}") for key in ("torque", "momentum")]
         self._motion = WheelMotion(wheels)
         self._ticks = np.zeros((2, wheels.count), dtype=np.intp)
-        self._first = np.full(wheels.count, -1)
+        self._first: NDArray[np.intp] = np.full(wheels.count, -1)
         """Row of the first tick at a limit; -1: there was none."""
         self._rows = self._any = 0
 

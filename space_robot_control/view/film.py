@@ -124,10 +124,11 @@ def _seen(robot: Robot, frames: Frames) -> Array:
 
 def _places(seen: Sequence[Array]) -> list[Array]:
     """Return where robots stand side by side along x, the first one where it flew."""
-    found, end = [np.zeros(3)], float(seen[0][:, 0].max())
+    places: list[Array] = [np.zeros(3)]
+    end = float(seen[0][:, 0].max())
     for before, points in pairwise(seen):
         width = max(float(np.ptp(points[:, 0])), float(np.ptp(before[:, 0])))
         x = end + GAP * width - float(points[:, 0].min())
-        found.append(np.array([x, 0.0, 0.0]))
+        places.append(np.array([x, 0.0, 0.0]))
         end = x + float(points[:, 0].max())
-    return found
+    return places

@@ -63,6 +63,7 @@ def plots_of(
         min(float(tick_times(log)[0]) for log in logs),
         max(float(tick_times(log)[-1]) for log in logs),
         STRETCHES + 1,
+        dtype=np.float64,
     )
     time = np.repeat(edges[:-1], 2)
     time[1::2] += 0.5 * (edges[1] - edges[0])

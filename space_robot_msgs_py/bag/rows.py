@@ -185,7 +185,7 @@ class Rows:
     def _put(self, topic: topics.Topic, ticks: NDArray[np.int64], values: Array) -> None:
         """Put messages' rows, of which the first belongs to the tick, where the columns say."""
         columns = self._readers[topic].columns
-        rows = values.reshape(len(ticks), -1, sum(column.length for column in columns))
+        rows: Array = values.reshape(len(ticks), -1, sum(column.length for column in columns))
         length = rows.shape[1]
         if not topic.per_tick:
             self._believed += length * len(ticks)
@@ -252,7 +252,7 @@ def _by_place(
     Of several for one place the last one stays.
     """
     length = rows.shape[1]
-    places = (ticks[:, None] + np.arange(length)).reshape(-1)
+    places: NDArray[np.int64] = (ticks[:, None] + np.arange(length)).reshape(-1)
     rows = rows.reshape(len(places), -1)
     inside = (places >= 0) & (places < stop)
     if not inside.all():

@@ -147,4 +147,5 @@ def _indices(description: MessageDescription, record: np.dtype[Any] | None) -> O
         np.arange(first, first + column.length)
         for first, column in zip(firsts, description.columns, strict=True)
     ]
-    return np.concatenate(runs).astype(np.uint64)
+    indices: Offsets = np.concatenate(runs).astype(np.uint64)
+    return indices

@@ -97,7 +97,7 @@ class ThrusterSettings(StrictModel):
     def torques(self) -> Array:
         """(T, 3) torque of each open thruster about the base's CoM, N m, in the base frame."""
         forces = self.unit_directions * self.values("force")[:, None]
-        return np.cross(self.places, forces)
+        return np.asarray(np.cross(self.places, forces), dtype=np.float64)
 
     def values(self, name: str) -> Array:
         """Return (T,) values of the setting ``name``, one a thruster.

@@ -55,7 +55,7 @@ class ScheduledFault:
             raise InputError(f"fault '{fault}': there is no tick of {period:g} s in that time")
         self._key = (seed, index)
         self._block = -1
-        self._rows = np.empty((0, 0))
+        self._rows: Array = np.empty((0, 0))
 
     def acts_at(self, tick: int) -> bool:
         """Return whether ``tick`` is within the fault's time."""

@@ -40,7 +40,7 @@ def drawn_shapes(robot: Robot) -> Iterator[Visual]:
     radius = max(THINNEST, SLENDER * lengths)
     for body, own in enumerate(ends):
         is_base, is_panel = body == 0, body > robot.n
-        start = np.zeros(3)
+        start: Array = np.zeros(3)
         if is_base or is_panel:
             box = even_box(
                 float(robot.mass[body]), robot.inertia[body], robot.com[body], body,

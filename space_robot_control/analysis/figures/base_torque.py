@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from statistics import median_low
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -112,13 +112,14 @@ def power_spectral_density(values: Array, period: float) -> tuple[Array, Array]:
         Frequencies above 0, Hz, and the density in the square of the values' unit per Hz, NaN
         where there is no power; both empty if there are too few samples.
     """
-    from scipy.signal import detrend, welch  # slow to import
+    from scipy import signal  # slow to import
 
     known = np.all(np.isfinite(values), axis=1)
     samples = values[: len(values) if known.all() else int(np.argmin(known))]
     if len(samples) < SHORTEST:
         return np.empty(0), np.empty(0)
-    frequency, density = welch(
+    detrend: Any = signal.detrend  # whose overloads welch's types do not match in SciPy 1.15
+    frequency, density = signal.welch(
         samples.T, 1.0 / period, nperseg=min(SEGMENT, len(samples)), detrend=detrend
     )
     total = np.sum(density[:, 1:], axis=0)

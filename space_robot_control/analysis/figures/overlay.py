@@ -100,7 +100,8 @@ def latency_histogram(flights: Mapping[str, PlotSeries]) -> Figure:
 
 def _events(flights: Mapping[str, PlotSeries]) -> Array:
     """Return the times at which something was captured or released in any flight, s."""
-    return np.unique(np.concatenate([series.events for series in flights.values()]))
+    times: Array = np.unique(np.concatenate([series.events for series in flights.values()]))
+    return times
 
 
 def _draw(columns: list[list[_Panel]], names: list[str], events: Array) -> Figure:

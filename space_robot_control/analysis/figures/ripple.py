@@ -6,11 +6,14 @@ from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from ..metrics import unit_of
 from ..plot_series import PlotSeries
 from .overlay import words
 from .style import Look, house_style, legend_above, page, scattered
+
+Array = NDArray[np.float64]
 
 
 @house_style()
@@ -51,7 +54,7 @@ def ripple(flights: Mapping[str, PlotSeries]) -> Figure:
     return figure
 
 
-def _marks(frequency: np.ndarray, index: int, count: int) -> list[int]:
+def _marks(frequency: Array, index: int, count: int) -> list[int]:
     """Choose the frequencies to mark, evenly along the logarithmic axis."""
     even = np.geomspace(frequency[0], frequency[-1], 1000)
     marks: list[int] = np.searchsorted(frequency, even[scattered(1000, index, count)]).tolist()

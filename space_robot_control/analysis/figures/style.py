@@ -137,7 +137,8 @@ def thinned(signal: Array, stretches: int = STRETCHES) -> Indices:
     lowest = np.argmin(np.where(np.isnan(rows), np.inf, rows), axis=1)
     highest = np.argmax(np.where(np.isnan(rows), -np.inf, rows), axis=1)
     kept = np.concatenate([[0], starts + lowest, starts + highest, [last]])
-    return np.unique(np.minimum(kept, last))
+    chosen: Indices = np.unique(np.minimum(kept, last))
+    return chosen
 
 
 def scattered(samples: int, index: int, count: int) -> Indices:

@@ -79,7 +79,7 @@ def sensitivity(
     rows = of_law(table, law)
     values = measured(rows, column)
     variables = dict(variables_of(rows))
-    if len(rows) < 2 * FEWEST or not variables or not np.ptp(ranked := rankdata(values)):
+    if len(rows) < 2 * FEWEST or not variables or not np.ptp(ranked := _ranks(values)):
         return None
     numbers = {n: v.to_numpy(np.float64) for n, v in variables.items() if v.dtype.kind in "fiu"}
     correlations = rank_correlations(list(numbers.values()), ranked, confidence)
@@ -118,7 +118,7 @@ def rank_correlations(
     if not variables:
         return [], [], None
     count, runs = len(variables), len(ranked)
-    matrix = np.corrcoef([*(rankdata(v) for v in variables), ranked])
+    matrix = np.corrcoef([*(_ranks(v) for v in variables), ranked])
     plain = [_interval(float(r), runs - 3, confidence) for r in matrix[-1, :-1]]
     free = runs - count - 1
     if free < 3:
@@ -132,6 +132,10 @@ def rank_correlations(
         partial = [_interval(float(r), free - 1, confidence) for r in held]
     explained = float(matrix[-1, :-1] @ np.linalg.pinv(matrix[:-1, :-1]) @ matrix[-1, :-1])
     return plain, partial, max(0.0, 1.0 - (1.0 - explained) * (runs - 1) / free)
+
+
+def _ranks(values: Array | Series) -> Array:
+    return np.asarray(rankdata(values), dtype=np.float64)
 
 
 def _interval(r: float, free: int, confidence: float) -> Estimate:
@@ -148,7 +152,7 @@ def _by_groups(series: Series, ranked: Array) -> tuple[float, float]:
     """Return what the groups of a variable explain of the ranks, and the p value of nothing."""
     if series.dtype.kind in "fiu" and series.nunique() > BINS:
         groups = max(2, min(BINS, len(ranked) // FEWEST))
-        places = np.minimum((rankdata(series) - 0.5) * groups // len(ranked), groups - 1)
+        places = np.minimum((_ranks(series) - 0.5) * groups // len(ranked), groups - 1)
     else:
         places = series.astype("category").cat.codes.to_numpy()
     _, codes = np.unique(places, return_inverse=True)
