@@ -49,6 +49,26 @@ def test_a_file_is_about_the_base_alone_and_makes_a_plant(robot: Robot, name: st
     assert (name == "ideal") is (settings.base_actuation == "ideal")
 
 
+@pytest.mark.parametrize(
+    ("part", "key", "zero_is_allowed"),
+    [
+        *(("wheels", key, True) for key in ("max_torque", "max_momentum", "coulomb", "viscous")),
+        ("wheels", "rotor_inertia", False),
+        *(("thrusters", key, True) for key in ("shortest_pulse", "delay")),
+        *(("thrusters", key, False) for key in ("force", "specific_impulse")),
+    ],
+)
+def test_sizes_are_not_negative(part: str, key: str, zero_is_allowed: bool) -> None:
+    """The smallest number below zero is refused, and named; zero only where it means something."""
+    with pytest.raises(InputError, match=rf"{part}\.{key}"):
+        PlantNodeSettings.resolve({f"{part}.{key}": [-5e-324]})
+    if zero_is_allowed:
+        PlantNodeSettings.resolve({f"{part}.{key}": [0.0]})
+    else:
+        with pytest.raises(InputError, match=rf"{part}\.{key}"):
+            PlantNodeSettings.resolve({f"{part}.{key}": [0.0]})
+
+
 def test_without_a_choice_the_base_is_ideal() -> None:
     assert PlantNodeSettings.resolve({}) == of("ideal")
     settings = of("ideal")

@@ -252,17 +252,17 @@ def test_pauses_and_steps_leave_no_trace(
     assert not any("behind" in text for text in bench.logged)
 
 
+@pytest.mark.parametrize("first", [1, 50])
 def test_by_the_wall_clock_a_late_command_acts_late(
-    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch
+    paper_robot: Robot, monkeypatch: pytest.MonkeyPatch, first: int
 ) -> None:
-    """The answers of ten ticks do not come; the one before them is held."""
-    bench = Bench(
-        paper_robot, monkeypatch, lambda tick: not 50 <= tick < 60, realtime=True
-    )  # fmt: skip
+    """The answers of ten ticks do not come; the one before them is held. Tick 0 alone waits."""
+    late = range(first, first + 10)
+    bench = Bench(paper_robot, monkeypatch, lambda tick: tick not in late, realtime=True)
     bench.run()
     assert bench.loop.missed_deadlines == 10
     assert bench.now - 1000.0 == pytest.approx(99 * PERIOD, abs=3 * PERIOD)
-    expected = bench.flown_by_hand(lambda k: torque(49 if 50 <= k < 60 else k))
+    expected = bench.flown_by_hand(lambda k: torque(first - 1 if k in late else k))
     np.testing.assert_array_equal(bench.numbers, expected)
 
 

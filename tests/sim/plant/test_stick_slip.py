@@ -29,7 +29,7 @@ from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.plant.conservation import kinetic_energy, momentum
 from space_robot_sim.plant.integrator import Stages
 from space_robot_sim.plant.plant import Plant, PlantSettings
-from space_robot_sim.plant.stick_slip import integrate, slide_or_stand
+from space_robot_sim.plant.stick_slip import MOST_CUTS, integrate, slide_or_stand
 from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
@@ -171,19 +171,19 @@ SPIN, STEP = 0.5, 0.01
 """kg m2 of each of six balls, and s, of one long step."""
 
 
-def balls(**disturbance: float) -> Plant:
+def balls(count: int = 6, **disturbance: float) -> Plant:
     """Balls turned about their own centres, on a base that none of them moves; it drifts."""
     centred: dict[str, Any] = {"com": [0.0] * 3, "parent": "base"}
     ball = {"mass": 1.0, "inertia": [SPIN] * 3 + [0.0] * 3, **centred}
     base = {"mass": 1e9, "inertia": [1e12] * 3 + [0.0] * 3}
-    links = [{"name": f"ball{k}", **ball} for k in range(6)]
+    links = [{"name": f"ball{k}", **ball} for k in range(count)]
     robot = Robot.from_dict({"robot": {"name": "balls", "base": base, "links": links}})
     settings = DisturbanceSettings(
         scale=1.0, base_amplitude=0.0, outer_amplitude=0.0, inner_frequencies=[5.0, 0.0],
         **disturbance,
     )  # fmt: skip
-    plant = plant_of(robot, 0.0, initial_joints_deg=[0.0] * 6, disturbance=settings)
-    plant.memory.x[13] = 2.0
+    plant = plant_of(robot, 0.0, initial_joints_deg=[0.0] * count, disturbance=settings)
+    plant.memory.x[7 + count] = 2.0
     return plant
 
 
@@ -244,6 +244,22 @@ def test_where_one_joint_comes_to_rest_others_break_away(
     expected = [slides.angle, *ways, 0.5 * 0.0025 * outer, 0.0, 0.0]
     np.testing.assert_allclose(angles, expected, rtol=0.0, atol=2e-9)
     assert memory.x[0] == pytest.approx(2.0 * STEP, rel=1e-12), "time passes once"
+
+
+def test_beyond_the_most_cuts_the_rest_of_a_step_is_flown_uncut() -> None:
+    """More joints come to rest in one step, one after the other, than it may be cut."""
+    count, brake = MOST_CUTS + 4, 20.0
+    plant = balls(count)
+    memory, stops = plant.memory, np.linspace(0.1, 0.9, count) * STEP
+    memory.environment.friction.coulomb[:count] = brake
+    memory.x[13 + count :][:count] = brake * stops / SPIN
+    integrate(memory.model, memory.environment, memory.x, 0.0, STEP, memory.stages)
+    angles, rates = memory.x[7 : 7 + count], memory.x[13 + count :][:count]
+    assert memory.x[0] == pytest.approx(2.0 * STEP, rel=1e-12), "time passes once"
+    assert not rates[:MOST_CUTS].any()
+    assert (rates[MOST_CUTS:] != 0.0).all(), "they have not come to rest"
+    expected = 0.5 * brake / SPIN * stops**2
+    np.testing.assert_allclose(angles[:MOST_CUTS], expected[:MOST_CUTS], rtol=0.0, atol=1e-9)
 
 
 def test_substeps_are_as_many_short_ticks() -> None:
