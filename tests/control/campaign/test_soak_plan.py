@@ -95,6 +95,13 @@ def test_faults_are_such_that_a_flight_can_end() -> None:
                 assert length_s <= LONGEST_S[fault.kind.name] + 1e-9
 
 
+def test_faults_begin_within_the_middle_eight_tenths() -> None:
+    """From the first tenth of a flight to the last, both reached within a hundredth."""
+    starts = [f.start_s / MANY[k].duration for k in range(len(MANY)) for f in faults(k)]
+    assert 0.1 - 1e-9 <= min(starts) < 0.11
+    assert 0.89 < max(starts) <= 0.9 + 1e-9
+
+
 def test_a_process_that_stays_dead_fails_once() -> None:
     for plan in MANY:
         kinds = [text.partition("@")[0] for text in plan.faults]

@@ -43,6 +43,8 @@ def test_files_of_one_name_in_two_folders_are_two_laws(folder: Path) -> None:
     one, two = find_law("my_law.py:Mine"), find_law("other/my_law.py:Mine")
     assert one is not two
     assert two.name == "other"
+    assert importable_name(one) == "my_law.py:Mine", "another process imports it by its path"
+    assert importable_name(two) == "other/my_law.py:Mine"
     for law in (one, two):
         assert find_law(importable_name(law)) is law, "what nodes and bags say finds it again"
         assert law_setting(law) == importable_name(law)
