@@ -65,6 +65,7 @@ setup(
             "mermaidx",
             "mkdocs-material>=9.7",
             "mkdocstrings[python]>=1.0",
+            "pymdown-extensions<12; python_full_version < '3.11.5'",  # as mkdocstrings there
             "nbconvert",
             "ruff",  # wraps the signatures
             "ziamath",
@@ -89,6 +90,7 @@ setup(
             "mermaidx",
             "mkdocs-material>=9.7",
             "mkdocstrings[python]>=1.0",
+            "pymdown-extensions<12; python_full_version < '3.11.5'",  # as mkdocstrings there
             "mujoco",
             "mypy",
             "nbclient",

@@ -10,8 +10,12 @@ from ..result import Result, Target
 from . import is_installed
 from .simulators import PERIOD, MuJoCo, Ours, Peer, Pinocchio, Start
 
-TOLERANCE = Target(1e-9)
-"""Largest difference in any of position (m), quaternion, angles (rad) and rates at the end."""
+TOLERANCE = Target(1e-8)
+"""Largest difference in any of position (m), quaternion, angles (rad) and rates at the end.
+
+Pinocchio's is below 1e-15. MuJoCo turns each inertia to principal axes by an iteration of its own:
+1e-11 as a rule, 1e-9 with version 3.17.
+"""
 MOTION = Target(1e-3)
 """The least that the plant moves: at rest every robot is the same."""
 
