@@ -17,7 +17,7 @@ from typing import NamedTuple
 from areas import ROOT
 from mutants import Mutant
 
-LIMIT_S = 1200.0
+LIMIT_S = 400.0
 """Time for the tests of one mutant; one that makes them hang is noticed."""
 
 
