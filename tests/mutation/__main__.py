@@ -68,7 +68,10 @@ def draw(areas: list[str], count: int, seed: int) -> Iterator[tuple[str, Mutant]
 @click.option("--jobs", default=1, show_default=True, help="Mutants tried at a time.")
 @click.option("--list", "only_list", is_flag=True, help="Show the sample, try nothing.")
 def main(areas: tuple[str, ...], count: int, seed: int | None, jobs: int, only_list: bool) -> None:
-    """Try a random sample of mutants on the tests near them, and list those that survive."""
+    """Try a random sample of mutants on the tests near them, and list those that survive.
+
+    Those that survive the near tests are tried on tests that look at everything from outside, too.
+    """
     console = Console(width=160 if not sys.stdout.isatty() else None)
     if seed is None:
         seed = secrets.randbelow(10**6)
@@ -93,6 +96,8 @@ def main(areas: tuple[str, ...], count: int, seed: int | None, jobs: int, only_l
             try:
                 tests = AREAS[area].tests_of(mutant.module)
                 outcome = copy.trial(mutant, tests, AREAS[area].marks)
+                if outcome.verdict == "survived":
+                    outcome = copy.trial(mutant, AREAS[area].further_tests(), "")
             finally:
                 copies.put(copy)
             with lock:

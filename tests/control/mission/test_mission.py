@@ -131,6 +131,12 @@ def test_arm_is_held_before_and_after(paper: Mission) -> None:
         np.testing.assert_array_equal(rows[:, 1:], np.zeros((50, 2, 6)))
 
 
+def test_by_default_one_joint_is_held_at_zero() -> None:
+    settings = MissionSettings()
+    assert (settings.waypoint_times, settings.waypoints_deg) == ([0.0], [0.0])
+    assert settings.base_quaternion == [1.0, 0.0, 0.0, 0.0]
+
+
 def test_one_waypoint_is_a_pose_to_hold() -> None:
     mission = mission_of([0.0], [[10.0, 20.0]])
     assert mission.duration == 0.0

@@ -67,6 +67,17 @@ def test_the_page_and_its_websocket_are_for_pages_from_here() -> None:
         assert [opened(origin) for origin in origins] == [101, 101, 403, 403, 403]
 
 
+def test_connections_that_have_ended_count_no_more() -> None:
+    """Else nobody could come after so many visitors."""
+    with local_server() as server:
+        address = f"127.0.0.1:{server.get_port()}"
+        for _ in range(module.MOST_CONNECTIONS + 20):
+            connection = http.client.HTTPConnection(address)
+            connection.request("GET", "/")
+            assert connection.getresponse().status == 200
+            connection.close()
+
+
 @pytest.mark.parametrize("sent", [b"", b"GET / HTTP/1.1\r\nHost: ", os.urandom(300)])
 def test_it_stops_whatever_is_connected(sent: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "OPENING_S", 300.0)
