@@ -51,7 +51,7 @@ class ProcessMonitor:
                     self._weigh(process)
 
     def _weigh(self, process: psutil.Process) -> None:
-        if process not in self._seen:
+        if self._seen.get(process) not in MODULES:  # seen before it became the node, it still may
             words = process.cmdline()
             self._seen[process] = node_of(words) or " ".join(words[:3])
         name, mb = self._seen[process], process.memory_info().rss / 1e6
