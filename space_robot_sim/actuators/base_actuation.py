@@ -97,8 +97,6 @@ def _check_torques(settings: BaseActuatorSettings) -> None:
     Raises:
         InputError: says about which axis none can.
     """
-    from scipy.optimize import linprog  # slow to import
-
     axes, torques = settings.wheels.unit_axes, settings.thrusters.torques
     if not len(torques):
         if np.linalg.matrix_rank(axes, tol=LEAST_SHARE) < 3:
@@ -112,15 +110,22 @@ def _check_torques(settings: BaseActuatorSettings) -> None:
     for i, name in enumerate("xyz"):
         for sign in (1.0, -1.0):
             wanted = sign * np.eye(3)[i]
-            is_given = False
-            if (
-                columns.size
-            ):  # by some forces that push: not nnls, whose residual SciPy 1.15 errs in
-                solved: Any = linprog(np.zeros(columns.shape[1]), A_eq=columns, b_eq=wanted)
-                is_given = solved.status == 0
-            if not is_given:
+            if not _can_push(columns, wanted):
                 side = "positive" if sign > 0.0 else "negative"
                 raise InputError(
                     f"thrusters.directions: no {side} torque about {name} can be had of the "
                     "thrusters" + (" and wheels" if len(axes) else "")
                 )
+
+
+def _can_push(columns: Array, wanted: Array) -> bool:
+    """Return whether sizes of zero or more along ``columns`` (3, k) add up to ``wanted`` (3,).
+
+    By a linear program: SciPy 1.15 reports the residual of non-negative least squares wrongly.
+    """
+    from scipy.optimize import linprog  # slow to import
+
+    if not columns.size:
+        return False
+    solved: Any = linprog(np.zeros(columns.shape[1]), A_eq=columns, b_eq=wanted)
+    return bool(solved.status == 0)
