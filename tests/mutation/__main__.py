@@ -21,7 +21,7 @@ from random import Random
 from typing import NoReturn
 
 import click
-from areas import AREAS
+from areas import AREAS, FURTHER
 from mutants import Mutant, sample, text_of
 from rich.console import Console
 from rich.table import Table
@@ -97,7 +97,7 @@ def main(areas: tuple[str, ...], count: int, seed: int | None, jobs: int, only_l
                 tests = AREAS[area].tests_of(mutant.module)
                 outcome = copy.trial(mutant, tests, AREAS[area].marks)
                 if outcome.verdict == "survived":
-                    outcome = copy.trial(mutant, AREAS[area].further_tests(), "")
+                    outcome = copy.trial(mutant, FURTHER, "")
             finally:
                 copies.put(copy)
             with lock:

@@ -23,10 +23,6 @@ class Area(NamedTuple):
             paths = (path.relative_to(ROOT) for path in _paths(pattern))
             yield from (path for path in paths if path.name != "__init__.py")
 
-    def further_tests(self) -> list[str]:
-        """Tests that look at everything from outside, for what the near ones do not notice."""
-        return [f"tests/{name}" for name in FURTHER]
-
     def tests_of(self, module: Path) -> list[str]:
         """Tests of the area: those that bear the module's name first, then those of its folder."""
         tests = {path.relative_to(ROOT) for pattern in self.tests for path in _paths(pattern)}
@@ -69,9 +65,12 @@ def _files(place: str, *tests: str, marks: str = Area(sources=(), tests=()).mark
 
 
 FURTHER = (
-    "test_reference.py", "test_start_up.py", "control/cli/test_output.py",
-    "control/scenario/test_scenario.py", "control/flight/graph/test_graph_nodes.py",
-)  # fmt: skip
+    "tests/test_reference.py",
+    "tests/test_start_up.py",
+    "tests/control/cli/test_output.py",
+    "tests/control/scenario/test_scenario.py",
+    "tests/control/flight/graph/test_graph_nodes.py",
+)
 """Pages made from the code, commands with their output, flights in process and on the graph."""
 CLOSED_LOOP = (
     "control/flight/test_compiled_loop.py", "control/flight/test_closed_loop.py",
