@@ -6,21 +6,20 @@ The angle of a prismatic joint is its position; m stands in the place of rad the
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
-from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.samples import State
 from space_robot_msgs_py.topics import BASE_AXES
 
 from ..faults.axes import About
 from ..faults.grammar import Argument, Kind
 from ..faults.schedule import BLOCK_TICKS, ScheduledFault
+from ..hardware.encoders import MOST_DIFFERENCED, EncoderSettings
 from .faults import (
     SIGMA_RAD,
     SIGMA_RAD_PER_S,
@@ -34,27 +33,9 @@ from .faults import (
 from .noise import in_steps, row_of
 
 Array = NDArray[np.float64]
-Sigma = Annotated[float, Field(ge=0.0, le=1e3)]
-
-MOST_DIFFERENCED = 256
-"""Ticks over which a rate can be differenced."""
 
 
-class EncoderSettings(StrictModel):
-    """The encoders of all joints; by default without error."""
 
-    bits: Annotated[int, Field(ge=0, le=32)] = Field(
-        0,
-        description="steps of a turn, or of a metre, are two to this power (0: no steps)",
-    )
-    noise: Sigma = Field(0.0, description="white noise of each angle, rad or m")
-    difference_ticks: Annotated[int, Field(ge=0, le=MOST_DIFFERENCED)] = Field(
-        0, description="joint rates are differences of angles over so many ticks (0: measured)"
-    )
-    velocity_noise: Sigma = Field(0.0, description="white noise of each joint rate, rad/s or m/s")
-    velocity_step: Sigma = Field(
-        0.0, description="distance of two values of a joint rate, rad/s or m/s (0: none)"
-    )
 
 
 class Encoders(Record):

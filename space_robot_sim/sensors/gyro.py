@@ -3,47 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
-from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.samples import State
 
 from ..faults.axes import About
 from ..faults.grammar import Argument, Kind
 from ..faults.schedule import BLOCK_TICKS, ScheduledFault
+from ..hardware.gyro import GyroSettings
 from .faults import SIGMA_RAD_PER_S, STEP_RAD_PER_S, Change, SensorFault, add_noise, coarsen
 from .noise import in_steps, row_of
 
 Array = NDArray[np.float64]
-Sigma = Annotated[float, Field(ge=0.0, le=1e3)]
-OnAxes = Annotated[
-    list[Annotated[float, Field(ge=-10.0, le=10.0)]], Field(min_length=3, max_length=3)
-]
 
 
-class GyroSettings(StrictModel):
-    """A gyro; by default without error."""
-
-    noise: Sigma = Field(0.0, description="white noise of each sample, whatever the period, rad/s")
-    angle_random_walk: Sigma = Field(
-        0.0, description="density sigma_v of the white noise on the rate, rad/s^1/2"
-    )
-    rate_random_walk: Sigma = Field(
-        0.0, description="density sigma_u of the white noise that drives the bias, rad/s^3/2"
-    )
-    initial_bias: OnAxes = Field(
-        [0.0, 0.0, 0.0], description="bias at tick 0 on base x, y, z, rad/s"
-    )
-    scale_factor_error: OnAxes = Field(
-        [0.0, 0.0, 0.0], description="e of (1 + e) times the true rate, on base x, y, z"
-    )
-    step: Sigma = Field(0.0, description="distance of two values, rad/s (0: none)")
 
 
 class Gyro(Record):

@@ -9,24 +9,18 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
-from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import State
 
 from ..faults.schedule import PartFault
-from .encoders import EncoderFault, Encoders, EncoderSettings, read_encoders
-from .gyro import Gyro, GyroFault, GyroSettings, read_gyro
-from .star_tracker import StarTracker, StarTrackerFault, StarTrackerSettings, track_stars
+from ..hardware.sensors import SensorSettings
+from .encoders import EncoderFault, Encoders, read_encoders
+from .gyro import Gyro, GyroFault, read_gyro
+from .star_tracker import StarTracker, StarTrackerFault, track_stars
 
 Array = NDArray[np.float64]
 
 
-class SensorSettings(StrictModel):
-    """Settings of the sensors."""
-
-    star_tracker: StarTrackerSettings = StarTrackerSettings()
-    gyro: GyroSettings = GyroSettings()
-    encoders: EncoderSettings = EncoderSettings()
 
 
 class Sensors(Record):

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field
 
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
-from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import State
 
@@ -19,49 +17,16 @@ from ..elementary.matrices import norm
 from ..elementary.sine import sin_cos
 from ..faults.grammar import Argument, Kind
 from ..faults.schedule import BLOCK_TICKS, ScheduledFault
+from ..hardware.star_tracker import LEAST_RATE, MOST_UNDER_WAY, StarTrackerSettings
 from .faults import SIGMA_RAD, Change, SensorFault, add_noise, coarsen
 from .noise import in_steps, row_of
 
 Array = NDArray[np.float64]
-Angle = Annotated[float, Field(ge=0.0, le=1.0)]
-
-LEAST_RATE = 1e-6
-"""Hz; a measurement in eleven days."""
-MOST_UNDER_WAY = 64
-"""Measurements that have been taken and are not released yet."""
 
 
-def has_direction(vector: list[float]) -> list[float]:
-    """Return ``vector`` if it can be made a unit vector.
-
-    Raises:
-        ValueError: it is far too short or too long.
-    """
-    length = norm(vector)
-    if not 1e-3 <= length <= 1e3:
-        raise ValueError(f"the norm must be near 1, not {length:g}")
-    return vector
 
 
-class StarTrackerSettings(StrictModel):
-    """A star tracker; by default without error, at every tick."""
 
-    noise_across: Angle = Field(
-        0.0, description="standard deviation about each axis across the boresight, rad"
-    )
-    noise_about: Angle = Field(0.0, description="standard deviation about the boresight, rad")
-    boresight: Annotated[
-        list[float], Field(min_length=3, max_length=3), AfterValidator(has_direction)
-    ] = Field([0.0, 0.0, 1.0], description="axis of its optics in the base frame")
-    rate: Annotated[float, Field(ge=0.0, le=1e5)] = Field(
-        0.0, description="measurements a second, to a whole number of ticks (0: one a tick)"
-    )
-    delay: Annotated[float, Field(ge=0.0, le=100.0)] = Field(
-        0.0, description="time from exposure to release, s, to a whole number of ticks"
-    )
-    step: Angle = Field(
-        0.0, description="rotation that the last digit of the quaternion stands for, rad"
-    )
 
 
 class StarTracker(Record):
