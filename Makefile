@@ -6,11 +6,11 @@ VENV := .venv
 CONSTRAINTS := constraints.txt
 # Extras with versions in it. Not apt, which has ROS's own NumPy, and not bench: Basilisk holds others back.
 CONSTRAINED := campaign dask docs gym mutation notebooks parquet ros soak test view xacro
-PACKAGES := space_robot_control space_robot_msgs_py space_robot_sim
+PACKAGES := space_robot space_robot_control space_robot_model space_robot_msgs_py space_robot_sim
 # A file's tests run in one process; tests/conftest.py has the files in an order that fills both.
 PYTEST := $(VENV)/bin/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
 # Tests of kernels that are short enough without a compiler.
-INTERPRETED := $(addprefix tests/,sim/dynamics sim/environment sim/robot sim/sensors sim/faults \
+INTERPRETED := $(addprefix tests/,model/dynamics sim/environment model/robot sim/sensors sim/faults \
   control/laws $(addprefix control/controller/test_,tracking.py time_delay_estimation.py controller.py))
 PIP := $(VENV)/bin/python -m pip install -qq --disable-pip-version-check
 PIP_INSTALL := $(PIP) $(foreach file,$(CONSTRAINTS),--constraint $(file) --build-constraint $(file))
@@ -80,7 +80,7 @@ lint: $(VENV)/.tests
 
 # Else both test processes would begin with it. It begins while the tests' tools are installed.
 kernels: $(VENV)/.flies
-	$(VENV)/bin/python -c "from space_robot_control.flight.compilation import compile_kernels as c; c(True)"
+	$(VENV)/bin/python -c "from space_robot.flight.compilation import compile_kernels as c; c(True)"
 
 docs: $(VENV)/.docs
 	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/python -m mkdocs --quiet build --strict

@@ -25,13 +25,13 @@ setup(
     license="Apache-2.0",
     maintainer="space_robot maintainers",
     maintainer_email="maintainers@space-robot.example.org",
-    packages=find_packages(include=[f"{NAME}_*"]),
+    packages=find_packages(include=[f"{NAME}*"]),
     package_data={
-        "space_robot_control.analysis": ["templates/*.j2"],
-        "space_robot_control.analysis.figures": ["*.mplstyle"],
-        "space_robot_control.campaign.report": ["templates/*.j2"],
-        "space_robot_control.paper.reproduction": ["templates/*.j2"],
-        "space_robot_control.view": ["templates/*"],
+        "space_robot.analysis": ["templates/*.j2"],
+        "space_robot.analysis.figures": ["*.mplstyle"],
+        "space_robot.campaign.report": ["templates/*.j2"],
+        "space_robot.paper.reproduction": ["templates/*.j2"],
+        "space_robot.view": ["templates/*"],
         "space_robot_msgs_py.ros": ["*.xml"],
     },
     python_requires=">=3.10,<3.14",
@@ -70,7 +70,7 @@ setup(
             "ruff",  # wraps the signatures
             "ziamath",
         ],
-        "gym": ["gymnasium>=1.0"],  # space_robot_control.scenario.gymnasium_env
+        "gym": ["gymnasium>=1.0"],  # space_robot.api.gymnasium_env
         "mutation": ["cosmic-ray"],  # tests/mutation
         "notebooks": ["ipykernel", "pandas>=2.1", "pyarrow>=14"],  # docs/notebooks
         "parquet": ["pyarrow>=14"],  # `analyze --parquet`
@@ -117,7 +117,7 @@ setup(
         "view": ["trimesh>=4", "viser>=1.1", "websockets>=13"],  # `view`
         "xacro": ["xacro"],  # robots in files that end in .xacro
     },
-    entry_points={"console_scripts": ["space-robot = space_robot_control.cli.main:main"]},
+    entry_points={"console_scripts": ["space-robot = space_robot.cli.main:main"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

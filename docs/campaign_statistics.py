@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv, gammaln, xlog1py, xlogy
 
-from space_robot_control.campaign.verdicts.projection import projected_decision
-from space_robot_control.campaign.verdicts.share_test import (
+from space_robot.campaign.verdicts.projection import projected_decision
+from space_robot.campaign.verdicts.share_test import (
     FixedSample,
     Sequential,
     ShareTest,

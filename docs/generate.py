@@ -13,10 +13,10 @@ from pathlib import Path
 from types import GenericAlias
 from typing import Any, get_args, get_origin
 
+from space_robot.scenario.faults import PROCESS_KINDS
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.flight.faults import PROCESS_KINDS
+from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import laws
-from space_robot_control.mission.settings import MissionNodeSettings
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
 from space_robot_msgs_py.config.settings import NodeSettings, leaves

@@ -11,14 +11,19 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from space_robot_control.analysis.figures.style import save_figure
-from space_robot_control.analysis.tables import Column, Group, Table, as_markdown
-from space_robot_control.campaign.flown import FlownCampaign
-from space_robot_control.campaign.report.console import tables
-from space_robot_control.campaign.report.figures import summary_figure
-from space_robot_control.campaign.report.findings import Findings
-from space_robot_control.campaign.report.league_tables import choice_tables
-from space_robot_control.campaign.report.subject import subject_of
+from space_robot.analysis.figures.style import save_figure
+from space_robot.campaign.flown import FlownCampaign
+from space_robot.campaign.report.console import tables
+from space_robot.campaign.report.figures import summary_figure
+from space_robot.campaign.report.findings import Findings
+from space_robot.campaign.report.league_tables import choice_tables
+from space_robot.campaign.report.subject import subject_of
+from space_robot.console.tables import (
+    Column,
+    Group,
+    Table,
+    as_markdown,
+)
 
 PAGE = Path(__file__).with_name("law_league.md")
 BLOCK = re.compile(r"(<!-- begin (\S+)( medians)? -->\n).*?(<!-- end -->)", re.DOTALL)

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from space_robot_sim import load_bag
+from space_robot import load_bag
 
 BEGIN_S, END_S = 1.0, 1.3
 

@@ -19,7 +19,7 @@ import argparse
 
 import numpy as np
 
-from space_robot_control import FlownFlight, Scenario
+from space_robot import FlownFlight, Scenario
 
 
 def base_motion(flight: FlownFlight) -> str:

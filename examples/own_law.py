@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control import Scenario
+from space_robot import Scenario
 from space_robot_control.laws import ControlLaw, LawGains, Signals, per_axis
 
 

@@ -16,7 +16,7 @@ prints:
 
 from __future__ import annotations
 
-from space_robot_control import FlownFlight, Scenario
+from space_robot import FlownFlight, Scenario
 
 FOLDED = [0.0, 120.0, 220.0, 0.0, -10.0, 0.0]
 REACHED_OUT = [30.0, 100.0, 150.0, 90.0, 30.0, -50.0]

@@ -18,8 +18,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from space_robot_control import Scenario
-from space_robot_sim import Robot
+from space_robot import Robot, Scenario
 
 URDF = Path(__file__).with_name("two_link_arm.urdf")
 

@@ -1,6 +1,6 @@
 """A flight as a table of pandas: where the energy goes, leg by leg.
 
-`FlownFlight.table` (of a bag: `space_robot_control.analysis.export.dataframe(load_bag(...))`) has a
+`FlownFlight.table` (of a bag: `space_robot.analysis.export.dataframe(load_bag(...))`) has a
 row a tick, and columns that bear their units. The paper's mission has two legs of 15 s from rest
 to rest, so whatever the motors put in has gone into friction by their ends. Joint 2's motor takes
 energy out: the others drive that joint through the arm, and it brakes. That is dynamic coupling.
@@ -22,7 +22,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from space_robot_control import Scenario
+from space_robot import Scenario
 
 COULOMB_NM, VISCOUS_NMS = 0.02, 0.2
 """Friction of every joint in case 1, N m and N m s/rad: `config/cases/1.yaml`."""

@@ -19,7 +19,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from space_robot_control import Scenario, replay
+from space_robot import Scenario, replay
 
 
 def main(bag: Path) -> None:

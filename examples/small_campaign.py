@@ -17,7 +17,7 @@ prints:
 
 from __future__ import annotations
 
-from space_robot_control import Campaign
+from space_robot import Campaign
 
 STUDY = {
     "scenario": {"case": "3", "sensors": "fine", "navigation": "filtered", "duration": 1.0},

@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control import Bench, Scenario
+from space_robot import Bench, Scenario
 
 
 def joint_pd(bench: Bench) -> NDArray[np.float64]:

@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from space_robot_sim import load_bag
+from space_robot import load_bag
 
 
 def main(bag: Path) -> None:

@@ -24,13 +24,13 @@ from launch.event_handlers import OnProcessExit, OnShutdown
 from launch.substitutions import EnvironmentVariable, LaunchConfiguration
 from launch_ros.actions import LifecycleNode
 
-from space_robot_control.cli.launch_arguments import (
+from space_robot.cli.launch_arguments import (
     launch_arguments,
     launched_flight,
     refuse_unknown,
 )
-from space_robot_control.flight.graph.launched import launched_parameters
-from space_robot_control.flight.graph.node_names import NODE_NAMES
+from space_robot.flight.graph.launched import launched_parameters
+from space_robot.flight.graph.node_names import NODE_NAMES
 from space_robot_msgs_py.ros.process_environment import defaults
 
 PACKAGE = "space_robot"

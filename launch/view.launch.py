@@ -25,10 +25,13 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from space_robot_control.cli.launch_arguments import launch_arguments, refuse_unknown
+from space_robot.cli.launch_arguments import (
+    launch_arguments,
+    refuse_unknown,
+)
 
 RVIZ, PAGE = "rviz", "page"
-VIEW = [sys.executable, "-m", "space_robot_control.cli.main", "view"]
+VIEW = [sys.executable, "-m", "space_robot.cli.main", "view"]
 
 
 def generate_launch_description() -> LaunchDescription:

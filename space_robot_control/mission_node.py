@@ -6,8 +6,8 @@ from typing import NoReturn
 
 from space_robot_msgs_py.ros.node_host import NodeKind, run_nodes
 
-from .mission.loop import MissionLoop
-from .mission.settings import MissionNodeSettings
+from .guidance.loop import MissionLoop
+from .guidance.settings import MissionNodeSettings
 
 NODE = NodeKind(MissionNodeSettings, MissionLoop)
 

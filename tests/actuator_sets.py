@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
-from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
-from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
 IDEAL = BaseActuatorSettings()

@@ -8,10 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from wheel_layouts import PYRAMID
 
-from space_robot_control.controller.allocation.allocation import Allocation, allocate
-from space_robot_control.controller.allocation.settings import AllocationSettings
+from space_robot_control.allocation.allocation import (
+    Allocation,
+    allocate,
+)
+from space_robot_control.allocation.settings import AllocationSettings
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_msgs_py.samples import State
-from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
 
 Array = NDArray[np.float64]
 

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from space_robot_control.controller.navigation.attitude_filter import (
+from space_robot_control.navigation.attitude_filter import (
     AttitudeFilter,
     observe_tracker,
     propagate,
     start,
 )
-from space_robot_control.controller.navigation.navigation import Navigation
-from space_robot_control.controller.navigation.settings import NavigationFilterSettings
+from space_robot_control.navigation.navigation import Navigation
+from space_robot_control.navigation.settings import NavigationFilterSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 
 Array = NDArray[np.float64]

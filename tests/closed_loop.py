@@ -8,11 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller
-from space_robot_control.controller.navigation.settings import NavigationFilterSettings
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
+from space_robot_control.guidance.mission import (
+    Mission,
+    MissionSettings,
+)
 from space_robot_control.laws import ControlLaw, find_law
-from space_robot_control.mission.mission import Mission, MissionSettings
-from space_robot_sim import Robot
+from space_robot_control.navigation.settings import NavigationFilterSettings
+from space_robot_model.robot import Robot
 from space_robot_sim.plant.plant import Plant, PlantSettings
 
 Array = NDArray[np.float64]

@@ -26,9 +26,9 @@ from command import Ran, Run
 from flights import Flown, Start, ros_environment, space_robot_here
 from paths import CONFIG, TESTS
 
-from space_robot_control.flight.graph.domain import ros_domain
-from space_robot_control.flight.node_modules import MODULES
-from space_robot_sim.robot import Robot
+from space_robot.flight.graph.domain import ros_domain
+from space_robot.processes.node_modules import MODULES
+from space_robot_model.robot import Robot
 
 if TYPE_CHECKING:
     from ground import Ground
@@ -134,7 +134,7 @@ def space_robot(capsys: pytest.CaptureFixture[str]) -> Run:
     """Run a `space-robot` command to its end, in this process."""
 
     def run(*words: object) -> Ran:
-        from space_robot_control.cli.main import main
+        from space_robot.cli.main import main
 
         with pytest.raises(SystemExit) as ended:
             main([*map(str, words)])

@@ -18,7 +18,7 @@ from space_robot_msgs_py.ros.process_environment import DEFAULTS
 
 Start = Callable[..., "subprocess.Popen[str]"]
 """Starts a node with parameters."""
-COMMAND = [sys.executable, "-m", "space_robot_control.cli.main"]
+COMMAND = [sys.executable, "-m", "space_robot.cli.main"]
 
 
 def ros_environment() -> dict[str, str]:
@@ -47,7 +47,7 @@ def space_robot_here(*arguments: str) -> subprocess.CompletedProcess[str]:
 
     For tests of what a command does. Those of how it starts, ends or is ended use `space_robot`.
     """
-    from space_robot_control.cli.main import main
+    from space_robot.cli.main import main
 
     streams = {
         name: io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True) for name in ("out", "err")

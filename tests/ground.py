@@ -18,7 +18,7 @@ from lifecycle_msgs.msg import Transition  # noqa: E402
 from lifecycle_msgs.srv import ChangeState, GetState  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 
-from space_robot_control.flight.graph.monitor import Monitor  # noqa: E402
+from space_robot.flight.graph.monitor import Monitor  # noqa: E402
 
 PATIENCE_S = 30.0
 

@@ -1,4 +1,4 @@
-"""Who imports whom in the three packages, from the source: no module is run."""
+"""Who imports whom in the five packages, from the source: no module is run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,13 @@ from pathlib import Path
 
 from paths import ROOT
 
-PACKAGES = ("space_robot_msgs_py", "space_robot_sim", "space_robot_control")
+PACKAGES = (
+    "space_robot_msgs_py",
+    "space_robot_model",
+    "space_robot_sim",
+    "space_robot_control",
+    "space_robot",
+)
 """From the ground up."""
 Graph = Mapping[str, set[str]]
 

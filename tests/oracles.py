@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from random_robots import State
 from scipy.spatial.transform import Rotation
 
-from space_robot_sim.robot import Robot
+from space_robot_model.robot import Robot
 
 Array = NDArray[np.float64]
 

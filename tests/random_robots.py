@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from space_robot_sim.robot import Robot
+from space_robot_model.robot import Robot
 
 Array = NDArray[np.float64]
 

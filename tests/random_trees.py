@@ -9,8 +9,14 @@ from numpy.typing import NDArray
 from random_robots import random_inertia
 from scipy.spatial.transform import Rotation
 
-from space_robot_sim.robot.inertia import inertia_tensor
-from space_robot_sim.robot.tree import Body, Joint, JointFriction, Spring, Tool
+from space_robot_model.robot.inertia import inertia_tensor
+from space_robot_model.robot.tree import (
+    Body,
+    Joint,
+    JointFriction,
+    Spring,
+    Tool,
+)
 
 Array = NDArray[np.float64]
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from random_robots import random_quaternion
 from random_samples import random_sample
 
+from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.samples import RobotNames, RobotState
@@ -19,7 +20,6 @@ from space_robot_sim.sensors.noise import Draws
 from space_robot_sim.sensors.sensors import (
     FAULTS,
     Sensors,
-    SensorSettings,
     arrays_of_draws,
     sense,
 )

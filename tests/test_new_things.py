@@ -12,12 +12,19 @@ import pytest
 from bags import read_accounts
 from paths import CONFIG, ROOT
 
-import space_robot_control.cli as room_of_commands
+import space_robot.cli as room_of_commands
 import space_robot_control.laws as room_of_laws
 import space_robot_msgs_py.wire as room_of_messages
-from space_robot_control.cli.main import cli, commands
-from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_control.flight.simulate import simulate
+from space_robot import load_bag
+from space_robot.cli.main import (
+    cli,
+    commands,
+)
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
@@ -26,7 +33,6 @@ from space_robot_msgs_py.samples import RobotNames
 from space_robot_msgs_py.wire.codec import Codec
 from space_robot_msgs_py.wire.definitions import decode
 from space_robot_msgs_py.wire.message import description
-from space_robot_sim import load_bag
 
 MODEL = "tde_stc"
 """The law that the new one is a copy of."""

@@ -17,8 +17,8 @@ from import_graph import PACKAGES, modules
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from space_robot_control.cli.main import cli
-from space_robot_control.flight.node_modules import MODULES
+from space_robot.cli.main import cli
+from space_robot.processes.node_modules import MODULES
 from space_robot_msgs_py import topics
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -7,7 +7,7 @@ import runpy
 import pytest
 from paths import DOCS
 
-from space_robot_control.flight.node_settings import SCHEMAS
+from space_robot.scenario.node_settings import SCHEMAS
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.settings import NodeSettings, leaves

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from shown import ROOT, block, check, differences, run
 
-from space_robot_sim import load_bag
+from space_robot import load_bag
 
 
 @pytest.fixture(scope="module")

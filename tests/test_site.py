@@ -93,7 +93,7 @@ def test_commands_and_the_names_for_users_are_there(site: Path) -> None:
     assert '<h3 id="campaign-run">' in commands
     assert "--restart-controller" in commands
     names = (site / "reference/api/index.html").read_text("utf-8")
-    for name in ("space_robot_control.Scenario", "space_robot_sim.load_bag"):
+    for name in ("space_robot.Scenario", "space_robot.load_bag"):
         assert f'id="{name}"' in names, name
     law = (site / "reference/api/space_robot_control/laws.html").read_text("utf-8")
     assert law.count('id="space_robot_control.laws.base.ControlLaw"') == 1

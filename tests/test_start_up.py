@@ -16,8 +16,8 @@ SLOW = {"matplotlib", "scipy.spatial", "scipy.signal", "scipy.optimize", "pyarro
     [
         ("space_robot_control.mission_node, space_robot_msgs_py.recorder_node", {*SLOW, "numba"}),
         ("space_robot_control.controller_node, space_robot_sim.plant_node", SLOW),
-        ("space_robot_control.flight.graph.orchestrator, space_robot_control.scenario", SLOW),
-        ("space_robot_control.cli.main", {*SLOW, "numba", "numpy", "pydantic"}),
+        ("space_robot.flight.graph.orchestrator, space_robot.api", SLOW),
+        ("space_robot.cli.main", {*SLOW, "numba", "numpy", "pydantic"}),
     ],
 )
 def test_slow_libraries_are_imported_where_they_are_used(modules: str, slow: set[str]) -> None:

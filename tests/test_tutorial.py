@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 from shown import ROOT, differences, run
 
-from space_robot_control.cli.main import cli
+from space_robot.cli.main import cli
 
 PAGE = (ROOT / "docs/tutorial.md").read_text("utf-8")
 LEFT_OUT = "..."

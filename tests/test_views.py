@@ -13,11 +13,14 @@ import yaml
 from paths import CONFIG
 from rosbags.highlevel import AnyReader
 
-from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_control.flight.simulate import simulate
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import simulate
+from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.wire.controller_telemetry import SIGNALS
-from space_robot_sim.robot import Robot
 
 VIEWS = CONFIG / "views"
 SHOWN = {topic.full_name: topic for topic in (topics.ROBOT_DESCRIPTION, topics.MARKERS)}

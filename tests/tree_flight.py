@@ -12,11 +12,14 @@ from oracles import rotation_of
 from random_trees import BASE, random_bodies
 from tree_oracle import TreeOracle, pinocchio_tree
 
+from space_robot_model.robot import Robot
+from space_robot_model.robot.tree import (
+    Body,
+    JointFriction,
+)
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.plant.plant import Plant, PlantSettings
-from space_robot_sim.robot import Robot
-from space_robot_sim.robot.tree import Body, JointFriction
 
 Array = NDArray[np.float64]
 PERIOD = 5e-4

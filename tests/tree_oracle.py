@@ -10,9 +10,13 @@ from numpy.typing import NDArray
 from oracles import quaternion_of
 from scipy.spatial.transform import Rotation
 
-from space_robot_sim.robot import Robot
-from space_robot_sim.robot.dynamics import bias_force, forward_dynamics, mass_matrix
-from space_robot_sim.robot.tree import Body
+from space_robot_model.robot import Robot
+from space_robot_model.robot.dynamics import (
+    bias_force,
+    forward_dynamics,
+    mass_matrix,
+)
+from space_robot_model.robot.tree import Body
 
 Array = NDArray[np.float64]
 JOINTS = {

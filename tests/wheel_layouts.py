@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.allocation.wheel_set import WheelSet, tabulate
+from space_robot_control.allocation.wheel_set import (
+    WheelSet,
+    tabulate,
+)
 from space_robot_msgs_py.samples import MOST_WHEELS
 
 Array = NDArray[np.float64]

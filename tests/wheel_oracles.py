@@ -15,9 +15,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from oracles import mujoco_inertial, mujoco_model, mujoco_numbers, pinocchio_model
 
+from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.records import assign
-from space_robot_sim.actuators.wheels import WheelSettings
-from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from space_robot_control.analysis import analyze
-from space_robot_control.analysis.described import robot_of
-from space_robot_control.analysis.metrics import tracking_error
-from space_robot_control.analysis.sizing import ActuatorSet
-from space_robot_control.controller.allocation.believed_actuators import believed_actuators
-from space_robot_control.scenario.flown_flight import FlownFlight
+from space_robot.analysis import analyze
+from space_robot.analysis.described import robot_of
+from space_robot.analysis.metrics import tracking_error
+from space_robot.analysis.sizing import ActuatorSet
+from space_robot.api.flown_flight import FlownFlight
+from space_robot_control.allocation.assumed_actuators import believed_actuators
 
 ATTITUDE = "rms.mean_axis.attitude"
 JOINTS_1_3 = "rms.mean_axis.joints_1_3"

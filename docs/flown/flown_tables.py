@@ -20,9 +20,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from space_robot_control import Scenario
-from space_robot_control.campaign.store.software import flight_digest
-from space_robot_control.scenario.flown_flight import FlownFlight
+from space_robot import Scenario
+from space_robot.api.flown_flight import FlownFlight
+from space_robot.campaign.store.software import flight_digest
 
 DOCS = Path(__file__).parents[1]
 BEGINNING_S = 0.1

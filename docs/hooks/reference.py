@@ -9,7 +9,7 @@ import click
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
-from space_robot_control.cli.main import cli
+from space_robot.cli.main import cli
 
 PUBLIC = """\
 # Names for users
@@ -18,17 +18,21 @@ What programs import; names of other modules may change from version to version.
 a [`FlightLog`][space_robot_msgs_py.bag.flight_log.FlightLog]; a law of one's own is a
 [`ControlLaw`][space_robot_control.laws.base.ControlLaw]; bad input raises
 [`InputError`][space_robot_msgs_py.errors.InputError]; for Gymnasium there is
-[`SpaceRobotEnv`][space_robot_control.scenario.gymnasium_env.SpaceRobotEnv].
+[`SpaceRobotEnv`][space_robot.api.gymnasium_env.SpaceRobotEnv].
 
-::: space_robot_control
-
-::: space_robot_sim
+::: space_robot
 """
 OF_PROGRAMS = {"campaign", "flight", "paper", "ros"}
 """Rooms that the commands are made of: of their files the page says what each is for, no more."""
 WIDTH = 100
 """Columns of the commands' help."""
-PACKAGES = ("space_robot_control", "space_robot_sim", "space_robot_msgs_py")
+PACKAGES = (
+    "space_robot",
+    "space_robot_control",
+    "space_robot_sim",
+    "space_robot_model",
+    "space_robot_msgs_py",
+)
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:

@@ -9,19 +9,28 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import norm
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import RecordFunction
 from space_robot_msgs_py.compiled.records import Block, RecordOwner, assign
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Command, RobotState
-from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
-from space_robot_sim.elementary.matrices import norm
-from space_robot_sim.robot import Robot
 
+from ..allocation.allocation import (
+    Allocation,
+    allocation_code,
+)
+from ..allocation.diagnosis import (
+    Diagnosis,
+    diagnose,
+)
+from ..allocation.settings import AllocationSettings
 from ..laws import ControlLaw, Signals
 from ..laws.checked import force_of
-from .allocation.allocation import Allocation, allocation_code
-from .allocation.diagnosis import Diagnosis, diagnose
-from .allocation.settings import AllocationSettings
+from ..navigation.low_pass import low_pass_weight
+from ..navigation.navigation import Navigation
+from ..navigation.settings import NavigationFilterSettings
 from .kernels import (
     LARGEST,
     NOT_UNIT,
@@ -32,9 +41,6 @@ from .kernels import (
     apply_transfer,
     compute_signals,
 )
-from .navigation.low_pass import low_pass_weight
-from .navigation.navigation import Navigation
-from .navigation.settings import NavigationFilterSettings
 
 Array = NDArray[np.float64]
 

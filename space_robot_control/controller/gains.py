@@ -11,13 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.robot.find import (
+    new_command,
+    robot_files,
+)
 from space_robot_msgs_py.config.files import GIVEN, node_parameters
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.config.trees import Tree, nest
 from space_robot_msgs_py.config.validation import one_of, read_yaml, short
 from space_robot_msgs_py.config.yaml_text import check_file, is_folder
 from space_robot_msgs_py.errors import InputError, SpaceRobotError
-from space_robot_sim.robot.find import new_command, robot_files
 
 from ..laws import ControlLaw, find_law, laws
 from .settings import DEFAULT, DEFAULT_SETS, OF_THE_SET, ControllerNodeSettings

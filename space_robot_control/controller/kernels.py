@@ -5,18 +5,27 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.attitude import (
+    SINGULAR_ETA,
+    attitude_jacobian_inverse,
+)
+from space_robot_model.dynamics.free_floating import eliminate_rotation
+from space_robot_model.dynamics.model import Model
+from space_robot_model.dynamics.rho_space import (
+    semi_floating_into,
+    to_rho_space,
+)
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS, State
-from space_robot_sim.dynamics.attitude import SINGULAR_ETA, attitude_jacobian_inverse
-from space_robot_sim.dynamics.free_floating import eliminate_rotation
-from space_robot_sim.dynamics.model import Model
-from space_robot_sim.dynamics.rho_space import semi_floating_into, to_rho_space
 
+from ..allocation.allocation import Allocation
 from ..laws import Signals
 from ..laws.compiled import LawCode
-from .allocation.allocation import Allocation
-from .navigation.navigation import Navigation, navigate
+from ..navigation.navigation import (
+    Navigation,
+    navigate,
+)
 from .time_delay_estimation import TimeDelayPair, follows, observe, time_delay_estimate
 from .tracking import (
     force_from_torque,

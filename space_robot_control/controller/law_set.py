@@ -7,6 +7,8 @@ from typing import Any
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.parameter import Parameter
 
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.law_history import LawChange
 from space_robot_msgs_py.config.trees import nest
 from space_robot_msgs_py.config.validation import one_of
@@ -14,8 +16,6 @@ from space_robot_msgs_py.errors import SpaceRobotError
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.parameters import overrides
 from space_robot_msgs_py.samples import Reference, RobotState
-from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
-from space_robot_sim.robot import Robot
 
 from ..laws import ControlLaw
 from .controller import Controller

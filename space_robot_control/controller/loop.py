@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
+from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.ros.endpoints import RawPublisher, flush
@@ -12,9 +13,8 @@ from space_robot_msgs_py.ros.health import Health, Level
 from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.paused import PausedInput
-from space_robot_sim.robot.find import find_robot
 
-from .allocation.believed_actuators import believed_actuators
+from ..allocation.assumed_actuators import believed_actuators
 from .answering import Answering, Standing
 from .controller import Controller
 from .law_set import LawSet

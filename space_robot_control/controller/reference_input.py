@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rclpy.node import Node
 
+from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import MessageError
@@ -17,7 +18,6 @@ from space_robot_msgs_py.ros.endpoints import FollowedSubscription, PolledCallba
 from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
-from space_robot_sim.robot import Robot
 
 from .reference_buffer import ReferenceBuffer
 

@@ -8,16 +8,19 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
+from space_robot_model.robot.find import robot_files
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.files import named_layers
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.config.yaml_text import is_folder
-from space_robot_sim.robot.find import robot_files
 
-from .allocation.settings import AllocationSettings
-from .navigation.believed_sensors import completed
-from .navigation.settings import Mode, NavigationFilterSettings
+from ..allocation.settings import AllocationSettings
+from ..navigation.assumed_sensors import completed
+from ..navigation.settings import (
+    Mode,
+    NavigationFilterSettings,
+)
 
 OF_THE_SET = "controller.yaml"
 """A file of a gain set with the controller's parameters that belong to its gains; need not be."""

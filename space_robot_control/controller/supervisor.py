@@ -16,10 +16,10 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import norm
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Command, RobotState
-from space_robot_sim.elementary.matrices import norm
 
 from .controller import Controller
 from .kernels import NORM_TOLERANCE

@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.faults.grammar import check_time
-from space_robot_sim.faults.schedule import tick_from
+from space_robot_msgs_py.simulated_time import check_time, tick_from
 
 
 class Swap(NamedTuple):

@@ -5,9 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.attitude import (
+    attitude_jacobian,
+    rotate,
+    rotate_back,
+)
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.samples import Reference, State
-from space_robot_sim.dynamics.attitude import attitude_jacobian, rotate, rotate_back
 
 from ..laws import Signals
 

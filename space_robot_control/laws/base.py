@@ -10,9 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.rho_space import RhoSpaceModel
 from space_robot_msgs_py.compiled.records import Field, Record, RecordOwner, nested, shaped
 from space_robot_msgs_py.samples import LawInForce
-from space_robot_sim.dynamics.rho_space import RhoSpaceModel
 
 Array = NDArray[np.float64]
 
@@ -33,8 +33,8 @@ class Signals(Record):
     nominal: RhoSpaceModel = nested(RhoSpaceModel)
     """``inertia`` (m, m) H_S and ``bias`` (m,) c_S; filled only for laws with ``uses_model``.
 
-    Of a base that nothing turns they are `space_robot_sim.dynamics.free_floating`'s, and all other
-    signals are zero on its axes.
+    Of a base that nothing turns they are those of `space_robot_model.dynamics.free_floating`, and
+    all other signals are zero on its axes.
     """
 
 

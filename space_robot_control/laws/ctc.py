@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from space_robot_model.dynamics.rho_space import RhoSpaceModel
 from space_robot_msgs_py.compiled.kernels import kernel
-from space_robot_sim.dynamics.rho_space import RhoSpaceModel
 
 from .base import Array, LawGains, LawMemory, Signals, per_axis
 from .compiled import CompiledLaw

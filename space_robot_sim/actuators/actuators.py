@@ -22,16 +22,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.hardware.drives import DriveSettings
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_WHEELS, State
 
 from ..faults.schedule import PartFault, Schedule
-from ..robot import Robot
-from .base_actuation import BaseActuatorSettings
 from .command_delay import CommandDelaySettings, delay_command, ring_of
-from .drive import Drive, DriveSettings, WrongDrive, drive_torque
+from .drive import (
+    Drive,
+    WrongDrive,
+    drive_torque,
+)
 from .thrusters import StuckThruster, Thrusters, fire
 from .torque_echo import TorqueEcho, TorqueEchoSettings, WrongEcho, report_torque
 from .torque_limit import (

@@ -22,18 +22,16 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.hardware.drives import DriveSettings
+from space_robot_model.hardware.per_axis import per_axis
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 
 from ..faults.axes import About
 from ..faults.grammar import Argument, Kind
 from ..faults.schedule import Schedule, ScheduledFault, TemporaryChange
-from ..hardware.drives import DriveSettings
-from .per_axis import per_axis
 
 Array = NDArray[np.float64]
-
-
 
 
 class Drive(Record):

@@ -12,6 +12,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.hardware.thrusters import ThrusterSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.samples import MOST_THRUSTERS
@@ -19,15 +20,8 @@ from space_robot_msgs_py.samples import MOST_THRUSTERS
 from ..faults.axes import About
 from ..faults.grammar import Argument, Kind
 from ..faults.schedule import Schedule, ScheduledFault, TemporaryChange
-from ..hardware.thrusters import ThrusterSettings
 
 Array = NDArray[np.float64]
-
-
-
-
-
-
 
 
 class Thrusters(Record):

@@ -17,6 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from space_robot_model.hardware.per_axis import (
+    PER_AXIS,
+    Numbers,
+    per_axis,
+)
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.config.validation import StrictModel
@@ -24,7 +29,6 @@ from space_robot_msgs_py.config.validation import StrictModel
 from ..faults.axes import About
 from ..faults.grammar import Argument, Kind
 from ..faults.schedule import Schedule, ScheduledFault, TemporaryChange
-from .per_axis import PER_AXIS, Numbers, per_axis
 
 Array = NDArray[np.float64]
 

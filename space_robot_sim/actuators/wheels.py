@@ -7,7 +7,7 @@ momentum ``h`` within a tick of T:
     -max(0, h + J Omega) / T <= u <= max(0, h - J Omega) / T
 
 How the wheels' rotation acts on the robot, and their friction, is the dynamics'
-(`space_robot_sim.dynamics`).
+(`space_robot_model.dynamics`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS
@@ -24,13 +25,8 @@ from space_robot_msgs_py.samples import MOST_WHEELS
 from ..faults.axes import About
 from ..faults.grammar import Argument, Kind
 from ..faults.schedule import Schedule, ScheduledFault, TemporaryChange
-from ..hardware.wheels import WheelSettings
 
 Array = NDArray[np.float64]
-
-
-
-
 
 
 class Wheels(Record):

@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..dynamics.model import Model
-from ..faults.schedule import tick_from
-from ..robot import Robot
-from ..robot.dynamics import generalised_rows
+from space_robot_model.dynamics.model import Model
+from space_robot_model.robot import Robot
+from space_robot_model.robot.dynamics import generalised_rows
+from space_robot_msgs_py.simulated_time import tick_from
+
 from .events import Capture, Event, in_order
 from .grasp import Grasp
 from .impact import Impact

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from space_robot_model.elementary.sine import sin_cos
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.config.validation import StrictModel
-
-from ..elementary.sine import sin_cos
 
 Array = NDArray[np.float64]
 

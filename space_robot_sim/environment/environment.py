@@ -6,11 +6,11 @@ from pathlib import Path
 
 from pydantic import Field
 
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.records import Record, assign, nested
 from space_robot_msgs_py.config.validation import StrictModel
 
 from ..faults.schedule import PartFault
-from ..robot import Robot
 from .disturbance import Disturbance, DisturbanceSettings
 from .events import Event, EventTexts, parse_events
 from .friction import Friction, FrictionSettings, StuckJoint

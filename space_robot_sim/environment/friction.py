@@ -13,17 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from space_robot_model.dynamics.model import MOST_JOINTS
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.samples import MOST_WHEELS
 from space_robot_msgs_py.topics import BASE_AXES
 
-from ..dynamics.model import MOST_JOINTS
 from ..faults.axes import About
 from ..faults.grammar import Argument, Kind
 from ..faults.schedule import Schedule, ScheduledFault, TemporaryChange
-from ..robot import Robot
 
 Array = NDArray[np.float64]
 Coefficient = Annotated[float, Field(ge=0.0, le=1e6)]

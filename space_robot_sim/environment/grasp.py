@@ -8,12 +8,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import (
+    product,
+    turned_tensor,
+)
+from space_robot_model.robot import Robot
+from space_robot_model.robot.inertia import inertia_tensor
+from space_robot_model.robot.tree import parallel_axes
 from space_robot_msgs_py.config.validation import one_of
 
-from ..elementary.matrices import product, turned_tensor
-from ..robot import Robot
-from ..robot.inertia import inertia_tensor
-from ..robot.tree import parallel_axes
 from .target import Target
 
 Array = NDArray[np.float64]

@@ -19,11 +19,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..elementary.matrices import product, solve, turned_tensor
-from ..robot import Robot
-from ..robot.base_axes import base_axes
-from ..robot.dynamics import mass_matrix
-from ..robot.frames import BodyFrame, body_frames
+from space_robot_model.elementary.matrices import (
+    product,
+    solve,
+    turned_tensor,
+)
+from space_robot_model.robot import Robot
+from space_robot_model.robot.base_axes import base_axes
+from space_robot_model.robot.dynamics import mass_matrix
+from space_robot_model.robot.frames import (
+    BodyFrame,
+    body_frames,
+)
+
 from .grasp import Grasp
 from .target import Motion
 

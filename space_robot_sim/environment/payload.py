@@ -6,10 +6,9 @@ from typing import Annotated
 
 from pydantic import Field
 
+from space_robot_model.robot import Robot
+from space_robot_model.robot.inertia import Inertia
 from space_robot_msgs_py.config.validation import StrictModel
-
-from ..robot import Robot
-from ..robot.inertia import Inertia
 
 
 class PayloadSettings(StrictModel):

@@ -13,11 +13,10 @@ from typing import NamedTuple
 
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.simulated_time import check_time, shortest
 
 from .axes import About
 
-LATEST_S = 1e9
-"""Of a fault, an event or a swap, s of simulated time: its tick then fits in 64 bits."""
 NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FAULT = re.compile(
     rf"(?P<kind>[^@]*)@(?P<start>{NUMBER})(?:-(?P<stop>{NUMBER}))?(?::(?P<argument>.+))?",
@@ -177,21 +176,6 @@ def parse_faults(texts: Iterable[str], kinds: Kinds) -> list[Fault]:
         InputError: see `parse_fault`.
     """
     return [parse_fault(text, kinds) for text in texts if text.strip()]
-
-
-def check_time(seconds: float, name: str = "T") -> None:
-    """See that a time can be that of something that happens in a flight.
-
-    Raises:
-        InputError: it is negative, or later than any flight lasts.
-    """
-    if not 0.0 <= seconds <= LATEST_S:
-        raise InputError(f"{name} must be from 0 to {LATEST_S:g} s, got {seconds:g}")
-
-
-def shortest(seconds: float) -> str:
-    """Write a time with as few digits as give the same number again."""
-    return repr(seconds).removesuffix(".0")
 
 
 PROBABILITY = Argument("P", "probability per tick", 0.0, 1.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, Protocol
 
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotNames
+from space_robot_msgs_py.simulated_time import tick_from
 
 from .axes import axes_of
 from .grammar import Fault, Kind
@@ -140,12 +140,3 @@ class TemporaryChange:
             change(values, fault)
         self._acting = acting
         return True
-
-
-def tick_from(seconds: float, period: float) -> float:
-    """Return the first tick at or after a time; a millionth of a tick counts as rounding.
-
-    Of a time with more ticks than a float can count it is infinite.
-    """
-    ticks = seconds / period - 1e-6
-    return math.ceil(ticks) if math.isfinite(ticks) else ticks

@@ -9,12 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.attitude import rotation_matrix
+from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.robot import Robot
+from space_robot_model.robot.dynamics import mass_matrix
 from space_robot_msgs_py.samples import RobotState
-
-from ..actuators.wheels import WheelSettings
-from ..dynamics.attitude import rotation_matrix
-from ..robot import Robot
-from ..robot.dynamics import mass_matrix
 
 Array = NDArray[np.float64]
 NO_WHEELS = WheelSettings()

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..actuators.base_actuation import BaseActuatorSettings
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.robot import Robot
+
 from ..environment.friction import coefficients
-from ..robot import Robot
 from .plant import Plant
 from .settings import PlantNodeSettings
 

@@ -5,14 +5,24 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.aba import aba
+from space_robot_model.dynamics.attitude import (
+    quaternion_rate,
+    rotate,
+)
+from space_robot_model.dynamics.kinematics import (
+    forward_kinematics,
+    spatial_velocities,
+)
+from space_robot_model.dynamics.model import (
+    MOST_JOINTS,
+    Data,
+    Model,
+)
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS
 
-from ..dynamics.aba import aba
-from ..dynamics.attitude import quaternion_rate, rotate
-from ..dynamics.kinematics import forward_kinematics, spatial_velocities
-from ..dynamics.model import MOST_JOINTS, Data, Model
 from ..environment.disturbance import disturbance_torque
 from ..environment.environment import Environment
 from ..environment.friction import friction_torque

@@ -11,6 +11,7 @@ import numpy as np
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 
+from space_robot_model.robot.find import robot_source
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.ros.endpoints import (
@@ -27,7 +28,6 @@ from space_robot_msgs_py.samples import Command
 from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 
-from ..robot.find import robot_source
 from .actuator_health import ActuatorHealth
 from .command_guard import CommandGuard
 from .description import plant_description

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from rclpy.node import Node
 
+from space_robot_model.robot import Robot
+from space_robot_model.robot.markers import RobotMarkers
+from space_robot_model.robot.poses import RobotPoses
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.endpoints import RawPublisher
 from space_robot_msgs_py.samples import RobotState, Timebase
 from space_robot_msgs_py.wire.markers import no_markers
-
-from ..robot import Robot
-from ..robot.markers import RobotMarkers
-from ..robot.poses import RobotPoses
 
 PERIOD_NS = 33_333_333
 """Least simulated time between two messages: 30 Hz."""

@@ -10,6 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from space_robot_model.dynamics.model import Model
+from space_robot_model.elementary.matrices import norm
+from space_robot_model.hardware.sensors import SensorSettings
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, RecordOwner, assign, nested, shaped
 from space_robot_msgs_py.errors import DivergedError, InputError
@@ -23,14 +27,15 @@ from ..actuators.actuators import (
     command_delay_buffer,
     reports_given,
 )
-from ..dynamics.model import Model
-from ..elementary.matrices import norm
 from ..environment.captures import Captures
 from ..environment.environment import Environment, EnvironmentSettings
 from ..environment.payload import with_payload
-from ..robot import Robot
 from ..sensors.noise import Draws
-from ..sensors.sensors import Sensors, SensorSettings, arrays_of_draws, sense
+from ..sensors.sensors import (
+    Sensors,
+    arrays_of_draws,
+    sense,
+)
 from .faults import FaultSettings, PartFaults
 from .integrator import MOST_NUMBERS, Stages, state_size
 from .stick_slip import integrate

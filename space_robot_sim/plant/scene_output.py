@@ -6,12 +6,12 @@ from importlib.util import find_spec
 
 from rclpy.node import Node
 
+from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.endpoints import RawPublisher
 from space_robot_msgs_py.samples import RobotState, Timebase
 from space_robot_msgs_py.wire.carrier import unwrap
 
-from ..robot import Robot
 from .marker_output import MarkerOutput
 from .scene import Messages, SceneWriter
 

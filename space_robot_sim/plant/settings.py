@@ -8,11 +8,11 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
+from space_robot_model.robot.find import mission_layers
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.config.files import named_layers
 from space_robot_msgs_py.config.settings import NodeSettings, Texts
 
-from ..robot.find import mission_layers
 from .plant import PlantSettings
 
 MOST_TICKS = 10**10

@@ -19,9 +19,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.model import Model
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 
-from ..dynamics.model import Model
 from ..environment.disturbance import disturbance_torque
 from ..environment.environment import Environment
 from .integrator import Stages, first_velocity, rk4_step, state_derivative, state_size

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.attitude import (
+    rotate_back,
+    rotation_matrix,
+)
+from space_robot_model.dynamics.model import Model
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.samples import State
-
-from ..dynamics.attitude import rotate_back, rotation_matrix
-from ..dynamics.model import Model
 
 Array = NDArray[np.float64]
 

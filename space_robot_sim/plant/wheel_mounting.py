@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.dynamics.model import Model
+from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_msgs_py.compiled.records import assign
 
-from ..actuators.wheels import WheelSettings
-from ..dynamics.model import Model
 from ..environment.friction import Friction
 
 Array = NDArray[np.float64]

@@ -11,6 +11,10 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.hardware.encoders import (
+    MOST_DIFFERENCED,
+    EncoderSettings,
+)
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.samples import State
@@ -19,7 +23,6 @@ from space_robot_msgs_py.topics import BASE_AXES
 from ..faults.axes import About
 from ..faults.grammar import Argument, Kind
 from ..faults.schedule import BLOCK_TICKS, ScheduledFault
-from ..hardware.encoders import MOST_DIFFERENCED, EncoderSettings
 from .faults import (
     SIGMA_RAD,
     SIGMA_RAD_PER_S,
@@ -33,9 +36,6 @@ from .faults import (
 from .noise import in_steps, row_of
 
 Array = NDArray[np.float64]
-
-
-
 
 
 class Encoders(Record):

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.hardware.gyro import GyroSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.samples import State
@@ -15,13 +16,10 @@ from space_robot_msgs_py.samples import State
 from ..faults.axes import About
 from ..faults.grammar import Argument, Kind
 from ..faults.schedule import BLOCK_TICKS, ScheduledFault
-from ..hardware.gyro import GyroSettings
 from .faults import SIGMA_RAD_PER_S, STEP_RAD_PER_S, Change, SensorFault, add_noise, coarsen
 from .noise import in_steps, row_of
 
 Array = NDArray[np.float64]
-
-
 
 
 class Gyro(Record):

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.normal import normal_numbers
 from space_robot_msgs_py.compiled.kernels import kernel
 
-from ..elementary.normal import normal_numbers
 from ..faults.schedule import BLOCK_TICKS
 
 Array = NDArray[np.float64]

@@ -7,20 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import State
 
 from ..faults.schedule import PartFault
-from ..hardware.sensors import SensorSettings
 from .encoders import EncoderFault, Encoders, read_encoders
 from .gyro import Gyro, GyroFault, read_gyro
 from .star_tracker import StarTracker, StarTrackerFault, track_stars
 
 Array = NDArray[np.float64]
-
-
 
 
 class Sensors(Record):

@@ -8,25 +8,24 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from space_robot_model.elementary.matrices import norm
+from space_robot_model.elementary.sine import sin_cos
+from space_robot_model.hardware.star_tracker import (
+    LEAST_RATE,
+    MOST_UNDER_WAY,
+    StarTrackerSettings,
+)
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import State
 
-from ..elementary.matrices import norm
-from ..elementary.sine import sin_cos
 from ..faults.grammar import Argument, Kind
 from ..faults.schedule import BLOCK_TICKS, ScheduledFault
-from ..hardware.star_tracker import LEAST_RATE, MOST_UNDER_WAY, StarTrackerSettings
 from .faults import SIGMA_RAD, Change, SensorFault, add_noise, coarsen
 from .noise import in_steps, row_of
 
 Array = NDArray[np.float64]
-
-
-
-
-
 
 
 class StarTracker(Record):

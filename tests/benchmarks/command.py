@@ -12,8 +12,11 @@ from typing import Any
 
 import click
 
-from space_robot_control.analysis.files import check_writable
-from space_robot_control.cli.options import OUTPUT, put_json
+from space_robot.cli.options import (
+    OUTPUT,
+    put_json,
+)
+from space_robot.console.files import check_writable
 from space_robot_msgs_py.errors import SpaceRobotError
 
 SECTIONS = (
@@ -81,8 +84,8 @@ def _run(
     is_shown: bool, cold: bool,
 ) -> tuple[dict[str, Any], bool]:  # fmt: skip
     """The report, and whether all conditions were kept."""
-    from space_robot_control.flight.compilation import compile_kernels
-    from space_robot_control.flight.terminal import terminal
+    from space_robot.console.terminal import terminal
+    from space_robot.flight.compilation import compile_kernels
 
     from .display import print_machine, print_section
     from .machine import machine

@@ -7,8 +7,8 @@ import sys
 import numpy as np
 from random_robots import random_robot
 
+from space_robot.flight.closed_loop import close_loop
 from space_robot_control.controller.controller import Controller
-from space_robot_control.flight.closed_loop import close_loop
 from space_robot_control.laws import find_law
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase

@@ -14,11 +14,18 @@ import numpy as np
 import psutil
 from numpy.typing import NDArray
 
-from space_robot_control.flight.graph.domain import ros_domain
-from space_robot_control.flight.graph.orchestrator import flight_parameters, require_ros
-from space_robot_control.flight.graph.processes import Graph, node_environment, ros_arguments
-from space_robot_control.flight.node_modules import MODULES
-from space_robot_control.flight.plan import Flight
+from space_robot.flight.graph.domain import ros_domain
+from space_robot.flight.graph.orchestrator import (
+    flight_parameters,
+    require_ros,
+)
+from space_robot.flight.graph.processes import (
+    Graph,
+    node_environment,
+    ros_arguments,
+)
+from space_robot.flight.plan import Flight
+from space_robot.processes.node_modules import MODULES
 from space_robot_msgs_py.bag.accounts import noted_accounts
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.errors import FlightError

@@ -7,10 +7,13 @@ from numpy.typing import NDArray
 
 from space_robot_control.controller.kernels import controller_tick
 from space_robot_control.laws.compiled import LawCode
+from space_robot_model.dynamics.aba import aba
+from space_robot_model.dynamics.kinematics import (
+    forward_kinematics,
+    spatial_velocities,
+)
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.records import Block
-from space_robot_sim.dynamics.aba import aba
-from space_robot_sim.dynamics.kinematics import forward_kinematics, spatial_velocities
 from space_robot_sim.plant.integrator import state_derivative
 from space_robot_sim.plant.plant import advance
 

@@ -23,8 +23,11 @@ from benchmarks.measure import Options, interleave, repeated
 from benchmarks.result import Result, Target
 from benchmarks.sections import section
 from benchmarks.sections.laws import Recorded
-from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_control.flight.simulate import simulate
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import simulate
 
 COMMAND = [sys.executable, str(TESTS / "benchmarks")]
 

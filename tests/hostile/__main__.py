@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from attacks import GROUPS
 from trial import Verdict
 
-from space_robot_control.flight.graph.domain import ros_domain
+from space_robot.flight.graph.domain import ros_domain
 
 
 @click.command()

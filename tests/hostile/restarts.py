@@ -14,8 +14,8 @@ from pathlib import Path
 
 from trial import NODES, Verdict
 
-from space_robot_control.flight.graph.monitor import Monitor
-from space_robot_control.flight.graph.processes import MODULES
+from space_robot.flight.graph.monitor import Monitor
+from space_robot.flight.graph.processes import MODULES
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.ros.process_environment import DEFAULTS
 

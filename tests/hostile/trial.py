@@ -54,9 +54,7 @@ class Trial:
     def start(self) -> Trial:
         """Start the flight."""
         self._began = time.monotonic()
-        self.process = self.run(
-            "-m", "space_robot_control.cli.main", "fly", "--json", *self._options
-        )
+        self.process = self.run("-m", "space_robot.cli.main", "fly", "--json", *self._options)
         return self
 
     def run(self, *arguments: str) -> subprocess.Popen[str]:

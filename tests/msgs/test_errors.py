@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from paths import ROOT
 
-from space_robot_control.flight.graph.following import InterruptedFlightError
+from space_robot.flight.graph.following import InterruptedFlightError
 from space_robot_msgs_py.errors import (
     DivergedError,
     MessageError,

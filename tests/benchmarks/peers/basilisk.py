@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from oracles import quaternion_of, rotation_of
 from scipy.spatial.transform import Rotation
 
-from space_robot_sim import mass_matrix
+from space_robot import mass_matrix
 
 from .simulators import PERIOD, Start
 

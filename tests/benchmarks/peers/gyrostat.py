@@ -13,11 +13,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_sim import mass_matrix
-from space_robot_sim.actuators.wheels import WheelSettings
+from space_robot import mass_matrix
+from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_model.robot import Robot
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.plant.plant import Plant, PlantSettings
-from space_robot_sim.robot import Robot
 
 from ..kernels import plant_steps
 

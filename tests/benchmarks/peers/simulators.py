@@ -22,12 +22,12 @@ from oracles import (
 )
 from random_robots import State
 
+from space_robot_model.dynamics.attitude import quaternion_rate
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import MOST_WHEELS
-from space_robot_sim.dynamics.attitude import quaternion_rate
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.plant.plant import Plant, PlantSettings
-from space_robot_sim.robot import Robot
 
 from ..kernels import forward_dynamics_calls, plant_steps
 

@@ -9,12 +9,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from space_robot_control.analysis import analyze
-from space_robot_control.campaign.flown import Campaign
-from space_robot_control.campaign.runner import run_many
-from space_robot_control.campaign.study import Study
-from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_control.flight.simulate import simulate
+from space_robot.analysis import analyze
+from space_robot.campaign.flown import Campaign
+from space_robot.campaign.study import Study
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import simulate
+from space_robot.processes.pool import run_many
 
 from ..measure import Options, interleave
 from ..result import Result, Target

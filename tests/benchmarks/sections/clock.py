@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
 
 from ..graph_flights import WARM_UP_TICKS, GraphRun, fly_graph
 from ..measure import Options

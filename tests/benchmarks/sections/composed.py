@@ -10,8 +10,11 @@ import numpy as np
 from mcap.reader import make_reader
 from numpy.typing import NDArray
 
-from space_robot_control.flight.graph.orchestrator import fly
-from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot.flight.graph.orchestrator import fly
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
 from space_robot_msgs_py import topics
 
 from ..graph_flights import WARM_UP_TICKS

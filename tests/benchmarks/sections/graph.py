@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
 
 from ..graph_flights import WARM_UP_TICKS, GraphRun, fly_graph, naive_ticks_per_s
 from ..measure import Options

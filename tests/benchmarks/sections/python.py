@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from space_robot_control import Scenario
+from space_robot import Scenario
 
 from ..measure import Competitor, Options, interleave
 from ..result import Result, Target

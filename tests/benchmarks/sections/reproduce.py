@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from space_robot_control.campaign.runner import cores
-from space_robot_control.paper.reproduction.flights import ROWS
-from space_robot_control.paper.reproduction.reproduce import reproduce as run
+from space_robot.paper.reproduction.flights import ROWS
+from space_robot.paper.reproduction.reproduce import reproduce as run
+from space_robot.processes.pool import cores
 
 from ..measure import Options, interleave
 from ..result import Result, Target

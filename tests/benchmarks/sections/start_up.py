@@ -8,10 +8,10 @@ import tempfile
 import time
 from pathlib import Path
 
-from space_robot_control.flight.child_process import child_process
-from space_robot_control.flight.graph.domain import ros_domain
-from space_robot_control.flight.graph.monitor import Monitor
-from space_robot_control.flight.graph.orchestrator import require_ros
+from space_robot.flight.graph.domain import ros_domain
+from space_robot.flight.graph.monitor import Monitor
+from space_robot.flight.graph.orchestrator import require_ros
+from space_robot.processes.child_process import child_process
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.ros.run_module import module_command
 
@@ -20,7 +20,7 @@ from ..result import Result, Target
 
 HELP_ASKED = Target(0.3)
 FIRST_TICK_ASKED = Target(5.0)
-COMMAND = module_command("space_robot_control.cli.main")
+COMMAND = module_command("space_robot.cli.main")
 
 
 def start_up(options: Options) -> list[Result]:

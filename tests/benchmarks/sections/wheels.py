@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
 from space_robot_sim.plant.plant import Plant
 
 from ..kernels import plant_steps

@@ -16,11 +16,11 @@ from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import ControlLaw
+from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.samples import Command, Reference, RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec
 from space_robot_msgs_py.wire.stamp_guard import AGREEING
-from space_robot_sim import Robot
 
 LAWS: dict[str, ControlLaw] = {name: law_of(name) for name in GAINS}
 DECIMATION = 4

@@ -14,9 +14,10 @@ from space_robot_control.controller.controller import TRANSFER_S, Controller
 from space_robot_control.controller.kernels import LARGEST
 from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
 from space_robot_control.laws import find_law
+from space_robot_model.robot import Robot
+from space_robot_model.robot.dynamics import forward_dynamics
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Reference, ReferenceChunk, RobotState
-from space_robot_sim import Robot, forward_dynamics
 from space_robot_sim.environment.friction import FrictionSettings
 
 NO_FRICTION = FrictionSettings(coulomb=0.0, viscous=0.0)

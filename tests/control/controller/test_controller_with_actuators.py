@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from closed_loop import PERIOD, law_of
 
-from space_robot_control.controller.allocation.settings import AllocationSettings
+from space_robot_control.allocation.settings import AllocationSettings
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.supervisor import Mode, Supervisor
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import Reference, RobotState
-from space_robot_sim import Robot
-from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
 
 CORNERS = [1.0, 1.0, 1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0, -1.0, 1.0]
 WHEELS: dict[str, Any] = {

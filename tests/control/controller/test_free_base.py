@@ -18,9 +18,9 @@ from random_robots import Case, State, cases
 
 from space_robot_control.controller.controller import Controller
 from space_robot_control.laws import ControlLaw, LawGains, Signals, find_law, laws, per_axis
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import ReferenceChunk, RobotState
-from space_robot_sim import Robot
-from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 from flights import COMMAND, ros_environment, space_robot_here
 
-from space_robot_control.flight.graph.domain import ros_domain
-from space_robot_control.flight.graph.temporary_node import TemporaryNode
-from space_robot_control.flight.replay.outcome import Options
-from space_robot_control.flight.replay.run import replay
+from space_robot.flight.graph.domain import ros_domain
+from space_robot.flight.graph.temporary_node import TemporaryNode
+from space_robot.flight.replay.outcome import Options
+from space_robot.flight.replay.run import replay
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 

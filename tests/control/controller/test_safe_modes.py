@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from flights import space_robot_here
 
-from space_robot_control.flight.replay.outcome import Options
-from space_robot_control.flight.replay.run import replay
+from space_robot.flight.replay.outcome import Options
+from space_robot.flight.replay.run import replay
 from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")

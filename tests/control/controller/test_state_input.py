@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from paths import CONFIG
 
+from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.codecs import StateCodec
 from space_robot_msgs_py.wire.source_guard import SourceGuard
-from space_robot_sim.robot import Robot
 
 pytest.importorskip("rclpy")
 

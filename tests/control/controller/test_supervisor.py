@@ -19,8 +19,8 @@ from space_robot_control.controller.supervisor import (
     Supervisor,
 )
 from space_robot_control.controller.time_delay_estimation import LONGEST_GAP
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import STATE_FIELDS, Reference, RobotState
-from space_robot_sim import Robot
 
 Array = NDArray[np.float64]
 

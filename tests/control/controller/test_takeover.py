@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from space_robot_control.analysis.metrics import tracking_error
+from space_robot.analysis.metrics import tracking_error
+from space_robot.flight.closed_loop import close_loop
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import unflown
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import build_law
-from space_robot_control.flight.closed_loop import close_loop
-from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_control.flight.simulate import unflown
 from space_robot_control.laws import ControlLaw, laws
 from space_robot_msgs_py.bag.flight_log import FlightLog
 

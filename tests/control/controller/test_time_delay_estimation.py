@@ -10,13 +10,13 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 from random_robots import JOINTS
 
-from space_robot_control.controller.navigation.low_pass import low_pass_weight
 from space_robot_control.controller.time_delay_estimation import (
     LONGEST_GAP,
     TimeDelayPair,
     observe,
     time_delay_estimate,
 )
+from space_robot_control.navigation.low_pass import low_pass_weight
 from space_robot_msgs_py.compiled.records import assign
 
 Array = NDArray[np.float64]

@@ -20,8 +20,8 @@ from space_robot_control.controller.tracking import (
     tracking_errors,
 )
 from space_robot_control.laws import Signals
+from space_robot_model.dynamics.attitude import attitude_jacobian_inverse
 from space_robot_msgs_py.samples import ReferenceChunk, State
-from space_robot_sim.dynamics.attitude import attitude_jacobian_inverse
 
 Array = NDArray[np.float64]
 

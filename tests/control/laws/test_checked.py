@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
-from space_robot_control.flight.interruption import Interrupted
+from space_robot.processes.interruption import Interrupted
 from space_robot_control.laws import ControlLaw, LawGains
 from space_robot_control.laws.checked import LawError, force_of
 from space_robot_msgs_py.errors import InputError

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from space_robot_control.campaign.store.software import file_digests
-from space_robot_control.flight.objects import law_setting
+from space_robot.campaign.store.software import file_digests
+from space_robot.scenario.objects import law_setting
 from space_robot_control.laws import find_law, importable_name
 from space_robot_msgs_py.errors import InputError
 

@@ -14,8 +14,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from paths import ROOT
 
-from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_control.flight.simulate import simulate
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import simulate
 from space_robot_control.laws import (
     CompiledLaw,
     ControlLaw,
@@ -277,7 +280,7 @@ def test_a_law_of_ones_own_is_found_by_module_and_class() -> None:
         ("pid", "unknown controller 'pid'"),
         ("space_robot_control.laws.ctc:Pid", "has no attribute 'Pid'"),
         ("space_robot_control.laws.ctc:", "cannot be imported"),
-        ("space_robot_sim.robot:Robot", "is not a ControlLaw"),
+        ("space_robot_model.robot:Robot", "is not a ControlLaw"),
         ("math:pi", "is not a ControlLaw"),
         (":Law", "cannot be imported"),
         ("space_robot_control.laws:ControlLaw", "is not a ControlLaw"),

@@ -12,10 +12,13 @@ import pytest
 from bags import redescribed
 from command import Run
 
-from space_robot_control.analysis import analyze
-from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_control.flight.replay.choice import ControllerChoice
-from space_robot_control.flight.simulate import simulate
+from space_robot.analysis import analyze
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.replay.choice import ControllerChoice
+from space_robot.flight.simulate import simulate
 from space_robot_control.laws import find_law
 from space_robot_control.laws.trust import NotTrustedError, is_plain
 from space_robot_msgs_py.bag.reader import read_flight

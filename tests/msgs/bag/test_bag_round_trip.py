@@ -10,9 +10,12 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from space_robot_control.analysis import analyze
-from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_control.flight.simulate import simulate
+from space_robot.analysis import analyze
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight

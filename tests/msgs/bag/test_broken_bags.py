@@ -26,7 +26,7 @@ from bags import (
 )
 from mcap.writer import Writer as McapWriter
 
-from space_robot_control.analysis import analyze
+from space_robot.analysis import analyze
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder

@@ -20,16 +20,22 @@ from bags import redescribed
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from space_robot_control.analysis import analyze
-from space_robot_control.analysis.figures.figure_set import FigureSet
-from space_robot_control.analysis.report_tables import metrics_table, rms_table
-from space_robot_control.analysis.terminal import print_table
-from space_robot_control.cli.report_display import print_comparison
-from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_control.flight.replay.choice import ControllerChoice
-from space_robot_control.flight.replay.recording import Recording
-from space_robot_control.flight.simulate import simulate
-from space_robot_control.flight.terminal import terminal
+from space_robot.analysis import analyze
+from space_robot.analysis.figures.figure_set import FigureSet
+from space_robot.analysis.report_tables import (
+    metrics_table,
+    rms_table,
+)
+from space_robot.cli.report_display import print_comparison
+from space_robot.console.terminal import terminal
+from space_robot.console.terminal_tables import print_table
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.replay.choice import ControllerChoice
+from space_robot.flight.replay.recording import Recording
+from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import InputError
 

@@ -7,13 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from space_robot_control.analysis import analyze
-from space_robot_control.analysis.described import estimator
-from space_robot_control.analysis.estimate_error import EstimateErrors, HBar
-from space_robot_control.analysis.excerpt import excerpt
-from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_control.flight.replay.laws import RecordedLaws
-from space_robot_control.flight.simulate import simulate
+from space_robot.analysis import analyze
+from space_robot.analysis.described import estimator
+from space_robot.analysis.estimate_error import (
+    EstimateErrors,
+    HBar,
+)
+from space_robot.analysis.excerpt import excerpt
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.replay.laws import RecordedLaws
+from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import LawChange, as_data, in_words, same, within
 from space_robot_msgs_py.samples import LawInForce, Timebase, in_order

@@ -1,4 +1,4 @@
-"""`space_robot_sim.load_bag`, and the example of the documentation."""
+"""`space_robot.load_bag`, and the example of the documentation."""
 
 from __future__ import annotations
 
@@ -11,10 +11,13 @@ import numpy as np
 import pytest
 from paths import DOCS
 
-from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_control.flight.simulate import simulate
+from space_robot import load_bag
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_sim import load_bag
 
 DOCUMENT = DOCS / "manual/bags.md"
 

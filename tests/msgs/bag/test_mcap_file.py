@@ -18,8 +18,11 @@ from mcap.records import MessageIndex
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 
-from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_control.flight.simulate import simulate
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.chunk import OpenChunk
 from space_robot_msgs_py.bag.mcap_file import Compression

@@ -19,6 +19,7 @@ from bags import (
     within,
 )
 
+from space_robot import load_bag
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
@@ -26,7 +27,6 @@ from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.config.namespace import full_namespace
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim import load_bag
 
 
 @pytest.fixture(scope="module")

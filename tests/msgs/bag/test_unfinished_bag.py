@@ -20,11 +20,14 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 from rich.console import Console
 
-from space_robot_control.analysis import analyze
-from space_robot_control.analysis.report_tables import rms_table
-from space_robot_control.analysis.terminal import print_table
-from space_robot_control.flight.plan import Flight, FlightPlan
-from space_robot_control.flight.simulate import simulate
+from space_robot.analysis import analyze
+from space_robot.analysis.report_tables import rms_table
+from space_robot.console.terminal_tables import print_table
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import space_robot_control
+import space_robot_model
 import space_robot_sim
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.layouts import Layout, Polynomial
@@ -47,7 +48,7 @@ def check(layout: Layout, dtype: np.dtype[np.void], n: int) -> None:
 
 
 def test_every_record_of_the_packages_is_laid_out_as_numpy_does() -> None:
-    for package in (space_robot_sim, space_robot_control):
+    for package in (space_robot_model, space_robot_sim, space_robot_control):
         for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
             if "node" not in module.name and ".laws" not in module.name:
                 importlib.import_module(module.name)

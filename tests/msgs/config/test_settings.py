@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 import yaml
 
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
 from space_robot_control.controller.gains import build_law, gain_files, read_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.flight.plan import Flight, FlightPlan
+from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import laws
-from space_robot_control.mission.settings import MissionNodeSettings
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
 from space_robot_msgs_py.config.files import config_directory, named_file, node_parameters
 from space_robot_msgs_py.config.settings import leaves

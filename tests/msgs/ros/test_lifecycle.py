@@ -22,8 +22,8 @@ pytest.importorskip("rclpy")
 
 from ground import Ground  # noqa: E402
 
+from space_robot_model.robot import Robot  # noqa: E402
 from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription  # noqa: E402
-from space_robot_sim.robot import Robot  # noqa: E402
 
 TIMEBASE = Timebase(500_000)
 

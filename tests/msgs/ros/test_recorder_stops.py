@@ -11,7 +11,7 @@ import pytest
 from bags import read_accounts
 from flights import Start
 
-from space_robot_control.flight.graph.listeners import wait_for
+from space_robot.flight.graph.listeners import wait_for
 from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")

@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from paths import CONFIG
 
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.errors import InputError
-from space_robot_sim.actuators.base_actuation import BaseActuatorSettings
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantNodeSettings
-from space_robot_sim.robot import Robot
 
 FILES = {path.stem: path for path in (CONFIG / "actuators").glob("*.yaml")}
 ROBOTS = [Robot.from_yaml(CONFIG / f"robots/{name}.yaml") for name in ("paper", "seven_joint")]

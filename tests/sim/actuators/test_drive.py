@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 from scipy.linalg import expm
 
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Command
 from space_robot_sim.actuators.drive import DRIVE_BIAS, DRIVE_SCALE, WrongDrive, judge
 from space_robot_sim.faults.grammar import by_name, parse_faults
 from space_robot_sim.faults.schedule import Schedule
 from space_robot_sim.plant.plant import Plant, PlantSettings
-from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
 

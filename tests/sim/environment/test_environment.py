@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from random_robots import random_robot
 from random_trees import KINDS, random_bodies
 
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import RobotNames
 from space_robot_sim.environment.disturbance import (
     Disturbance,
@@ -28,7 +29,6 @@ from space_robot_sim.environment.payload import PayloadSettings, with_payload
 from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule
 from space_robot_sim.plant.faults import PLANT_KINDS
-from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
 FOUR = random_robot(np.random.default_rng(4), 4)

@@ -20,14 +20,14 @@ from random_robots import (
     random_state,
 )
 
+from space_robot_model.robot import Robot
+from space_robot_model.robot.dynamics import mass_matrix
+from space_robot_model.robot.tree import Tool
 from space_robot_sim.environment.captures import Captures
 from space_robot_sim.environment.events import Capture, Release
 from space_robot_sim.environment.grasp import Grasp
 from space_robot_sim.environment.impact import Impact
 from space_robot_sim.environment.target import Target
-from space_robot_sim.robot import Robot
-from space_robot_sim.robot.dynamics import mass_matrix
-from space_robot_sim.robot.tree import Tool
 
 Array = NDArray[np.float64]
 FEW = settings(max_examples=60, deadline=None)

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import Command
 from space_robot_sim.plant.actuator_health import ActuatorHealth
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantNodeSettings
-from space_robot_sim.robot import Robot
 
 PERIOD = 5e-4
 

@@ -12,8 +12,8 @@ from oracles import rotation_of
 from random_robots import random_inertia, random_quaternion
 from tree_flight import PERIOD, SEEDS, TORQUE, TreeFlight, tree
 
+from space_robot_model.robot.inertia import inertia_tensor
 from space_robot_sim.environment.target import Target
-from space_robot_sim.robot.inertia import inertia_tensor
 
 Array = NDArray[np.float64]
 PUSH, CAPTURE, RELEASE = 100, 200, 500

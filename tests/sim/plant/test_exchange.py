@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.codecs import StateCodec
 from space_robot_sim.plant.command_guard import CommandGuard
 from space_robot_sim.plant.exchange import NONE, Exchange, FaultyExchange, SentState, exchange_of
 from space_robot_sim.plant.faults import FaultSettings
-from space_robot_sim.robot import Robot
 
 PERIOD = 5e-4
 

@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 from paths import CONFIG
 
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.samples import Command
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.plant.plant import Plant, PlantSettings
-from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
 

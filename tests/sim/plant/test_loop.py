@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.samples import Command
 from space_robot_msgs_py.wire.clock import ClockCodec
@@ -21,7 +22,6 @@ from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.source_guard import SourceGuard
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantNodeSettings
-from space_robot_sim.robot import Robot
 
 pytest.importorskip("rclpy")
 

@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from random_robots import State, random_quaternion, random_robot
 from scipy.integrate import solve_ivp
 
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_msgs_py.samples import Command, RobotState
@@ -23,7 +24,6 @@ from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.environment.payload import PayloadSettings
 from space_robot_sim.plant.conservation import kinetic_energy, momentum
 from space_robot_sim.plant.plant import Plant, PlantSettings, fastest_rate
-from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
 

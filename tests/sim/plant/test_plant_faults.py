@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from random_samples import assert_same
 
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import STATE_FIELDS, Command, RobotNames
 from space_robot_sim.faults.grammar import parse_fault, parse_faults
@@ -18,7 +19,6 @@ from space_robot_sim.faults.schedule import Schedule, ScheduledFault
 from space_robot_sim.plant.faults import PLANT_KINDS, MessageFaults
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.plant.settings import PlantNodeSettings
-from space_robot_sim.robot import Robot
 
 PERIOD = 5e-4
 TORQUE = np.array([5.0, -4.0, 3.0, 20.0, -30.0, 15.0, 4.0, -3.0, 2.0])

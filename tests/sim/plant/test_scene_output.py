@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from space_robot_model.robot import Robot
+from space_robot_model.robot.urdf_text import urdf_text
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.wire.carrier import unwrap
 from space_robot_msgs_py.wire.definitions import decode
-from space_robot_sim.robot import Robot
-from space_robot_sim.robot.urdf_text import urdf_text
 
 pytest.importorskip("rclpy")
 

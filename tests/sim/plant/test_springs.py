@@ -9,6 +9,8 @@ import pytest
 from numpy.typing import NDArray
 from paths import DATA
 
+from space_robot_model.robot import Robot
+from space_robot_model.robot.dynamics import mass_matrix
 from space_robot_msgs_py.samples import Command
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.plant.conservation import (
@@ -18,8 +20,6 @@ from space_robot_sim.plant.conservation import (
     spring_energy,
 )
 from space_robot_sim.plant.plant import Plant, PlantSettings
-from space_robot_sim.robot import Robot
-from space_robot_sim.robot.dynamics import mass_matrix
 
 Array = NDArray[np.float64]
 PERIOD = 5e-4

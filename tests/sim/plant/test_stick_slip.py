@@ -21,16 +21,16 @@ from oracles import (
 from random_robots import State, random_quaternion, random_robot
 from scipy.integrate import quad, solve_ivp
 
+from space_robot_model.dynamics.attitude import quaternion_rate
+from space_robot_model.dynamics.model import Data
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import Command
-from space_robot_sim.dynamics.attitude import quaternion_rate
-from space_robot_sim.dynamics.model import Data
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.plant.conservation import kinetic_energy, momentum
 from space_robot_sim.plant.integrator import Stages
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.plant.stick_slip import MOST_CUTS, integrate, slide_or_stand
-from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
 

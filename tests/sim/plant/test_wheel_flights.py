@@ -21,14 +21,14 @@ from wheel_oracles import (
     settings_of,
 )
 
+from space_robot_model.dynamics.attitude import quaternion_rate
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import Command
-from space_robot_sim.dynamics.attitude import quaternion_rate
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.environment.target import Target
 from space_robot_sim.plant.conservation import kinetic_energy
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.plant.stick_slip import integrate
-from space_robot_sim.robot import Robot
 
 Array = NDArray[np.float64]
 

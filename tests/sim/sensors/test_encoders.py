@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from scipy import stats
 from sensor_bench import PERIOD, Bench, N, a_state
 
+from space_robot_model.hardware.encoders import EncoderSettings
 from space_robot_msgs_py.samples import RobotState
-from space_robot_sim.sensors.encoders import Encoders, EncoderSettings
+from space_robot_sim.sensors.encoders import Encoders
 
 Array = NDArray[np.float64]
 

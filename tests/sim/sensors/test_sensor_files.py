@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from paths import CONFIG
 from sensor_bench import Bench
 
+from space_robot_model.hardware.sensors import SensorSettings
+from space_robot_model.robot import Robot
 from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantNodeSettings
-from space_robot_sim.robot import Robot
-from space_robot_sim.sensors.sensors import SensorSettings
 
 FILES = {path.stem: path for path in (CONFIG / "sensors").glob("*.yaml")}
 PARTS = ("star_tracker", "gyro", "encoders")

@@ -14,9 +14,9 @@ from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 from sensor_bench import PERIOD, Bench, N, a_state
 
+from space_robot_model.hardware.star_tracker import StarTrackerSettings
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import RobotState
-from space_robot_sim.sensors.star_tracker import StarTrackerSettings
 
 Array = NDArray[np.float64]
 

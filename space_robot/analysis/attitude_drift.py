@@ -1,0 +1,66 @@
+"""Attitude drift: how far the base turned while nothing held it.
+
+The arm's motion turns a base without actuators by momentum exchange. No law may be measured by
+that attitude, so it has no error: what is told is the angle from where the base was.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.elementary.arctangent import arctan2
+from space_robot_model.elementary.matrices import product
+from space_robot_msgs_py.bag.blocks import Metric
+from space_robot_msgs_py.bag.flight_log import FlightLog
+
+Array = NDArray[np.float64]
+
+FREE = "nothing turns the base"
+UNAVAILABLE = {
+    "attitude": f"{FREE}, so its attitude drifts and is no error",
+    "base_torque": f"{FREE}, for it has no actuators",
+}
+"""Columns that a flight with a free base does not have, and why."""
+
+
+def controls_base(log: FlightLog) -> bool:
+    """Return whether anything turned the base; else it floated freely."""
+    described = log.flight.get("base_actuators")
+    return not (isinstance(described, dict) and described.get("base_actuation") == "none")
+
+
+class AttitudeDrift(Metric):
+    """The largest and the last angle of the base from where it was at the first tick, degrees."""
+
+    def __init__(self, log: FlightLog) -> None:
+        """``log``: the first rows."""
+        self._start = log.quaternion[0].copy()
+        self._largest = self._end = 0.0
+
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows."""
+        angle = np.linalg.norm(attitude_drift(log, self._start), axis=1)
+        self._largest = max(self._largest, float(angle.max()))
+        self._end = float(angle[-1])
+
+    def result(self) -> dict[str, float]:
+        """Return ``max_deg`` and ``end_deg``."""
+        return {"max_deg": self._largest, "end_deg": self._end}
+
+
+def attitude_drift(log: FlightLog, start: Array | None = None) -> Array:
+    """(N, 3) deg, the rotation vector of the base, on its axes, from where it was to each tick.
+
+    ``start``: (4,) the attitude to count from (None: that of the first row).
+    """
+    q = log.quaternion
+    w, x, y, z = q[0] if start is None else start
+    # the vector and scalar parts of start^-1 * Q
+    back = np.array([[-x, w, z, -y], [-y, -z, w, x], [-z, y, -x, w], [w, x, y, z]])
+    turned = product(q, back.T)
+    sine = np.linalg.norm(turned[:, :3], axis=1)
+    angle = 2.0 * np.degrees(arctan2(sine, np.abs(turned[:, 3])))
+    along = np.copysign(1.0, turned[:, 3]) / np.where(sine > 0.0, sine, 1.0)
+    drift: Array = (angle * along)[:, np.newaxis] * turned[:, :3]
+    return drift

@@ -1,0 +1,301 @@
+"""The robot, the actuators' limits and h_bar, from a flight's description.
+
+A bag carries the numbers. One that does not (an older one, or of another recorder) is taken at its
+names' word: the robot, case and gains of that name here and now. Files and modules that it names
+are opened only if it is trusted (`FlightLog.trusted`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_control.controller.gains import build_law
+from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.laws.trust import (
+    check_file,
+    check_law,
+    is_plain,
+)
+from space_robot_control.navigation.low_pass import low_pass_weight
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.robot import Robot
+from space_robot_model.robot.find import find_robot
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.law_history import laws_of
+from space_robot_msgs_py.config.text import shortened
+from space_robot_msgs_py.config.validation import short, validate
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.simulated_time import tick_from
+from space_robot_sim.environment.captures import Captures
+from space_robot_sim.environment.environment import EnvironmentSettings
+from space_robot_sim.environment.events import Event, named_targets, parse_events
+from space_robot_sim.environment.payload import with_payload
+from space_robot_sim.plant.settings import PlantNodeSettings
+
+from ..flight.start_step import StartStep
+from .actuation import TorqueLimits
+from .estimate_error import HBar
+from .momentum import MomentumSeries
+
+Array = NDArray[np.float64]
+
+
+IDEAL = "ideal"
+"""The sensors that tell the truth."""
+MOST_LETTERS = 400
+"""Of the joints' names in an error."""
+DIRECT = "direct"
+"""The navigation that takes the states for what they are."""
+
+
+class NotDescribedError(InputError):
+    """The bag does not say what a metric needs; the message says what is missing."""
+
+
+def start_step_of(log: FlightLog) -> dict[str, Any] | None:
+    """Return the `StartStep` that the flight began with; None: none is described."""
+    step = log.flight.get("start_step")
+    zero = StartStep(0.0, "", 0.0, "", "", "", 0.0, 0.0)._asdict()
+    if not isinstance(step, dict) or set(step) != set(zero):
+        return None
+    return step if all(type(step[key]) is type(value) for key, value in zero.items()) else None
+
+
+def robot_of(log: FlightLog) -> Robot:
+    """Build the robot that was flown.
+
+    Raises:
+        InputError: it is not described, not here, or not that of the bag's joints.
+    """
+    flight = log.flight
+    if isinstance(content := flight.get("robot_file"), dict):
+        robot = Robot.from_dict(content, where="robot_file of the bag")
+    elif name := flight.get("robot"):
+        _check_files(log, {"robot": name})
+        robot = find_robot(str(name))
+    else:
+        raise NotDescribedError("the bag does not say which robot was flown")
+    check_joints(robot, log)
+    return robot
+
+
+def check_joints(robot: Robot, log: FlightLog) -> None:
+    """See that a robot has the joints of a bag.
+
+    Raises:
+        NotDescribedError: it has others.
+    """
+    if (robot.joint_names, robot.passive_names) != (log.joint_names, log.passive_names):
+        own = shortened(", ".join(robot.all_joint_names), MOST_LETTERS)
+        of_bag = shortened(", ".join((*log.joint_names, *log.passive_names)), MOST_LETTERS)
+        raise NotDescribedError(f"robot {robot.name!r} has the joints {own}, the bag {of_bag}")
+
+
+def torque_limits(log: FlightLog) -> TorqueLimits:
+    """Find the limits that the plant clipped the torques to.
+
+    Raises:
+        InputError: not even the case is named, or it is not here.
+    """
+    settings = _plant_settings(log, ("base_torque_limit", "joint_torque_limit"))
+    base, joint = settings.base_torque_limit, settings.joint_torque_limit
+    if base_actuators_of(log).base_actuation != IDEAL:
+        base = 0.0  # hardware has limits of its own
+    return TorqueLimits(base or np.inf, joint or np.inf)
+
+
+def environment_of(log: FlightLog) -> EnvironmentSettings:
+    """Find what acted on the robot beside its actuators.
+
+    Raises:
+        InputError: not even the case is named, or it is not here.
+    """
+    return _plant_settings(log)
+
+
+def momentum_of(log: FlightLog) -> MomentumSeries:
+    """Return what follows the momentum of a flight from its first rows ``log`` on.
+
+    Raises:
+        InputError: the robot, its actuators or its environment are not known.
+    """
+    environment = environment_of(log)
+    robot = with_payload(robot_of(log), environment.payload)
+    captures = Captures(events_of(log), robot, log.timebase.period)
+    return MomentumSeries(captures, flown_actuators(log), environment.disturbance)
+
+
+def events_of(log: FlightLog) -> list[Event]:
+    """Return what was captured and released, by time.
+
+    Raises:
+        InputError: what the bag tells cannot be, or names a file and the bag is not trusted.
+    """
+    texts = [str(text) for text in log.flight.get("events", ())]
+    if not log.trusted:
+        for name in named_targets(texts):
+            check_file("target", name)
+    return parse_events(texts)
+
+
+def event_labels(log: FlightLog) -> list[str]:
+    """Say in a few words each what was captured and released; as the bag has it if it cannot be."""
+    try:
+        return [event.label for event in events_of(log)]
+    except InputError:
+        return [short(str(text)) for text in log.flight.get("events", ())]
+
+
+def event_times(log: FlightLog) -> Array:
+    """Return the times of the flight's events within ``log``, s; none if they are not known."""
+    try:
+        ticks = np.array([tick_from(e.time_s, log.timebase.period) for e in events_of(log)])
+    except InputError:
+        ticks = np.empty(0)
+    inside = (log.first_tick <= ticks) & (ticks < log.first_tick + log.ticks)
+    times: Array = ticks[inside] * log.timebase.period
+    return times
+
+
+def _plant_settings(log: FlightLog, keys: Sequence[str] = ()) -> PlantNodeSettings:
+    """Return the plant's settings; if all ``keys`` are given, nothing but these is looked at."""
+    given = _parameters(log, PlantNodeSettings.node)
+    if not given:
+        given = {key: log.flight[key] for key in ("robot", "case", "mission") if key in log.flight}
+    if not given:
+        raise NotDescribedError("the bag does not say what the plant was told")
+    if keys and all(key in given for key in keys):
+        given = {key: given[key] for key in keys}
+    given = _without_told_robot(log, given)
+    _check_files(log, given)
+    # their numbers are in the bag, while their files may be elsewhere
+    given = {key: value for key, value in given.items() if key not in ("actuators", "sensors")}
+    return PlantNodeSettings.resolve(given)
+
+
+def _without_told_robot(log: FlightLog, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Leave out the files of a robot and a mission all of which the bag tells."""
+    told = {
+        "robot": isinstance(log.flight.get("robot_file"), dict),
+        "mission": "waypoints_deg" in _parameters(log, "mission"),
+    }
+    return {key: value for key, value in given.items() if not told.get(key) or is_plain(str(value))}
+
+
+def estimator(log: FlightLog) -> tuple[HBar, float]:
+    """Find h_bar of the laws' time-delay estimate, and the weight of its low-pass (0: none).
+
+    Raises:
+        InputError: the law is not recorded, and has no estimate or is not described; or its
+            estimate is not of the states measured.
+    """
+    if navigation_of(log) != DIRECT:
+        raise InputError("the filtered states that N_hat is formed of are not recorded")
+    if log.laws:
+        h_bar = recorded_h_bar
+    else:
+        described = _described_h_bar(log)
+
+        def h_bar(log: FlightLog) -> Array:
+            return described
+
+    parameters, key = _parameters(log, ControllerNodeSettings.node), "acceleration_filter_hz"
+    settings = ControllerNodeSettings.resolve({key: parameters[key]} if key in parameters else {})
+    return h_bar, low_pass_weight(settings.acceleration_filter_hz, log.timebase.period)
+
+
+def sensors_of(log: FlightLog) -> str:
+    """Name the sensors that flew, as far as the bag tells."""
+    return str(_parameters(log, PlantNodeSettings.node).get("sensors", "")) or IDEAL
+
+
+def actuators_of(log: FlightLog) -> str:
+    """Name the base's actuators that flew, as far as the bag tells."""
+    return str(log.flight.get("actuators", "")) or IDEAL
+
+
+def base_actuators_of(log: FlightLog) -> BaseActuatorSettings:
+    """Return the base's actuators that flew: ideal ones if the bag tells of none.
+
+    Raises:
+        InputError: what the bag tells cannot be.
+    """
+    told = log.flight.get("base_actuators", {})
+    return validate(BaseActuatorSettings, told, "base_actuators of the bag")
+
+
+def flown_actuators(log: FlightLog) -> BaseActuatorSettings:
+    """Return `base_actuators_of` a flight, whose robot and columns they fit.
+
+    Raises:
+        InputError: they do not, or the robot is not known.
+    """
+    found = base_actuators_of(log)
+    if found.base_actuation == "hardware":
+        found.check(robot_of(log), "of the bag")
+    counts = log.wheel_velocities.shape[1], log.thrusts.shape[1]
+    if counts != (found.wheel_count, found.thruster_count):
+        raise NotDescribedError(
+            f"the bag describes {found.wheel_count} wheels and {found.thruster_count} thrusters, "
+            f"and has the states of {counts[0]} and {counts[1]}"
+        )
+    return found
+
+
+def navigation_of(log: FlightLog) -> str:
+    """Name the navigation that flew, as far as the bag tells."""
+    return str(_parameters(log, ControllerNodeSettings.node).get("navigation", "")) or DIRECT
+
+
+def recorded_h_bar(log: FlightLog) -> Array:
+    """Return h_bar of the laws in force in the rows of ``log``, see `HBar`."""
+    laws, none = laws_of(log), np.full(log.axes, np.nan)
+    rows: list[Array] = [none]
+    for law in laws:
+        values = law.gains.get("h_bar", ())
+        rows.append(np.broadcast_to(values, log.axes) if len(values) in (1, log.axes) else none)
+    if len(laws) == 1 and laws[0].tick <= log.first_tick:
+        return np.asarray(rows[1])
+    ticks = np.arange(log.first_tick, log.first_tick + log.ticks)
+    which = np.searchsorted([law.tick for law in laws], ticks, side="right")
+    return np.array(rows)[which]
+
+
+def _described_h_bar(log: FlightLog) -> Array:
+    """Return h_bar of a bag without the laws in force, at its description's word."""
+    flight = log.flight
+    if flight.get("swaps"):
+        raise NotDescribedError("laws were swapped in flight, so no one h_bar holds")
+    if not (name := flight.get("controller")):
+        raise NotDescribedError("the bag does not say which law was flown")
+    if isinstance(gains := flight.get("gains_used"), dict):
+        h_bar = np.array(gains.get("h_bar", ()), dtype=np.float64)
+    else:
+        chosen: dict[str, Any] = {key: flight[key] for key in ("robot", "gains") if key in flight}
+        chosen |= {**_parameters(log, ControllerNodeSettings.node), "controller": name}
+        _check_files(log, chosen)
+        if not log.trusted:
+            check_law(str(name))
+        h_bar = build_law(str(name), ControllerNodeSettings.resolve(chosen), log.axes).h_bar
+    if not h_bar.size:
+        raise NotDescribedError(f"{name} has no time-delay estimate")
+    if h_bar.shape not in ((log.axes,), (1,)):
+        raise NotDescribedError(f"gains_used of the bag: h_bar: {log.axes} values were expected")
+    return np.broadcast_to(h_bar, log.axes)
+
+
+def _check_files(log: FlightLog, given: Mapping[str, Any]) -> None:
+    """See that nothing but what is shipped is read, unless the bag is trusted."""
+    if not log.trusted:
+        for what in ("robot", "case", "mission", "gains", "sensors", "actuators"):
+            check_file(what, str(given.get(what, "")))
+
+
+def _parameters(log: FlightLog, node: str) -> dict[str, Any]:
+    parameters = log.flight.get("parameters")
+    given = parameters.get(node) if isinstance(parameters, dict) else None
+    return dict(given) if isinstance(given, dict) else {}

@@ -1,0 +1,138 @@
+"""Figures of what turned the base: momentum, wheels, thrusters; one flight each."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.hardware.thrusters import ThrusterSettings
+from space_robot_model.hardware.wheels import WheelSettings
+from space_robot_msgs_py.bag.flight_log import FlightLog
+
+from ..metrics import tracking_error
+from ..momentum import Momentum
+from ..plot_series import tick_times
+from .single_flight import BASE_AXES
+from .style import GREY, Look, house_style, legend_above, page, plot_lines
+
+Array = NDArray[np.float64]
+
+BINS = 600
+"""Columns of the raster of pulses: each is as dark as a thruster is open in it."""
+POINTS = 6000
+"""Most points of a line in the phase plane."""
+INERTIAL = ("x", "y", "z")
+
+
+@house_style()
+def momentum(log: FlightLog, found: Momentum, flown: BaseActuatorSettings) -> Figure:
+    """Draw the angular momentum of robot, wheels and both, by inertial axis.
+
+    What came from outside stands beside them; without it the sum is a straight line. Of a base
+    that nothing turned, base and arm have what the other lacks.
+    """
+    parts = {"robot": found.robot, "wheels": found.wheels, "sum": found.total}
+    if not flown.wheel_count:
+        arm = found.robot - found.base
+        parts = {"base": found.base, "arm": arm, "sum": found.total}
+    if np.any(found.outside):
+        parts["from outside"] = found.outside
+    figure = page(18.0 + 45.0 * 3)
+    panels = figure.subplots(3, 1, sharex=True)
+    for i, (axes, name) in enumerate(zip(panels, INERTIAL, strict=True)):
+        lines = np.column_stack([values[:, i] for values in parts.values()])
+        plot_lines(axes, tick_times(log), lines, dashed=True)
+        axes.set_ylabel(f"momentum {name} (N m s)")
+    panels[-1].set_xlabel("time (s)")
+    figure.align_ylabels()
+    legend_above(figure, list(parts), dashed=True)
+    return figure
+
+
+@house_style()
+def wheels(log: FlightLog, settings: WheelSettings) -> Figure:
+    """Draw momentum and motor torque of every wheel between their limits, where they have any."""
+    figure = page(18.0 + 55.0 * 2)
+    above, below = figure.subplots(2, 1, sharex=True)
+    time, held = tick_times(log), settings.spin_momenta(log.wheel_velocities)
+    plot_lines(above, time, held)
+    plot_lines(below, time, log.wheel_torques)
+    _mark_limits(above, settings.values("max_momentum"))
+    _mark_limits(below, settings.values("max_torque"))
+    above.set_ylabel("wheel's momentum (N m s)")
+    below.set(xlabel="time (s)", ylabel="motor's torque (N m)")
+    figure.align_ylabels()
+    legend_above(figure, [f"wheel_{i + 1}" for i in range(settings.count)], dashed=False)
+    return figure
+
+
+@house_style()
+def thrusters(log: FlightLog, pushed: Array, settings: ThrusterSettings) -> Figure:
+    """Draw pulses, propellant, how far the robot was pushed, and the attitude's limit cycle.
+
+    Args:
+        log: a flight.
+        pushed: (N, 3) m of the robot's centre of mass from where it was at first.
+        settings: of the thrusters.
+    """
+    figure, time = page(210.0, ""), tick_times(log)
+    rows = figure.add_gridspec(4, 1, height_ratios=(5, 3, 3, 6))
+    pulses = figure.add_subplot(rows[0])
+    used, place = (figure.add_subplot(rows[i], sharex=pulses) for i in (1, 2))
+    cycle = figure.add_subplot(rows[3])
+    _draw_pulses(pulses, time, log.thrusts / settings.values("force"), log.timebase.period)
+    rates = log.thrusts / settings.values("force") * settings.mass_flow
+    mass = log.timebase.period * np.cumsum(rates.sum(axis=1))
+    plot_lines(used, time, 1e3 * mass[:, np.newaxis])
+    used.set_ylabel("propellant (g)")
+    plot_lines(place, time, pushed)
+    place.set(xlabel="time (s)", ylabel="robot pushed (m)")
+    for axes in (pulses, used):
+        axes.tick_params(labelbottom=False)
+    legend_above(place, [f"inertial {name}" for name in INERTIAL], dashed=False)
+    _draw_cycle(cycle, log)
+    legend_above(cycle, BASE_AXES, dashed=False)
+    figure.align_ylabels([pulses, used, place])
+    return figure
+
+
+def _mark_limits(axes: Axes, limits: Array) -> None:
+    """Draw limits other than 0 (none) as dotted lines on either side."""
+    for limit in np.unique(limits[limits > 0.0]):
+        for side in (-limit, limit):
+            axes.axhline(side, color=GREY, linewidth=0.8, linestyle=":", zorder=1.5)
+
+
+def _draw_pulses(axes: Axes, time: Array, is_open: Array, period: float) -> None:
+    """Draw a row a thruster, dark where it is open."""
+    length = max(1, -(-len(time) // BINS))
+    starts = np.arange(0, len(time), length)
+    counts = np.diff(np.append(starts, len(time)))
+    share = np.add.reduceat(np.nan_to_num(is_open), starts, axis=0) / counts[:, np.newaxis]
+    count = is_open.shape[1]
+    axes.imshow(
+        share.T, cmap="Greys", vmin=0.0, vmax=1.0, aspect="auto", interpolation="nearest",
+        extent=(time[0] - period, time[0] + (starts[-1] + length - 1) * period, count + 0.5, 0.5),
+    )  # fmt: skip
+    axes.grid(visible=False)
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_ylabel("thruster, open")
+    axes.set_xlim(time[0] - period, time[-1])
+
+
+def _draw_cycle(axes: Axes, log: FlightLog) -> None:
+    """Draw the error of the base's rate over that of its attitude, both about its own axes."""
+    every = max(1, log.ticks // POINTS)
+    angle = 2.0 * tracking_error(log)[::every, :3]
+    rate = (log.reference_base[:, 4:7] - log.omega_base)[::every]
+    for i in range(3):
+        look = Look.of(i)
+        axes.plot(
+            angle[:, i], rate[:, i], color=look.colour, linewidth=0.5, marker=look.marker,
+            markevery=[len(angle) // 2],
+        )  # fmt: skip
+    axes.set(xlabel="attitude error (rad)", ylabel="rate error (rad/s)")

@@ -1,0 +1,257 @@
+"""The looks that all figures share, and how they become files.
+
+Colours are those of Okabe and Ito, safe for the colour-blind, without their yellow, which is too
+pale for a line. They are ordered so that neighbours differ in brightness too, and every line has a
+marker of its own shape, so that lines are told apart in grey print.
+"""
+
+from __future__ import annotations
+
+import textwrap
+import warnings
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+import matplotlib.style
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure, FigureBase
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.config.text import shortened
+from space_robot_msgs_py.errors import InputError
+
+from ...console.files import (
+    make_folder,
+    whole_file,
+)
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+MOST_LETTERS = 40
+"""Of a name in a legend: layout of long texts takes minutes."""
+RESOLUTION = 150
+"""dpi of a PNG."""
+PAGE_WIDTH = 180.0
+"""mm; A4 less its margins."""
+GREY = "#707070"
+COLOURS = ("#000000", "#E69F00", "#0072B2", "#CC79A7", "#009E73", "#56B4E9", "#D55E00")
+MARKERS = ("o", "s", "^", "D", "v", "<", "P", ">", "*")
+DASHES: tuple[Any, ...] = ("-", "--", "-.", (0, (5, 1, 1, 1, 1, 1)), (0, (8, 2)), (0, (2, 1)))
+STRETCHES = 250
+"""Stretches of a long line, narrower than the line is thick."""
+MARKS = 4
+"""Markers a line."""
+
+house_style = partial(
+    matplotlib.style.context, Path(__file__).with_name("space_robot.mplstyle"), after_reset=True
+)
+"""Applies the style sheet on top of matplotlib's defaults, not the user's; undone afterwards."""
+
+
+class Look(NamedTuple):
+    """Colour, marker and dashes that tell one of several lines from the others."""
+
+    colour: str
+    marker: str
+    dashes: Any
+
+    @classmethod
+    def of(cls, index: int) -> Look:
+        """Return the look of the line ``index``: no two of 63 share colour and marker."""
+        return cls(
+            COLOURS[index % len(COLOURS)],
+            MARKERS[index % len(MARKERS)],
+            DASHES[index % len(DASHES)],
+        )
+
+
+def page(height: float, title: str = "") -> Figure:
+    """Make an empty page of ``height`` mm, with a title if there is one."""
+    figure = Figure(figsize=(PAGE_WIDTH / 25.4, height / 25.4), dpi=RESOLUTION)
+    if title:
+        figure.suptitle(plain(textwrap.fill(shortened(title, 5 * MOST_LETTERS), 95)))
+    return figure
+
+
+def plain(text: str) -> str:
+    """Escape ``text`` so that it is drawn as it is, and a $ does not begin a formula."""
+    return text.replace("$", r"\$")
+
+
+def plot_lines(
+    axes: Axes,
+    x: Array,
+    values: Array,
+    *,
+    looks: Sequence[int] | None = None,
+    marks: Indices | None = None,
+    dashed: bool = False,
+    steps: bool = False,
+) -> None:
+    """Plot the columns of ``values``, the wildest at the back, for it would hide the others.
+
+    Args:
+        axes: where to.
+        x: (N,) in the unit of the horizontal axis.
+        values: (N, m), one line a column; what is not finite is left out.
+        looks: of each column; by default counted from 0.
+        marks: samples with a marker; by default `MARKS` of each line, where no other has one.
+        dashed: tell the lines apart by dashes too; chatter would make a muddle of them.
+        steps: draw each value as having held since the one before it.
+    """
+    looks = range(values.shape[1]) if looks is None else looks
+    shown = np.where(np.isfinite(values), values, np.nan)
+    with np.errstate(over="ignore"):
+        roughness = np.nansum(np.abs(np.diff(shown, axis=0)), axis=0)
+    for depth, column in enumerate(np.argsort(-roughness, kind="stable").tolist()):
+        index = looks[column]
+        look = Look.of(index)
+        marked = scattered(len(x), index, max(looks) + 1) if marks is None else marks
+        drawn = np.union1d(thinned(shown[:, column]), marked)
+        axes.plot(
+            x[drawn], shown[drawn, column],
+            color=look.colour, linestyle=look.dashes if dashed else "-", marker=look.marker,
+            markevery=np.searchsorted(drawn, marked).tolist(), zorder=2.0 + 0.01 * depth,
+            drawstyle="steps-pre" if steps else "default",
+        )  # fmt: skip
+
+
+def thinned(signal: Array, stretches: int = STRETCHES) -> Indices:
+    """Choose the lowest and the highest sample of each of so many stretches, and both ends.
+
+    They draw the same line as all samples, in half the time and file: no peak is lost, and chatter
+    stays a band of its full width. NaN is chosen only where a stretch has nothing else.
+    """
+    last = len(signal) - 1
+    length = -(-len(signal) // stretches)
+    if length <= 2:
+        return np.arange(len(signal))
+    starts = np.arange(0, len(signal), length)
+    padded = np.pad(signal, (0, len(starts) * length - len(signal)), mode="edge")
+    rows = padded.reshape(-1, length)
+    lowest = np.argmin(np.where(np.isnan(rows), np.inf, rows), axis=1)
+    highest = np.argmax(np.where(np.isnan(rows), -np.inf, rows), axis=1)
+    kept = np.concatenate([[0], starts + lowest, starts + highest, [last]])
+    chosen: Indices = np.unique(np.minimum(kept, last))
+    return chosen
+
+
+def scattered(samples: int, index: int, count: int) -> Indices:
+    """Choose the samples of the line ``index`` of ``count`` to mark: none where another is."""
+    places = (np.arange(MARKS) + (index + 0.5) / count) / MARKS
+    return np.unique((places * samples).astype(np.intp))
+
+
+def mark_moments(axes: Axes, moments: Array) -> None:
+    """Draw dotted upright lines at ``moments``, in the unit of the horizontal axis."""
+    for moment in moments:
+        axes.axvline(moment, color=GREY, linewidth=0.8, linestyle=":", zorder=1.5)
+
+
+def mark_events(axes: Axes, times: Array) -> None:
+    """Draw upright lines where something was captured or released, s."""
+    for time in times:
+        axes.axvline(time, color=GREY, linewidth=0.8, zorder=1.5)
+
+
+def legend_above(
+    where: Axes | FigureBase, names: Sequence[str], *, dashed: bool, width: float = PAGE_WIDTH - 20
+) -> Legend:
+    """Name the lines above all else in a figure or above one panel, where it hides nothing.
+
+    Args:
+        where: figure, part of a figure, or panel.
+        names: of the lines, in the order of their looks.
+        dashed: as in `plot_lines`.
+        width: mm that there are.
+    """
+    names = [shortened(name, MOST_LETTERS) for name in names]
+    looks = [Look.of(index) for index in range(len(names))]
+    handles = [
+        Line2D([], [], color=x.colour, marker=x.marker, linestyle=x.dashes if dashed else "-")
+        for x in looks
+    ]
+    options: dict[str, Any] = {"loc": "outside upper left"}
+    if isinstance(where, Axes):  # above the power of ten that its axis may have
+        options = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 1.5}
+    legend = where.legend(handles, ["-"] * len(names), ncols=_columns(names, width), **options)
+    for text, name in zip(legend.get_texts(), names, strict=True):
+        text.set_text(plain(name))  # a label that begins with _ would be left out
+    return legend
+
+
+def _columns(names: Sequence[str], width: float) -> int:
+    """Count the columns in which the legend of ``names`` fits into ``width`` mm."""
+    entries = [11.0 + 1.6 * len(name) for name in names]
+    for columns in range(len(names), 1, -1):
+        if sum(max(column) for column in np.array_split(entries, columns)) <= width:
+            return columns
+    return 1
+
+
+def grid(figure: FigureBase, count: int, columns: int, *, shared: bool = True) -> list[Axes]:
+    """Make ``count`` panels in rows of ``columns``.
+
+    ``shared``: on common scales, with numbers at the outer panels only.
+    """
+    cells = figure.add_gridspec(max(1, -(-count // columns)), columns)
+    panels: list[Axes] = []
+    for number in range(count):
+        first = panels[0] if panels and shared else None
+        axes = figure.add_subplot(cells[divmod(number, columns)], sharex=first, sharey=first)
+        if shared:
+            is_left, is_lowest = number % columns == 0, number + columns >= count
+            axes.tick_params(labelleft=is_left, labelbottom=is_lowest)
+            axes.yaxis.get_offset_text().set_visible(is_left)
+        panels.append(axes)
+    return panels
+
+
+@house_style()
+def save_figure(figure: Figure, stem: Path, *, png: bool = True) -> tuple[Path, ...]:
+    """Write ``stem``.svg and, if wanted, ``stem``.png; of equal figures the same bytes at any time.
+
+    Older files of these names are replaced.
+
+    Returns:
+        The files, the SVG last.
+
+    Raises:
+        InputError: they cannot be written.
+    """
+    if not stem.name:
+        raise InputError(f"{stem}: is a folder; name the file, without its ending")
+    make_folder(stem.parent)
+    with warnings.catch_warnings():  # of letters that the font does not have: drawn as boxes
+        warnings.filterwarnings("ignore", "Glyph .* missing")
+        engine = figure.get_layout_engine()
+        if engine and figure.get_axes():
+            engine.execute(figure)
+            figure.set_layout_engine("none")  # else each file would lay it out again
+        files = []
+        for format in ("png", "svg") if png else ("svg",):
+            path = stem.with_name(f"{stem.name}.{format}")
+            with whole_file(path, replace=True) as file:
+                _print(figure, file, format)
+            files.append(path)
+    return tuple(files)
+
+
+def _print(figure: Figure, file: IO[Any], format: str) -> None:
+    """Do what `Figure.savefig` does, which draws everything twice, in half the time."""
+    canvas: Any  # its methods have no types
+    if format == "png":
+        figure.dpi = RESOLUTION  # that of an SVG stays behind
+        canvas = FigureCanvasAgg(figure)
+        canvas.print_png(file, metadata={"Software": None})
+    else:
+        canvas = FigureCanvasSVG(figure)
+        canvas.print_svg(file, metadata={"Date": None, "Creator": None})

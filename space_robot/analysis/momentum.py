@@ -1,0 +1,222 @@
+"""Angular momentum of robot and wheels about their common centre of mass, on inertial axes.
+
+The base's inertia in the robot's file includes its wheels, locked. So the robot's momentum is
+that of everything with locked wheels, and the wheels' is what their spin relative to the base adds,
+``sum a_k J_k Omega_k``. Motors and joints only move it from one to the other: the sum changes by
+what comes from outside, that is thrusters, the disturbances of (61) and what a captured or released
+target has, and by nothing else.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.elementary.matrices import product
+from space_robot_model.elementary.sine import sines_cosines
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.robot import Robot
+from space_robot_model.robot.base_axes import (
+    cross,
+    to_inertial,
+)
+from space_robot_model.robot.momentum import (
+    Motion,
+    robot_momentum,
+)
+from space_robot_msgs_py.bag.blocks import Metric, joined, last_rows
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_sim.environment.captures import Captures
+from space_robot_sim.environment.disturbance import DisturbanceSettings
+
+from .base_demand import axes_of
+from .before_events import state_before
+
+Array = NDArray[np.float64]
+
+
+class Momentum(NamedTuple):
+    """Angular momentum of a flight's parts, tick by tick; N m s on inertial axes."""
+
+    robot: Array
+    """(N, 3) of all bodies, wheels locked."""
+    base: Array
+    """(N, 3) the share of it that the base has."""
+    wheels: Array
+    """(N, 3) of the wheels' spin."""
+    outside: Array
+    """(N, 3) N m s that came from outside since the first row."""
+    centre_of_mass: Array
+    """(N, 3) m, of the robot, inertial frame."""
+
+    @property
+    def total(self) -> Array:
+        """(N, 3) robot and wheels; less `outside` it is conserved."""
+        return self.robot + self.wheels
+
+
+class MomentumSeries:
+    """Follows the momentum through a flight, block by block.
+
+    At the tick of a capture or release it is that after it; the change is from outside.
+    """
+
+    def __init__(
+        self, captures: Captures, flown: BaseActuatorSettings, disturbance: DisturbanceSettings
+    ) -> None:
+        """``captures``: of the robot that flew, payload included; ``flown``: what turned it."""
+        self._captures, self.flown, self._disturbance = captures, flown, disturbance
+        self._part: _OfOneRobot | None = None
+
+    def add(self, log: FlightLog) -> Momentum:
+        """Take further rows of the flight and return their momentum."""
+        start, stop = log.first_tick, log.first_tick + log.ticks
+        if self._part is None:  # the first state that is known is that after the first tick's
+            self._part = self._begin(self._captures.robot_at(start), np.zeros(3))
+            start += 1
+        found, begin = [], log.first_tick
+        for tick in self._captures.ticks(start, stop):
+            if tick > begin:
+                found.append(self._part.add(_rows(log, begin, tick)))
+            found.append(self._exchange(_rows(log, tick, tick + 1)))
+            begin = tick + 1
+        if begin < stop:
+            found.append(self._part.add(_rows(log, begin, stop)))
+        return Momentum(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+
+    def _begin(self, robot: Robot, outside: Array) -> _OfOneRobot:
+        return _OfOneRobot(robot, self.flown, self._disturbance, outside)
+
+    def _exchange(self, row: FlightLog) -> Momentum:
+        """Take the tick of one event or several, as they happen one after the other."""
+        exchanges = self._captures.at(row.first_tick)
+        states = [row]
+        for exchange in reversed(exchanges):
+            states.insert(0, state_before(exchange, states[0], self.flown.wheels))
+        assert self._part is not None
+        for exchange, state, after in zip(exchanges, states[:-1], states[1:], strict=True):
+            before = self._part.add(state)
+            bare = self._begin(exchange.after, np.zeros(3)).add(after)
+            outside = before.outside[0] + bare.total[0] - before.total[0]
+            self._part = self._begin(exchange.after, outside)
+            found = self._part.add(after)
+        return found
+
+
+class _OfOneRobot:
+    """Follows the momentum of a robot that holds the same all the time."""
+
+    def __init__(
+        self, robot: Robot, flown: BaseActuatorSettings, disturbance: DisturbanceSettings,
+        outside: Array,
+    ) -> None:  # fmt: skip
+        """``outside``: (3,) N m s that have come from outside at the first row."""
+        self._robot, self._flown, self._disturbance = robot, flown, disturbance
+        self._before: FlightLog | None = None
+        self._outside = outside
+
+    def add(self, log: FlightLog) -> Momentum:
+        """Take further rows, see `MomentumSeries.add`."""
+        rows = joined(self._before, log)
+        axes, skipped = axes_of(rows), rows.ticks - log.ticks
+        motion = Motion(
+            rows.quaternion / np.linalg.norm(rows.quaternion, axis=1, keepdims=True),
+            rows.omega_base, rows.all_positions, rows.all_velocities,
+        )  # fmt: skip
+        found = robot_momentum(self._robot, motion)
+        wheels = self._flown.wheels
+        spin = product(wheels.spin_momenta(rows.wheel_velocities), wheels.unit_axes)
+        outside = self._from_outside(rows, axes, found.centre_of_mass)
+        self._before, self._outside = last_rows(log, 1), outside[-1].copy()
+        whole = Momentum(
+            found.angular, found.base, to_inertial(axes, spin.T).T, outside,
+            rows.base_position + found.centre_of_mass,
+        )  # fmt: skip
+        return Momentum(*(values[skipped:] for values in whole))
+
+    def _from_outside(self, rows: FlightLog, axes: Array, centre_of_mass: Array) -> Array:
+        """Return the angular impulse up to each row, the first row's known, (N, 3) N m s."""
+        period, time = rows.timebase.period, rows.time
+        impulse = np.zeros((rows.ticks, 3))
+        if self._flown.thruster_count:
+            thrusters = self._flown.thrusters
+            force = product(rows.thrusts, thrusters.unit_directions)
+            arms = np.cross(thrusters.places, thrusters.unit_directions)
+            torque = product(rows.thrusts, arms)
+            each = [  # turned as the base is before and after the interval
+                _torque(side, centre, force[1:], torque[1:])
+                for side, centre in (
+                    (axes[:, :, :-1], centre_of_mass[:-1]), (axes[:, :, 1:], centre_of_mass[1:])
+                )
+            ]  # fmt: skip
+            impulse[1:] = 0.5 * period * np.cumsum(each[0] + each[1], axis=0)
+        wave = disturbance_impulse(self._disturbance, time)
+        outside: Array = self._outside + impulse + (wave - wave[0])[:, np.newaxis]
+        return outside
+
+
+class MomentumBudget(Metric):
+    """Largest momentum of each part, and how far the sum is from being conserved."""
+
+    def __init__(self, series: MomentumSeries) -> None:
+        self._series, self._flown = series, series.flown
+        self._start: Momentum | None = None
+        self._largest = dict.fromkeys(("robot", "base", "wheels", "outside"), 0.0)
+        self._drift = self._pushed = self._end = 0.0
+
+    def add(self, log: FlightLog, error: Array) -> None:
+        """Take further rows."""
+        found = self._series.add(log)
+        if self._start is None:
+            self._start = Momentum(*(values[:1].copy() for values in found))
+        start = self._start
+        for name in self._largest:
+            self._largest[name] = max(self._largest[name], _longest(getattr(found, name)))
+        self._drift = max(self._drift, _longest(found.total - start.total - found.outside))
+        pushed = np.linalg.norm(found.centre_of_mass - start.centre_of_mass, axis=1)
+        self._pushed, self._end = max(self._pushed, float(pushed.max())), float(pushed[-1])
+
+    def result(self) -> dict[str, Any]:
+        """Return the largest sizes, N m s, the drift of the sum, and how far thrusters pushed, m.
+
+        The drift is relative to the largest momentum of the robot; where there are no wheels, to
+        that of its base, for the robot's is then to stay what it was.
+        """
+        size = self._largest["robot" if self._flown.wheel_count else "base"]
+        pushed = {"max": self._pushed, "end": self._end} if self._flown.thruster_count else None
+        return {
+            "peak_n_m_s": dict(self._largest),
+            "drift": {"n_m_s": self._drift, "relative": self._drift / size if size else None},
+            "pushed_m": pushed,
+        }
+
+
+def disturbance_impulse(disturbance: DisturbanceSettings, time: Array) -> Array:
+    """(N,) N m s that (61) has given to each inertial axis of the base from 0 to ``time`` (N,) s.
+
+    It acts as friction does, against the torque: ``-integral sin(w t) = (cos(w t) - 1) / w``.
+    """
+    found = np.zeros_like(time)
+    for frequency in disturbance.base_frequencies:
+        if frequency:
+            omega = 2.0 * np.pi * frequency
+            found += (sines_cosines(omega * time)[1] - 1.0) / omega
+    impulse: Array = disturbance.scale * disturbance.base_amplitude * found
+    return impulse
+
+
+def _torque(axes: Array, centre_of_mass: Array, force: Array, torque: Array) -> Array:
+    """(N, 3) N m about the common CoM, inertial axes; of force and torque on the base's axes."""
+    pushed, turned = to_inertial(axes, force.T), to_inertial(axes, torque.T)
+    return (turned - cross(centre_of_mass.T, pushed)).T
+
+
+def _rows(log: FlightLog, start: int, stop: int) -> FlightLog:
+    """Return the rows of the ticks from ``start`` to before ``stop``."""
+    return log.rows(start - log.first_tick, stop - log.first_tick)
+
+
+def _longest(vectors: Array) -> float:
+    return float(np.linalg.norm(vectors, axis=1).max())

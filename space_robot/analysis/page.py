@@ -1,0 +1,60 @@
+"""One self-contained HTML page about one flight or several."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..console.tables import (
+    Column,
+    Table,
+    Verdict,
+)
+from .report_tables import comparison_table
+from .sizing_table import sizing_table
+from .template import template
+from .words import Report, law_of, notes, remarks
+
+
+def render(
+    reports: Mapping[str, Report],
+    descriptions: Mapping[str, dict[str, Any]],
+    figures: Sequence[tuple[str, str]],
+) -> str:
+    """Render the page, without references to anything outside itself.
+
+    Args:
+        reports: of `analyze`, by name of the bag.
+        descriptions: what was flown, as the bags have it.
+        figures: caption and data URI of each.
+    """
+    return template("space_robot.analysis", "flights.html.j2").render(
+        names=list(reports),
+        recorded=_recorded(reports),
+        metrics=comparison_table(reports),
+        sizing={name: table for name, r in reports.items() if (table := sizing_table(r))},
+        notes={name: [*remarks(r), *notes(r)] for name, r in reports.items()},
+        descriptions={name: json.dumps(d, indent=1) for name, d in descriptions.items()},
+        figures=figures,
+    )
+
+
+def _recorded(reports: Mapping[str, Report]) -> Table:
+    names = ("bag", "law", "case", "gains", "robot", "time analysed", "ticks", "recording")
+    rows = [
+        [
+            name, law_of(report) or "not said",
+            *(report[key] or "not said" for key in ("case", "gains", "robot")),
+            f"{report['from_s']:g} to {report['to_s']:g} s", report["ticks"],
+            Verdict("", "whole", "good") if _whole(report) else Verdict("", "not whole", "bad"),
+        ]
+        for name, report in reports.items()
+    ]  # fmt: skip
+    return Table.of("", [Column(name) for name in names], rows)
+
+
+def _whole(report: Report) -> bool:
+    """Tell whether the bag holds the flight without loss, gap or damage."""
+    missing = any(report["lost"].values()) or report["filled_ticks"]
+    return not (missing or report["unfinished"] or report["damage"])

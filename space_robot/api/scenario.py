@@ -1,0 +1,140 @@
+"""What is to be flown, and the ways to fly it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+from typing_extensions import Self
+
+from space_robot_msgs_py.config.arguments import as_path
+from space_robot_msgs_py.config.validation import one_line, one_of, short
+from space_robot_msgs_py.errors import InputError
+
+from ..flight.bench import Bench
+from ..flight.compilation import compile_kernels
+from ..flight.plan import Flight
+from ..flight.start_step import sentence
+from ..scenario.options import FlightPlan
+from .flown_flight import FlownFlight
+from .in_process import fly_in_process
+
+OF_THE_GRAPH = (
+    "realtime",
+    "fifo_priority",
+    "restart_controller",
+    "composed",
+    "domain",
+    "namespace",
+)
+"""Options of `FlightPlan` that only a graph of nodes has: `space-robot fly`."""
+
+
+class Scenario(FlightPlan):
+    """A flight to be flown: the options of ``space-robot simulate``, with the same defaults.
+
+        Scenario(robot="paper", controller="tde_stc", case="3", sensors="fine", seed=1)
+
+    An option that names a file may be the object itself, or its numbers:
+
+    - ``robot``: a `Robot`; with the mission and gains of the shipped one of its name, if any
+    - ``plant_robot``: what the plant is in truth, where controller and mission know another one
+    - ``controller``: a `ControlLaw` class or object; None: none, for `bench`
+    - ``gains``: numbers by gain, over the default set: ``{"k_1": 3.0, "h_bar": [...]}``, one for
+      all axes or n+3 (base x, y, z, joints); or such a mapping for each of several laws
+    - ``mission``: `MissionSettings` or a mapping: ``waypoint_times`` s, ``waypoints_deg`` (flat,
+      degrees, or m of prismatic joints), ``base_quaternion`` ``[w, x, y, z]``,
+      ``initial_joints_deg`` (else the first waypoint), ``events``
+    - ``case``, ``sensors``, ``actuators``: their settings, objects or mappings
+    - ``parameters``: any parameter of a node, ``{"plant": {"friction.coulomb": 0.0}}``
+
+    The other options: ``duration`` s, ``period`` s, ``substeps``, ``navigation`` ("direct" or
+    "filtered"), ``command_latency_ticks``, ``friction`` (False: none), ``faults``, ``events`` and
+    ``swaps`` (lists of texts), ``seed``, ``compression`` and ``split_size`` of a bag. A scenario
+    does not change; it can be pickled, and `replace` makes another of it.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        """Take the options; what they name is looked up by `check`, `fly` and `bench`.
+
+        Raises:
+            InputError: (a ValueError) an option that there is not, or of another type.
+        """
+        allowed = [name for name in FlightPlan.model_fields if name not in OF_THE_GRAPH]
+        for name in options:
+            one_of(name, allowed, "option", " of Scenario")
+        try:
+            super().__init__(**options)
+        except ValidationError as error:
+            raise InputError(one_line(error, type(self), "Scenario")) from None
+
+    def replace(self, **options: Any) -> Self:
+        """Return the same scenario but for these options.
+
+        Raises:
+            InputError: see `Scenario`.
+        """
+        return type(self)(**{**self.given, **options})
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """The options that are not left at their defaults, by name."""
+        return {name: getattr(self, name) for name in sorted(self.model_fields_set)}
+
+    def check(self) -> Flight:
+        """Look up all that is named, and return the flight that would be flown.
+
+        Raises:
+            InputError: something does not exist, or does not fit the rest; in one line.
+        """
+        flight = Flight(self)
+        flight.check_in_process()
+        return flight
+
+    def fly(
+        self,
+        bag: str | Path | None = None,
+        progress: Callable[[float], object] | None = None,
+        keep_log: bool = True,
+    ) -> FlownFlight:
+        """Fly it in this process; the bits are those of ``simulate``, and of ``fly`` in lockstep.
+
+        A flight that diverges is a result, too: see `FlownFlight.outcome`. The first flight on a
+        machine compiles what it needs. A start away from the mission's, for which the law
+        commands far more than the mission asks for, is a `UserWarning`.
+
+        Args:
+            bag: folder to record to, which must not be there yet.
+            progress: called now and then with the simulated seconds flown.
+            keep_log: False for flights longer than memory: the metrics alone are kept.
+
+        Raises:
+            InputError: see `check`; or the bag cannot be made, or memory is too small for a log.
+        """
+        if self.controller is None:
+            raise InputError("controller is None, so there is nothing to fly: use bench()")
+        if progress is not None and not callable(progress):
+            raise InputError(f"progress: a function was expected, got {short(progress)}")
+        path, flight = None if bag is None else as_path(bag, "bag"), self.check()
+        if step := flight.start_step:
+            warnings.warn(sentence(step), stacklevel=2)
+        return fly_in_process(flight, path, progress, keep_log)
+
+    def bench(self) -> Bench:
+        """Return a bench that stands at the flight's first tick.
+
+        Raises:
+            InputError: see `check`.
+        """
+        flight = self.check()
+        compile_kernels(bool(flight.plant.names.actuators))
+        return Bench(flight)
+
+    def __repr__(self) -> str:
+        said = ", ".join(f"{name}={short(value)}" for name, value in self.given.items())
+        return f"Scenario({said})"
+
+    __str__ = __repr__

@@ -1,0 +1,108 @@
+"""A law's nominal flight, and what a run changes of it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from typing_extensions import Self
+
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.config.trees import flatten
+from space_robot_msgs_py.samples import RobotNames
+
+from ...api import Scenario
+from ...scenario.node_settings import NODES
+from .robot_arrays import RobotArrays
+
+
+class Nominal(NamedTuple):
+    """The flight of a law when nothing is varied."""
+
+    scenario: Scenario
+    robot: Robot
+    names: RobotNames
+    """Of axes, wheels and thrusters."""
+    parameters: dict[str, dict[str, Any]]
+    """All parameters by node and dotted name."""
+    law: str
+    gains: dict[str, list[float]]
+    """Of the law in force at the start."""
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Self:
+        """Look up all that a scenario names.
+
+        Raises:
+            InputError: it cannot be flown.
+        """
+        flight = scenario.check()
+        settings = {node: getattr(flight, f"{node}_settings") for node in NODES}
+        return cls(
+            scenario,
+            flight.robot,
+            flight.plant.names,
+            {node: dict(flatten(own.model_dump())) for node, own in settings.items()},
+            flight.law.name,
+            flight.gains_used,
+        )
+
+
+class Changes:
+    """What one run changes; variables add to it one after the other."""
+
+    def __init__(self, nominal: Nominal) -> None:
+        self.nominal = nominal
+        self.options: dict[str, Any] = {}
+        self.faults: list[str] = []
+        self._parameters: dict[str, dict[str, Any]] = {}
+        self._robot: RobotArrays | None = None
+
+    def on(self, nominal: Nominal) -> Changes:
+        """Return the same options of another nominal flight."""
+        changes = Changes(nominal)
+        changes.options = self.options
+        return changes
+
+    @property
+    def robot(self) -> RobotArrays:
+        """The plant's robot, to be changed."""
+        if self._robot is None:
+            self._robot = RobotArrays(self.nominal.robot)
+        return self._robot
+
+    def parameter(self, node: str, name: str) -> Any:
+        """Return a node's parameter as changed until now; a list may be changed."""
+        changed = self._parameters.setdefault(node, {})
+        if name not in changed:
+            value = self.nominal.parameters[node][name]
+            changed[name] = list(value) if isinstance(value, list) else value
+        return changed[name]
+
+    def set_parameter(self, node: str, name: str, value: Any) -> None:
+        """Change a node's parameter."""
+        self._parameters.setdefault(node, {})[name] = value
+
+    def gain(self, name: str) -> list[float]:
+        """Return the law's gain, a number an axis, to be changed."""
+        key = f"{self.nominal.law}.{name}"
+        own = self._parameters.setdefault("controller", {})
+        if key not in own:
+            own[key] = list(self.nominal.gains[name])
+        gain: list[float] = own[key]
+        return gain
+
+    def scenario(self, **options: Any) -> Scenario:
+        """Return the flight with these changes and further options."""
+        given = self.nominal.scenario.given
+        found = {**given, **self.options, **options}
+        if self._robot is not None:
+            found["plant_robot"] = self._robot.robot()
+        if self.faults:
+            found["faults"] = [*given.get("faults", ()), *self.faults]
+        if self._parameters:
+            own = given.get("parameters", {})
+            found["parameters"] = {
+                node: {**own.get(node, {}), **self._parameters.get(node, {})}
+                for node in {**own, **self._parameters}
+            }
+        return Scenario(**found)

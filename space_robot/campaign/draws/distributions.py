@@ -1,0 +1,255 @@
+"""How a variable is distributed: its values by their quantiles."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from functools import cached_property
+from typing import Annotated, Any, ClassVar
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+from typing_extensions import Self
+
+from space_robot_model.elementary.exponential import (
+    exp,
+    log,
+)
+from space_robot_model.elementary.normal import (
+    normal_cdf,
+    quantile,
+)
+from space_robot_msgs_py.config.validation import StrictModel, short, validate
+from space_robot_msgs_py.errors import InputError
+
+Value = float | int | str | bool
+"""What is drawn; a whole number is one only out of a list."""
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+Values = Annotated[list[bool | int | float | str], Field(min_length=1, max_length=100_000)]
+
+
+LEAST_SHARE = 2.0**-1000
+"""Below it a normal number is not asked for."""
+
+
+class Distribution(StrictModel):
+    """A distribution as a campaign's file has it."""
+
+    is_continuous: ClassVar[bool] = True
+    relative: bool = False
+    """What is drawn is a factor of the nominal value."""
+    offset: bool = False
+    """What is drawn is added to the nominal value."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if self.relative and self.offset:
+            raise ValueError("relative and offset cannot both be true")
+        return self
+
+    @abstractmethod
+    def quantile(self, u: float) -> Value:
+        """Return the value that a share ``u`` of all draws is below, 0 < u < 1."""
+
+    @property
+    def ends(self) -> list[Value]:
+        """The least and the largest value that can be drawn; all of them if it is a list."""
+        return [self.quantile(2.0**-53), self.quantile(1.0 - 2.0**-53)]
+
+    @property
+    def is_number(self) -> bool:
+        """True if all values are numbers."""
+        return not any(isinstance(value, (str, bool)) for value in self.ends)
+
+    def on(self, nominal: float, drawn: Value) -> Any:
+        """Return what a value drawn makes of a nominal one."""
+        if self.relative:
+            return nominal * float(drawn)
+        return nominal + float(drawn) if self.offset else drawn
+
+    def at_least(self, low: float) -> Distribution:
+        """Return the distribution with no value below ``low``: a normal one is truncated there.
+
+        Raises:
+            InputError: another one has values below.
+        """
+        if min(float(value) for value in self.ends) < low:
+            raise InputError(f"can be {min(map(float, self.ends)):g}: {low:g} or more is needed")
+        return self
+
+
+class Normal(Distribution):
+    """Normal, cut off at ``low`` and ``high`` if given."""
+
+    normal: float
+    sigma: Annotated[float, Field(gt=0.0)]
+    low: float | None = None
+    high: float | None = None
+
+    @model_validator(mode="after")
+    def _has_values(self) -> Self:
+        low, high = self._probabilities
+        if not high - low > 1e-12:
+            raise ValueError("low and high leave nothing of it: low must be below high, near it")
+        return self
+
+    @cached_property
+    def _probabilities(self) -> tuple[float, float]:
+        low, high = (
+            otherwise if bound is None else normal_cdf((bound - self.normal) / self.sigma)
+            for bound, otherwise in ((self.low, 0.0), (self.high, 1.0))
+        )
+        return low, high
+
+    def quantile(self, u: float) -> float:
+        """See `Distribution`."""
+        low, high = self._probabilities
+        share = min(max(low + u * (high - low), LEAST_SHARE), 1.0 - 2.0**-53)
+        value = self.normal + self.sigma * quantile(share)
+        value = value if self.low is None else max(value, self.low)
+        return value if self.high is None else min(value, self.high)
+
+    def at_least(self, low: float) -> Normal:
+        """See `Distribution`."""
+        if self.low is not None and self.low >= low:
+            return self
+        return type(self).model_validate({**self.model_dump(), "low": low})
+
+
+class Uniform(Distribution):
+    """All values between two alike."""
+
+    uniform: Pair
+
+    @field_validator("uniform", mode="after")
+    @classmethod
+    def _rise(cls, ends: list[float]) -> list[float]:
+        return _rising(ends)
+
+    def quantile(self, u: float) -> float:
+        """See `Distribution`."""
+        low, high = self.uniform
+        return min(max(low + u * (high - low), low), high)
+
+
+class LogUniform(Distribution):
+    """Uniform in the logarithm."""
+
+    log_uniform: Pair
+
+    @field_validator("log_uniform", mode="after")
+    @classmethod
+    def _rise(cls, ends: list[float]) -> list[float]:
+        if not ends[0] > 0.0:
+            raise ValueError("numbers above 0 were expected")
+        return _rising(ends)
+
+    @cached_property
+    def _span(self) -> float:
+        low, high = self.log_uniform
+        return log(high / low)
+
+    def quantile(self, u: float) -> float:
+        """See `Distribution`."""
+        low, high = self.log_uniform
+        return min(max(low * exp(u * self._span), low), high)
+
+
+class Listed(Distribution):
+    """One of some values: numbers, or texts."""
+
+    is_continuous: ClassVar[bool] = False
+
+    @property
+    @abstractmethod
+    def values(self) -> list[Any]:
+        """The values."""
+
+    @property
+    def ends(self) -> list[Value]:
+        """See `Distribution`."""
+        return list(dict.fromkeys(self.values))
+
+    @model_validator(mode="after")
+    def _are_alike(self) -> Self:
+        if len({isinstance(value, (str, bool)) for value in self.values}) > 1:
+            raise ValueError("numbers and texts are mixed: put the numbers in quotes")
+        if (self.relative or self.offset) and not self.is_number:
+            raise ValueError("only numbers can be relative to the nominal value, or an offset")
+        return self
+
+
+class Choice(Listed):
+    """One of some values at random, each with its weight; all alike if there are none."""
+
+    choice: Values
+    weights: list[Annotated[float, Field(ge=0.0)]] | None = None
+
+    @field_validator("weights", mode="after")
+    @classmethod
+    def _fit(cls, weights: list[float] | None, info: ValidationInfo) -> list[float] | None:
+        if weights is not None:
+            if len(weights) != len(info.data.get("choice", weights)):
+                raise ValueError("as many numbers as choice has were expected")
+            if not 0.0 < sum(weights) < math.inf:
+                raise ValueError("one of them at least must be above 0")
+        return weights
+
+    @property
+    def values(self) -> list[Any]:
+        """See `Listed`."""
+        return self.choice
+
+    def quantile(self, u: float) -> Value:
+        """See `Distribution`."""
+        weights = self.weights or [1.0] * len(self.choice)
+        left = u * sum(weights)
+        for value, weight in zip(self.choice, weights, strict=True):
+            left -= weight
+            if left < 0.0:
+                return value
+        return self.choice[-1]
+
+
+class Grid(Listed):
+    """Every one of some values in turn."""
+
+    grid: Values
+
+    @property
+    def values(self) -> list[Any]:
+        """See `Listed`."""
+        return self.grid
+
+    def quantile(self, u: float) -> Value:
+        """See `Distribution`."""
+        return self.grid[int(u * len(self.grid))]
+
+
+KINDS: dict[str, type[Distribution]] = {
+    "normal": Normal, "uniform": Uniform, "log_uniform": LogUniform, "choice": Choice, "grid": Grid,
+}  # fmt: skip
+"""Distributions by the key that tells them."""
+
+
+def read_distribution(given: Any, where: str) -> Distribution:
+    """Read a distribution; a number or a text alone is a constant.
+
+    Raises:
+        InputError: it is none; ``where`` names file and key.
+    """
+    if isinstance(given, (bool, int, float, str)):
+        return validate(Choice, {"choice": [given]}, where)
+    if isinstance(given, dict):
+        for key, kind in KINDS.items():
+            if key in given:
+                return validate(kind, given, where)
+    raise InputError(
+        f"{where}: a distribution was expected, a mapping with one of {', '.join(KINDS)}, "
+        f"got {short(given)}"
+    )
+
+
+def _rising(ends: list[float]) -> list[float]:
+    if not ends[0] < ends[1]:
+        raise ValueError("the lower end, then a higher one, were expected")
+    return ends

@@ -1,0 +1,273 @@
+"""Variables of the plant's robot: masses, inertias, centres of mass, friction, springs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from space_robot_model.elementary.exponential import exp
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.config.validation import StrictModel, one_of, validate
+from space_robot_msgs_py.errors import InputError
+
+from .changes import Changes
+from .distributions import Distribution, Normal, Value, read_distribution
+from .names import Part, chosen
+from .variable import Variable
+
+LEAST = 0.01
+"""Masses and inertias are this share of the nominal ones at least."""
+OF_BODIES = ("mass", "inertia", "com")
+OF_JOINTS = ("friction.coulomb", "friction.viscous", "stiffness", "damping")
+XYZ = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class OfRobot(Variable):
+    """A variable of a body, or of the joint that moves it."""
+
+    body: int
+
+    @property
+    def is_of_plant_robot(self) -> bool:
+        """See `Variable`."""
+        return True
+
+
+@dataclass(frozen=True)
+class Mass(OfRobot):
+    """kg of a body."""
+
+    @property
+    def place(self) -> Hashable:
+        """See `Variable`."""
+        return "mass", self.body
+
+    def apply(self, value: Value, changes: Changes) -> None:
+        """See `Variable`."""
+        mass = changes.robot.mass
+        mass[self.body] = self.distribution.on(float(mass[self.body]), value)
+
+
+@dataclass(frozen=True)
+class InertiaScale(OfRobot):
+    """A factor of a body's whole inertia."""
+
+    @property
+    def place(self) -> Hashable:
+        """See `Variable`."""
+        return "inertia", self.body
+
+    def apply(self, value: Value, changes: Changes) -> None:
+        """See `Variable`."""
+        changes.robot.inertia[self.body] *= float(value)
+
+
+@dataclass(frozen=True)
+class InertiaSpread(OfRobot):
+    """One of the six numbers that spread a body's mass otherwise: three factors, three turns."""
+
+    number: int
+
+    @property
+    def place(self) -> Hashable:
+        """See `Variable`."""
+        return "inertia", self.body, self.number
+
+    def apply(self, value: Value, changes: Changes) -> None:
+        """See `Variable`."""
+        own = changes.robot.spreads[self.body]
+        if self.number < 3:
+            own.factors[self.number] = exp(float(value))
+        else:
+            own.turn[self.number - 3] = float(value) * (math.pi / 180.0)
+
+
+@dataclass(frozen=True)
+class CentreOfMass(OfRobot):
+    """m of a body's centre of mass along an axis of its frame."""
+
+    axis: int
+
+    @property
+    def place(self) -> Hashable:
+        """See `Variable`."""
+        return "com", self.body, self.axis
+
+    def apply(self, value: Value, changes: Changes) -> None:
+        """See `Variable`."""
+        com = changes.robot.com[self.body]
+        com[self.axis] = self.distribution.on(float(com[self.axis]), value)
+
+
+@dataclass(frozen=True)
+class OfJoint(OfRobot):
+    """A number of a joint: its friction, or its spring if it has no motor."""
+
+    field: str
+
+    @property
+    def place(self) -> Hashable:
+        """See `Variable`."""
+        return "joint", self.body, self.field
+
+    def apply(self, value: Value, changes: Changes) -> None:
+        """See `Variable`."""
+        robot, joint = changes.robot, self.body - 1
+        word, _, field = self.field.rpartition(".")
+        if word == "friction":
+            old = robot.friction[joint]
+            number = self.distribution.on(getattr(old, field), value)
+            robot.friction[joint] = old._replace(**{field: number})
+        else:
+            passive = joint - robot.nominal.n
+            spring = robot.springs[passive]
+            number = self.distribution.on(getattr(spring, field), value)
+            robot.springs[passive] = spring._replace(**{field: number})
+
+
+class SpreadFile(StrictModel):
+    """``{scale: 0.1, rotate_deg: 3}`` of an inertia."""
+
+    scale: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
+    """Standard deviation of the logarithms of the second moments' factors."""
+    rotate_deg: Annotated[float, Field(gt=0.0, le=30.0)] | None = None
+    """Standard deviation of the turn about each axis, degrees."""
+
+
+def robot_variables(
+    key: str, parts: list[Part], given: Any, where: str, robot: Robot
+) -> list[OfRobot]:
+    """Return the variables of ``robot.*``.
+
+    Args:
+        key: of ``vary``.
+        parts: the key's, behind ``robot``.
+        given: what stands there.
+        where: file and key, for errors.
+        robot: the nominal one.
+
+    Raises:
+        InputError: the robot has no such thing, or it cannot have such values.
+    """
+    group = one_of(parts[0].word if parts else "", ("base", "links", "joints"), "part of the robot")
+    what = ".".join(part.word for part in parts[1:])
+    allowed = OF_JOINTS if group == "joints" else OF_BODIES
+    one_of(what, allowed, f"number of robot.{group}{'' if group == 'base' else '[...]'}")
+    if group == "base":
+        if parts[0].element:
+            raise InputError(f"there is one base: robot.base.{what}")
+        bodies = [(0, "robot.base")]
+    else:
+        if not parts[0].element:
+            raise InputError(f"which of them: robot.{group}[*].{what}, or a name in the brackets")
+        names = robot.body_names[1:] if group == "links" else robot.all_joint_names
+        kind = group.rstrip("s")
+        bodies = [
+            (number + 1, f"robot.{group}[{name}]")
+            for number, name in _chosen(parts[0].element, names, robot, kind)
+        ]
+    if group != "joints" and parts[-1].element and what != "com":
+        raise InputError(f"{what} has no elements")
+    if group == "joints":
+        return [
+            _of_joint(f"{name}.{what}", key, given, where, robot, body, what)
+            for body, name in bodies
+        ]
+    if what == "com":
+        if not parts[-1].element:
+            raise InputError(f"along which axis: {key}[x], [y], [z] or [*]")
+        distribution = _number(given, where)
+        return [
+            CentreOfMass(f"{name}.com[{axis_name}]", key, distribution, body, axis)
+            for body, name in bodies
+            for axis, axis_name in chosen(parts[-1].element, XYZ, "axis")
+        ]
+    if what == "mass":
+        return [
+            Mass(f"{name}.mass", key, _positive(given, where, float(robot.mass[body])), body)
+            for body, name in bodies
+        ]
+    return [
+        variable
+        for body, name in bodies
+        for variable in _of_inertia(f"{name}.inertia", key, given, where, body)
+    ]
+
+
+def _chosen(element: str, names: tuple[str, ...], robot: Robot, what: str) -> list[tuple[int, str]]:
+    if element not in names and element in robot.all_joint_names:  # a link by its joint's name
+        return [(number := robot.all_joint_names.index(element), names[number])][:1]
+    return chosen(element, names, what)
+
+
+def _of_inertia(name: str, key: str, given: Any, where: str, body: int) -> list[OfRobot]:
+    if isinstance(given, dict) and {"scale", "rotate_deg"} & given.keys():
+        spread = validate(SpreadFile, given, where)
+        factors = [
+            InertiaSpread(
+                f"{name}.scale_{i + 1}", key, Normal(normal=0.0, sigma=spread.scale), body, i
+            )
+            for i in range(3) if spread.scale
+        ]  # fmt: skip
+        turns = [
+            InertiaSpread(
+                f"{name}.rotate_{XYZ[i]}", key, Normal(normal=0.0, sigma=spread.rotate_deg), body,
+                3 + i,
+            )
+            for i in range(3) if spread.rotate_deg
+        ]  # fmt: skip
+        return [*factors, *turns]
+    distribution = _positive(given, where, 1.0)
+    if not distribution.relative:
+        raise InputError(f"{where}: a factor of all of it needs relative: true")
+    return [InertiaScale(name, key, distribution, body)]
+
+
+def _of_joint(
+    name: str, key: str, given: Any, where: str, robot: Robot, body: int, what: str
+) -> OfRobot:
+    joint = body - 1
+    if what.startswith("friction"):
+        nominal = getattr(robot.friction[joint], what.partition(".")[2])
+        if np.isnan(nominal):
+            raise InputError(
+                f"the robot's file tells no friction of joint {robot.all_joint_names[joint]}, the "
+                f"case does: vary plant.{what}"
+            )
+    elif joint < robot.n:
+        raise InputError(f"joint {robot.all_joint_names[joint]} has a motor and no spring")
+    else:
+        nominal = getattr(robot.springs[joint - robot.n], what)
+    distribution = _number(given, where)
+    least = 0.0 if not distribution.offset else -nominal
+    return OfJoint(name, key, _at_least(distribution, least, where), body, what)
+
+
+def _number(given: Any, where: str) -> Distribution:
+    distribution = read_distribution(given, where)
+    if not distribution.is_number:
+        raise InputError(f"{where}: numbers are needed")
+    return distribution
+
+
+def _positive(given: Any, where: str, nominal: float) -> Distribution:
+    """Read the distribution of what must stay positive: a normal one is truncated."""
+    distribution = _number(given, where)
+    if distribution.relative:
+        least = LEAST
+    else:
+        least = (LEAST - 1.0) * nominal if distribution.offset else LEAST * nominal
+    return _at_least(distribution, least, where)
+
+
+def _at_least(distribution: Distribution, least: float, where: str) -> Distribution:
+    try:
+        return distribution.at_least(least)
+    except ValueError as error:
+        raise InputError(f"{where}: {' '.join(str(error).split())}") from None

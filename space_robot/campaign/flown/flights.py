@@ -1,0 +1,116 @@
+"""The flights of a campaign that are not in its journal yet, flown into it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from space_robot_msgs_py.config.text import one_line_of
+
+from ...flight.ending import FAILED
+from ...processes.pool import (
+    OutOfTimeError,
+    WorkerDiedError,
+    run_many,
+)
+from ..row.fly import RowFlyer
+from ..row.row import KILLED, OUT_OF_TIME, Row, Task
+from ..store.journal import Journal
+from .precision import Precision
+
+
+class Progress(NamedTuple):
+    """How far a campaign is."""
+
+    done: int
+    """Flights that have a row."""
+    total: int
+    """Flights that there are to be."""
+    kept: int
+    """Of those done: flown before, when the campaign was begun."""
+    failed: int
+    """Of those done: ended early, or have no flight at all."""
+
+
+class Flights:
+    """The flights of a campaign."""
+
+    def __init__(self, flyer: RowFlyer, runs: int, journal: Journal) -> None:
+        """Take what the journal has.
+
+        Args:
+            flyer: of the campaign's tasks.
+            runs: of the campaign.
+            journal: open.
+        """
+        self._flyer, self._runs, self._journal = flyer, runs, journal
+        self._laws = flyer.study.laws
+        self._done = np.zeros((runs, len(self._laws)), bool)
+        self._failed = 0
+        self.precision = Precision(flyer.study, runs, flyer.draws.grid)
+        for row in journal.rows(runs):
+            if row.is_final:  # what chance or the machine had a part in is tried again
+                self._count(row)
+        self.kept = int(self._done.sum())
+        """Flights that were in the journal."""
+
+    @property
+    def count(self) -> int:
+        """Flights that there are to be."""
+        return self.precision.stop * len(self._laws)
+
+    def missing(self) -> Iterator[Task]:
+        """Yield what is to be flown yet, in order, until the precision is reached."""
+        for run in range(self._runs):
+            if run >= self.precision.stop:
+                return
+            for number in np.flatnonzero(~self._done[run]):
+                yield Task(run, self._laws[number])
+
+    @property
+    def are_complete(self) -> bool:
+        """True if there is nothing left to fly."""
+        return next(self.missing(), None) is None
+
+    def fly(self, on_progress: Callable[[Progress], object], options: Mapping[str, Any]) -> None:
+        """Fly what is missing; each row is in the journal as soon as it is there.
+
+        Args:
+            on_progress: told at the beginning and after every flight.
+            options: of `run_many`.
+
+        Raises:
+            InputError: the journal cannot be written, or the scheduler is not there.
+        """
+        done = run_many(self._flyer, self.missing(), **options)
+        with closing(done):
+            on_progress(self._progress)
+            for result in done:
+                row = result.result or self._unflown(result.item, result.error)
+                self._journal.add(row)
+                self._count(row)
+                on_progress(self._progress)
+                if self.precision.is_reached and self.are_complete:
+                    return
+
+    def _unflown(self, task: Task, error: Exception | None) -> Row:
+        """Return the row of a flight whose process brought none."""
+        vary = self._flyer.draws.values(task.run)
+        if isinstance(error, (WorkerDiedError, OutOfTimeError)):
+            outcome = KILLED if isinstance(error, WorkerDiedError) else OUT_OF_TIME
+            return Row(task, outcome, str(error), vary=vary)
+        assert error is not None
+        return Row(task, FAILED, one_line_of(error), vary=vary).digested()
+
+    def _count(self, row: Row) -> None:
+        self.precision.add(row)
+        self._done[row.task.run, self._laws.index(row.task.law)] = True
+        self._failed += not row.is_complete
+
+    @property
+    def _progress(self) -> Progress:
+        done, total = int(self._done[: self.precision.stop].sum()), self.count
+        return Progress(done, total, min(self.kept, total), self._failed)

@@ -1,0 +1,138 @@
+"""A campaign that was flown: its table, its verdicts, and any of its flights again."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from typing_extensions import Self
+
+from space_robot_msgs_py.bag.blocks import blocks_of
+from space_robot_msgs_py.config.arguments import as_path
+from space_robot_msgs_py.config.validation import one_of, validate
+from space_robot_msgs_py.errors import InputError
+
+from ...api.in_process import fly_in_process
+from ..row.fly import RowFlyer
+from ..row.row import Task
+from ..store.folder import MANIFEST, STUDY, TABLE, study_changes
+from ..store.manifest import Manifest, read_manifest
+from ..store.software import software
+from ..store.table import check_table, read_table
+from ..study import Study
+from ..verdicts.requirements import Verdict, verdicts
+from .again import FlownAgain
+from .trust import check_study
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+
+class FlownCampaign:
+    """What is in a campaign's folder."""
+
+    def __init__(
+        self, folder: Path, trust: bool = False,
+        temporary: TemporaryDirectory[str] | None = None, kept: int = 0,
+    ) -> None:  # fmt: skip
+        """Read the folder's manifest.
+
+        Args:
+            folder: of the campaign.
+            trust: see `open`.
+            temporary: the same, if it is to go with this object.
+            kept: flights that were there when it was flown on.
+
+        Raises:
+            InputError: no campaign is there, or its manifest is damaged.
+        """
+        if not (folder / MANIFEST).is_file():
+            raise InputError(f"{folder}: is no campaign's folder (it has no {MANIFEST})")
+        self.folder, self.kept, self._trust, self._temporary = folder, kept, trust, temporary
+        self.manifest: Manifest = read_manifest(folder / MANIFEST)
+
+    @classmethod
+    def open(cls, folder: str | Path, trust: bool = False) -> Self:
+        """Return the campaign that was flown into a folder, to its end or not.
+
+        Args:
+            folder: of the campaign; it may be anybody's.
+            trust: let `rerun` import the ``module:Class`` and read the files that it names.
+
+        Raises:
+            InputError: no campaign is there, or its manifest is damaged.
+        """
+        return cls(as_path(folder, "folder"), trust)
+
+    @property
+    def seed(self) -> int:
+        """Of all draws."""
+        return self.manifest.seed
+
+    @property
+    def runs(self) -> int:
+        """Runs that were asked for; fewer may be in the table."""
+        return self.manifest.runs
+
+    @cached_property
+    def study(self) -> Study:
+        """The study that was flown, whatever ``campaign.yaml`` says by now."""
+        where = str(self.folder / MANIFEST)
+        return validate(Study, self.manifest.study, f"{where}: study").named(where)
+
+    @property
+    def study_changes(self) -> str:
+        """How ``campaign.yaml`` differs from the study that was flown, in a line; or empty."""
+        return study_changes(self.folder / STUDY, self.study.content)
+
+    @cached_property
+    def table(self) -> DataFrame:
+        """All rows: a flight each, by run, then by law.
+
+        Raises:
+            InputError: it cannot be read, or is damaged.
+        """
+        check_table(self.folder / TABLE, self.manifest.campaign)
+        return read_table(self.folder / TABLE, self.manifest.table)
+
+    @cached_property
+    def verdicts(self) -> list[Verdict]:
+        """What the table says about each requirement, law by law."""
+        return verdicts(self.table, self.study, self.runs, list(self.manifest.table.grid))
+
+    def rerun(self, run: int, law: str | None = None, bag: str | Path | None = None) -> FlownAgain:
+        """Fly a row's flight again, to the same bits, with its whole log.
+
+        Args:
+            run: number of the run.
+            law: as the campaign's file has it; None: its first.
+            bag: folder to record to, which must not be there yet.
+
+        Raises:
+            InputError: there is no such row, or its draws make no flight.
+            NotTrustedError: the campaign names a module or a file, and is not trusted, see `open`.
+        """
+        if not self._trust:
+            check_study(self.study)
+        task = Task(run, one_of(law or self.study.laws[0], self.study.laws, "law"))
+        table = self.table
+        rows = table[(table["run"] == task.run) & (table["law"] == task.law)]
+        if rows.empty:
+            raise InputError(f"run {run}: {self.folder} has no row of it under {task.law}")
+        flyer = RowFlyer.of(self.study, self.seed, self.runs)
+        flight = flyer.draws.scenario(task.run, task.law).check()
+        flown = fly_in_process(flight, None if bag is None else Path(bag))
+        row = flyer.row_of_log(task, flight, flown.ending, blocks_of(flown.log))
+        return FlownAgain(
+            flown, task, row.digest, rows.iloc[0]["digest"],
+            [
+                f"{name} {then or 'none'}, now {software()[name] or 'none'}"
+                for name, then in self.manifest.software.items() if then != software().get(name)
+            ],
+        )  # fmt: skip
+
+    def __repr__(self) -> str:
+        laws = ", ".join(self.study.laws)
+        return f"<FlownCampaign: {self.folder}, {len(self.table)} flights of {laws}>"

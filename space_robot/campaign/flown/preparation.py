@@ -1,0 +1,97 @@
+"""A campaign before it flies: all that can be checked is, and its folder's manifest is made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from space_robot_msgs_py.errors import InputError
+
+from ...flight.compilation import compile_kernels
+from ...flight.plan import Flight
+from ...processes.software import commit
+from ..row.bands import BINS
+from ..row.columns import Columns
+from ..row.fly import RowFlyer
+from ..row.measure import check_requirements
+from ..store.manifest import Manifest
+from ..store.schema import Schema
+from ..store.software import file_digests, flight_digest, software
+from ..study import Study
+
+ACTUATORS = "actuators"
+"""What the name of a variable that chooses the base's actuators ends with."""
+
+
+@dataclass(frozen=True)
+class Preparation:
+    """A study with its seed and the number of its runs."""
+
+    study: Study
+    seed: int
+    runs: int
+
+    @classmethod
+    def of(cls, study: Study, seed: int, runs: int | None) -> Preparation:
+        """Take what is asked for; ``runs``: None: what the file says.
+
+        Raises:
+            InputError: nobody says how many runs there are; or the seed is negative.
+        """
+        if seed < 0:
+            raise InputError(f"seed: 0 or more is allowed, got {seed}")
+        asked = study.runs_asked(runs)
+        return cls(study, seed, min(asked, study.until.runs) if study.until else asked)
+
+    @cached_property
+    def flyer(self) -> RowFlyer:
+        """What flies each task."""
+        return RowFlyer.of(self.study, self.seed, self.runs)
+
+    @cached_property
+    def flights(self) -> dict[str, Flight]:
+        """The nominal flight of each law.
+
+        Raises:
+            InputError: one of them cannot be flown.
+        """
+        draws = self.flyer.draws
+        return {law: draws.nominal(law).check() for law in self.study.laws}
+
+    @cached_property
+    def manifest(self) -> Manifest:
+        """What the folder is to say of it.
+
+        Raises:
+            InputError: something cannot be flown or required.
+        """
+        where = self.study.where
+        for flight in self.flights.values():
+            check_requirements(flight, self.study.require, where)
+        if self.study.require:
+            for option, flight in self.flyer.draws.flights_of_options():
+                check_requirements(flight, self.study.require, where, option)
+        study = self.study.content
+        return Manifest(
+            seed=self.seed, runs=self.runs, study=study,
+            software=software(), commit=commit(), files=file_digests(study),
+            flights={law: flight_digest(flight) for law, flight in self.flights.items()},
+            table=self._schema(),
+        )  # fmt: skip
+
+    def compile(self) -> None:
+        """Compile what the flights need once, before there are several processes to do so."""
+        has_hardware = any(flight.plant.names.actuators for flight in self.flights.values())
+        is_varied = any(name.endswith(ACTUATORS) for name in self.flyer.draws.names)
+        compile_kernels(has_hardware or is_varied)
+
+    def _schema(self) -> Schema:
+        nominal = next(iter(self.flights.values()))
+        columns, draws = Columns.of_flight(nominal), self.flyer.draws
+        first = draws.values(0)
+        return Schema(
+            vary={n: "str" if isinstance(first[n], str) else "float64" for n in draws.names},
+            grid=draws.grid,
+            metrics=list(columns.metrics), require=list(self.study.require),
+            bands=list(columns.names), bins=min(BINS, nominal.ticks),
+        )  # fmt: skip

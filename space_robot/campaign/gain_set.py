@@ -1,0 +1,79 @@
+"""A gain set made for a robot and a mission: from options to files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from space_robot_model.dynamics.attitude import SINGULAR_ETA
+from space_robot_model.elementary.matrices import norm
+from space_robot_msgs_py.config.validation import validate
+from space_robot_msgs_py.errors import InputError
+from space_robot_sim.environment.payload import with_payload
+
+from ..console.files import (
+    make_folder,
+    whole_file,
+)
+from ..flight.plan import FlightPlan
+from ..scenario.node_settings import FlightSettings
+from ..scenario.robots import Robots
+from ..tuning.demand import demand
+from ..tuning.gain_file import gain_files
+from ..tuning.inertia import inertia_along
+from ..tuning.method import Tuned, Wishes, tune
+from ..tuning.noise import listen
+
+
+def tuned_set(
+    options: Mapping[str, Any], cases: Sequence[str], wishes: Wishes, step: Callable[[str], None]
+) -> Tuned:
+    """Make the set.
+
+    Args:
+        options: of a `FlightPlan`: robot (the nominal one), mission, sensors, navigation.
+        cases: names or paths of the environments to be flown in.
+        wishes: of the user.
+        step: told what is being done.
+
+    Raises:
+        InputError: something named is not there, or the wishes do not go together.
+    """
+    plans = [validate(FlightPlan, {**options, "case": case}, "options") for case in cases]
+    settings = [FlightSettings.resolve(plan.options(), plan.parameters) for plan in plans]
+    nominal, reference = Robots(settings[0], plans[0].robot).plant, settings[0].mission
+    eta = reference.base_quaternion[0] / norm(reference.base_quaternion)
+    if abs(eta) <= SINGULAR_ETA:
+        raise InputError("base_quaternion: turned by 180 degrees, where the laws are singular")
+    if len(reference.waypoint_times) < 2:
+        raise InputError("the mission has a single waypoint: there is nothing to tune for")
+    inertias = []
+    for case, own in zip(cases, settings, strict=True):
+        step(f"inertia, case {case}")
+        loaded = with_payload(nominal, own.plant.payload)
+        inertias.append(inertia_along(loaded, reference))
+    step("forces along the mission")
+    asked = demand(nominal, reference, [own.plant for own in settings])
+    plant, navigation, noise = settings[0].plant, settings[0].controller.filter_settings, None
+    if plant.sensors != "ideal" or navigation:
+        step("noise of the sensors")
+        noise = listen(nominal, plant, navigation, reference, plant.period)
+    return tune(np.concatenate(inertias), asked, wishes, plant.period, noise)
+
+
+def write_set(tuned: Tuned, command: str, folder: Path) -> list[Path]:
+    """Write the files of a set.
+
+    Raises:
+        InputError: the folder cannot be made or written.
+    """
+    make_folder(folder)
+    paths = []
+    for name, text in gain_files(tuned, command).items():
+        with whole_file(folder / name, replace=True) as file:
+            file.write(text.encode())
+        paths.append(folder / name)
+    return paths

@@ -1,0 +1,122 @@
+"""Makes the folder of a new robot, and flies all laws with what is in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from space_robot_control.controller.settings import DEFAULT_SETS
+from space_robot_control.guidance.mission import MissionSettings
+from space_robot_control.laws import laws
+from space_robot_model.robot import Robot
+from space_robot_model.robot.find import (
+    OWN_GAINS,
+    OWN_MISSION,
+)
+from space_robot_msgs_py.errors import FlightError
+
+from ...analysis import Analysis
+from ...flight.plan import Flight, FlightPlan
+from ...flight.simulate import fly_blocks
+from ...processes.pool import (
+    cores,
+    run_all,
+)
+from ...tuning.method import Wishes
+from ...tuning.warning import estimate_remark
+from ..gain_set import tuned_set, write_set
+from .folder import whole_folder
+from .hinges import hinge_remark
+from .motion import mission_text, rest_to_rest
+
+SET, CASE = "tuned", "1"
+"""The gain set that is made, and the environment that it is made for and flown in."""
+WISHES = Wishes(margin=0.05, mass_uncertainty=0.2)
+"""Those of ``gains tune``."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A law's flight."""
+
+    rms: dict[str, float]
+    """Of attitude and joint errors and torques, mean over the axes; empty if it failed."""
+    failure: str
+    """Why it ended early; empty if it did not."""
+
+
+@dataclass(frozen=True)
+class NewRobot:
+    """What was made, and how it flew."""
+
+    folder: Path
+    robot: Robot
+    mission: MissionSettings
+    flights: dict[str, Outcome]
+    """By law."""
+    remarks: tuple[str, ...] = ()
+    """Why laws are weak, which joints may be passive; a sentence or more each."""
+
+    def report(self) -> dict[str, Any]:
+        """Return it as data for JSON."""
+        return {
+            "folder": str(self.folder),
+            "robot": self.robot.name,
+            "joints": list(self.robot.joint_names),
+            "passive_joints": list(self.robot.passive_names),
+            "repaired": list(self.robot.repairs),
+            "remarks": list(self.remarks),
+            "duration": self.mission.waypoint_times[-1],
+            "laws": {
+                law: {"failure": flown.failure} if flown.failure else {"rms": flown.rms}
+                for law, flown in self.flights.items()
+            },
+        }
+
+
+def make_robot(
+    files: Mapping[str, str], robot: Robot, folder: Path, command: str,
+    step: Callable[[str], None] = lambda text: None,
+) -> NewRobot:  # fmt: skip
+    """Make the folder of a robot and fly every law once with what is in it.
+
+    Args:
+        files: texts of the files that tell the robot, by name, see `robot_texts`.
+        robot: that they tell.
+        folder: to be made, or replaced, see `check_replaceable`; nothing of it is left if anything
+            fails but a flight.
+        command: what makes it, for the files.
+        step: told what is being done.
+
+    Raises:
+        InputError: no mission can be made, or the folder cannot be written.
+    """
+    with whole_folder(folder) as place:
+        for name, text in files.items():
+            (place / name).write_text(text, "utf-8")
+        step("mission")
+        mission = rest_to_rest(robot)
+        (place / OWN_MISSION).write_text(mission_text(robot, mission, command), "utf-8")
+        tuned = tuned_set({"robot": str(place)}, [CASE], WISHES, step)
+        write_set(tuned, command, place / OWN_GAINS / SET)
+        default = "".join(f"{law}: {SET}\n" for law in tuned.gains)
+        (place / OWN_GAINS / DEFAULT_SETS).write_text(f"# The set of each law.\n{default}", "utf-8")
+        names = sorted(laws())
+        step(f"flying {', '.join(names)}")
+        outcomes = run_all(partial(_fly, place), names, cores())
+    remarks = tuple(filter(None, (estimate_remark(tuned), hinge_remark(robot))))
+    return NewRobot(folder, robot, mission, dict(zip(names, outcomes, strict=True)), remarks)
+
+
+def _fly(folder: Path, law: str) -> Outcome:
+    flight = Flight(FlightPlan(controller=law, robot=str(folder), case=CASE))
+    analysis = Analysis()
+    try:
+        for block in fly_blocks(flight):
+            analysis.add(block)
+    except FlightError as error:
+        return Outcome({}, str(error))
+    return Outcome(dict(analysis.report()["rms"]["mean_axis"]), "")

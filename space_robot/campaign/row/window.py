@@ -1,0 +1,118 @@
+"""Metrics of the ticks within a window of time, summed up block by block; only those wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.bag.flight_log import FlightLog
+
+from ...analysis.metrics import AxisRms
+from ...analysis.ripple import Ripple
+from .columns import FAST_RIPPLE, RIPPLE, Columns, missing_for_ripple
+
+Array = NDArray[np.float64]
+
+
+class Window(NamedTuple):
+    """Some seconds of a flight; both ends belong to it."""
+
+    from_s: float = 0.0
+    to_s: float | None = None
+    """None: to the end of the flight."""
+
+    def ticks(self, ticks: int, period: float) -> range:
+        """Return the ticks of a flight of so many that are within.
+
+        Args:
+            ticks: of the flight.
+            period: s.
+        """
+        start, stop = int(np.ceil(self.from_s / period - 1e-6)), ticks
+        if self.to_s is not None:
+            stop = int(np.floor(self.to_s / period + 1e-6)) + 1
+        return range(min(max(start, 0), ticks), min(max(stop, 0), ticks))
+
+    def rows(self, log: FlightLog) -> slice:
+        """Return the rows of a block that are within."""
+        first = log.first_tick
+        within = self.ticks(first + log.ticks, log.timebase.period)
+        return slice(max(within.start - first, 0), max(within.stop - first, 0))
+
+
+class WindowMetrics:
+    """Sums up the wanted metrics of a window of one flight."""
+
+    def __init__(self, window: Window, wanted: Collection[str], columns: Columns) -> None:
+        """Begin without rows.
+
+        Args:
+            window: of the flight.
+            wanted: names of metrics.
+            columns: of the flight.
+        """
+        self._window, self._wanted, self._columns = window, wanted, columns
+        self._rms: tuple[AxisRms, AxisRms] | None = None
+        self._largest: dict[str, float] = {}
+        self._ripple: Ripple | None = None
+        self._ticks, self._period = 0, 0.0
+        self._has_ripple = any(name.startswith((RIPPLE, FAST_RIPPLE)) for name in wanted)
+        self._has_rms = any(name.endswith("_rms") for name in wanted)
+
+    def add(self, log: FlightLog, error: Array, sizes: dict[str, Array], robot: Robot) -> None:
+        """Take the next block.
+
+        Args:
+            log: its rows.
+            error: (N, n+3) their tracking error.
+            sizes: of its columns, see `Columns.sizes`.
+            robot: that was flown.
+        """
+        rows = self._window.rows(log)
+        if rows.start >= rows.stop:
+            return
+        if rows.stop - rows.start < log.ticks:
+            log, error = log.rows(rows.start, rows.stop), error[rows]
+        if self._has_rms:
+            self._rms = self._rms or (AxisRms(log.axes), AxisRms(log.axes))
+            for rms, values in zip(self._rms, (error, log.applied_torque), strict=True):
+                rms.add(values)
+        for name, size in sizes.items():
+            if f"{name}_max" in self._wanted:
+                self._largest[name] = max(
+                    self._largest.get(name, 0.0), float(np.max(size[rows], initial=0.0))
+                )
+        if self._has_ripple:
+            self._ripple = self._ripple or Ripple(log, robot)
+            self._ripple.add(log, error)
+            self._ticks += log.ticks
+            self._period = log.timebase.period
+
+    def result(self) -> dict[str, float]:
+        """Return the metrics that this flight has, by name."""
+        found = {f"{name}_max": value for name, value in self._largest.items()} | self._ripples()
+        if self._rms:
+            both = self._columns.errors, self._columns.torques
+            for rms, columns in zip(self._rms, both, strict=True):
+                values = rms.value
+                found |= {f"{name}_rms": float(np.mean(values[ax])) for name, ax in columns.items()}
+        return {name: found[name] for name in self._wanted if np.isfinite(found.get(name, np.nan))}
+
+    def _ripples(self) -> dict[str, float]:
+        if self._ripple is None or missing_for_ripple(RIPPLE, self._ticks, self._period):
+            return {}
+        ripple = self._ripple.result()
+        values = {
+            f"{prefix}{name}": value
+            for prefix, bands in ((RIPPLE, ripple), (FAST_RIPPLE, ripple["fast"]))
+            for name, value in bands["rms"].items()
+        }
+        return {
+            name: value
+            for name, value in values.items()
+            if not missing_for_ripple(name, self._ticks, self._period)
+        }

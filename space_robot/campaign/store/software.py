@@ -1,0 +1,90 @@
+"""What a campaign was flown with: versions, sources, and the files that its own file names."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from space_robot_control.laws.law_file import law_file
+
+from ...flight.plan import Flight
+from ...processes.software import versions
+
+DECIDE = ("python", "space_robot", "numpy", "scipy", "numba", "llvmlite")
+"""Packages whose version may change the bits of a row."""
+OF_TABLES = "pyarrow"
+"""The package that makes the table's bytes."""
+SUFFIXES = (".yaml", ".yml", ".urdf", ".xacro", ".py")
+"""Of files that a campaign's file may name."""
+ROOT = Path(__file__).resolve().parents[3]
+"""Of the project's packages."""
+
+
+@cache
+def software() -> dict[str, str | None]:
+    """Return the versions of all that makes the bytes of a table, and a digest of the sources."""
+    known = versions()
+    try:
+        tables: str | None = version(OF_TABLES)
+    except PackageNotFoundError:
+        tables = None
+    found = {name: known[name] for name in DECIDE}
+    return {**found, OF_TABLES: tables, "sources": source_digest(ROOT)}
+
+
+def file_digests(values: Any) -> dict[str, str]:
+    """Return the digest of every file that is named anywhere in a file's content, by its name."""
+    names = {str(law_file(text.partition("=")[0]) or text) for text in texts_of(values)}
+    return {
+        name: digest(Path(name).read_bytes())
+        for name in sorted(names)
+        if name.endswith(SUFFIXES) and "\0" not in name and Path(name).is_file()
+    }
+
+
+def flight_digest(flight: Flight) -> str:
+    """Return a digest of all that a flight's description says, the numbers of its files included.
+
+    The software, which is told apart from it, is left out.
+    """
+    told = {k: v for k, v in flight.description.items() if k not in ("versions", "commit")}
+    return digest(json.dumps(told, sort_keys=True, default=str).encode())
+
+
+def digest(data: bytes) -> str:
+    """Return 32 hexadecimal digits of SHA-256."""
+    return hashlib.sha256(data).hexdigest()[:32]
+
+
+def source_digest(root: Path) -> str:
+    """Return a digest of the project's Python files below ``root``, by their places in it."""
+    packages = (
+        "space_robot_msgs_py",
+        "space_robot_model",
+        "space_robot_sim",
+        "space_robot_control",
+        "space_robot",
+    )
+    files = sorted(file for name in packages for file in (root / name).rglob("*.py"))
+    whole = hashlib.sha256()
+    for file in files:
+        whole.update(f"{file.relative_to(root)}\0".encode() + file.read_bytes() + b"\0")
+    return whole.hexdigest()[:32]
+
+
+def texts_of(value: Any) -> Iterator[str]:
+    """Yield all texts in a file's content, the keys of its mappings included."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, dict):
+        for key, inner in value.items():
+            yield from texts_of(key)
+            yield from texts_of(inner)
+    elif isinstance(value, list):
+        for inner in value:
+            yield from texts_of(inner)

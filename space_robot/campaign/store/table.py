@@ -1,0 +1,174 @@
+"""The table of a campaign as Parquet: the same rows give the same bytes.
+
+Beside it stands its digest, with the campaign's; ``sha256sum -c`` reads it, too.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from space_robot_msgs_py.errors import InputError
+
+from ...console.files import whole_file
+from ..row.row import Row
+from .schema import Kind, Schema
+
+if TYPE_CHECKING:
+    import pyarrow
+    from pandas import DataFrame
+
+ROW_GROUP = 2000
+"""Rows that are in memory at a time."""
+SHA256 = ".sha256"
+"""What the name of a table's digest ends with."""
+
+
+def check_tables() -> None:
+    """See that tables can be written, before anything is flown for one.
+
+    Raises:
+        InputError: a package is not installed.
+    """
+    try:
+        import pandas  # noqa: F401
+        import pyarrow.parquet  # noqa: F401
+    except ImportError as error:
+        raise InputError(
+            f"a campaign's table needs {error.name}: pip install 'space_robot[campaign]'"
+        ) from None
+
+
+def write_table(path: Path, schema: Schema, campaign: str, rows: Iterable[Row]) -> str:
+    """Write the rows, whole or not at all, over an older table, and beside it the digest.
+
+    Args:
+        path: of the file.
+        schema: its columns.
+        campaign: see `Manifest.campaign`.
+        rows: in their order; a few of them are in memory at a time.
+
+    Returns:
+        The digest of the file, see `file_digest`.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    from pyarrow.parquet import ParquetWriter
+
+    columns = _arrow_schema(schema)
+    remaining = iter(rows)
+    with (
+        whole_file(path, replace=True) as file,
+        ParquetWriter(
+            file, columns, version="2.6", compression="zstd", compression_level=3,
+            data_page_version="1.0", store_schema=False,
+        ) as writer,
+    ):  # fmt: skip
+        while group := list(itertools.islice(remaining, ROW_GROUP)):
+            writer.write_batch(_batch(group, schema, columns), row_group_size=ROW_GROUP)
+    digest = file_digest(path)
+    with whole_file(_digest_of(path), replace=True) as file:
+        file.write(_digest_text(path, campaign, digest).encode())
+    return digest
+
+
+def check_table(path: Path, campaign: str) -> None:
+    """See that a table is as it was written, and of a campaign.
+
+    Raises:
+        InputError: it is not, or is missing.
+    """
+    check_there(path)
+    digest = _digest_of(path)
+    with suppress(OSError, UnicodeDecodeError):
+        if digest.read_text("utf-8") == _digest_text(path, campaign, file_digest(path)):
+            return
+    raise InputError(
+        f"{path}: damaged, or of another campaign: does not have the digest in {digest.name}"
+    )
+
+
+def check_there(path: Path) -> None:
+    """See that a table was written.
+
+    Raises:
+        InputError: it was not.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file: the campaign has no table yet")
+
+
+def read_table(path: Path, schema: Schema) -> DataFrame:
+    """Read a table as a data frame.
+
+    Args:
+        path: of the file, see `check_table`.
+        schema: its columns.
+
+    Raises:
+        InputError: it is not there, cannot be read, or has other columns.
+    """
+    check_tables()
+    from pandas import read_parquet
+    from pyarrow import ArrowException
+
+    check_there(path)
+    try:
+        found: DataFrame = read_parquet(path, engine="pyarrow")
+    except (OSError, ValueError, ArrowException) as error:
+        raise InputError(f"{path}: cannot be read ({' '.join(str(error).split())})") from None
+    if list(found) != [name for name, _ in schema.columns()]:
+        raise InputError(f"{path}: damaged: its columns are not those of the campaign")
+    return found
+
+
+def table_rows(path: Path, schema: Schema) -> Iterator[Row]:
+    """Yield the rows of an undamaged table, with all their digits."""
+    from pyarrow.parquet import ParquetFile
+
+    for batch in ParquetFile(path).iter_batches(ROW_GROUP):
+        yield from map(schema.row, batch.to_pylist())
+
+
+def file_digest(path: Path) -> str:
+    """Return the SHA-256 of a file; empty if there is none."""
+    if not path.is_file():
+        return ""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while part := file.read(2**20):
+            digest.update(part)
+    return digest.hexdigest()
+
+
+def _digest_of(path: Path) -> Path:
+    return path.with_name(path.name + SHA256)
+
+
+def _digest_text(path: Path, campaign: str, digest: str) -> str:
+    return f"# campaign {campaign}\n{digest}  {path.name}\n"
+
+
+def _arrow_schema(schema: Schema) -> pyarrow.Schema:
+    import pyarrow
+
+    kinds: dict[Kind, Any] = {
+        "int64": pyarrow.int64(), "float64": pyarrow.float64(), "str": pyarrow.string(),
+        "float32s": pyarrow.list_(pyarrow.float32()),
+    }  # fmt: skip
+    return pyarrow.schema([(name, kinds[kind]) for name, kind in schema.columns()])
+
+
+def _batch(rows: list[Row], schema: Schema, columns: pyarrow.Schema) -> pyarrow.RecordBatch:
+    import pyarrow
+
+    values = zip(*(schema.values(row) for row in rows), strict=True)
+    return pyarrow.record_batch(
+        [pyarrow.array(v, field.type) for v, field in zip(values, columns, strict=True)],
+        schema=columns,
+    )

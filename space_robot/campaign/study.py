@@ -1,0 +1,226 @@
+"""The file of a campaign: what is flown, what is varied, what is required of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
+from typing_extensions import Self
+
+from space_robot_msgs_py.config.arguments import path_text
+from space_robot_msgs_py.config.choices import choices
+from space_robot_msgs_py.config.files import named_file
+from space_robot_msgs_py.config.validation import StrictModel, read_yaml, short, validate
+from space_robot_msgs_py.errors import InputError
+
+from ..api.scenario import OF_THE_GRAPH
+from ..scenario.options import FlightPlan
+
+Design = Literal["independent", "latin_hypercube", "sobol", "saltelli"]
+NOT_TO_BE_EXTENDED = ("latin_hypercube", "saltelli")
+"""Designs in which every run depends on how many there are."""
+MOST_RUNS = 10_000_000
+OF_THE_CAMPAIGN = {
+    "controller": "name laws",
+    "seed": "each run has its own, of the campaign's --seed",
+    "plant_robot": "vary robot.*",
+    "compression": "a campaign's bags have the recorder's own",
+    "split_size": "a campaign's bags have the recorder's own",
+    **dict.fromkeys(OF_THE_GRAPH, "only a graph of nodes has it"),
+}
+"""Options of a flight that the campaign itself gives, and what to do instead."""
+
+
+class Law(NamedTuple):
+    """A control law with a gain set."""
+
+    controller: str
+    gains: str
+
+    @classmethod
+    def parse(cls, text: str) -> Law:
+        """From ``LAW`` or ``LAW=GAINS``."""
+        controller, _, gains = text.partition("=")
+        return cls(controller, gains or "default")
+
+    @property
+    def title(self) -> str:
+        """For a person."""
+        return f"{self.controller}, {self.gains.rstrip('/').rpartition('/')[2]}"
+
+
+def short_names(laws: Sequence[str]) -> dict[str, str]:
+    """Return what tables call each law: without its gain set, if all laws have the same."""
+    sets = {Law.parse(law).gains for law in laws}
+    return {law: Law.parse(law).controller if len(sets) == 1 else law for law in laws}
+
+
+class Requirement(StrictModel):
+    """A metric, in a window of time, that a share of all runs must keep below or above a bound."""
+
+    metric: Annotated[str, Field(min_length=1)]
+    from_s: Annotated[float, Field(ge=0.0)] = 0.0
+    to_s: float | None = None
+    """None: to the end of the flight."""
+    below: float | None = None
+    above: float | None = None
+    share: Annotated[float, Field(gt=0.0, lt=1.0, alias="in")]
+    """Of the runs that must meet it."""
+    confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.9
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> Self:
+        if (self.below is None) is (self.above is None):
+            raise ValueError("either below or above is needed, and not both")
+        if self.to_s is not None and not self.from_s < self.to_s:
+            raise ValueError(f"to_s must be later than from_s ({self.from_s:g} s)")
+        return self
+
+    @property
+    def bound(self) -> float:
+        """What the metric must be below or above."""
+        bound = self.above if self.below is None else self.below
+        assert bound is not None
+        return bound
+
+    @property
+    def sign(self) -> float:
+        """1 if more of the metric is worse, -1 if less is."""
+        return 1.0 if self.above is None else -1.0
+
+    def is_met(self, value: float) -> bool:
+        """Tell whether a flight's value meets the bound; NaN does not."""
+        return self.sign * value < self.sign * self.bound
+
+
+class Keep(StrictModel):
+    """What is kept of each flight beside its row."""
+
+    bag: Literal["never", "on_failure", "always"] = "never"
+
+
+class Until(StrictModel):
+    """When to stop: at a precision of every requirement's share, or after so many runs."""
+
+    half_width: Annotated[float, Field(gt=0.0, lt=0.5)]
+    """Of the confidence interval of the share."""
+    runs: Annotated[int, Field(ge=1, le=MOST_RUNS)]
+
+
+class Study(StrictModel):
+    """A campaign's file."""
+
+    scenario: dict[str, Any] = Field(default_factory=dict)
+    """Options of `Scenario`; those of `OF_THE_CAMPAIGN` are its own."""
+    laws: Annotated[list[str], Field(min_length=1)]
+    """Each as ``LAW`` or ``LAW=GAINS``."""
+    vary: dict[str, Any] = Field(default_factory=dict)
+    """See `space_robot.campaign.draws`."""
+    require: dict[str, Requirement] = Field(default_factory=dict)
+    keep: Keep = Keep()
+    until: Until | None = None
+    design: Design = "independent"
+    runs: Annotated[int, Field(ge=1, le=MOST_RUNS)] | None = None
+    fixed_runs: bool = False
+    """The number of runs is chosen before the first one flies: none can be added, and verdicts are
+    reached once, after the last. Otherwise they hold whenever one looks, and need more runs."""
+
+    _where: str = PrivateAttr("campaign")
+
+    @property
+    def where(self) -> str:
+        """The name of the file, for errors."""
+        return self._where
+
+    @field_validator("scenario", mode="after")
+    @classmethod
+    def _are_options(cls, scenario: dict[str, Any]) -> dict[str, Any]:
+        for name in scenario:
+            check_option(name)
+        return scenario
+
+    @field_validator("laws", mode="after")
+    @classmethod
+    def _differ(cls, laws: list[str]) -> list[str]:
+        for law in laws:
+            if not Law.parse(law).controller or law.endswith("="):
+                raise ValueError(f"LAW or LAW=GAINS was expected, got {short(law)}")
+        if len({Law.parse(law) for law in laws}) < len(laws):
+            raise ValueError("the same law twice")
+        return laws
+
+    @field_validator("until", mode="after")
+    @classmethod
+    def _needs_require(cls, until: Until | None, info: ValidationInfo) -> Until | None:
+        if until and not info.data.get("require"):
+            raise ValueError("stops at a precision of what is required: there is no require")
+        return until
+
+    @field_validator("design", mode="after")
+    @classmethod
+    def _can_stop_early(cls, design: Design, info: ValidationInfo) -> Design:
+        if info.data.get("until") and design in NOT_TO_BE_EXTENDED:
+            raise ValueError("is whole only with all runs, and cannot stop early: leave out until")
+        return design
+
+    @field_validator("fixed_runs", mode="after")
+    @classmethod
+    def _cannot_stop_early(cls, fixed_runs: bool, info: ValidationInfo) -> bool:
+        if fixed_runs and info.data.get("until"):
+            raise ValueError("until chooses the number of runs: leave one of them out")
+        return fixed_runs
+
+    @property
+    def has_fixed_runs(self) -> bool:
+        """True if no runs can be added to those that a campaign was begun with."""
+        return self.fixed_runs or self.design in NOT_TO_BE_EXTENDED
+
+    def runs_asked(self, runs: int | None = None) -> int:
+        """Return how many runs are to be flown: ``runs`` if given, else what the file says.
+
+        Raises:
+            InputError: neither says it.
+        """
+        found = runs or self.runs or (self.until and self.until.runs)
+        if not found:
+            raise InputError(f"{self.where}: runs: missing: say there how many, or with --runs")
+        return found
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """Return all but the number of runs, as JSON has it."""
+        content: dict[str, Any] = json.loads(self.model_dump_json(by_alias=True))
+        del content["runs"]
+        return content
+
+    def named(self, where: str) -> Study:
+        """Return the same study with its file's name for errors."""
+        copied = self.model_copy()
+        copied._where = where
+        return copied
+
+
+def check_option(name: str) -> None:
+    """See that a study may give an option of `Scenario`.
+
+    Raises:
+        ValueError: says what does it instead, or which options there are.
+    """
+    if name in OF_THE_CAMPAIGN:
+        raise ValueError(f"{name} cannot be given: {OF_THE_CAMPAIGN[name]}")
+    allowed = [option for option in FlightPlan.model_fields if option not in OF_THE_CAMPAIGN]
+    if name not in allowed:
+        raise ValueError(f"unknown option {short(name)}: {choices(name, allowed)}")
+
+
+def read_study(path: str | Path) -> Study:
+    """Read a campaign's file, by path or by a name of ``config/campaigns``.
+
+    Raises:
+        InputError: in one line, naming file and key.
+    """
+    file = named_file("campaigns", path_text(path, "path"))
+    return validate(Study, read_yaml(file), str(file)).named(str(file))

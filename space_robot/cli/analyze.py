@@ -1,0 +1,197 @@
+"""``space-robot analyze``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from space_robot_msgs_py.config.text import printable
+
+from .options import NAMESPACE, REMAP, TRUST, file_option, folder_option
+
+if TYPE_CHECKING:
+    from space_robot_msgs_py.bag.flight_log import FlightLog
+
+    from ..analysis.sizing import ActuatorSet
+
+
+@click.command()
+@click.argument("bags", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="BAG...")
+@folder_option("--plot", help="Folder for the figures, as PNG and SVG; several bags overlaid.")
+@click.option(
+    "--csv",
+    type=click.Path(path_type=Path),
+    metavar="DIR-or-FILE",
+    help="Every tick's numbers as <bag>.csv in a folder, or of one bag as FILE.csv.",
+)
+@click.option(
+    "--parquet",
+    type=click.Path(path_type=Path),
+    metavar="DIR-or-FILE",
+    help="The same as Parquet, with the flight's description.",
+)
+@file_option("--html", help="One page with tables and figures, to send to a colleague.")
+@click.option(
+    "--actuators",
+    metavar="NAME-or-FILE",
+    help="Whether these would have what each flight asks of its base (default: those that flew).",
+)
+@click.option("--from", "from_s", type=float, metavar="T", help="Begin at T simulated seconds.")
+@click.option("--to", "to_s", type=float, metavar="T", help="End before T simulated seconds.")
+@REMAP
+@NAMESPACE
+@TRUST
+@click.option(
+    "--json", "as_json", is_flag=True, help="Print the report as JSON: a list of several."
+)
+def analyze(
+    bags: tuple[Path, ...],
+    plot: Path | None,
+    csv: Path | None,
+    parquet: Path | None,
+    html: Path | None,
+    actuators: str | None,
+    from_s: float | None,
+    to_s: float | None,
+    remap: dict[str, str],
+    namespace: str | None,
+    trust: bool,
+    as_json: bool,
+) -> None:
+    """Metrics of recorded flights: one bag, or several side by side.
+
+    RMS, maxima, settling, chatter, saturation, latency, the error of the time-delay estimate,
+    where the end effector pointed, and what was asked of the base. docs/manual/analysis.md says
+    what each means.
+    Modules and files that a bag names are not opened without --trust.
+
+    \b
+    Examples:
+      space-robot analyze flights/one
+      space-robot analyze flights/one flights/two --plot figures --html flights.html
+      space-robot analyze flights/one --from 14 --to 16 --json
+      space-robot analyze flights/one --actuators wheels
+      space-robot analyze flights/one --parquet one.parquet
+      space-robot analyze theirs --remap /arm/joint_states:=/joint_states
+      space-robot analyze both --namespace /sat1
+    """  # fmt: skip
+    from space_robot_msgs_py.bag.reader import read_flight
+
+    from ..analysis import analyze, excerpt
+    from ..analysis.export import check_parquet, write_csv, write_parquet
+    from ..console.files import (
+        check_free,
+        write_text,
+    )
+
+    if parquet:
+        check_parquet()
+    names = bag_names(bags)
+    exports = [
+        (write, dict(zip(names, _files(where, names, suffix), strict=True)))
+        for write, where, suffix in ((write_csv, csv, ".csv"), (write_parquet, parquet, ".parquet"))
+        if where
+    ]
+    for path in (
+        *(path for _, paths in exports for path in paths.values()),
+        *([html] if html else []),
+    ):
+        check_free(path)
+    figure_set = None
+    if plot or html:
+        from ..analysis.figures.figure_set import FigureSet
+
+        figure_set = FigureSet()
+    reports: dict[str, dict[str, Any]] = {}
+    descriptions: dict[str, dict[str, Any]] = {}
+    for name, bag in zip(names, bags, strict=True):
+        log = excerpt(read_flight(bag, remap, trust, namespace), from_s, to_s)
+        reports[name], descriptions[name] = analyze(log, _set(log, actuators)), log.flight
+        for write, paths in exports:
+            write(log, paths[name])
+            click.echo(f"wrote {paths[name]}", err=True)
+        if figure_set:
+            figure_set.add(name, log)
+        del log  # before the next is read: a long flight fills a gigabyte
+    with ExitStack() as stack:
+        if figure_set:
+            folder = plot or Path(stack.enter_context(TemporaryDirectory()))
+            figures = figure_set.save(folder)
+            if plot:
+                files = ", ".join(str(figure.svg.with_suffix(".png")) for figure in figures)
+                click.echo(f"wrote {files} and .svg", err=True)
+            if html:
+                from ..analysis.page import render
+
+                shown = [(figure.caption, figure.data_uri) for figure in figures]
+                write_text(render(reports, descriptions, shown), html)
+                click.echo(f"wrote {html}", err=True)
+    _print(reports, as_json)
+
+
+def _set(log: FlightLog, name: str | None) -> ActuatorSet | None:
+    """Read the base's actuators that a flight is held beside.
+
+    Raises:
+        InputError: there are none of that name, or they do not fit its robot.
+    """
+    if name is None:
+        return None
+    from space_robot_control.allocation.assumed_actuators import believed_actuators
+
+    from ..analysis.described import robot_of
+    from ..analysis.sizing import ActuatorSet
+
+    return ActuatorSet(name, believed_actuators(name, robot_of(log)))
+
+
+def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
+    from ..console.terminal import (
+        echo_json,
+        terminal,
+    )
+
+    if as_json:
+        found = list(reports.values())
+        echo_json(found[0] if len(found) == 1 else found)
+        return
+    from ..analysis.report_tables import metrics_table, rms_table
+    from ..analysis.sizing_table import sizing_table
+    from ..console.terminal_tables import print_table
+    from .report_display import print_comparison
+
+    console = terminal()
+    if len(reports) > 1:
+        print_comparison(reports, console)
+        return
+    for report in reports.values():
+        print_table(rms_table(report), console)
+        print_table(metrics_table(report), console)
+        if table := sizing_table(report):
+            print_table(table, console)
+
+
+def bag_names(bags: Sequence[Path]) -> list[str]:
+    """Name the bags: by their folders' names, with as much before them as tells apart."""
+    paths = [Path(printable(str(bag.absolute()))) for bag in bags]
+    if len(set(paths)) < len(paths):
+        raise click.BadParameter("the same bag was given twice", param_hint="BAG...")
+    for length in range(1, max(len(path.parts) for path in paths)):
+        names = ["_".join(path.parts[-length:]) for path in paths]
+        if len(set(names)) == len(names):
+            return names
+    return [str(path) for path in paths]
+
+
+def _files(where: Path, names: Sequence[str], suffix: str) -> list[Path]:
+    """Name the file of each bag: ``where`` itself if it is a file's name, else one below it."""
+    if where.suffix != suffix or where.is_dir():
+        return [where / f"{name}{suffix}" for name in names]
+    if len(names) > 1:
+        raise click.BadParameter(f"{where}: one file for {len(names)} bags: name a folder")
+    return [where]

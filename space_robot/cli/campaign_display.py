@@ -1,0 +1,87 @@
+"""What ``space-robot campaign run`` says at its end."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+
+from ..campaign.flown import FlownCampaign
+from ..campaign.report.findings import Findings
+from ..campaign.report.league_tables import number
+from ..campaign.report.subject import subject_of
+from ..campaign.report.verdict_tables import TONES, command
+from ..campaign.verdicts.quantiles import quantile
+from ..campaign.verdicts.values import ended, is_known, laws_of, measured, of_law
+from ..console.tables import (
+    Column,
+    Table,
+)
+from ..console.tables import Verdict as Judged
+from ..console.terminal import say
+from ..console.terminal_tables import print_table
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+SHOWN = ("attitude_rms", "joints_4_6_rms", "ripple_base_torque")
+"""Metrics whose medians are shown, of those that there are."""
+
+
+def as_record(flown: FlownCampaign) -> dict[str, Any]:
+    """Return what there is to say of a campaign, ready for JSON."""
+    table = flown.table
+    return {
+        "folder": str(flown.folder), "seed": flown.seed, "flights": len(table),
+        "runs": int(table["run"].nunique()), "runs_asked": flown.runs, "kept": flown.kept,
+        "outcomes": {
+            law: of_law(table, law)["outcome"].value_counts().to_dict() for law in laws_of(table)
+        },
+        "verdicts": [asdict(verdict) for verdict in flown.verdicts],
+    }  # fmt: skip
+
+
+def print_summary(flown: FlownCampaign, console: Console) -> None:
+    """Print how many flights came to their end, medians, verdicts, and how to go on."""
+    findings = Findings(subject_of(flown))
+    names = findings.names
+    print_table(medians(flown.table, names, flown.seed), console)
+    if found := findings.verdicts:
+        print_table(
+            Table.of(
+                "Requirements",
+                (
+                    Column("requirement", is_label=True), Column("law", is_label=True),
+                    Column("met in"), Column("at least", spec=".4f"), Column("verdict"),
+                ),
+                [
+                    [
+                        f"{v.requirement}, {v.point}" if v.point else v.requirement,
+                        names[v.law], f"{v.met} of {v.runs}", v.limits.low,
+                        Judged("", v.word, TONES[v.word]),
+                    ]
+                    for v in found
+                ],
+            ),
+            console,
+        )  # fmt: skip
+    say(console, shlex.join(["space-robot", "campaign", "report", str(flown.folder)]))
+    # where no flight has a number all failed, and the first is as bad as any
+    driven = findings.driven
+    rows = findings.worst(findings.whole, driven[0], 1) if driven else flown.table
+    again = command(flown.folder, int(rows["run"].iloc[0]), rows["law"].iloc[0])
+    say(console, f"{again}    # the worst")
+
+
+def medians(table: DataFrame, names: dict[str, str], seed: int) -> Table:
+    """Tabulate each law's medians; a flight that failed counts as worse than any number."""
+    shown = [name for name in SHOWN if is_known(table, f"metric.{name}")]
+    rows = []
+    for law in laws_of(table):
+        own = of_law(table, law)
+        middle = (quantile(measured(own, f"metric.{name}"), 0.5).value for name in shown)
+        rows.append([names[law], f"{ended(own).sum()} of {len(own)}", *map(number, middle)])
+    columns = (Column("law", is_label=True), Column("complete"), *map(Column, shown))
+    return Table.of(f"{table['run'].nunique()} runs, seed {seed}: medians", columns, rows)

@@ -1,0 +1,81 @@
+"""``space-robot campaign report``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from .options import file_option
+
+
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
+@file_option("--html", help="One page with all tables and figures, to send to a colleague.")
+@file_option("--markdown", help="The tables as Markdown, and beside it a figure, as PNG and SVG.")
+@click.option(
+    "--metric", "metrics", multiple=True, metavar="NAME",
+    help="Compare the laws by this metric, as attitude_max; repeatable [default: RMS errors, "
+    "the base's ripple, and what is required].",
+)  # fmt: skip
+@click.option(
+    "--study", type=click.Path(path_type=Path), metavar="FILE",
+    help="Judge by the requirements of this campaign's file [default: those that were flown].",
+)  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
+def report(
+    folder: Path,
+    html: Path | None,
+    markdown: Path | None,
+    metrics: tuple[str, ...],
+    study: Path | None,
+    as_json: bool,
+) -> None:
+    """What a campaign's flights say: requirements, laws, what drives the error, worst runs.
+
+    DIR is the folder of `campaign run`, finished or not. docs/manual/campaigns.md says what the
+    numbers mean. Files that are damaged are named.
+
+    \b
+    Examples:
+      space-robot campaign report campaigns/a
+      space-robot campaign report campaigns/a --html a.html
+      space-robot campaign report campaigns/a --metric attitude_max --json
+      space-robot campaign report campaigns/a --study stricter.yaml
+    """  # fmt: skip
+    from ..analysis.figures.style import save_figure
+    from ..campaign.flown import FlownCampaign
+    from ..campaign.report import console, page, record, subject
+    from ..campaign.report.figures import summary_figure
+    from ..campaign.report.findings import Findings
+    from ..campaign.study import read_study
+    from ..console.files import (
+        check_free,
+        write_text,
+    )
+    from ..console.terminal import (
+        echo_json,
+        terminal,
+    )
+
+    for path in (html, markdown):
+        if path:
+            check_free(path)
+    asked = None if study is None else read_study(study)
+    about = subject.subject_of(FlownCampaign.open(folder), asked)
+    for remark in about.remarks:
+        click.echo(remark, err=True)
+    findings = Findings(about, metrics)
+    if html:
+        write_text(page.render(findings), html)
+        click.echo(f"wrote {html}", err=True)
+    if markdown:
+        files = [markdown]
+        if figure := summary_figure(findings):
+            files += save_figure(figure, markdown.with_suffix(""))
+        write_text(console.markdown(findings), markdown)
+        click.echo(f"wrote {', '.join(map(str, files))}", err=True)
+    if as_json:
+        echo_json(record.record(findings))
+    else:
+        console.print_report(findings, terminal())

@@ -1,0 +1,140 @@
+"""``space-robot gains``."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+from typing import Any
+
+import click
+from click.core import ParameterSource
+
+from .numbers import FiniteRange
+from .options import flight_options
+
+
+@click.group()
+def gains() -> None:
+    """Look at a gain set before it flies, or make one."""
+
+
+@gains.command()
+@click.option(
+    "--controller", default="all", show_default=True,
+    help="A law's name, or file.py:Class of your own; all: every law that the gain set has.",
+)  # fmt: skip
+@flight_options(
+    "case", "gains", "robot", "mission", "sensors", "actuators", "navigation", "seed", "set", "json"
+)
+def check(as_json: bool, **options: Any) -> None:
+    """Tell which margin and noise gain the laws of a gain set have along a mission.
+
+    For laws with time-delay estimation: the eigenvalues of H_S^-1 h_bar, the radius of
+    E - H_S^-1 h_bar, the share by which the torque reported may exceed the one commanded. For all
+    laws: the torque that noise on the measured rates becomes; with --sensors, the ripple of the
+    torque while the robot is held still for some seconds. With --actuators none the inertia is that
+    of the joints of a robot whose base floats freely. Exit code 1 if the radius is 1 or more or the
+    margin below 2 % for any of the laws.
+
+    \b
+    Examples:
+      space-robot gains check
+      space-robot gains check --controller tde_stc --gains my_gains/
+      space-robot gains check --sensors fine --navigation filtered
+      space-robot gains check --actuators none
+      space-robot gains check --case 4-2 --set controller.tde_stc.h_bar='[200.]'
+    """
+    from space_robot_msgs_py.errors import SpaceRobotError
+
+    from ..console.terminal import (
+        echo_json,
+        terminal,
+    )
+    from .gains_checked import checked, report_of
+    from .gains_display import print_checks
+
+    found = checked(options)
+    if as_json:
+        echo_json(report_of(found))
+    else:
+        print_checks(found, terminal())
+    if not found.is_sound:
+        names = ", ".join(check.law for check in found.checks if not check.is_sound)
+        raise SpaceRobotError(f"{names}: h_bar leaves too little margin in torque scale")
+
+
+@gains.command()
+@flight_options("robot", "mission", "sensors", "navigation", "set")
+@click.option(
+    "--case", "cases", multiple=True, default=["1"], show_default=True, metavar="CASE",
+    help="A case that is to be flown, with its payload; may be repeated.",
+)  # fmt: skip
+@click.option(
+    "--margin", type=FiniteRange(0.0, 0.5, min_open=True), default=0.05, show_default=True,
+    help="Share by which the torque reported may exceed the one commanded.",
+)  # fmt: skip
+@click.option(
+    "--mass-uncertainty", type=FiniteRange(0.0, 0.9), default=0.2, show_default=True,
+    help="Share by which each mass and inertia may be wrong.",
+)  # fmt: skip
+@click.option(
+    "--bandwidth", type=FiniteRange(0.0, 1e4, min_open=True), metavar="W",
+    help="Poles of all laws, rad/s [default: what lag and ripple allow].",
+)  # fmt: skip
+@click.option(
+    "--ripple", type=FiniteRange(0.0, 10.0, min_open=True), default=0.1, show_default=True,
+    help="Noise allowed on a torque, RMS, as a share of the largest that the mission asks.",
+)  # fmt: skip
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path, file_okay=False), required=True,
+    metavar="DIR", help="Folder of the set, for --gains.",
+)  # fmt: skip
+@click.pass_context
+def tune(context: click.Context, /, output: Path, **options: Any) -> None:
+    """Make a gain set for all five laws, by a method without search or luck.
+
+    h_bar from the inertia along the mission, so that the time-delay estimate contracts with the
+    margin asked for, whichever of the masses are wrong; a low-pass for it; poles below its lag;
+    switching gains from the errors that are left. Sensors and navigation are listened to on a robot
+    at rest; nothing is flown. The method is told in the docs, its numbers in the files.
+
+    \b
+    Examples:
+      space-robot gains tune -o my_gains
+      space-robot gains tune --sensors fine --navigation filtered -o my_gains
+      space-robot gains tune --robot seven_joint --case 1 --case 2 --margin 0.03 -o my_gains
+      space-robot fly --gains my_gains
+    """
+    from ..campaign.gain_set import tuned_set, write_set
+    from ..console.terminal import terminal
+    from ..tuning.method import Wishes
+    from ..tuning.warning import estimate_remark
+
+    names = ("margin", "mass_uncertainty", "bandwidth", "ripple")
+    wishes, cases = Wishes(*(options.pop(name) for name in names)), options.pop("cases")
+    with terminal(stderr=True).status("tuning") as status:
+        tuned = tuned_set(options, cases, wishes, status.update)
+    for path in write_set(tuned, _command(context), output):
+        click.echo(f"wrote {path}", err=True)
+    if remark := estimate_remark(tuned):
+        click.echo(remark, err=True)
+
+
+def _command(context: click.Context) -> str:
+    """Return the command line with the options that were given."""
+    words = []
+    for option in context.command.params:
+        name = str(option.name)
+        if context.get_parameter_source(name) == ParameterSource.DEFAULT:
+            continue
+        value = context.params[name]
+        if getattr(option, "is_flag", False):
+            words.append(option.opts[0])
+            continue
+        if name == "parameters":
+            given = [(f"{n}.{key}", v) for n, own in value.items() for key, v in own.items()]
+            value = [f"{parameter}={json.dumps(v)}" for parameter, v in given]
+        for each in value if isinstance(value, (list, tuple)) else [value]:
+            words += [option.opts[0], str(each)]
+    return shlex.join(["space-robot", "gains", "tune", *words])

@@ -1,0 +1,94 @@
+"""The findings of ``space-robot gains check`` as tables."""
+
+from __future__ import annotations
+
+from rich.console import Console
+
+from ..console.tables import (
+    Column,
+    Table,
+    Verdict,
+)
+from ..console.terminal import say
+from ..console.terminal_tables import print_table
+from ..tuning.spectrum import LEAST_MARGIN
+from .gains_checked import Checked
+
+
+def print_checks(found: Checked, console: Console) -> None:
+    """Print margins, noise gains and what they mean."""
+    what = found.flight.description
+    say(
+        console,
+        f"robot {what['robot']}, mission {what['mission']}, case {what['case']}, "
+        f"gains {what['gains']}, actuators {what['actuators']}",
+    )
+    if any(check.spectrum for check in found.checks):
+        print_table(_margins(found), console)
+    print_table(_noise_gains(found), console)
+    if found.ripple:
+        print_table(_ripple(found), console)
+
+
+def _margins(found: Checked) -> Table:
+    columns = [
+        Column("", is_label=True), Column("smallest", spec=".4f"), Column("largest", spec=".4f"),
+        Column("radius"), Column("margin"),
+    ]  # fmt: skip
+    rows = []
+    for check in found.checks:
+        if spectrum := check.spectrum:
+            small = "good" if spectrum.is_sound else "bad"
+            word = "sound" if spectrum.margin >= LEAST_MARGIN else "small"
+            rows.append([
+                check.law, spectrum.smallest, spectrum.largest,
+                Verdict(f"{spectrum.radius:.4f} < 1", *_holds(spectrum.contracts)),
+                Verdict(f"{spectrum.margin:.2%}", word if spectrum.contracts else "none", small),
+            ])  # fmt: skip
+    inertia = "H_S" if found.flight.controls_base else "H_f"
+    table = Table.of(f"Eigenvalues of {inertia}^-1 h_bar along the mission", columns, rows)
+    note = (
+        "The margin is the share by which the torque reported may exceed the one commanded "
+        "until the time-delay estimate diverges."
+    )
+    return Table(table.title, table.columns, table.groups, [note])
+
+
+def _holds(value: bool) -> tuple[str, str]:
+    return ("holds", "good") if value else ("fails", "bad")
+
+
+def _noise_gains(found: Checked) -> Table:
+    columns = [
+        Column("", is_label=True), *(Column(check.law, spec=".3g") for check in found.checks)
+    ]  # fmt: skip
+    names = _axes(found, "N s/m")
+    rows = [
+        [name, *(float(check.noise_gain[axis]) for check in found.checks)]
+        for axis, name in enumerate(names)
+    ]
+    title = "Torque that noise on the rate of an axis becomes, N m per rad/s"
+    return Table.of(title, columns, rows)
+
+
+def _axes(found: Checked, of_prismatic: str) -> list[str]:
+    """Name the axes, those of prismatic joints with the unit of their own."""
+    robot = found.flight.robot
+    slides = (False, False, False, *robot.is_prismatic[: robot.n])
+    return [
+        f"{name} ({of_prismatic})" if is_prismatic else name
+        for name, is_prismatic in zip(robot.axis_names, slides, strict=True)
+    ]
+
+
+def _ripple(found: Checked) -> Table:
+    columns = [Column("", is_label=True), *(Column(law, spec=".3g") for law in found.ripple)]
+    rows = [
+        [name, *(None if x is None else float(x[axis]) for x in found.ripple.values())]
+        for axis, name in enumerate(_axes(found, "N"))
+    ]
+    sensors = found.flight.plant_settings.sensors
+    table = Table.of(f"Torque ripple with sensors {sensors}, held still, N m RMS", columns, rows)
+    diverged = [law for law, ripple in found.ripple.items() if ripple is None]
+    notes = [f"Held still, {', '.join(diverged)} diverged."] if diverged else []
+    return Table(table.title, table.columns, table.groups, notes)

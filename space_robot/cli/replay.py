@@ -1,0 +1,120 @@
+"""``space-robot replay``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .numbers import FiniteRange
+from .options import NAMESPACE, OPTIONS, REMAP, TRUST, file_option
+
+
+@click.command()
+@click.argument("bag", type=click.Path(path_type=Path))
+@click.option(
+    "--controller", default="", help="Law to answer, or file.py:Class [default: the one that flew]."
+)
+@click.option("--gains", default="", help="Its gains [default: those flown].")
+@OPTIONS["set"]
+@click.option(
+    "--rate",
+    type=FiniteRange(0.0, 1e3, min_open=True),
+    metavar="R",
+    help="By the wall clock, R times real time [default: lockstep].",
+)
+@click.option(
+    "--start", type=FiniteRange(0.0), default=0.0, metavar="T",
+    help="Simulated time to begin at, s.",
+)  # fmt: skip
+@click.option(
+    "--end", type=FiniteRange(0.0, min_open=True), metavar="T",
+    help="Simulated time to end before, s.",
+)  # fmt: skip
+@file_option("--csv", "table", help="File for both torques of every tick.")
+@file_option("--plot", help="Picture of both torques by axis, as PNG and SVG.")
+@REMAP
+@NAMESPACE
+@TRUST
+@click.option(
+    "--domain",
+    type=click.IntRange(0, 232),
+    help="ROS domain [default: ROS_DOMAIN_ID, or a free one].",
+)
+@OPTIONS["json"]
+def replay(
+    bag: Path,
+    parameters: dict[str, dict[str, Any]],
+    start: float,
+    end: float | None,
+    table: Path | None,
+    plot: Path | None,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Play a recorded flight to a live controller, and compare its commands with the recorded.
+
+    Starts a controller node with what the bag says that flew, sends it the recorded states and
+    references through the middleware, byte by byte, in lockstep, and compares every command to
+    the last bit. Exit code 0: all are equal and none is missing; 1: not so, and the first that
+    differs is shown; 2: bad input.
+
+    With another --controller or other --gains there is nothing to be equal to: shown is what
+    they would have commanded on the same history (open loop), with exit code 0.
+
+    A bag may be anybody's: modules and files that it names are not opened without --trust.
+
+    \b
+    Examples:
+      space-robot replay flights/one
+      space-robot replay flights/one --set controller.tde_stc.k_1=[40.0]
+      space-robot replay flights/one --controller ctc --plot ctc_instead.png
+      space-robot replay flights/one --rate 1 --start 5 --end 10 --json
+    """
+    import math
+
+    from space_robot_msgs_py.errors import FlightError, InputError
+
+    from ..console.files import check_writable
+    from ..console.terminal import (
+        echo_json,
+        terminal,
+    )
+    from ..flight.replay.outcome import Options
+    from ..flight.replay.run import replay as run
+
+    if other := sorted(set(parameters) - {"controller"}):
+        raise InputError(f"--set {other[0]}.…: a replay has no {other[0]}, only the controller")
+    if end is not None and end <= start:
+        raise InputError(f"--end {end:g} is not after --start {start:g}")
+    for file in filter(None, (table, plot and plot.with_suffix(".png"))):
+        check_writable(file)
+    done = run(
+        Options(
+            bag, parameters=parameters.get("controller", {}), start_s=start,
+            end_s=math.inf if end is None else end, **options,
+        )
+    )  # fmt: skip
+    report, period = done.report(), done.recording.timebase.period
+    if table:
+        from .replay_files import write_csv
+
+        write_csv(done.comparison, period, table)
+    if plot:
+        from .replay_display import title
+        from .replay_files import write_plot
+
+        write_plot(done.comparison, period, title(report), plot)
+    if as_json:
+        echo_json(report)
+    else:
+        from .replay_display import print_replay
+
+        print_replay(report, terminal())
+    if done.error:
+        raise done.error
+    if not done.has_passed:
+        from .replay_display import verdict
+
+        raise FlightError(verdict(report))

@@ -1,0 +1,141 @@
+"""A replay on a terminal: counts, the first difference, the differences by axis."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.console import Console
+
+from space_robot_msgs_py.bag.law_history import in_words
+
+from ..analysis.words import flown as words_of
+from ..console.tables import (
+    Column,
+    Table,
+)
+from ..console.terminal import say
+from ..console.terminal_tables import print_table
+
+COUNTS = {
+    "played": "states sent",
+    "compared": "commands compared",
+    "equal": "equal to the last bit",
+    "unanswered": "recorded, not answered now",
+    "unrecorded": "answered now, not recorded",
+    "without_state": "recorded without their state",
+    "skipped": "not answered in flight, not sent",
+}
+ALWAYS = ("played", "compared", "equal")
+MOST_STRETCHES = 10
+"""Of a damaged bag that are shown."""
+
+
+def print_replay(report: dict[str, Any], console: Console) -> None:
+    """Print the report of `run.Replay`."""
+    say(console, title(report))
+    print_table(Table.of("", (Column(is_label=True), Column()), counts(report)), console)
+    for text in filter(None, (report["unfinished"], *report["damage"])):
+        say(console, text)
+    if not report["whole"] and len(report["stretches"]) > 1:
+        _print_stretches(report["stretches"], console)
+    if (first := report["first_difference"]) and report["differs"]:
+        _print_first(first, console)
+    if not report["identical"] and report["compared"]:
+        _print_axes(report, console)
+        for reason in report["reasons"] if report["judged"] else ():
+            say(console, f"may differ: {reason}")
+    if report["passed"]:
+        say(console, verdict(report))
+
+
+def title(report: dict[str, Any]) -> str:
+    """Say what was replayed, by whom."""
+    now = report["replayed"]
+    pace = "in lockstep" if report["lockstep"] else f"at {report['rate']:g} times real time"
+    law, swaps = now["controller"], ""
+    if now["as_in_flight"]:
+        law = in_words(report["recorded"]["laws"])
+    elif now["swaps"]:
+        swaps = f", swaps {' '.join(now['swaps'])}"
+    changed = "".join(f", {name}={value}" for name, value in now["set"].items())
+    law = f"{law}, gains {now['gains']}{swaps}{changed}"
+    return f"replay of {report['bag']}: {law}, {pace}"
+
+
+def counts(report: dict[str, Any]) -> list[tuple[str, str]]:
+    """List name and number of each line of the table; what is zero and rare is left out."""
+    rows = [(words, str(report[k])) for k, words in COUNTS.items() if k in ALWAYS or report[k]]
+    for key, words in (("recorded", "in the bag"), ("replayed", "now")):
+        if number := report["unreadable"][key]:
+            rows.append((f"commands {words} that cannot be read", str(number)))
+    rate = report["ticks_per_s"]
+    return [*rows, ("ticks/s", "-" if rate is None else f"{rate:.0f}")]
+
+
+def verdict(report: dict[str, Any]) -> str:
+    """Say the outcome in a line."""
+    flown, first = report["recorded"], report["first_difference"]
+    if not report["has_commands"]:
+        return "the bag has no commands to compare with"
+    if report["identical"] and (report["whole"] or not report["judged"]):
+        return "the commands are the recorded ones, to the last bit"
+    if not report["judged"]:
+        return (
+            f"{words_of(flown)} was flown: the differences are what the other would have "
+            "commanded on the same history (open loop)"
+        )
+    if first and report["differs"]:
+        when = f"tick {first['tick']} (t = {first['time_s']:.4f} s)"
+        return f"the commands are not the recorded ones: they differ from {when} on"
+    if first:
+        gap = report["first_gap_s"]
+        before = "the commands before it are the recorded ones, to the last bit; " if gap else ""
+        return (
+            f"the bag is not whole, from t = {gap:.4f} s on: {before}after a gap the controller "
+            "was not sent all that it was sent in flight"
+        )
+    if not report["whole"]:
+        return (
+            "the bag is not whole: the commands that are left are the recorded ones, to the last "
+            "bit, but some are missing"
+        )
+    return "the commands are equal as far as they can be compared, but some are missing"
+
+
+def _print_stretches(stretches: list[dict[str, Any]], console: Console) -> None:
+    columns = (
+        Column("from, s", spec=".4f"), Column("to, s", spec=".4f"), Column("compared"),
+        Column("equal"),
+    )  # fmt: skip
+    shown = stretches[:MOST_STRETCHES]
+    rows = [[s["from_s"], s["to_s"], str(s["compared"]), str(s["equal"])] for s in shown]
+    more = "" if len(stretches) == len(shown) else f" (the first {len(shown)} of {len(stretches)})"
+    print_table(Table.of(f"whole stretches of the bag{more}", columns, rows), console)
+
+
+def _print_first(first: dict[str, Any], console: Console) -> None:
+    title = f"first difference: tick {first['tick']}, t = {first['time_s']:.4f} s"
+    columns = (
+        Column("field", is_label=True), Column("recorded"), Column("replayed"),
+        Column("by", spec=".3g"),
+    )  # fmt: skip
+    rows = [
+        [
+            field["field"], str(field["recorded"]), str(field["replayed"]),
+            "" if field["difference"] is None else field["difference"],
+        ]
+        for field in first["fields"]
+    ]  # fmt: skip
+    print_table(Table.of(title, columns, rows), console, dense=True)  # all digits in 80 columns
+
+
+def _print_axes(report: dict[str, Any], console: Console) -> None:
+    names = ("RMS recorded", "RMS replayed", "RMS of difference", "largest difference")
+    columns = Column("axis", is_label=True), *(Column(name, spec=".4g") for name in names)
+    rows = [
+        [axis if unit == "N m" else f"{axis} ({unit})", *numbers]
+        for axis, (unit, *numbers) in (
+            (name, found.values()) for name, found in report["axes"].items()
+        )
+    ]
+    print_table(Table.of("torque, N m, over the ticks compared", columns, rows), console)

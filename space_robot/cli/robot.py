@@ -1,0 +1,71 @@
+"""``space-robot robot``: what a robot's file was read as."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from .options import BASE, REPAIR, file_option, flight_options
+
+
+@click.command()
+@click.argument("robot", default="paper")
+@BASE
+@REPAIR
+@file_option("--out", help="Write all numbers as a robot's YAML, to edit it or to fly it.")
+@flight_options("json")
+def robot(robot: str, base: str | None, repair: bool, out: Path | None, as_json: bool) -> None:
+    """Show what was read of a robot: its bodies, joints, tools and shapes, and the defects.
+
+    ROBOT is a name, a URDF, a xacro (where xacro is installed), a YAML file or a folder. A URDF
+    with defects is not read unless they are repaired: they are listed, with exit code 2.
+
+    \b
+    Examples:
+      space-robot robot my.urdf
+      space-robot robot my.urdf --repair --out robot.yaml
+      space-robot robot my.urdf --base satellite --json
+      space-robot robot seven_joint
+    """
+    from space_robot_model.robot import Robot
+    from space_robot_model.robot.described import describe
+    from space_robot_model.robot.find import (
+        robot_as_path,
+        robot_files,
+    )
+    from space_robot_model.robot.source import (
+        URDF,
+        read_robot_file,
+    )
+    from space_robot_model.robot.urdf import read_urdf
+    from space_robot_msgs_py.errors import InputError
+
+    from ..console.files import whole_file
+    from ..console.terminal import (
+        echo_json,
+        terminal,
+    )
+    from .robot_display import print_defects, print_robot
+
+    file = robot_files(robot_as_path(robot)).file
+    is_urdf = file.suffix in URDF
+    findings = read_urdf(file, base, repair=True).findings if is_urdf else ()
+    if findings and not repair:
+        if as_json:
+            echo_json({"file": str(file), "defects": [finding.told for finding in findings]})
+        else:
+            print_defects(findings, terminal())
+        these = "a defect" if len(findings) == 1 else f"{len(findings)} defects"
+        raise InputError(f"{file}: {these} to repair: --repair does so")
+    source = read_robot_file(file, base, repair)
+    if out:
+        with whole_file(out, replace=True) as written:
+            written.write(source.text.encode())
+        click.echo(f"wrote {out}", err=True)
+    # the URDF's own names of links
+    found = describe(Robot.from_urdf(file, base, repair) if is_urdf else source.robot)
+    if as_json:
+        echo_json({"file": str(file), **found, "defects": [f.told for f in findings]})
+    else:
+        print_robot(found, findings, terminal())

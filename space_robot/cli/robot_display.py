@@ -1,0 +1,138 @@
+"""A robot's bodies, joints, tools and shapes as tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from rich.console import Console
+
+from space_robot_model.robot.urdf import Finding
+
+from ..console.tables import (
+    Column,
+    Group,
+    Table,
+)
+from ..console.terminal import say
+from ..console.terminal_tables import print_table
+
+
+def print_robot(told: dict[str, Any], findings: Sequence[Finding], console: Console) -> None:
+    """Print what `space_robot_model.robot.described.describe` tells of a robot."""
+    passive = len(told["passive_names"])
+    say(
+        console,
+        f"robot {told['name']}: {told['mass']:g} kg, {len(told['joint_names'])} joints with a "
+        f"motor{f', {passive} with a spring' if passive else ''}",
+    )
+    if findings:
+        print_defects(findings, console, are_repaired=True)
+    print_table(_bodies(told), console)
+    print_table(_joints(told), console)
+    print_table(_tools(told), console)
+    if told["shapes"]:
+        print_table(_shapes(told), console)
+
+
+def print_defects(
+    findings: Sequence[Finding], console: Console, are_repaired: bool = False
+) -> None:
+    """Print defects of a URDF with their repairs."""
+    columns = [
+        Column("line", spec="d"),
+        *(Column(name, is_label=True) for name in ("part", "defect", "given")),
+        Column("repaired" if are_repaired else "what --repair does", is_label=True),
+    ]
+    rows = [[f.line, f.part, f.defect, f.value, f.repair] for f in findings]
+    print_table(Table.of("Defects", columns, rows), console)
+
+
+def _bodies(told: dict[str, Any]) -> Table:
+    columns = [
+        Column("body", is_label=True), Column("moved by", is_label=True),
+        Column("mass", "kg", ".6g"), Column("CoM", "m"), Column("principal moments", "kg m2"),
+    ]  # fmt: skip
+    rows = [
+        [
+            body["name"], body["joint"] or "-", body["mass"], _vector(body["com"]),
+            _vector(body["principal_moments"]),
+        ]
+        for body in told["bodies"]
+    ]  # fmt: skip
+    note = "With all that is fixed to it; its frame is its joint's, whose axis is z."
+    return Table("Bodies", columns, [Group(rows)], [note])
+
+
+def _joints(told: dict[str, Any]) -> Table:
+    joints = told["joints"]
+    columns = {
+        "joint": [joint["name"] for joint in joints],
+        "kind": [joint["kind"] for joint in joints],
+        "parent": [joint["parent"] for joint in joints],
+        "range": [_range(joint) for joint in joints],
+        "velocity": [_limit(joint, "velocity") for joint in joints],
+        "effort": [_limit(joint, "effort") for joint in joints],
+        "friction": [_coefficients(joint["friction"]) for joint in joints],
+        "spring": [_coefficients(joint.get("spring")) for joint in joints],
+    }
+    shown = {name: cells for name, cells in columns.items() if any(cells)}
+    heads = [Column(name, is_label=name in ("joint", "kind", "parent")) for name in shown]
+    note = (
+        "In this order in all arrays. deg and N m, or m and N of prismatic joints; friction: "
+        "Coulomb and viscous; spring: stiffness, damping and rest; - is not told."
+    )
+    return Table("Joints", heads, [Group(list(zip(*shown.values(), strict=True)))], [note])
+
+
+def _unit(joint: dict[str, Any]) -> tuple[float, str]:
+    return (1.0, "m") if joint["kind"] == "prismatic" else (180.0 / math.pi, "deg")
+
+
+def _range(joint: dict[str, Any]) -> str | None:
+    limits, (factor, unit) = joint.get("limits", {}), _unit(joint)
+    ends = [factor * limits.get(end, math.inf) for end in ("lower", "upper")]
+    if not any(map(math.isfinite, ends)):
+        return None
+    return f"{ends[0]:.5g} to {ends[1]:.5g} {unit}"
+
+
+def _limit(joint: dict[str, Any], name: str) -> str | None:
+    value, (factor, unit) = joint.get("limits", {}).get(name, math.inf), _unit(joint)
+    if not math.isfinite(value):
+        return None
+    if name == "velocity":
+        return f"{factor * value:.5g} {unit}/s"
+    return f"{value:.5g} {'N' if unit == 'm' else 'N m'}"
+
+
+def _coefficients(told: dict[str, float] | None) -> str | None:
+    return ", ".join(f"{value:.4g}" for value in told.values()) if told else None
+
+
+def _tools(told: dict[str, Any]) -> Table:
+    columns = [Column("tool", is_label=True), Column("body", is_label=True), Column("place", "m")]
+    rows = [[tool["name"], tool["body"], _vector(tool["position"])] for tool in told["tools"]]
+    return Table("Tools", columns, [Group(rows)], ["The first one is that of tool_pose."])
+
+
+def _shapes(told: dict[str, Any]) -> Table:
+    columns = [
+        Column("body", is_label=True), Column("shape", is_label=True), Column("size", "m"),
+        Column("mesh", is_label=True),
+    ]  # fmt: skip
+    rows = [
+        [
+            seen["body"],
+            seen["shape"],
+            _vector(seen["size"]),
+            seen.get("mesh", "") + ("" if seen.get("found", True) else " (not there)"),
+        ]
+        for seen in told["shapes"]
+    ]
+    return Table.of("Shapes", columns, rows)
+
+
+def _vector(values: Sequence[float]) -> str:
+    return ", ".join(f"{value:.4g}" for value in values)

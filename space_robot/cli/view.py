@@ -1,0 +1,118 @@
+"""``space-robot view``: flights in 3-D with plots that follow, as one page."""
+
+from __future__ import annotations
+
+import webbrowser
+from pathlib import Path
+
+import click
+
+from .numbers import FiniteRange
+from .options import NAMESPACE, REMAP, TRUST, file_option
+
+
+@click.command()
+@click.argument("bags", nargs=-1, type=click.Path(path_type=Path), metavar="[BAG...]")
+@file_option(
+    "--out",
+    help="Page to write, or of one bag an animated picture: .webp, .gif or .png. An older one is "
+    "replaced [default: <BAG>_view.html, here].",
+)
+@click.option("--open/--no-open", "opens", default=True, help="Open the page in a browser.")
+@click.option(
+    "--side-by-side", is_flag=True,
+    help="A place for each robot [default: of one and the same robot all flights in one place].",
+)  # fmt: skip
+@click.option(
+    "--rate", type=FiniteRange(0.0, 1e3, min_open=True), default=30.0, metavar="HZ",
+    help="Poses a second of flight [default: 30]; fewer where the page grew beyond 3 MB.",
+)  # fmt: skip
+@click.option("--from", "from_s", type=float, metavar="T", help="Begin at T simulated seconds.")
+@click.option("--to", "to_s", type=float, metavar="T", help="End before T simulated seconds.")
+@click.option(
+    "--robot", default="", metavar="NAME-or-FILE",
+    help="The robot that flew, where the bag does not tell; of a URDF its shapes, too.",
+)  # fmt: skip
+@click.option("--title", default="", help="Of the page [default: the bags' names].")
+@click.option("--light", is_flag=True, help="Dark on white, to print.")
+@REMAP
+@NAMESPACE
+@TRUST
+@click.option("--live", is_flag=True, help="What flies now: serve the scene until Ctrl-C.")
+@click.option(
+    "--domain", type=int,
+    help="ROS domain of the live graph [default: ROS_DOMAIN_ID, or that of this machine's newest "
+    "flight].",
+)  # fmt: skip
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=8080, show_default=True,
+    help="Of the live scene, on 127.0.0.1; if it is taken, the next one that is free.",
+)  # fmt: skip
+@click.pass_context
+def view(
+    context: click.Context, bags: tuple[Path, ...], out: Path | None, opens: bool,
+    side_by_side: bool, rate: float, from_s: float | None, to_s: float | None, robot: str,
+    title: str, light: bool,
+    remap: dict[str, str], namespace: str | None, trust: bool, live: bool, domain: int | None,
+    port: int,
+) -> None:  # fmt: skip
+    """Show recorded flights: the robot in 3-D, with plots that follow it, on one HTML page.
+
+    The page needs nothing but a browser, no network: send it to a colleague. Play, scrub, click a
+    plot or a mark to go there. Several bags are drawn over one another, or side by side.
+
+    Named .webp, .gif or .png the file is an animated picture, for which Chromium must be here.
+    With --live and no bag the same scene is served from a running graph, one flight after another.
+
+    \b
+    Examples:
+      space-robot view flights/one
+      space-robot view flights/tde_stc flights/ctc --out laws.html
+      space-robot view flights/one flights/two --side-by-side --no-open
+      space-robot view flights/mine --robot my.urdf --from 10 --to 12 --rate 200
+      space-robot view flights/one --out one.webp
+      space-robot view --live
+      space-robot view --live --domain 7 --namespace /sat1
+    """
+    from space_robot_msgs_py.bag.reader import read_flight
+
+    from ..analysis import excerpt
+    from ..console.files import (
+        check_writable,
+        make_folder,
+        whole_file,
+    )
+    from ..console.progress import counting_progress
+    from ..view.animation import FORMATS
+    from ..view.flights import Options, flights_page, picture_of, remarks_on, shown_robot
+    from ..view.stage import check_viser
+    from .analyze import bag_names
+    from .view_live import check_options, serve_live
+
+    check_options(context, live, bags)
+    check_viser()
+    if live:
+        serve_live(domain, namespace, robot, port, light, opens)
+        return
+    names = bag_names(bags)
+    page = out or Path(f"{'_'.join(names)}_view.html")
+    make_folder(page.parent)
+    check_writable(page)
+    logs = {
+        name: excerpt(read_flight(bag, remap, trust, namespace), from_s, to_s)
+        for name, bag in zip(names, bags, strict=True)
+    }
+    robots = {name: shown_robot(log, robot) for name, log in logs.items()}
+    for line in remarks_on(logs, robots):
+        click.echo(line, err=True)
+    options = Options(side_by_side, rate, title, not light)
+    with counting_progress("drawing") as advance:
+        if page.suffix in FORMATS:
+            data = picture_of(logs, robots, title, page, advance)
+        else:
+            data = flights_page(logs, robots, options, advance).encode()
+    with whole_file(page, replace=True) as written:
+        written.write(data)
+    click.echo(f"wrote {page} ({page.stat().st_size / 1e6:.1f} MB)", err=True)
+    if opens and not webbrowser.open(page.absolute().as_uri()):
+        click.echo("no browser was found here: open the page in one", err=True)

@@ -1,0 +1,60 @@
+"""``space-robot view --live``: the scene of what flies now, served to browsers."""
+
+from __future__ import annotations
+
+import os
+import webbrowser
+from collections.abc import Collection
+
+import click
+
+NICENESS = 10
+"""The graph comes first: a frame may be late, a tick may not."""
+OF_LIVE = ("domain", "port")
+OF_BOTH = ("live", "opens", "robot", "light", "namespace")
+
+
+def check_options(context: click.Context, live: bool, bags: Collection[object]) -> None:
+    """See that what was given fits recorded flights, or a live one.
+
+    Raises:
+        InputError: it is for the other.
+    """
+    from click.core import ParameterSource
+
+    from space_robot_msgs_py.errors import InputError
+
+    if live == bool(bags):
+        raise InputError("a BAG was expected, or --live without one")
+    for option in context.command.params:
+        name = option.name or ""
+        given = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        if given and name not in ("bags", *OF_BOTH) and (name in OF_LIVE) != live:
+            other = "recorded flights" if live else "--live"
+            raise InputError(f"{option.opts[0]} is for {other} only")
+
+
+def serve_live(
+    domain: int | None, namespace: str | None, robot: str, port: int, light: bool, opens: bool
+) -> None:
+    """Serve the scene until the user ends it; its arguments are the command's options."""
+    click.echo("starting the scene ...", err=True)  # where much else runs, that takes a while
+    from space_robot_model.robot.find import robot_as_path
+
+    from ..processes.interruption import Interrupted
+    from ..view.live.serve import LiveOptions, serve
+
+    def say(text: str) -> None:
+        click.echo(text, err=True)
+
+    def ready(address: str) -> None:
+        say(f"the scene is at {address}; Ctrl-C ends")
+        if opens:
+            webbrowser.open(address)
+        os.nice(NICENESS)
+
+    named = robot_as_path(robot) if robot else ""
+    try:
+        serve(LiveOptions(domain, namespace or "", named, port, not light), say, ready)
+    except Interrupted:
+        say("ended")

@@ -1,0 +1,62 @@
+"""Tables on a terminal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from .tables import (
+    Column,
+    Table,
+    Value,
+    Verdict,
+    text_of,
+)
+from .terminal import (
+    say,
+    show,
+)
+
+TONES = {"good": "green", "bad": "red", "open": "yellow"}
+
+
+def print_table(table: Table, console: Console, *, dense: bool = False) -> None:
+    """Print a table and its notes; one that does not fit becomes lines.
+
+    Args:
+        table: what to print.
+        console: where to.
+        dense: without lines at the sides, for long numbers.
+    """
+    style: dict[str, Any] = {"box": SIMPLE_HEAD, "show_edge": False} if dense else {}
+    shown = RichTable(
+        title=table.title or None, title_justify="left",
+        show_header=any(column.heading for column in table.columns), **style,
+    )  # fmt: skip
+    is_grouped = table.has_named_groups
+    if is_grouped:
+        shown.add_column("", no_wrap=True)
+    for column in table.columns:
+        shown.add_column(
+            column.heading, justify="left" if column.is_label else "right", overflow="fold"
+        )
+    for group in table.groups:
+        for number, row in enumerate(group.rows):
+            name = [group.name if number == 0 else ""] if is_grouped else []
+            cells = [_cell(value, c) for value, c in zip(row, table.columns, strict=True)]
+            shown.add_row(*name, *cells, end_section=number == len(group.rows) - 1)
+    show(shown, console)
+    for note in table.notes:
+        say(console, note)
+
+
+def _cell(value: Value, column: Column) -> str | Text:
+    if isinstance(value, Verdict):
+        return Text.assemble(
+            f"{value.text} " if value.text else "", (value.word, TONES[value.tone])
+        )
+    return text_of(value, column)

@@ -1,0 +1,261 @@
+"""A flight step by step, for laws under development and for learning.
+
+    state = bench.reset(seed=1)
+    while not bench.done:
+        state = bench.step(torque_of(state))
+
+The bits are those of the flight flown whole.
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from space_robot_control.controller.controller import (
+    Controller,
+    ControllerSnapshot,
+)
+from space_robot_control.laws import ControlLaw
+from space_robot_msgs_py.compiled.records import Block, RecordOwner
+from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
+from space_robot_msgs_py.config.validation import short
+from space_robot_msgs_py.errors import FlightError, InputError
+from space_robot_msgs_py.samples import Command, Reference, RobotState
+from space_robot_sim.plant.plant import Plant, PlantSnapshot
+
+from .ending import Ending
+from .plan import Flight
+
+Array = NDArray[np.float64]
+
+REFERENCE_TICKS = 1000
+"""Ticks of the desired motion that are computed at once."""
+
+
+class Snapshot(NamedTuple):
+    """A bench at a tick: plant, random numbers, faults, controller and law. It can be pickled."""
+
+    plant: PlantSnapshot
+    controller: ControllerSnapshot
+    answered: int
+    """The last tick that the law has answered; -1: none."""
+    ending: Ending | None
+
+
+class Bench(RecordOwner):
+    """Flies a plant tick by tick under torques from anywhere, or under the flight's own law.
+
+    States are views of the memory of one flight, overwritten by every step: `RobotState.copy`
+    keeps one. A fresh bench stands at tick 0, with the seed of its flight. A copy, by `copy` or
+    `pickle`, flies on to the same bits; `save` and `restore` take a fortieth of its time.
+    """
+
+    _views = ("_reference",)
+
+    def __init__(self, flight: Flight) -> None:
+        """Put a flight on the bench.
+
+        Raises:
+            InputError: it needs a graph of nodes, or its messages fail: here are none.
+        """
+        flight.check_in_process()
+        if flight.plant_settings.has_message_faults:
+            raise InputError("on the bench are no messages that could fail: fly the faults of them")
+        self.flight, self.ticks, self.period = flight, flight.ticks, flight.period
+        # of its own: a law remembers, and another bench may fly the same flight
+        self._laws, self._law, self._swaps = copy.deepcopy((
+            flight.laws, flight.law, flight.swaps
+        ))  # fmt: skip
+        self.names = flight.plant.names
+        """Names of joints and actuators; ``names.commanded`` are those of a command's numbers."""
+        self.axes = len(self.names.axes)
+        """m = n+3."""
+        self._shape = (len(self.names.commanded),)
+        self._given = Command(0, np.zeros(self._shape))
+        self._desired: Block = np.empty(0, Reference.dtype(flight.robot.n))
+        self._first = 0
+        """Tick of the first row of ``_desired``."""
+        self._reference_block = Reference.block(flight.robot.n)
+        self._look_into_blocks()
+        self.reset()
+
+    def _look_into_blocks(self) -> None:
+        self._reference = Reference.view(self._reference_block)
+
+    def reset(self, seed: int | None = None) -> RobotState:
+        """Begin the flight anew and return the measured state of tick 0.
+
+        Args:
+            seed: of the random numbers of sensors and faults; None: the flight's own.
+
+        Raises:
+            InputError: the seed is not a whole number from 0 to 2147483647.
+        """
+        flight = self.flight
+        settings = flight.plant_settings
+        if seed is not None:
+            number = as_whole_number(seed, "seed", 0, 2**31 - 1)
+            settings = settings.model_copy(update={"fault_seed": number})
+        self._plant = Plant(flight.robot, settings, flight.period)
+        self.controller: Controller = flight.build_controller(self._law)
+        """The controller, with the law in force; its signals are those of the last answer."""
+        self._answered = -1
+        self._ending: Ending | None = None
+        self.done = False
+        """True once the flight is over: `outcome` says how."""
+        return self._plant.state
+
+    def step(self, torque: ArrayLike | None = None) -> RobotState:
+        """Hold a torque over one tick and return the state measured then.
+
+        Args:
+            torque: (m,) N m on base x, y, z (base frame), then the joints; a base of wheels and
+                thrusters shares its part out as a controller does. Or (m+A,), with a number for
+                each of these A actuators. None: what the flight's law commands.
+
+        Raises:
+            InputError: not as many numbers, or none; no law to command; the flight is over.
+        """
+        if self.done:
+            raise InputError(f"the flight is over ({self.outcome}): reset or restore the bench")
+        plant = self._plant
+        try:
+            plant.step(self.command() if torque is None else self._command_of(torque))
+        except FlightError as error:
+            self._end(Ending.early(error, self.period))
+        else:
+            if plant.state.tick >= self.ticks:
+                self._end(Ending.complete(self.ticks, self.period))
+        return plant.state
+
+    def command(self) -> Command:
+        """Return what the flight's law commands at this tick; ``torque`` (m+A,) is overwritten.
+
+        Asked again it answers the same. It takes over anew after ticks that it has not answered.
+
+        Raises:
+            InputError: the flight has no law.
+            UnusableStateError: the law has no command for this state.
+        """
+        controller, state = self.controller, self._plant.state
+        tick = state.tick
+        if self.flight.plan.controller is None:
+            raise InputError("controller is None: give every step a torque")
+        if tick != self._answered:
+            law = self._law_at(tick)
+            if law is not controller.law:
+                controller.law = law
+            elif tick and tick != self._answered + 1:
+                controller.engage()
+            self._look_up(tick)
+            controller.update(state, self._reference_block)
+            self._answered = tick
+        return controller.last_command
+
+    def save(self) -> Snapshot:
+        """Copy all that the rest of the flight depends on."""
+        return Snapshot(
+            self._plant.save(), self.controller.save(), self._answered, self._ending
+        )  # fmt: skip
+
+    def restore(self, snapshot: Snapshot) -> RobotState:
+        """Go back, or on, to a snapshot of this scenario, whatever its seed; the same bits follow.
+
+        Raises:
+            InputError: it is no snapshot, or of another robot or scenario.
+        """
+        if not isinstance(snapshot, Snapshot):
+            raise InputError(f"snapshot: what `save` returned was expected, got {short(snapshot)}")
+        if snapshot.plant.block.dtype != self._plant.block.dtype:
+            raise InputError("the snapshot is of another robot")
+        delayed, law = snapshot.plant.command_delay_buffer, snapshot.controller.law
+        if delayed.shape != self._plant.command_delay_buffer.shape:
+            raise InputError("the snapshot is of another scenario: its delay of commands, or its "
+                             "actuators, are not those of this bench")  # fmt: skip
+        if law not in self._laws:
+            raise InputError(
+                f"the snapshot is of another scenario: under {law!r}, the laws of this bench are "
+                f"{', '.join(self._laws)}"
+            )
+        self._plant.restore(snapshot.plant)
+        self.controller.restore(snapshot.controller, self._laws)
+        self._answered, self._ending = snapshot.answered, snapshot.ending
+        self.done = self._ending is not None
+        return self._plant.state
+
+    @property
+    def state(self) -> RobotState:
+        """The state as the sensors measure it at this tick."""
+        return self._plant.state
+
+    @property
+    def truth(self) -> RobotState:
+        """The true state at this tick."""
+        return self._plant.truth
+
+    @property
+    def reference(self) -> Reference:
+        """The desired motion at this tick; overwritten."""
+        self._look_up(self._plant.state.tick)
+        return self._reference
+
+    @property
+    def tick(self) -> int:
+        """Ticks flown."""
+        return self._plant.state.tick
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self._plant.state.tick * self.period
+
+    @property
+    def outcome(self) -> str:
+        """``complete``, ``diverged`` or ``unanswered``; empty while the flight goes on."""
+        return self._ending.outcome if self._ending else ""
+
+    @property
+    def reason(self) -> str:
+        """Why the flight ended before its time, in a line; empty if it did not."""
+        return self._ending.reason if self._ending else ""
+
+    def __repr__(self) -> str:
+        said = self.outcome or "flying"
+        return f"<Bench: {self.flight.robot.name}, t = {self.time:.4f} s, {said}>"
+
+    def _end(self, ending: Ending) -> None:
+        self._ending, self.done = ending, True
+
+    def _command_of(self, torque: ArrayLike) -> Command:
+        """Return the command of numbers that somebody else gives."""
+        numbers, given = as_numbers(torque, "torque"), self._given
+        if numbers.shape == self._shape:
+            given.torque[:] = numbers
+            return given
+        if numbers.shape != (self.axes,):
+            counts = " or ".join(str(count) for count in sorted({self.axes, *self._shape}))
+            raise InputError(
+                f"torque: {counts} numbers were expected, got an array of shape {numbers.shape}"
+            )
+        return self.controller.share_out(self._plant.state, numbers)
+
+    def _law_at(self, tick: int) -> ControlLaw:
+        """Return the law in force: the one swapped to last."""
+        law = self._law
+        for swapped_at, other in self._swaps:
+            if swapped_at <= tick:
+                law = other
+        return law
+
+    def _look_up(self, tick: int) -> None:
+        """Put the reference of a tick into its block."""
+        row = tick - self._first
+        if not 0 <= row < len(self._desired):
+            self._first = tick - tick % REFERENCE_TICKS
+            self._desired = self.flight.mission.chunk(self._first, REFERENCE_TICKS).references()
+            row = tick - self._first
+        self._reference_block[:] = self._desired[row : row + 1]

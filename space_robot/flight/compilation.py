@@ -1,0 +1,98 @@
+"""Compiling everything a flight needs before it starts, once an installation."""
+
+from __future__ import annotations
+
+import subprocess
+from contextlib import AbstractContextManager
+from typing import Any
+
+import click
+import numpy as np
+
+from space_robot_control.allocation.allocation import (
+    allocate,
+    allocation_code,
+)
+from space_robot_control.laws import (
+    CompiledLaw,
+    laws,
+)
+from space_robot_msgs_py.compiled.cache import cache_directory
+from space_robot_msgs_py.compiled.call_graph import count_compiled, index_files
+from space_robot_msgs_py.ros.lifeline import hold_to_standard_input
+from space_robot_msgs_py.ros.run_module import module_command
+from space_robot_msgs_py.samples import Command, Reference, RobotState
+from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
+from space_robot_msgs_py.wire.compiled_codec import read, write
+
+from ..console.progress import watching_progress
+from ..processes.child_process import child_process
+from .closed_loop import fly_ticks
+from .plan import Flight, FlightPlan
+from .simulate import simulate
+
+MARK, ALLOCATION_MARK = "complete", "allocation"
+
+
+def compile_kernels(with_allocation: bool = False) -> None:
+    """Compile all that flights need, unless that has been done since the last change.
+
+    Else the nodes would compile the same functions side by side in their first tick. The allocation
+    is for bases whose actuators are hardware.
+    """
+    _compile_flights()
+    mark = cache_directory() / ALLOCATION_MARK
+    if with_allocation and not mark.exists():
+        with _progress("the allocation", allocate):
+            allocation_code(is_used=True)
+        mark.touch()
+
+
+def _compile_flights() -> None:
+    """Fly a few ticks under every law.
+
+    The controller's kernels are compiled by a second process while this one compiles the plant's.
+    """
+    mark = cache_directory() / MARK
+    if mark.exists():
+        return
+    own = [law.kernel for law in laws().values() if issubclass(law, CompiledLaw)]
+    with _progress("the dynamics and the laws", fly_ticks, read, write, *own):
+        with child_process(module_command(__name__), stdout=subprocess.DEVNULL) as helper:
+            _step_plant()
+            helper.wait()
+        for law in laws():
+            simulate(Flight(FlightPlan(controller=law, duration=0.002)))
+        _step_plant()
+        _answer_and_exchange()
+    mark.touch()
+
+
+def _progress(what: str, *kernels: Any) -> AbstractContextManager[None]:
+    """Say what is compiled, and show how many kernels are; other processes compile them, too."""
+    click.echo(f"compiling {what} (once an installation, a minute or two) ...", err=True)
+    files = index_files(kernels)
+    return watching_progress("kernels", len(files), lambda: count_compiled(files))
+
+
+def _step_plant() -> None:
+    flight = Flight(FlightPlan())
+    flight.plant.step(Command(0, np.zeros(len(flight.plant.names.commanded))))
+
+
+def _answer_and_exchange() -> None:
+    """The controller's entry under every law, and the messages."""
+    for law in laws():
+        flight = Flight(FlightPlan(controller=law, navigation="filtered"))
+        states = StateCodec(flight.plant.names, flight.timebase)
+        commands = CommandCodec(flight.plant.names.commanded, flight.timebase)
+        state = RobotState.allocate(flight.robot.n)
+        for topic, data in zip(states.topics, states.encode(state), strict=True):
+            states.decode(topic, data, state)
+        command = flight.controller.update(state, Reference.at_rest(flight.robot.n))
+        commands.decode(commands.encode(command), command)
+
+
+if __name__ == "__main__":
+    hold_to_standard_input()
+    _answer_and_exchange()

@@ -1,0 +1,205 @@
+"""A graph of nodes from their start to the flight's end: brought up, watched, shown, stopped."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Collection, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from space_robot_msgs_py.errors import FlightError
+from space_robot_sim.plant.run_control import PAUSED
+
+from ...console.progress import (
+    FlightProgress,
+    flight_progress,
+)
+from ...processes.interruption import exit_code
+from ...scenario.faults import NODE_OF
+from ..plan import Flight
+from .degraded import degradation
+from .foreign import ForeignNodes
+from .injection import Injector
+from .listeners import wait_for
+from .monitor import Event, Monitor
+from .node_names import NODE_NAMES, ORDER, PLANT
+from .node_services import change_state
+from .processes import Graph, node_command
+from .watch import Watch
+
+POLL_S = 0.1
+INJECTING_POLL_S = 0.01
+STALL_TIMEOUT_S = 60.0
+LISTENER_TIMEOUT_S = 5.0
+"""How long a controller that is started again waits for its listeners."""
+
+
+class InterruptedFlightError(FlightError):
+    """The user stopped the flight."""
+
+    def __init__(self, text: str, number: int) -> None:
+        """``number``: of the signal."""
+        super().__init__(text)
+        self.number, self.exit_code = number, exit_code(number)
+
+
+def follow(
+    graph: Graph, flight: Flight, parameters: dict[str, dict[str, Any]], domain: int,
+    stopped: list[int],
+) -> dict[str, Any]:  # fmt: skip
+    """Fly on started nodes until the plant has ended the flight; report what happened.
+
+    Args:
+        graph: the processes, not configured yet.
+        flight: what they fly.
+        parameters: of each node, for one that is started again.
+        domain: their ROS domain.
+        stopped: filled when the user wants to end.
+
+    Raises:
+        InterruptedFlightError: the user has ended the flight.
+        InputError: others publish its topics, or have its nodes' names.
+        FlightError: it cannot go on.
+    """
+    monitor = Monitor(domain, flight.plan.namespace, period=flight.period)
+    try:
+        follower = _Follower(graph, flight, parameters, monitor, stopped)
+        with flight_progress(follower.total_s, flight.controller.law.name) as show:
+            follower.bring_up(show)
+            follower.until_complete(show)
+        return follower.end()
+    finally:
+        monitor.close()
+
+
+class _Follower:
+    def __init__(
+        self, graph: Graph, flight: Flight, parameters: dict[str, dict[str, Any]],
+        monitor: Monitor, stopped: list[int],
+    ) -> None:  # fmt: skip
+        slides = flight.robot.is_prismatic[: flight.robot.n]
+        self._unit = "m" if slides.all() else "rad or m" if slides.any() else "rad"
+        self.total_s = flight.ticks * flight.period
+        self._last_clock_s = self.total_s - flight.plant_settings.clock_decimation * flight.period
+        self._graph, self._monitor, self._stopped = graph, monitor, stopped
+        self._foreign = ForeignNodes(monitor.node, NODE_NAMES)
+        self._fault_kinds = frozenset(fault.kind.name for fault in flight.orchestrator_faults)
+        self._realtime = flight.plant_settings.realtime
+        self._injector = Injector(flight.orchestrator_faults, graph)
+        self._watch = Watch(
+            graph, monitor,
+            planned=frozenset(NODE_OF[fault.kind] for fault in flight.orchestrator_faults),
+            restart_command=(
+                partial(_restart_command, parameters["controller"], flight.plan.namespace)
+                if flight.plan.restart_controller
+                else None
+            ),
+            last_tick=flight.ticks,
+        )  # fmt: skip
+        self._events: list[Event] = []
+        self._begun_at = 0.0
+        """The time when the first tick was seen; 0 before."""
+        self._last_s, self._moved_at = 0.0, time.monotonic()
+
+    def bring_up(self, show: FlightProgress) -> None:
+        """Configure all nodes, then activate them, the plant last."""
+        show(0.0, "configuring the nodes")
+        self._change(NODE_NAMES, "configure")
+        self._foreign.wait(self._check_start)
+        for name in NODE_NAMES:
+            self._change([name], "activate")
+        show.say(f"configured and active: {', '.join(ORDER)}")
+        show(0.0, "waiting for the nodes")
+
+    def _change(self, names: Sequence[str], transition: str) -> None:
+        for name in change_state(self._monitor.node, names, transition, self._check_start):
+            output = self._graph.host_of(name.removesuffix("_node")).output_tail()
+            raise FlightError(f"{name} refused to {transition}:\n{output}")
+
+    def until_complete(self, show: FlightProgress) -> None:
+        """Watch, inject, show."""
+        monitor, injector = self._monitor, self._injector
+        while not self._watch.is_complete:
+            if self._stopped:
+                raise InterruptedFlightError(
+                    f"stopped at {monitor.simulated_s:.2f} s", self._stopped[0]
+                )
+            time.sleep(INJECTING_POLL_S if injector.is_busy else POLL_S)
+            news = [*monitor.poll(), *injector.poll(monitor.simulated_s)]
+            news += self._watch.poll(monitor.simulated_s)
+            self._foreign.watch()
+            self._show_progress(show)
+            self._keep(news, show)
+        self._keep(monitor.poll(), show)
+        show(self.total_s, "")
+
+    def _keep(self, news: Sequence[Event], show: FlightProgress) -> None:
+        """Say and keep what happened before the plant's last clock: what ends then is meant to."""
+        for event in news:
+            if event.simulated_s < self._last_clock_s:
+                show.say(str(event))
+                self._events.append(event)
+
+    def end(self) -> dict[str, Any]:
+        """Stop the other nodes; report what happened."""
+        self._graph.stop()
+        self._watch.check_recorder_exit()
+        if self._stopped:
+            raise InterruptedFlightError("stopped when the flight was complete", self._stopped[0])
+        self._monitor.poll()  # the nodes' last reports
+        found = degradation(self._monitor.values, self._fault_kinds, self._realtime)
+        return {
+            "events": [
+                event._asdict() for event in sorted(self._events, key=lambda e: e.simulated_s)
+            ],
+            "nodes": self._monitor.values,
+            "restarts": self._watch.restarts,
+            "failures": [*self._watch.failures, *found.failures],
+            "warnings": found.warnings,
+        }
+
+    def _check_start(self) -> None:
+        self._graph.check()
+        if self._stopped:
+            raise InterruptedFlightError("stopped before the flight began", self._stopped[0])
+
+    def _show_progress(self, show: FlightProgress) -> None:
+        monitor, now = self._monitor, time.monotonic()
+        is_paused = monitor.modes.get(PLANT) == PAUSED
+        if monitor.simulated_s != self._last_s or (not self._begun_at and monitor.has_begun):
+            self._begun_at = self._begun_at or now
+            self._last_s, self._moved_at = monitor.simulated_s, now
+            wall_s = now - self._begun_at
+            show(self._last_s, _remark(monitor.errors, self._last_s, wall_s, self._unit))
+        elif is_paused:
+            self._moved_at = now
+            show(self._last_s, PAUSED)
+        elif now - self._moved_at > STALL_TIMEOUT_S:
+            output = "\n".join(f"{n}:\n{p.output_tail()}" for n, p in self._graph.nodes.items())
+            why = "".join(f"{node}: {mode}\n" for node, mode in monitor.complaints.items())
+            raise FlightError(
+                f"no progress for {STALL_TIMEOUT_S:.0f} s at {self._last_s:.2f} s:\n{why}{output}"
+            )
+
+
+def _remark(
+    errors: tuple[float, float] | None, simulated_s: float, wall_s: float, unit: str
+) -> str:
+    speed = f"{simulated_s / wall_s:.1f}x real time, " if wall_s > 0.5 else ""
+    if errors is None:
+        return speed
+    of_base = f"attitude {errors[0]:.1e}, " if errors[0] else ""  # the law of a free base sees none
+    return f"{speed}errors: {of_base}joints {errors[1]:.1e} {unit}"
+
+
+def _restart_command(
+    parameters: Mapping[str, Any], namespace: str, absent: Collection[str]
+) -> list[str]:
+    """Return the command of a controller that is started again while some nodes are ``absent``.
+
+    The recorder must have found it before it begins: the bag would lack what it answered until
+    then. But a recorder may be stopped, and the flight does not wait for that for long.
+    """
+    listeners = wait_for("controller", absent)
+    again = {"wait_for": listeners, "listener_timeout": LISTENER_TIMEOUT_S}
+    return node_command("controller", {**parameters, **again}, namespace)

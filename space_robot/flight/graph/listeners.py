@@ -1,0 +1,44 @@
+"""The listeners to each topic in a flight, for whom the nodes wait."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from space_robot_msgs_py import topics
+
+from ...scenario.node_settings import SCHEMAS
+from .node_names import PLANT
+
+_TO_CONTROLLER = ("controller_node", "recorder_node")
+
+LISTENERS = {
+    topics.JOINT_STATES: _TO_CONTROLLER,
+    topics.BASE_STATE: _TO_CONTROLLER,
+    topics.COMMAND: (PLANT, "recorder_node"),
+    topics.REFERENCE_JOINTS: _TO_CONTROLLER,
+    topics.REFERENCE_BASE: _TO_CONTROLLER,
+    topics.TELEMETRY: ("recorder_node",),
+    topics.SIGNALS: ("recorder_node",),
+    topics.LAW: ("recorder_node",),
+    topics.CLOCK: ("mission_node", "recorder_node"),
+    topics.TRUTH_JOINTS: ("recorder_node",),
+    topics.TRUTH_BASE: ("recorder_node",),
+    topics.WHEELS_STATE: _TO_CONTROLLER,
+    topics.THRUSTERS_STATE: ("recorder_node",),
+    **dict.fromkeys((*topics.SCENE, topics.PLANT_DESCRIPTION), ("recorder_node",)),
+}
+"""Nodes of the graph that subscribe to each topic."""
+
+RESET_WITH = ["recorder_node", "mission_node", "controller_node"]
+"""Parameter ``reset_with`` of the plant in a whole graph: the others as they are activated."""
+
+
+def wait_for(node: str, absent: Collection[str] = ()) -> list[str]:
+    """Return the parameter ``wait_for`` of the plant or the controller in a whole graph.
+
+    ``absent``: nodes that have ended.
+    """
+    (sends,) = (schema.sends for schema in SCHEMAS if schema.node == node)
+    return [
+        f"{name}:{topic.name}" for topic in sends for name in LISTENERS[topic] if name not in absent
+    ]

@@ -1,0 +1,177 @@
+"""A flight as a graph of real nodes: start, wait, follow, stop, check, report."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.bag.selection import Selection
+from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
+
+from ...processes.interruption import handled_signals
+from ...processes.scratch_folder import ScratchFolder
+from ..bag_path import check_bag_path
+from ..compilation import compile_kernels
+from ..plan import Flight
+from .composed import NAME, composed_command
+from .domain import ros_domain
+from .following import follow
+from .listeners import RESET_WITH, wait_for
+from .processes import Graph, node_command, node_environment
+
+COMPOSED_DRAIN_S = 0.002
+"""In one process the recorder takes little and often: while it does, no tick is flown."""
+
+
+def fly(
+    flight: Flight,
+    bag: Path,
+    analyze: Callable[[FlightLog], dict[str, Any]],
+    remarks: Iterable[str] = (),
+) -> dict[str, Any]:
+    """Fly on a ROS 2 graph and return the report of the recorded bag.
+
+    ``graph`` in the report says what happened in the graph; its ``failures`` are what keeps the
+    flight from being whole though it was flown to its end.
+
+    Args:
+        flight: a checked plan.
+        bag: the folder to record to.
+        analyze: makes the report of the recorded flight.
+        remarks: on the flight, said once it can begin.
+
+    Raises:
+        InputError: the bag cannot be made, or the domain is taken.
+        FlightError: a node died, the graph stalled, messages were lost, or the user stopped it.
+            The bag is closed, or gone if no tick was flown; no process is left.
+    """
+    check_bag_path(bag)
+    require_ros()
+    compile_kernels(bool(flight.plant.names.actuators))
+    namespace = flight.plan.namespace
+    with ros_domain(flight.plan.domain, namespace) as domain, stop_signals() as stopped:
+        _claim(bag)
+        begin = time.monotonic()
+        try:
+            within = "" if namespace == topics.ROOT else f" in namespace {namespace}"
+            _say(f"flying on ROS_DOMAIN_ID={domain}{within}, recording to {bag}")
+            for remark in remarks:
+                _say(remark)
+            parameters = flight_parameters(flight, bag)
+            with (
+                ScratchFolder() as folder,
+                Graph(
+                    _commands(flight, parameters, Path(folder)), node_environment(domain)
+                ) as graph,
+            ):
+                what_happened = follow(graph, flight, parameters, domain, stopped)
+        except BaseException as error:
+            if not _has_states(bag, namespace):
+                shutil.rmtree(bag, ignore_errors=True)
+            elif isinstance(error, SpaceRobotError):
+                error.args = (f"{error}; what was flown is in {bag}",)
+            raise
+        _say(f"flown and recorded in {time.monotonic() - begin:.1f} s, start-up included")
+    report = analyze(read_flight(bag, trust=True))
+    report["graph"] = what_happened
+    for warning in what_happened["warnings"]:
+        _say(f"warning: {warning}")
+    _check(report, flight)
+    return report
+
+
+def _commands(
+    flight: Flight, parameters: Mapping[str, Mapping[str, Any]], folder: Path
+) -> dict[str, list[str]]:
+    """Command lines of the processes: one a node, or one for all; their files go to ``folder``."""
+    told = {node: {**values, "autostart": False} for node, values in parameters.items()}
+    namespace = flight.plan.namespace
+    if flight.plan.composed:
+        return {NAME: composed_command(told, namespace, folder)}
+    return {node: node_command(node, values, namespace) for node, values in told.items()}
+
+
+def _claim(bag: Path) -> None:
+    """Make the bag's folder, so that what is in it is of this flight alone.
+
+    Raises:
+        InputError: it is there: another flight was quicker.
+    """
+    try:
+        bag.mkdir(parents=True)
+    except OSError:
+        check_bag_path(bag)  # in words
+        raise
+
+
+def _has_states(bag: Path, namespace: str) -> bool:
+    """Tell if a tick was flown."""
+    try:
+        found = Selection(open_bag(bag), {}, namespace).batches()
+        return any(topic is topics.JOINT_STATES for topic, _ in found)
+    except (InputError, OSError):
+        return False
+
+
+def require_ros() -> None:
+    """See that nodes can be started here.
+
+    Raises:
+        FlightError: rclpy cannot be imported.
+    """
+    try:
+        import rclpy  # noqa: F401
+    except ImportError as error:
+        raise FlightError(
+            f"rclpy cannot be imported ({error}): source your ROS 2 Jazzy, or install the [ros] "
+            "extra; `space-robot simulate` flies without"
+        ) from None
+
+
+def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
+    """The parameters of every node of a flight that is recorded to ``bag``."""
+    parameters = {node: dict(given) for node, given in flight.parameters.items()}
+    parameters["plant"] |= {
+        "ticks": flight.ticks, "wait_for": wait_for("plant"), "reset_with": RESET_WITH,
+    }  # fmt: skip
+    parameters["controller"] |= {"wait_for": wait_for("controller")}
+    parameters["recorder"] |= {
+        "bag": str(bag.absolute()),
+        "flight": json.dumps(flight.description),
+    }
+    if flight.plan.composed:
+        parameters["recorder"].setdefault("drain_period", COMPOSED_DRAIN_S)
+    return parameters
+
+
+def _check(report: dict[str, Any], flight: Flight) -> None:
+    lost = {topic: count for topic, count in report["lost"].items() if count}
+    if report["graph"]["failures"]:
+        return  # the bag is not expected to be whole
+    if lost:
+        raise FlightError(f"the recorder lost messages: {lost}")
+    if report["ticks"] != flight.ticks:
+        raise FlightError(f"the bag holds {report['ticks']} whole ticks of {flight.ticks}")
+
+
+@contextmanager
+def stop_signals() -> Iterator[list[int]]:
+    """Collect signals that end a command in a list; the nodes, in groups of their own, get none."""
+    arrived: list[int] = []
+    with handled_signals(lambda number, frame: arrived.append(number)):
+        yield arrived
+
+
+def _say(text: str) -> None:
+    click.echo(text, err=True)

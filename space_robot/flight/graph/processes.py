@@ -1,0 +1,207 @@
+"""The nodes as processes: started, watched, stopped, never left behind."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from space_robot_msgs_py.errors import FlightError
+from space_robot_msgs_py.ros import lifeline
+from space_robot_msgs_py.ros.process_environment import defaults
+from space_robot_msgs_py.ros.run_module import clean_environment, module_command
+from space_robot_msgs_py.topics import ROOT
+
+from ...processes.node_modules import MODULES
+
+PACKAGE = "space_robot"
+TAIL_LINES = 5
+ERROR = ": error: "
+"""Stands in a line that says why a process ends."""
+
+
+def has_ros2_run() -> bool:
+    """Tell if the ``ros2`` command is there and knows this package's executables."""
+    prefixes = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
+    return shutil.which("ros2") is not None and any(
+        (Path(prefix) / "share/ament_index/resource_index/packages" / PACKAGE).exists()
+        and os.access(Path(prefix) / "lib" / PACKAGE / "plant_node", os.X_OK)
+        for prefix in prefixes
+        if prefix
+    )
+
+
+def node_environment(domain: int) -> dict[str, str]:
+    """Return a node's environment: the project's defaults unless the user set others."""
+    return {
+        **defaults(), **clean_environment(), **lifeline.held(), "ROS_DOMAIN_ID": str(domain),
+    }  # fmt: skip
+
+
+def node_command(node: str, parameters: Mapping[str, Any], namespace: str = ROOT) -> list[str]:
+    """The command line of a node: through ``ros2 run`` where that works, else directly."""
+    command = (
+        ["ros2", "run", PACKAGE, f"{node}_node"]
+        if has_ros2_run()
+        else module_command(MODULES[node])
+    )
+    return command + ros_arguments(parameters, namespace)
+
+
+def ros_arguments(parameters: Mapping[str, Any], namespace: str = ROOT) -> list[str]:
+    """Parameters and namespace as a node's command line takes them."""
+    arguments = [] if namespace == ROOT else ["-r", f"__ns:={namespace}"]
+    for name, value in parameters.items():
+        # JSON is YAML, which ROS reads
+        arguments += ["-p", f"{name}:={json.dumps(value)}"]
+    return ["--ros-args", *arguments] if arguments else []
+
+
+class NodeProcess:
+    """One node in a process group of its own, its output kept in a file.
+
+    Its standard input is a lifeline: when this process ends, however it does, so does the node.
+    """
+
+    def __init__(self, node: str, command: Sequence[str], environment: Mapping[str, str]):
+        self.node = node
+        self._stopped = False
+        self._output = tempfile.TemporaryFile()  # noqa: SIM115  (closed in `close`)
+        self._process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE, stdout=self._output, stderr=subprocess.STDOUT,
+            env=dict(environment), start_new_session=True,
+        )  # fmt: skip
+
+    @property
+    def pid(self) -> int:
+        """Number of the process, and of its group."""
+        return self._process.pid
+
+    @property
+    def exit_code(self) -> int | None:
+        """Exit code of the process; None while it runs."""
+        return self._process.poll()
+
+    def exit_summary(self) -> str:
+        """Say how it ended, once it has."""
+        time.sleep(0.1)  # let it finish its last line
+        code = self.exit_code or 0
+        how = f"with exit code {code}" if code >= 0 else f"by signal {-code}"
+        return f"{self.node} ended {how}"
+
+    def early_end(self) -> FlightError:
+        """The error to raise when it has ended too early."""
+        return FlightError(f"{self.exit_summary()} before the flight did:\n{self.output_tail()}")
+
+    def output_tail(self) -> str:
+        """The end of what it printed, and errors of before, after which other nodes had ended."""
+        self._output.seek(0)
+        lines = self._output.read().decode(errors="replace").strip().splitlines()
+        errors = [line for line in lines[:-TAIL_LINES] if ERROR in line]
+        told = errors[-TAIL_LINES:] + lines[-TAIL_LINES:]
+        return "\n".join(f"  {line}" for line in told) or "  (it said nothing)"
+
+    def signal(self, number: int) -> None:
+        """Send a signal to the whole group: ``ros2 run`` would keep it to itself."""
+        with suppress(ProcessLookupError):
+            os.killpg(self._process.pid, number)
+
+    def ask_to_end(self) -> None:
+        """Interrupt it, as Ctrl-C would."""
+        self.signal(signal.SIGCONT)  # a stopped process would not hear the rest
+        self.signal(signal.SIGINT)
+
+    def stop(self, patience_s: float = 10.0) -> None:
+        """Ask it to end, insist, then force; returns when its group is gone."""
+        if self._stopped:
+            return
+        self._stopped = True
+        self.ask_to_end()
+        for number, wait_s in ((signal.SIGINT, patience_s), (signal.SIGTERM, 2.0)):
+            if self.exit_code is not None:
+                break
+            self.signal(number)
+            try:
+                self._process.wait(wait_s)
+            except subprocess.TimeoutExpired:
+                continue
+        self.signal(signal.SIGKILL)
+        self._process.wait()
+
+    def close(self) -> None:
+        """Let go of its output and its lifeline."""
+        self._output.close()
+        if self._process.stdin:
+            self._process.stdin.close()
+
+
+class Graph:
+    """The processes of one flight; leaving the context leaves none behind."""
+
+    def __init__(self, commands: Mapping[str, Sequence[str]], environment: Mapping[str, str]):
+        """``commands``: the command line of each node, or of the process that hosts them all."""
+        self._commands, self._environment = commands, environment
+        self.nodes: dict[str, NodeProcess] = {}
+        self._leader = "plant" if "plant" in commands else next(iter(commands))
+
+    def __enter__(self) -> Graph:
+        try:
+            for node, command in self._commands.items():
+                self.nodes[node] = NodeProcess(node, command, self._environment)
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.stop()
+        for node in self.nodes.values():
+            node.close()
+
+    def stop(self) -> None:
+        """End all nodes that have not ended, the recorder last: it takes what they still say."""
+        plant, recorder = self.nodes.get("plant"), self.nodes.get("recorder")
+        if plant:
+            plant.stop()  # first: what it asks must still be answered
+        for node in self.nodes.values():
+            if node is not recorder:
+                node.ask_to_end()
+        for node in sorted(self.nodes.values(), key=lambda node: node is recorder):
+            node.stop()
+
+    @property
+    def leader(self) -> NodeProcess:
+        """The process that ends, with exit code 0, when the flight has come to its end."""
+        return self.nodes[self._leader]
+
+    def host_of(self, node: str) -> NodeProcess:
+        """The process of a node."""
+        return self.nodes.get(node, self.leader)
+
+    def restart(self, name: str, command: Sequence[str]) -> None:
+        """Put a new process in the place of one that is dead or hangs."""
+        old = self.nodes[name]
+        old.signal(signal.SIGKILL)
+        old.stop()
+        old.close()
+        self.nodes[name] = NodeProcess(name, command, self._environment)
+
+    def check(self) -> bool:
+        """Tell if the plant has flown to its end.
+
+        Raises:
+            FlightError: a process has ended too early; with the end of its output.
+        """
+        for node in self.nodes.values():
+            if node.exit_code is not None and (node.exit_code != 0 or node is not self.leader):
+                raise node.early_end()
+        return self.leader.exit_code == 0

@@ -1,0 +1,221 @@
+"""The controller that answers the replay: the one that flew, or another."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from space_robot_control.allocation.assumed_actuators import (
+    OWNER,
+    believed_actuators,
+)
+from space_robot_control.controller.gains import (
+    build_law,
+    build_laws,
+    gain_files,
+    gains_as_path,
+    split_gains,
+)
+from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.controller.swaps import parse_swaps
+from space_robot_control.laws import (
+    ControlLaw,
+    find_law,
+)
+from space_robot_control.laws.trust import (
+    check_file,
+    check_law,
+    is_plain,
+)
+from space_robot_model.robot import Robot
+from space_robot_model.robot.find import (
+    OWN,
+    find_robot,
+)
+from space_robot_msgs_py.config.validation import one_of
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import LawInForce, RobotNames
+
+NODE = ControllerNodeSettings.node
+OF_THE_GRAPH = ("wait_for", "listener_timeout", "fifo_priority", "autostart")
+"""Parameters that say how a controller fits into its graph; a replay has another."""
+
+
+class ControllerChoice:
+    """The parameters of the node to start: the recorded ones, what the user gives over them.
+
+    Robot and gains are the recorded numbers, whatever the files of this installation say today.
+    """
+
+    def __init__(
+        self, flight: Mapping[str, Any], folder: Path, controller: str = "", gains: str = "",
+        given: Mapping[str, Any] | None = None, trust: bool = False,
+    ) -> None:  # fmt: skip
+        """Put the parameters together and check them.
+
+        Args:
+            flight: the description in the bag; empty for a bag of another recorder.
+            folder: where to write recorded numbers as files, which the node will read.
+            controller: law to fly (empty: the recorded one).
+            gains: gain set to fly (empty: the recorded one).
+            given: further parameters of the node, over the recorded ones.
+            trust: whether modules and files that the description names may be opened.
+
+        Raises:
+            InputError: something recorded or given does not exist here, or does not fit.
+        """
+        given = given or {}
+        controller = str(given.get("controller", controller))
+        gains = str(given.get("gains", gains))
+        flown = recorded_parameters(flight)
+        if not (named := controller or flown.get("controller") or flight.get("controller")):
+            raise InputError(
+                "the bag does not say which law was flown: name it with --controller, and its "
+                "gains with --gains"
+            )
+        gains = gains_as_path(gains, str(flown.get("robot", "paper")))
+        self._flight, self._folder, self._trust = flight, folder, trust
+        self._flown = flown
+        self._said = {
+            **({"controller": controller} if controller else {}),
+            **({"gains": gains} if gains else {}),
+            **given,
+        }
+        """By the user; all else is the bag's word."""
+        if not trust:
+            self._check_laws(str(named), flown)
+        self.gains_name = gains or str(flown.get("gains", "default"))
+        self._left_out = ""
+        """Gains that were flown, but are not read."""
+        law = find_law(str(named))
+        self.law_name = law.name
+        is_same_law = law.name == flight.get("controller", law.name)
+        self.parameters: dict[str, Any] = {**flown, **self._robot(flown)}
+        """The node's parameters, by dotted name."""
+        recorded_gains = flight.get("gains_used", {})
+        if recorded_gains and is_same_law and not gains:
+            self.parameters["gains"] = self._gains_folder(law, recorded_gains)
+        if "actuators" not in self._said:
+            self.parameters |= self._actuators(flown)
+        if "navigation_sensors" not in self._said:
+            self.parameters |= recorded_navigation(flight)
+        self.parameters |= self._said
+        if not trust:
+            self._check_files(flown)
+        self.swaps = [text for text in self.parameters.get("swaps", []) if text.strip()]
+        """Laws swapped to in flight."""
+        try:
+            self.robot, self.names, now = self._check()
+        except InputError as error:
+            if not self._left_out:
+                raise
+            raise InputError(
+                f"{error}; the gains flown are of {self._left_out!r}, read only with --trust"
+            ) from None
+        self.is_as_flown = is_same_law and (
+            not gains or gains == flown.get("gains") or _same(now.gain_values, recorded_gains)
+        )
+        """True if law and gains are those that flew; what was ``given`` is not looked at."""
+        self.follows_flight = is_same_law and "swaps" not in given
+        """True if laws and gains change as they did in flight."""
+
+    def law_parameters(self, law: LawInForce) -> dict[str, str | list[float]]:
+        """Return what to set to have a law of the flight in force; what the user gave stays."""
+        gains = {f"{law.name}.{gain}": list(values) for gain, values in law.gains.items()}
+        kept = {name: gains[name] for name in gains if name not in self._said}
+        return {"controller": law.name, **(kept if self.is_as_flown else {})}
+
+    def _check_laws(self, named: str, flown: Mapping[str, Any]) -> None:
+        """See that no law but those shipped, or given by the user, is imported."""
+        if "controller" not in self._said:
+            check_law(named)
+        if "swaps" not in self._said:
+            for swap in filter(str.strip, flown.get("swaps", ())):
+                check_law(swap.partition(":")[2].strip())
+
+    def _check_files(self, flown: Mapping[str, Any]) -> None:
+        """See that no file is read whose path the bag tells."""
+        for what in ("robot", "gains", "navigation_sensors", "actuators"):
+            if what not in self._said and self.parameters.get(what) == flown.get(what, ""):
+                check_file(what, str(flown[what]))
+
+    def _robot(self, flown: Mapping[str, Any]) -> dict[str, str]:
+        """The recorded robot as a file of its name, which also chooses its gains."""
+        content = self._flight.get("controller_robot_file", self._flight.get("robot_file"))
+        if content is None:
+            return {}
+        name = Path(str(flown.get("robot", "paper"))).stem
+        path = self._folder / f"{name if is_plain(name) and name != OWN else 'recorded'}.yaml"
+        _write(path, content)
+        return {"robot": str(path)}
+
+    def _actuators(self, flown: Mapping[str, Any]) -> dict[str, str]:
+        """The recorded hardware, as the controller knew it, as a file of its name."""
+        flight = self._flight
+        content = flight.get("controller_base_actuators", flight.get("base_actuators"))
+        if not content:
+            return {}
+        name = Path(str(flown.get("actuators", ""))).stem
+        path = self._folder / f"actuators_{name if is_plain(name) else 'recorded'}.yaml"
+        _write(path, {f"{OWNER}_node": {"ros__parameters": content}})
+        return {"actuators": str(path)}
+
+    def _gains_folder(self, law: type[ControlLaw], recorded: Mapping[str, Any]) -> str:
+        """The recorded gains, beside those of the other laws as far as they are found here."""
+        folder = self._folder / "gains"
+        folder.mkdir()
+        files: dict[str, Path] = {}
+        if self._trust or is_plain(self.gains_name):
+            with suppress(InputError):  # recorded elsewhere
+                robot = (self._flown if self._trust else self.parameters).get("robot", "paper")
+                files = gain_files(str(robot), self.gains_name)
+        else:
+            self._left_out = self.gains_name
+        for name, file in files.items():
+            shutil.copyfile(file, folder / f"{name}.yaml")
+        section = {law.name: dict(recorded)}
+        _write(folder / f"{law.name}.yaml", {f"{NODE}_node": {"ros__parameters": section}})
+        return str(folder)
+
+    def _check(self) -> tuple[Robot, RobotNames, ControlLaw]:
+        """The robot, the names in its messages, and the law with the gains of the files."""
+        own, gains = split_gains(self.parameters)
+        settings = ControllerNodeSettings.resolve(own)
+        robot = find_robot(settings.robot)
+        axes = robot.n + 3
+        laws = build_laws(settings, axes, gains)
+        for swap in parse_swaps(settings.swaps, settings.period):
+            one_of(swap.name, laws, "controller", " of swaps")
+        names = believed_actuators(settings.actuators, robot).robot_names(robot)
+        return robot, names, build_law(settings.controller, settings, axes)
+
+
+def recorded_parameters(flight: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the flown controller was given; older bags have names only."""
+    recorded = flight.get("parameters", {}).get(NODE)
+    if recorded is None:
+        names = ("controller", "gains", "robot", "swaps", "period")
+        recorded = {name: flight[name] for name in names if name in flight}
+    return {name: value for name, value in recorded.items() if name not in OF_THE_GRAPH}
+
+
+def recorded_navigation(flight: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the numbers of the navigation filter that flew, as parameters; no file is read."""
+    recorded = flight.get("navigation_filter", {})
+    numbers = {f"navigation_filter.{name}": value for name, value in recorded.items()}
+    return {"navigation_sensors": "fine", **numbers} if numbers else {}
+
+
+def _same(now: Mapping[str, Any], recorded: Mapping[str, Any]) -> bool:
+    return {name: list(value) for name, value in now.items()} == {
+        name: list(value) for name, value in recorded.items()
+    }
+
+
+def _write(path: Path, content: Mapping[str, Any]) -> None:
+    path.write_text(yaml.safe_dump(content), encoding="utf-8")

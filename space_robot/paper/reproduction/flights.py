@@ -1,0 +1,179 @@
+"""The flights behind Table V: which rows fly in which variants, and what is kept of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from space_robot_control.navigation.settings import Mode
+from space_robot_msgs_py.config.files import config_directory
+from space_robot_msgs_py.config.validation import read_yaml
+from space_robot_msgs_py.errors import DivergedError, InputError
+
+from ...analysis.figures import control_results
+from ...analysis.figures.figure_set import FigureFolder
+from ...analysis.metrics import Chatter, Rms, of_log
+from ...analysis.plot_series import BaseTorque
+from ...flight.plan import Flight, FlightPlan
+from ...flight.simulate import simulate
+from .table_v import PRINTED
+
+ROBOT = "paper"
+DEFINITIONS = {"mean_axis": "mean of the axes' RMS", "eq64": "RMS by (64)"}
+COMPARED_CASE = "1"
+"""The case in which the laws are set beside one another."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """The choices that Table V leaves open: the gain set, and whether the joints rub."""
+
+    gains: str
+    friction: bool
+
+    @property
+    def title(self) -> str:
+        """For a person."""
+        return f"{self.gains} gains, {'printed friction' if self.friction else 'friction-free'}"
+
+
+VARIANTS = tuple(Variant(g, f) for g in ("printed", "tuned") for f in (True, False))
+AS_PRINTED = VARIANTS[0]
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of Table V."""
+
+    controller: str
+    case: str
+
+    @classmethod
+    def parse(cls, text: str) -> Row:
+        """From ``CONTROLLER/CASE``.
+
+        Raises:
+            InputError: Table V has no such row.
+        """
+        row = cls(*text.partition("/")[::2])
+        if (row.controller, row.case) not in PRINTED:
+            names = ", ".join(f"{controller}/{case}" for controller, case in PRINTED)
+            raise InputError(f"Table V has no row {text!r}: choose from {names}")
+        return row
+
+    @property
+    def stem(self) -> str:
+        """The name of its figure's files, without their endings."""
+        return f"case{self.case}_{self.controller}"
+
+    @property
+    def shown(self) -> Variant:
+        """The variant that is drawn: the default gains, the printed friction."""
+        sets = read_yaml(config_directory() / "gains" / ROBOT / "default_sets.yaml")
+        return Variant(sets[self.controller], True)
+
+
+ROWS = tuple(Row(controller, case) for controller, case in PRINTED)
+
+
+class Equipment(NamedTuple):
+    """What stands between laws and robot: Table V's see the truth, and have what they ask for."""
+
+    sensors: str = "ideal"
+    """Of config/sensors, or a path."""
+    navigation: Mode = "direct"
+    actuators: str = "ideal"
+    """Of the base: of config/actuators, or a path."""
+
+
+PERFECT = Equipment()
+
+
+class Planned(NamedTuple):
+    """A row in one variant."""
+
+    row: Row
+    variant: Variant
+    shown: bool
+    """True if it is drawn: the default gains, the printed friction."""
+
+    @property
+    def compared(self) -> bool:
+        """True for the flight that stands for its law in the figures of all laws."""
+        return self.shown and self.row.case == COMPARED_CASE
+
+
+def plan(rows: Iterable[Row], brief: bool = False) -> Iterator[Planned]:
+    """Yield the flights of ``rows``: all four variants, or (``brief``) what Table V asks for.
+
+    That is the default gains with friction and without and, where the default ones are others,
+    the printed gains with the printed friction: what the paper says was flown.
+    """
+    for row in rows:
+        shown = row.shown
+        for variant in VARIANTS:
+            if not brief or variant.gains == shown.gains or variant == AS_PRINTED:
+                yield Planned(row, variant, variant == shown)
+
+
+@dataclass(frozen=True)
+class Result:
+    """A finished flight."""
+
+    row: Row
+    variant: Variant
+    parameters: dict[str, Any]
+    """All that plant, controller and mission were told."""
+    diverged_tick: int | None = None
+    rms: dict[str, dict[str, float]] | None = None
+    """By definition and column; None if the flight diverged."""
+    chatter: dict[str, dict[str, float]] | None = None
+    """By measure and column, of the compared case with friction."""
+    base_torque: BaseTorque | None = None
+    """Known of the flights that are compared."""
+
+
+def fly(
+    planned: Planned, duration: float | None, figures: FigureFolder | None,
+    equipment: Equipment = PERFECT,
+) -> Result:  # fmt: skip
+    """Fly one row in one variant; if it is shown it is also drawn into ``figures``."""
+    row, variant, _ = planned
+    flight = Flight(
+        FlightPlan(
+            controller=row.controller, case=row.case, gains=variant.gains, robot=ROBOT,
+            friction=variant.friction, duration=duration, sensors=equipment.sensors,
+            actuators=equipment.actuators,
+            navigation=None if equipment.navigation == "direct" else equipment.navigation,
+        )
+    )  # fmt: skip
+    told = parameters(flight)
+    try:
+        log = simulate(flight)
+    except DivergedError as error:
+        return Result(row, variant, told, error.tick)
+    if planned.shown and figures is not None:
+        title = f"{row.controller}, case {row.case}: {variant.title}"
+        figures.save(control_results(log, title), row.stem)
+    is_judged = row.case == COMPARED_CASE and variant.friction
+    return Result(
+        row, variant, told, None, of_log(Rms(log.axes), log),
+        of_log(Chatter(log.axes, log.timebase.period), log) if is_judged else None,
+        BaseTorque.of(log) if planned.compared else None,
+    )  # fmt: skip
+
+
+def parameters(flight: Flight) -> dict[str, Any]:
+    """Return all that plant, controller and mission are told in a flight."""
+    navigation = flight.controller_settings.filter_settings
+    return {
+        "period_s": flight.period,
+        "navigation": navigation.model_dump() if navigation else "direct",
+        "plant": flight.plant_settings.model_dump(exclude={"mission", "wait_for"}),
+        "gains": flight.gains_used,
+        "mission": {
+            "waypoint_times_s": flight.mission_settings.waypoint_times,
+            "waypoints_deg": flight.mission_settings.waypoints_deg,
+        },
+    }

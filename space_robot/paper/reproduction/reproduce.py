@@ -1,0 +1,172 @@
+"""The whole reproduction: fly, compare, draw, write a folder."""
+
+from __future__ import annotations
+
+import json
+import platform
+import shutil
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from space_robot_msgs_py.config.files import config_directory
+from space_robot_msgs_py.errors import InputError
+
+from ...analysis.figures.figure_set import FigureFolder
+from ...analysis.template import template
+from ...console.tables import (
+    as_csv,
+    as_markdown,
+    as_records,
+)
+from ...flight.plan import Flight, FlightPlan
+from ...processes.pool import run_all
+from ...processes.software import (
+    commit,
+    versions,
+)
+from .claims import claims, claims_table
+from .figures import comparisons, figure_groups
+from .flights import PERFECT, Equipment, Planned, Result, Row, fly, plan
+from .table import cells, cells_table, chatter, chatter_table, variant_tables
+
+TABLE = "table_v"
+ERRATA = "docs/explanation/errata.md"
+"""Stands beside ``config``, in the source tree and where it is installed."""
+FULL_DURATION = 30.0
+"""s, of the mission that Table V is about."""
+
+
+def check_folder(folder: Path) -> None:
+    """See that the results may be written there.
+
+    Raises:
+        InputError: something else is there.
+    """
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise InputError(f"{folder}: is no folder; name another with --out")
+    if any(folder.iterdir()) and not (folder / f"{TABLE}.json").is_file():
+        raise InputError(f"{folder}: holds other files; name another folder with --out")
+
+
+def reproduce(
+    rows: Sequence[Row],
+    folder: Path,
+    *,
+    duration: float | None = None,
+    brief: bool = False,
+    equipment: Equipment = PERFECT,
+    jobs: int = 1,
+    progress: Callable[[int], Callable[[], None]] = lambda total: lambda: None,
+) -> dict[str, Any]:
+    """Fly ``rows`` and write table, figures and report into ``folder``.
+
+    Args:
+        rows: of Table V.
+        folder: made or renewed at the end, whole; an older reproduction there is replaced.
+        duration: s to fly (None: the mission's 30 s, which is what Table V is about).
+        brief: fly only what Table V asks for, see `plan`; figures as SVG only.
+        equipment: sensors, navigation and actuators; Table V is about ideal ones.
+        jobs: processes at work.
+        progress: called with the number of flights, gives what is called after each.
+
+    Returns:
+        What is written as JSON.
+
+    Raises:
+        InputError: the folder holds something else, or nothing turns the base.
+    """
+    check_folder(folder)
+    if not Flight(FlightPlan(actuators=equipment.actuators)).controls_base:
+        raise InputError(
+            f"actuators {equipment.actuators}: Table V has attitude errors and base torques, which "
+            "a base that floats freely has not"
+        )
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(dir=folder.parent, prefix=".reproduce-") as temporary:
+        work = Path(temporary) / folder.name
+        figures = FigureFolder(work / "figures", png=not brief)
+        figures.path.mkdir(parents=True)
+        results = _fly(list(plan(rows, brief)), duration, figures, equipment, jobs, progress)
+        run_all(_call, comparisons(results, duration, figures), jobs)
+        record = _write(rows, results, duration or FULL_DURATION, brief, equipment, figures)
+        if folder.exists():
+            shutil.rmtree(folder)
+        work.rename(folder)
+    return record
+
+
+def _fly(
+    planned: Sequence[Planned],
+    duration: float | None,
+    figures: FigureFolder,
+    equipment: Equipment,
+    jobs: int,
+    progress: Callable[[int], Callable[[], None]],
+) -> list[Result]:
+    """Fly and draw every row by itself; return the results in the order of ``planned``."""
+
+    def fly_one(flight: Planned) -> Result:
+        return fly(flight, duration, figures, equipment)
+
+    order = sorted(planned, key=lambda flight: not flight.shown)  # those that take longest first
+    results = dict(zip(order, run_all(fly_one, order, jobs, progress), strict=True))
+    return [results[flight] for flight in planned]
+
+
+def _call(draw: Callable[[], None]) -> None:
+    draw()
+
+
+def _write(
+    rows: Sequence[Row],
+    results: Sequence[Result],
+    duration: float,
+    brief: bool,
+    equipment: Equipment,
+    figures: FigureFolder,
+) -> dict[str, Any]:
+    folder, comparison = figures.path.parent, cells(results)
+    judged, chattering = claims(results, comparison), chatter(results)
+    tables = [*variant_tables(comparison), chatter_table(chattering)]
+    numbers = cells_table(comparison)
+    provenance = {
+        "commit": commit(),
+        "versions": versions(),
+        "machine": f"{platform.system()} {platform.machine()}",
+        "duration_s": duration,
+        "brief": brief,
+        "sensors": equipment.sensors,
+        "navigation": equipment.navigation,
+        "actuators": equipment.actuators,
+    }
+    told = {
+        f"{r.row.controller}, case {r.row.case}, {r.variant.gains} gains": r.parameters
+        for r in results
+        if r.variant.friction
+    }
+    claim_records = [claim.as_record() for claim in judged]
+    record = {
+        "provenance": provenance,
+        "claims": claim_records,
+        "cells": as_records(numbers),
+        "chatter": [row._asdict() for row in chattering],
+        "parameters": told,
+    }
+    title = "Table V: measured / printed (ratio)"
+    (folder / f"{TABLE}.md").write_text(as_markdown(title, tables), "utf-8")
+    (folder / f"{TABLE}.csv").write_text(as_csv(numbers), "utf-8")
+    (folder / f"{TABLE}.json").write_text(json.dumps(record, indent=1) + "\n", "utf-8")
+    page = template("space_robot.paper.reproduction", "report.html.j2").render(
+        provenance=provenance,
+        parameters={name: json.dumps(value, indent=1) for name, value in told.items()},
+        claims=claims_table(claim_records),
+        tables=tables,
+        figure_groups=figure_groups(rows, figures),
+        errata=(config_directory().parent / ERRATA).read_text("utf-8"),
+    )
+    (folder / "report.html").write_text(page, "utf-8")
+    return record

@@ -1,0 +1,128 @@
+"""The tables: measured beside printed, and the chatter of the laws beside one another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import astuple
+from typing import NamedTuple
+
+from ...console.tables import (
+    Column,
+    Table,
+)
+from .flights import DEFINITIONS, VARIANTS, Result, Variant
+from .table_v import COLUMNS, HEADINGS, TORQUE, printed
+
+COLUMN_HEADS = (
+    Column("controller", is_label=True),
+    Column("case", is_label=True),
+    *(Column(*heading) for heading in HEADINGS.values()),
+)
+
+
+class Cell(NamedTuple):
+    """One number of Table V and its counterpart."""
+
+    controller: str
+    case: str
+    gains: str
+    friction: bool
+    definition: str
+    column: str
+    measured: float | None
+    """None if the flight diverged."""
+    printed: float
+    ratio: float | None
+    diverged_tick: int | None
+
+
+def cells(results: Sequence[Result]) -> list[Cell]:
+    """Compare every flight in every column, by both definitions."""
+    return [
+        _cell(result, definition, column)
+        for result in results
+        for definition in DEFINITIONS
+        for column in COLUMNS
+    ]
+
+
+def _cell(result: Result, definition: str, column: str) -> Cell:
+    row, variant = result.row, result.variant
+    expected = printed(row.controller, row.case, column)
+    measured = result.rms[definition][column] if result.rms else None
+    return Cell(
+        row.controller, row.case, variant.gains, variant.friction, definition, column, measured,
+        expected, None if measured is None else measured / expected, result.diverged_tick,
+    )  # fmt: skip
+
+
+def cells_table(comparison: Sequence[Cell]) -> Table:
+    """Tabulate every number by itself, a row a cell, for other programs."""
+    return Table.of("Table V", [Column(name) for name in Cell._fields], comparison)
+
+
+def variant_tables(comparison: Sequence[Cell]) -> list[Table]:
+    """Tabulate each variant flown by each definition, cells ``measured / printed (ratio)``."""
+    found = []
+    for definition, meaning in DEFINITIONS.items():
+        for variant in VARIANTS:
+            rows = _rows(comparison, variant, definition)
+            if rows:
+                found.append(Table.of(f"{variant.title}; {meaning}", COLUMN_HEADS, rows))
+    return found
+
+
+def _rows(comparison: Sequence[Cell], variant: Variant, definition: str) -> list[list[str]]:
+    rows: dict[tuple[str, str], list[str]] = {}
+    for cell in comparison:
+        if (cell.gains, cell.friction, cell.definition) == (*astuple(variant), definition):
+            row = rows.setdefault((cell.controller, cell.case), [cell.controller, cell.case])
+            row.append(_text(cell))
+    return list(rows.values())
+
+
+def _text(cell: Cell) -> str:
+    if cell.measured is None or cell.ratio is None:
+        return f"diverged at tick {cell.diverged_tick}"
+    form = ".4f" if "torque" in cell.column else ".2e"
+    ratio = f"{cell.ratio:.3f}" if cell.ratio > 0.01 else f"{cell.ratio:.1e}"
+    return f"{cell.measured:{form}} / {cell.printed:{form}} ({ratio})"
+
+
+class LawChatter(NamedTuple):
+    """The chatter of a flight of case 1 with printed friction, by torque column of Table V."""
+
+    controller: str
+    gains: str
+    total_variation_per_s: dict[str, float]
+    """N m/s, mean of the axes."""
+    power_above_100_hz: dict[str, float]
+    """Share of the power, mean of the axes."""
+
+
+def chatter(results: Sequence[Result]) -> list[LawChatter]:
+    """Collect it of every flight that is compared so and did not diverge."""
+    return [
+        LawChatter(r.row.controller, r.variant.gains, **r.chatter)
+        for r in results
+        if r.chatter is not None
+    ]
+
+
+def chatter_table(found: Sequence[LawChatter]) -> Table:
+    """Tabulate the chatter of the laws."""
+    names = ("base", "joints 1-3", "joints 4-6")
+    columns = (
+        Column("controller", is_label=True), Column("gains", is_label=True),
+        *(Column(f"{name}: variation", "N m/s", ".3g") for name in names),
+        *(Column(f"{name}: power > 100 Hz", spec=".1e") for name in names),
+    )  # fmt: skip
+    rows = [
+        [
+            x.controller, x.gains,
+            *(x.total_variation_per_s[column] for column in TORQUE),
+            *(x.power_above_100_hz[column] for column in TORQUE),
+        ]
+        for x in found
+    ]  # fmt: skip
+    return Table.of("Chatter in case 1, printed friction", columns, rows)

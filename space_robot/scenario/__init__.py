@@ -1,0 +1,1 @@
+"""The description of a flight: its options, and the settings of every node made from them."""

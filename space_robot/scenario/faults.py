@@ -1,0 +1,35 @@
+"""The catalogue of all kinds of faults of a flight, with those of the nodes' processes.
+
+The plant's faults stand beside what they spoil; a process is killed or stopped by the orchestrator
+(`space_robot.flight.graph.injection`).
+"""
+
+from __future__ import annotations
+
+import math
+
+from space_robot_sim.faults.grammar import Argument, Kind, by_name
+from space_robot_sim.plant.faults import PLANT_KINDS
+
+_SECONDS = Argument("SECONDS", "s of the wall clock", 0.0, 1e6)
+_NODES = ("controller", "recorder", "mission")
+
+KILLS = {
+    node: Kind(f"kill_{node}", None, None, f"the {node}'s process is killed", lasts=False)
+    for node in _NODES
+}
+"""By node."""
+STOPS = {
+    node: Kind(
+        f"stop_{node}", _SECONDS, math.inf,
+        f"the {node}'s process stands still, then goes on", lasts=False,
+    ) for node in _NODES
+}  # fmt: skip
+"""By node."""
+NODE_OF = {kind: node for kinds in (KILLS, STOPS) for node, kind in kinds.items()}
+"""The node that a kind of fault is about."""
+
+PROCESS_KINDS = by_name(*(kinds[node] for node in _NODES for kinds in (KILLS, STOPS)))
+"""All kinds that the orchestrator brings about, by name."""
+KINDS = by_name(*PLANT_KINDS.values(), *PROCESS_KINDS.values())
+"""All kinds by name: the plant's, then the orchestrator's."""

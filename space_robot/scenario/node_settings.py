@@ -1,0 +1,153 @@
+"""The settings of all nodes of a flight, resolved once: nodes, `simulate` and labels agree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from space_robot_control.controller.gains import (
+    gains_as_path,
+    split_gains,
+)
+from space_robot_control.controller.settings import (
+    ControllerNodeSettings,
+    set_file,
+)
+from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_control.laws import ControlLaw
+from space_robot_control.navigation.assumed_sensors import believed_numbers
+from space_robot_model.robot.find import mission_layers
+from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
+from space_robot_msgs_py.config.files import GIVEN, config_directory, named_layers, node_parameters
+from space_robot_msgs_py.config.settings import NodeSettings
+from space_robot_msgs_py.config.trees import Tree, flatten, merge, nest
+from space_robot_msgs_py.config.validation import one_of
+from space_robot_msgs_py.errors import InputError
+from space_robot_sim.plant.settings import PlantNodeSettings
+
+SCHEMAS: tuple[type[NodeSettings], ...] = (
+    PlantNodeSettings, ControllerNodeSettings, MissionNodeSettings, RecorderNodeSettings,
+)  # fmt: skip
+NODES = tuple(schema.node for schema in SCHEMAS)
+
+_WAITING = "a flight's nodes wait for one another as they must"
+NOT_TO_BE_SET = {
+    "plant.ticks": "use --duration",
+    "plant.wait_for": _WAITING,
+    "plant.reset_with": "all nodes of a flight are reset",
+    "plant.paused": "use --paused",
+    "controller.wait_for": _WAITING,
+    "controller.listener_timeout": _WAITING,
+    "recorder.bag": "use --bag",
+    "recorder.flight": "it is what the flight's options say",
+    "recorder.robot": "use --robot",
+    **{f"{node}.autostart": "the flight starts its nodes together" for node in NODES},
+    **{f"{node}.period": "use --period, which is for all nodes" for node in NODES},
+}
+"""Parameters that the flight itself gives, and what to do instead."""
+
+Given = Mapping[str, Mapping[str, Any]]
+"""Parameters by node and dotted name."""
+
+
+class FlightSettings(NamedTuple):
+    """The settings of every node, and the gains that were given by themselves."""
+
+    plant: PlantNodeSettings
+    controller: ControllerNodeSettings
+    mission: MissionNodeSettings
+    recorder: RecorderNodeSettings
+    gains: dict[str, Tree]
+    """Gains by law; they come over those of the gain set."""
+    given: dict[str, tuple[str, ...]]
+    """Dotted names of the settings given to each node, over its files."""
+
+    @classmethod
+    def resolve(cls, options: Given, parameters: Given) -> FlightSettings:
+        """Take settings from the files, the options over them, and single parameters over all.
+
+        Raises:
+            InputError: a parameter that is wrong, or that cannot be set so.
+        """
+        check_may_be_set(parameters)
+        given = {
+            node: dict(flatten(nest({**options.get(node, {}), **parameters.get(node, {})})))
+            for node in NODES
+        }
+        plant = PlantNodeSettings.resolve(given["plant"])
+        mission = MissionNodeSettings.resolve(given["mission"])
+        for node in (plant, mission):  # a file that is not shipped: a bag tells all of it
+            for file in mission_layers(node.robot, node.mission):
+                if config_directory() not in file.parents:
+                    told = dict(flatten(node_parameters(file, node.node)))
+                    given[node.node] = {**told, **given[node.node]}
+        if events := [str(event) for event in plant.parsed_events]:  # their files' numbers too
+            given["plant"]["events"] = events
+            plant = plant.model_copy(update={"events": events})
+        given["controller"].setdefault("actuators", plant.actuators)
+        if plant.realtime:  # by the wall clock there is no time to wait
+            given["controller"] = {"reference_timeout": 0.0, **given["controller"]}
+        own, gains = split_gains(given["controller"])
+        controller = ControllerNodeSettings.resolve(own)
+        path = gains_as_path(controller.gains, controller.robot)
+        of_flight = named_layers("actuators", controller.actuators)
+        # as if given: a bag tells of it
+        for file in (*of_flight, *set_file(controller.robot, path)):
+            of_the_set = dict(flatten(node_parameters(file, "controller")))
+            given["controller"] = {**of_the_set, **given["controller"]}
+            own = merge(nest(of_the_set), own)
+            controller = ControllerNodeSettings.resolve(own)
+        if controller.navigation == "filtered" and "navigation_sensors" not in own:
+            if plant.sensors == GIVEN:
+                believed = {"navigation_filter": believed_numbers(plant, plant.period)}
+                given["controller"] = {**dict(flatten(believed)), **given["controller"]}
+                own = merge(believed, own)
+            else:
+                own["navigation_sensors"] = plant.sensors
+                given["controller"]["navigation_sensors"] = plant.sensors
+            controller = ControllerNodeSettings.resolve(own)
+        settings = cls(
+            plant,
+            controller.model_copy(update={"gains": path}),
+            mission,
+            RecorderNodeSettings.resolve(given["recorder"]),
+            gains,
+            {node: tuple(names) for node, names in given.items()},
+        )
+        settings._check_periods()
+        return settings
+
+    def parameters(self, laws: Mapping[str, ControlLaw]) -> dict[str, dict[str, Any]]:
+        """Return the resolved values of what was given to each node, by dotted name."""
+        gains = {
+            f"{name}.{gain}": values.tolist()
+            for name, law in laws.items()
+            for gain, values in law.gain_values.items()
+        }
+        found = {}
+        for node, names in self.given.items():
+            settings: NodeSettings = getattr(self, node)
+            resolved = dict(flatten(settings.model_dump())) | gains
+            found[node] = {name: resolved[name] for name in names if name in resolved}
+        return found
+
+    def _check_periods(self) -> None:
+        periods = {node: getattr(self, node).period for node in NODES}
+        if len(set(periods.values())) > 1:
+            said = ", ".join(f"{node} {period:g}" for node, period in periods.items())
+            raise InputError(
+                f"the period must be the same for all nodes, got {said} s: use --period"
+            )
+
+
+def check_may_be_set(parameters: Given) -> None:
+    """See that parameters are for nodes there are, and are not the flight's own.
+
+    Raises:
+        InputError: names what does it instead.
+    """
+    for node, values in parameters.items():
+        one_of(node, NODES, "node", " in parameters")
+        for name, _ in flatten(nest(values)):
+            if why := NOT_TO_BE_SET.get(f"{node}.{name}"):
+                raise InputError(f"{node}.{name} cannot be set: {why}")

@@ -1,0 +1,180 @@
+"""Objects in the place of names in a flight's options: robot, law, gains, settings.
+
+An option's value is kept as it was given; the functions here turn it into what the nodes'
+parameters are to be. Numbers that are given stand over no file: its name is `GIVEN` then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from inspect import isabstract, isclass
+from pathlib import PurePath
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, PlainValidator
+
+from space_robot_control.controller.plain_laws import law_of
+from space_robot_control.guidance.mission import MissionSettings
+from space_robot_control.laws import (
+    ControlLaw,
+    find_law,
+    importable_name,
+    laws,
+)
+from space_robot_model.hardware.sensors import SensorSettings
+from space_robot_model.robot import Robot
+from space_robot_model.robot.find import (
+    ROBOTS,
+    robot_as_path,
+)
+from space_robot_msgs_py.config.files import GIVEN, is_named
+from space_robot_msgs_py.config.trees import Tree, nest
+from space_robot_msgs_py.config.validation import StrictModel, validate
+from space_robot_sim.actuators.actuators import ActuatorSettings
+from space_robot_sim.environment.environment import EnvironmentSettings
+from space_robot_sim.environment.events import Capture, Release
+
+OF_PLANT = ("initial_joints_deg", "initial_quaternion", "events")
+"""What a mission says to the plant: how it begins, and what it captures and releases."""
+
+
+def _name(value: Any, otherwise: str) -> str:
+    """Return the text of a name or a path; a number may stand for a name."""
+    is_name = isinstance(value, (str, PurePath, int, float)) and not isinstance(value, bool)
+    if not is_name or "\0" in str(value):
+        raise ValueError(f"a name, a path or {otherwise} was expected")
+    return str(value)
+
+
+def _plain(value: Any) -> Any:
+    """Return a copy as files have it: mappings, lists, numbers, texts."""
+    if isinstance(value, BaseModel):
+        return value.model_dump()
+    if isinstance(value, (Capture, Release)):
+        return str(value)
+    if isinstance(value, Mapping):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    return [_plain(inner) for inner in value] if isinstance(value, (list, tuple)) else value
+
+
+def _settings(schema: type[StrictModel], more: tuple[str, ...] = ()) -> Callable[[Any], Any]:
+    """Accept a name, or settings of a ``schema``: an object or a mapping, with ``more`` keys."""
+
+    def check(value: Any) -> str | Tree:
+        if not isinstance(value, (Mapping, BaseModel)):
+            return _name(value, f"{schema.__name__} (an object or a mapping)")
+        tree = nest(_plain(value))
+        if isinstance(value, BaseModel):  # one of more, as the plant's settings, holds these
+            tree = {key: tree[key] for key in (*schema.model_fields, *more) if key in tree}
+        own = {key: inner for key, inner in tree.items() if key not in more}
+        validate(schema, own, "numbers given")
+        return tree
+
+    return check
+
+
+def _robot(value: Any) -> str | Robot:
+    return value if isinstance(value, Robot) else _name(value, "a Robot")
+
+
+def _law(value: Any) -> Any:
+    if value is None or isinstance(value, ControlLaw):
+        return value
+    if isclass(value) and issubclass(value, ControlLaw) and not isabstract(value):
+        return value
+    if callable(value) and not isclass(value):
+        return value
+    return _name(value, "a ControlLaw (class or object), or a function")
+
+
+def _gains(value: Any) -> str | Tree:
+    if not isinstance(value, Mapping):
+        return _name(value, "a mapping of gains to numbers")
+    return _listed(nest(_plain(value)))
+
+
+def _listed(gains: Tree) -> Tree:
+    """Let a number stand for a list of one, which counts for all axes."""
+    return {
+        name: _listed(value) if isinstance(value, dict)
+        else value if isinstance(value, list)
+        else [value]
+        for name, value in gains.items()
+    }  # fmt: skip
+
+
+RobotGiven = Annotated[Any, PlainValidator(_robot)]
+LawGiven = Annotated[Any, PlainValidator(_law)]
+Gains = Annotated[Any, PlainValidator(_gains)]
+MissionGiven = Annotated[Any, PlainValidator(_settings(MissionSettings, OF_PLANT))]
+Case = Annotated[Any, PlainValidator(_settings(EnvironmentSettings))]
+Sensors = Annotated[Any, PlainValidator(_settings(SensorSettings))]
+Actuators = Annotated[Any, PlainValidator(_settings(ActuatorSettings))]
+EventText = Annotated[str, BeforeValidator(_plain)]
+
+
+def robot_setting(robot: str | Robot) -> str:
+    """Return what the parameter ``robot`` says.
+
+    A robot in memory has the mission and gains of the shipped one of its name, if there is one.
+    """
+    if isinstance(robot, str):
+        return robot_as_path(robot)
+    return robot.name if is_named(ROBOTS, robot.name) else GIVEN
+
+
+def law_given(law: Any) -> str | type[ControlLaw] | ControlLaw | None:
+    """Return a law as it was given, a function as the law that it is."""
+    is_function = callable(law) and not isclass(law) and not isinstance(law, ControlLaw)
+    return law_of(law) if is_function else law
+
+
+def law_setting(law: str | type[ControlLaw] | ControlLaw | None) -> str:
+    """Return what the parameter ``controller`` says; `importable_name` of a law not shipped."""
+    if law is None:
+        return ""
+    if isinstance(law, str):
+        return law
+    kind = law if isclass(law) else type(law)
+    return kind.name if laws().get(kind.name) is kind else importable_name(kind)
+
+
+def numbers_of(value: str | Tree) -> tuple[str, Tree]:
+    """Return the file's name and the numbers beside it."""
+    return (value, {}) if isinstance(value, str) else (GIVEN, value)
+
+
+def mission_of(mission: str | Tree) -> tuple[str, Tree, Tree]:
+    """Return the file's name, and what is given to the mission and to the plant.
+
+    Unless it is given too, the plant begins at the first waypoint.
+    """
+    if isinstance(mission, str):
+        return mission, {}, {}
+    of_mission = {key: v for key, v in mission.items() if key not in OF_PLANT}
+    waypoints = validate(MissionSettings, of_mission, "mission")
+    joints = len(waypoints.waypoints_deg) // len(waypoints.waypoint_times)
+    start = {
+        "initial_joints_deg": waypoints.waypoints_deg[:joints],
+        "initial_quaternion": waypoints.base_quaternion,
+    }
+    return GIVEN, of_mission, start | {key: mission[key] for key in OF_PLANT if key in mission}
+
+
+def gains_of(
+    gains: str | Tree, law: str | type[ControlLaw] | ControlLaw | None
+) -> tuple[str, Tree]:
+    """Return the set's name, and the gains given over it as ``<law>.<gain>``.
+
+    Raises:
+        InputError: they are of a law that is not there.
+    """
+    if isinstance(gains, str):
+        return gains, {}
+    if not any(isinstance(value, dict) for value in gains.values()):
+        of_law = find_law(law) if isinstance(law, str) else law
+        gains = {of_law.name: gains} if of_law is not None else {}
+    return "default", gains

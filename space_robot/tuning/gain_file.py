@@ -1,0 +1,81 @@
+"""A tuned set as the files of ``config/gains/<robot>/<set>``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_control.controller.settings import OF_THE_SET
+
+from .method import Tuned
+
+Array = NDArray[np.float64]
+
+NOTES = {
+    "ctc": "(31): K_P = W^2, K_D = 2 W.",
+    "ctc_smc": "lambda = W; g: what the nominal model does not know of; Delta: s fades with W.",
+    "tde_smc": "lambda = W; g = h_bar eps, the least that holds the surface.",
+    "tde_tsmc": "K_P = W^2, K_D = 2 W; K_1 = (W eps)^1/2.",
+    "tde_stc": "lambda = W; K_2 = 1.1 W eps, K_1 = 2.2 (W eps)^1/2.",
+}
+"""The rule of each law, see `method`."""
+
+
+def gain_files(tuned: Tuned, command: str) -> Mapping[str, str]:
+    """Return the text of each file of the set by its name.
+
+    Args:
+        tuned: the set.
+        command: what made it, to be made again.
+    """
+    head = [f"Made by `{command}`."]
+    files = {
+        f"{law}.yaml": _file([*head, NOTES[law], *_numbers(tuned, "h_bar" in gains)], law, gains)
+        for law, gains in tuned.gains.items()
+    }
+    files[OF_THE_SET] = "\n".join([
+        *_comments([*head, "Low-pass of the time-delay estimate, part of the set's margin."]),
+        "controller_node:",
+        "  ros__parameters:",
+        f"    acceleration_filter_hz: {tuned.corner_hz:g}",
+        "",
+    ])  # fmt: skip
+    return files
+
+
+def _numbers(tuned: Tuned, has_estimate: bool) -> Sequence[str]:
+    wishes = tuned.wishes
+    bandwidth = tuned.bandwidth if has_estimate else tuned.model_bandwidth
+    lines = [f"W = {bandwidth:.3g} rad/s; masses wrong by {wishes.mass_uncertainty:.0%}."]
+    if has_estimate:
+        lines += [
+            f"Eigenvalues of H_S^-1 h_bar {tuned.smallest:.3g} to {tuned.largest:.3g}: "
+            f"margin {wishes.margin:.1%}.",
+            f"The estimate lags by {tuned.delay * 1e3:.3g} ms; eps = {_list(tuned.error, 2)}.",
+        ]
+    return lines
+
+
+def _file(comments: Sequence[str], law: str, gains: Mapping[str, Array]) -> str:
+    lines = [*_comments(comments), "controller_node:", "  ros__parameters:", f"    {law}:"]
+    for name, values in gains.items():
+        same = bool(np.all(values == values[0]))
+        lines.append(f"      {name}: {_list(values[:1] if same else values, 12)}")
+    return "\n".join([*lines, ""])
+
+
+def _comments(lines: Sequence[str]) -> list[str]:
+    return [f"# {line}" for line in lines]
+
+
+def _list(values: Array, digits: int) -> str:
+    return f"[{', '.join(_number(value, digits) for value in values.tolist())}]"
+
+
+def _number(value: float, digits: int) -> str:
+    """Write a number as YAML 1.1 reads one, with a point before any exponent."""
+    text = f"{value:.{digits}g}"
+    mantissa, e, exponent = text.partition("e")
+    return text if "." in mantissa else f"{mantissa}.0{e}{exponent}"

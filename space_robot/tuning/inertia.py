@@ -1,0 +1,143 @@
+"""The semi-floating inertia H_S (28) in many configurations at once.
+
+The base floats freely, so its translation is eliminated: what is left of the kinetic energy is
+that about the robot's common CoM,
+
+    H_r = sum_i  Jw_i^T I_i Jw_i + m_i (Jv_i - Jv_c)^T (Jv_i - Jv_c),    H_S = J^-T H_r J^-1,
+
+with the Jacobians of body i's angular velocity and CoM, Jv_c their mean weighted by mass, and
+J = blkdiag(J0, E) of (22). If nothing turns the base its rotation goes, too, and the joints keep
+
+    H_f = H_MM - H_MB H_BB^-1 H_BM,    the inverse of the joints' part of H_S^-1.
+
+By Cauchy's interlacing the eigenvalues of ``H_f^-1 h_bar`` then lie between the extreme ones of
+``H_S^-1 h_bar``: a time-delay estimate has no less margin than with the base held.
+`rho_space_into` has H_S from composite bodies, one
+configuration a call; this one needs no compiled code, whose loading would make a command wait.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_control.guidance.mission import (
+    Mission,
+    MissionSettings,
+)
+from space_robot_model.robot import Robot
+from space_robot_model.robot.frames import (
+    BodyFrame,
+    body_frames,
+)
+from space_robot_msgs_py.samples import ReferenceChunk
+
+Array = NDArray[np.float64]
+
+SAMPLING = 0.05
+"""s between two configurations looked at; a leg of a mission takes seconds."""
+
+
+def sampled_reference(
+    robot: Robot, settings: MissionSettings, step: float = SAMPLING
+) -> ReferenceChunk:
+    """Return the whole reference of a mission every ``step`` s, its last waypoint included.
+
+    Raises:
+        InputError: the waypoints do not fit the times or the joints.
+    """
+    mission = Mission(robot, settings, step)
+    return mission.chunk(0, int(np.ceil(mission.duration / step - 1e-9)) + 1)
+
+
+def inertia_along(
+    robot: Robot, settings: MissionSettings, step: float = SAMPLING, controls_base: bool = True
+) -> Array:
+    """Return H_S (K, m, m) of ``robot`` along a mission's reference, every ``step`` s.
+
+    If nothing turns the base: H_f (K, n, n). Of a robot with passive joints every configuration is
+    there twice: with them locked at rest, as slow motion has them, and loose, as a tick has them.
+
+    Args:
+        robot: with its payload, if it carries one.
+        settings: of the mission; its last waypoint is looked at too.
+        step: s.
+        controls_base: whether anything turns the base.
+
+    Raises:
+        InputError: the waypoints do not fit the times or the joints.
+    """
+    chunk = sampled_reference(robot, settings, step)
+    inertia = semi_floating_inertia(robot.nominal, chunk.joints[:, 0])
+    if robot.springs:
+        inertia = np.concatenate([inertia, loose_inertia(robot, chunk.joints[:, 0])])
+    return inertia_in_rho(chunk.base[0, :4], inertia) if controls_base else free_inertia(inertia)
+
+
+def free_inertia(inertia: Array) -> Array:
+    """Return H_f (K, n, n) of H_r, or of H_S, (K, m, m)."""
+    share = np.linalg.solve(inertia[:, :3, :3], inertia[:, :3, 3:])
+    left: Array = inertia[:, 3:, 3:] - inertia[:, 3:, :3] @ share
+    return left
+
+
+def loose_inertia(robot: Robot, joint_positions: Array) -> Array:
+    """Return ``H_aa - H_ap H_pp^-1 H_pa`` (K, m, m) of H_r, p its passive joints, at rest.
+
+    The actuated axes a meet it in motion that is faster than the springs, which then do not count.
+    ``joint_positions`` (K, n) are those of the actuated joints, rad or m.
+    """
+    count, m = len(joint_positions), robot.n + 3
+    rest = np.broadcast_to([spring.rest for spring in robot.springs], (count, len(robot.springs)))
+    whole = semi_floating_inertia(robot, np.hstack([joint_positions, rest]))
+    share = np.linalg.solve(whole[:, m:, m:], whole[:, m:, :m])
+    left: Array = whole[:, :m, :m] - whole[:, :m, m:] @ share
+    return left
+
+
+def attitude_jacobian(quaternion: Array) -> Array:
+    """Return ``J0 = (eta E + skew(eps)) / 2`` of (1), (3, 3): epsdot = J0 omega_base."""
+    w, x, y, z = quaternion
+    return 0.5 * np.array([[w, -z, y], [z, w, -x], [-y, x, w]])
+
+
+def inertia_in_rho(quaternion: Array, inertia: Array) -> Array:
+    """Return ``J^-T H_r J^-1`` (K, m, m) of ``inertia`` (K, m, m) at one attitude of the base."""
+    inverse = np.eye(inertia.shape[-1])
+    inverse[:3, :3] = np.linalg.inv(attitude_jacobian(quaternion))
+    moved: Array = inverse.T @ inertia @ inverse
+    return moved
+
+
+def semi_floating_inertia(robot: Robot, joint_positions: Array) -> Array:
+    """Return H_r (K, N+3, N+3) about the base's axes for all ``joint_positions`` (K, N).
+
+    They are in rad, or in m of prismatic joints; passive joints are behind.
+    """
+    count, n = joint_positions.shape
+    angular = np.zeros((n + 1, count, 3, n + 3))
+    linear = np.zeros_like(angular)
+    x, y, z = (np.repeat(axis[:, np.newaxis], count, axis=1) for axis in np.eye(3))
+    frames: dict[int, BodyFrame] = {}
+    for frame in body_frames(robot, (x, y, z), joint_positions.T):
+        body = frame.body
+        frames[body] = frame
+        com = (frame.origin + frame.on_outer_axes(robot.com[body])).T
+        angular[body, :, :, :3] = np.eye(3)
+        linear[body, :, :, :3] = np.cross(np.eye(3), com[:, np.newaxis, :]).swapaxes(1, 2)
+        mover = body
+        while mover:  # every joint on the way to the base
+            joint, axis = mover - 1, frames[mover].z.T
+            if robot.is_prismatic[joint]:
+                linear[body, :, :, 3 + joint] = axis
+            else:
+                angular[body, :, :, 3 + joint] = axis
+                linear[body, :, :, 3 + joint] = np.cross(axis, com - frames[mover].origin.T)
+            mover = int(robot.parent[joint])
+        # from here on in the body's own axes, where its inertia is constant
+        angular[body] = np.stack((frame.x.T, frame.y.T, frame.z.T), axis=1) @ angular[body]
+    linear -= np.tensordot(robot.mass / robot.mass.sum(), linear, axes=1)
+    turning = angular.swapaxes(2, 3) @ robot.inertia[:, np.newaxis] @ angular
+    moving = linear.swapaxes(2, 3) @ (robot.mass[:, np.newaxis, np.newaxis, np.newaxis] * linear)
+    total: Array = (turning + moving).sum(axis=0)
+    return total

@@ -1,0 +1,134 @@
+"""Flights in one scene, moved from frame to frame, as the page that viser makes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.bag.flight_log import FlightLog
+
+from .frames import Frames
+from .local_server import local_server
+from .scene import Look, RobotScene, rgb
+from .stage import extent, set_stage
+from .targets import targets
+from .trails import Move, trails
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+Array = NDArray[np.float64]
+
+POSES = 12
+"""Of a flight that the first camera must see."""
+GAP = 0.15
+"""Between robots side by side, by their width."""
+GHOST = 0.4
+"""Opacity of robots that are drawn over another one."""
+
+
+class Flown(NamedTuple):
+    """A flight to be shown."""
+
+    name: str
+    log: FlightLog
+    robot: Robot
+    law: str
+    colour: str
+    """That tells it from the others, as ``#E69F00``."""
+
+
+def film(
+    flights: Sequence[Flown], times: Array, side_by_side: bool, dark: bool,
+    advance: Callable[[int], Callable[[], None]],
+) -> str:  # fmt: skip
+    """Return the page of a scene with the flights, from the first time on.
+
+    Args:
+        flights: to be shown.
+        times: (K,) s, of the frames.
+        side_by_side: whether each robot has a place of its own; else they are drawn over another.
+        dark: whether the page is.
+        advance: told how many frames there will be, then called after each.
+
+    Raises:
+        InputError: viser is not installed, or a flight has no state.
+    """
+    with local_server() as server:
+        moves = add_flights(server, flights, times, side_by_side, dark)
+        recorder, done = server.get_scene_serializer(), advance(len(times))
+        for k, time in enumerate(times):
+            if k:
+                recorder.insert_sleep(float(time - times[k - 1]))
+            for move in moves:
+                move(k)
+            done()
+        return str(recorder.as_html(dark_mode=dark))
+
+
+def add_flights(
+    server: ViserServer, flights: Sequence[Flown], times: Array, side_by_side: bool, dark: bool,
+    shadows: bool = True,
+) -> list[Move]:  # fmt: skip
+    """Add robots, trails and targets to a server's empty scene; return what moves them.
+
+    Args:
+        server: whose scene it is.
+        flights: to be shown.
+        times: (K,) s, of the frames.
+        side_by_side: whether each robot has a place of its own.
+        dark: whether the page is.
+        shadows: whether there are any.
+
+    Raises:
+        InputError: a flight has no state.
+    """
+    frames = [Frames.of(flight.log, flight.robot, times) for flight in flights]
+    seen = [_seen(flight.robot, of) for flight, of in zip(flights, frames, strict=True)]
+    places = _places(seen) if side_by_side else [np.zeros(3)] * len(flights)
+    scene = server.scene
+    points = np.concatenate([s + p for s, p in zip(seen, places, strict=True)])
+    set_stage(server, points, dark, shadows)
+    moves: list[Move] = []
+    for index, (flight, of, place) in enumerate(zip(flights, frames, places, strict=True)):
+        root = f"/{flight.name.replace('/', '_')}"
+        scene.add_frame(root, show_axes=False, position=place)
+        over = index > 0 and not side_by_side
+        size = float(np.ptp(seen[index], axis=0).max())
+        look = Look(flight.colour, GHOST, 0.004 * size * index) if over else Look()
+        robot = RobotScene(scene, root, flight.robot, look)
+        moves.append(_moving(robot, of))
+        moves += trails(scene, root, of, rgb(flight.colour), 0.0035 * size)
+        moves += targets(scene, root, robot, flight.log, flight.robot, times)
+    return moves
+
+
+def _moving(robot: RobotScene, frames: Frames) -> Move:
+    return lambda k: robot.move(*frames.move_to(k))
+
+
+def _seen(robot: Robot, frames: Frames) -> Array:
+    rows = np.linspace(0, len(frames.time) - 1, POSES).round().astype(int)
+    return extent(
+        robot,
+        frames.base_position[rows],
+        frames.base_quaternion[rows],
+        frames.joint_positions[rows],
+    )
+
+
+def _places(seen: Sequence[Array]) -> list[Array]:
+    """Return where robots stand side by side along x, the first one where it flew."""
+    places: list[Array] = [np.zeros(3)]
+    end = float(seen[0][:, 0].max())
+    for before, points in pairwise(seen):
+        width = max(float(np.ptp(points[:, 0])), float(np.ptp(before[:, 0])))
+        x = end + GAP * width - float(points[:, 0].min())
+        places.append(np.array([x, 0.0, 0.0]))
+        end = x + float(points[:, 0].max())
+    return places

@@ -1,0 +1,144 @@
+"""The page of some flights: which robot each was flown with, then scene, plots and marks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from space_robot_model.robot import Robot
+from space_robot_model.robot.choice import split_choice
+from space_robot_model.robot.find import (
+    find_robot,
+    robot_as_path,
+)
+from space_robot_model.robot.source import URDF
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.law_history import as_data, in_words, laws_of
+from space_robot_msgs_py.errors import InputError
+
+from ..analysis.described import check_joints, robot_of
+from .animation import animate, encoded
+from .film import Flown, film
+from .frames import RATE_HZ, shown_times
+from .marks import shared_marks
+from .meshes import shown_shapes
+from .page import Shown, render
+from .plots import plots_of
+
+ON_DARK = ("#56B4E9", "#E98FC0", "#2CC295", "#E69F00", "#F0E442", "#FF7F41")
+ON_WHITE = ("#0072B2", "#CC79A7", "#009E73", "#E69F00", "#8A7F00", "#D55E00")
+"""Okabe's and Ito's colours, brighter or darker where the page asks for it."""
+OF_TRAIL = "#FFB000"
+PICTURED, MOST_PLOTS = ("attitude", "base torque", "torque"), 3
+"""Beginnings of the titles of plots beside an animated picture."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What may be asked of a page."""
+
+    side_by_side: bool = False
+    """A place for each robot, even if all are the same."""
+    rate: float = RATE_HZ
+    """Poses a second of flight."""
+    title: str = ""
+    """Empty: the flights' names."""
+    dark: bool = True
+    """Light on dark."""
+
+
+def flights_page(
+    logs: Mapping[str, FlightLog], robots: Mapping[str, Robot], options: Options,
+    advance: Callable[[int], Callable[[], None]],
+) -> str:  # fmt: skip
+    """Return the page of some flights, complete in itself.
+
+    Args:
+        logs: by name, at least one.
+        robots: that flew, by the same names.
+        options: what is asked of it.
+        advance: told how many frames there will be, then called after each.
+
+    Raises:
+        InputError: viser is not installed, or a flight has no state.
+    """
+    colours = ON_DARK if options.dark else ON_WHITE
+    flights = [
+        Flown(name, log, robots[name], _law(log), colours[k % len(colours)])
+        for k, (name, log) in enumerate(logs.items())
+    ]
+    of_one = len({(flight.robot.name, flight.robot.body_names) for flight in flights}) == 1
+    times = shown_times(list(logs.values()), options.rate)
+    scene = film(flights, times, options.side_by_side or not of_one, options.dark, advance)
+    return render(
+        options.title or ", ".join(logs), scene,
+        [Shown(f.name, f.colour, _told(f), f.log.defects) for f in flights],
+        plots_of(logs, robots, colours), shared_marks(logs), float(times[0]), options.dark,
+    )  # fmt: skip
+
+
+def picture_of(
+    logs: Mapping[str, FlightLog], robots: Mapping[str, Robot], title: str, file: Path,
+    advance: Callable[[int], Callable[[], None]],
+) -> bytes:  # fmt: skip
+    """Return the animated picture of a flight.
+
+    Args:
+        logs: by name, one.
+        robots: that flew, by the same names.
+        title: caption; empty: law, robot and case.
+        file: whose ending tells the format, one of `animation.FORMATS`.
+        advance: told how many frames there will be, then called after each.
+
+    Raises:
+        InputError: there are several flights, there is no browser, or the flight has no state.
+        FlightError: the browser did not come up.
+    """
+    if len(logs) > 1:
+        raise InputError(f"{file}: an animated picture shows one flight, got {len(logs)} bags")
+    ((name, log),) = logs.items()
+    flight = Flown(name, log, robots[name], _law(log), OF_TRAIL)
+    shown = [p for p in plots_of(logs, robots, ON_DARK) if p.title.startswith(PICTURED)]
+    return encoded(animate(flight, shown[:MOST_PLOTS], title or _told(flight), advance), file)
+
+
+def shown_robot(log: FlightLog, given: str = "") -> Robot:
+    """Return the robot of a flight: the one given, or the one that the bag tells.
+
+    Raises:
+        InputError: it is not there, not told, or has other joints than the bag.
+    """
+    if not given:
+        return robot_of(log)
+    robot = find_robot(robot_as_path(given))
+    check_joints(robot, log)
+    return robot
+
+
+def remarks_on(logs: Mapping[str, FlightLog], robots: Mapping[str, Robot]) -> list[str]:
+    """Return what is wrong with the recordings and the shapes of the robots, a line each."""
+    found = [f"{name}: {text}" for name, log in logs.items() for text in log.defects]
+    found += [line for robot in robots.values() for line in shown_shapes(robot).remarks]
+    for name, log in logs.items():
+        if (urdf := _urdf_of(log)) and not robots[name].visuals:
+            found.append(f"a bag has no robot's shapes: --robot {urdf} draws those of that file")
+    return list(dict.fromkeys(found))
+
+
+def _urdf_of(log: FlightLog) -> str:
+    """Return the URDF that a flight's robot was read from; empty: it was none."""
+    parameters = log.flight.get("parameters")
+    plant = parameters.get("plant") if isinstance(parameters, dict) else None
+    name = split_choice(str(plant.get("robot", ""))).name if isinstance(plant, dict) else ""
+    return name if name.endswith(URDF) else ""
+
+
+def _law(log: FlightLog) -> str:
+    return in_words(as_data(laws_of(log), log.timebase)) or str(log.flight.get("controller", ""))
+
+
+def _told(flight: Flown) -> str:
+    case = flight.log.flight.get("case")
+    words = [flight.law, flight.robot.name, f"case {case}" if case else ""]
+    return ", ".join(filter(None, words))

@@ -1,0 +1,122 @@
+"""The motion of a target before it is captured: nothing acts on it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from space_robot_model.robot import Robot
+from space_robot_model.robot.base_axes import base_axes
+from space_robot_model.robot.frames import body_frames
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.simulated_time import tick_from
+from space_robot_sim.environment.events import Capture
+from space_robot_sim.environment.grasp import Grasp
+
+Array = NDArray[np.float64]
+
+ACCURACY = 1e-9
+"""Of the attitude, relative."""
+
+
+class FreeBody(NamedTuple):
+    """A rigid body in free motion, at one moment."""
+
+    position: Array
+    """(3,) m of its centre of mass, inertial frame."""
+    rotation: Array
+    """(3, 3) of its axes, as columns, on inertial axes."""
+    velocity: Array
+    """(3,) m/s, inertial frame."""
+    angular_velocity: Array
+    """(3,) rad/s, inertial axes."""
+    inertia: Array
+    """(3, 3) kg m2 about its centre of mass, on its own axes."""
+
+    def poses(self, times: Array) -> tuple[Array, Array]:
+        """Return where it is at some times.
+
+        Args:
+            times: (K,) s from the moment, negative ones before it; monotonic.
+
+        Returns:
+            (K, 3) m of its centre of mass; (K, 4) ``[w, x, y, z]`` of its axes.
+        """
+        positions = self.position + times[:, np.newaxis] * self.velocity
+        return positions, self._attitudes(times)
+
+    def _attitudes(self, times: Array) -> Array:
+        """Integrate Euler's equations without a torque."""
+        start = Rotation.from_matrix(self.rotation)
+        momentum = self.rotation @ self.inertia @ self.rotation.T @ self.angular_velocity
+        inverse = np.linalg.inv(self.inertia)
+
+        def rate(_: float, quaternion: Array) -> Array:
+            axes = Rotation.from_quat(quaternion).as_matrix()
+            x, y, z, w = quaternion
+            turn = inverse @ (axes.T @ momentum)  # on its own axes
+            on_left = np.array([[w, -z, y], [z, w, -x], [-y, x, w], [-x, -y, -z]])
+            return np.asarray(0.5 * on_left @ turn)
+
+        farthest = float(times[np.argmax(np.abs(times))]) if len(times) else 0.0
+        if farthest == 0.0 or not self.angular_velocity.any():
+            quaternions = np.tile(start.as_quat(), (len(times), 1))
+        else:
+            solved = solve_ivp(
+                rate, (0.0, farthest), start.as_quat(), dense_output=True, rtol=ACCURACY,
+                atol=ACCURACY,
+            )  # fmt: skip
+            assert solved.sol is not None  # it is dense
+            quaternions = solved.sol(times).T
+        quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+        return quaternions[:, [3, 0, 1, 2]]
+
+
+def before_capture(capture: Capture, log: FlightLog, robot: Robot) -> FreeBody | None:
+    """Return a target just before it is captured, its axes those of the body that grasps it.
+
+    Its place is the tool's at the tick of the capture. Its motion is the event's; what is relative
+    to the tool is added to the tool's own motion over the tick before.
+
+    Args:
+        capture: the event.
+        log: the flight.
+        robot: that flew.
+
+    Returns:
+        None where ``log`` does not have both ticks.
+    """
+    grasp = Grasp.of(robot, capture.target)
+    row = tick_from(capture.time_s, log.timebase.period) - log.first_tick
+    if not 1 <= row < log.ticks:
+        return None
+    part = log.rows(int(row) - 1, int(row) + 1)
+    positions, rotations = held_poses(grasp, part, robot)
+    if not np.isfinite(positions).all() or not np.isfinite(rotations).all():
+        return None
+    motion = capture.target.motion
+    velocity, angular_velocity = np.array(motion.velocity), np.array(motion.angular_velocity)
+    if motion.relative_to == "tool":
+        period, axes = log.timebase.period, rotations[1] @ grasp.tool_axes
+        turned = Rotation.from_matrix(rotations[1] @ rotations[0].T).as_rotvec()
+        velocity = axes @ velocity + (positions[1] - positions[0]) / period
+        angular_velocity = axes @ angular_velocity + turned / period
+    return FreeBody(positions[1], rotations[1], velocity, angular_velocity, grasp.inertia)
+
+
+def held_poses(grasp: Grasp, log: FlightLog, robot: Robot) -> tuple[Array, Array]:
+    """Return where a target would be if it were held in each row of a log.
+
+    Returns:
+        (N, 3) m of its centre of mass, inertial frame; (N, 3, 3) axes of the body that holds it,
+        as columns.
+    """
+    axes = base_axes(log.quaternion.T)
+    frames = body_frames(robot, tuple(axes), log.all_positions.T)
+    carrier = next(frame for frame in frames if frame.body == grasp.body)
+    positions = log.base_position + (carrier.origin + carrier.on_outer_axes(grasp.com)).T
+    return positions, np.stack([carrier.x.T, carrier.y.T, carrier.z.T], axis=2)

@@ -1,0 +1,169 @@
+"""What a flying robot tells of itself, as often as it is asked and no oftener."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.robot import Robot
+from space_robot_model.robot.find import find_robot
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.errors import InputError, MessageError
+from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
+from space_robot_msgs_py.wire.base_state import BaseState
+from space_robot_msgs_py.wire.controller_law import LawCodec
+from space_robot_msgs_py.wire.joint_states import JointStates
+from space_robot_msgs_py.wire.message import MessageDescription
+from space_robot_msgs_py.wire.truth_base import TruthBase
+from space_robot_msgs_py.wire.truth_joints import TruthJoints
+
+from ...flight.graph.monitor import Event, Monitor
+from ...flight.graph.node_names import PLANT
+from ...flight.graph.node_services import get_parameters
+from .finder import Place
+from .state_topic import StateTopic
+
+Array = NDArray[np.float64]
+
+MEASURED: tuple[type[MessageDescription], ...] = (JointStates, BaseState)
+TRUE: tuple[type[MessageDescription], ...] = (TruthJoints, TruthBase)
+
+
+class Sample(NamedTuple):
+    """The newest that is known of the robot."""
+
+    time: float
+    """s, simulated."""
+    base_position: Array
+    """(3,) m, inertial frame."""
+    base_quaternion: Array
+    """(4,) ``[w, x, y, z]``."""
+    angles: Array
+    """(N,) of all joints, the passive ones behind; rad, or m of prismatic ones."""
+    torque: Array
+    """(n+3,) N m applied over the last tick; base, then joints."""
+    error: Array | None
+    """(n+3,) tracking error as the law sees it; None: not told yet."""
+
+
+class Listener:
+    """Listens to the newest state only: the truth where it is sent, else what the sensors tell."""
+
+    def __init__(self, place: Place, robot: str, check: Callable[[], None]) -> None:
+        """Join the graph; ask the plant which robot it is, and for its period.
+
+        Args:
+            place: where the plant is.
+            robot: name or path of the robot; empty: the plant's.
+            check: called while waiting for the plant; raises to give up.
+
+        Raises:
+            InputError: its robot is not to be found here.
+            FlightError: the plant does not answer.
+        """
+        from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
+
+        self._monitor = Monitor(place.domain, place.namespace, "viewer")
+        self._group = PolledCallbackGroup()
+        self._topics: dict[type[MessageDescription], StateTopic] = {}
+        try:
+            # before the plant is asked: a short flight may be over when it has answered
+            for kind in (*MEASURED, *TRUE):
+                self._topics[kind] = StateTopic(self._monitor.node, self._group, kind)
+            self._law = RawSubscription(self._monitor.node, topics.LAW, self._group)
+            self.robot, period = self._ask_plant(robot, check)
+        except BaseException:
+            self.close()
+            raise
+        self._timebase = Timebase(round(period * 1e9))
+        self._names = RobotNames.of(self.robot.joint_names, passive=self.robot.passive_names)
+        for topic in self._topics.values():
+            topic.describe(self._names, self._timebase)
+        self._state = RobotState.allocate(self.robot.n)
+        self._stamp_ns: int | None = None
+        """The newest sample's time."""
+        self.law = ""
+        """The law that commands; empty: not told yet."""
+
+    def _ask_plant(self, robot: str, check: Callable[[], None]) -> tuple[Robot, float]:
+        name = period = None
+        while not (name and period):  # a plant that is not configured yet has neither
+            check()
+            name, period = get_parameters(self._monitor.node, PLANT, ["robot", "period"], check)
+        try:
+            return find_robot(robot or str(name)), float(period)
+        except InputError as error:
+            if robot:
+                raise
+            raise InputError(f"the plant's robot: {error}; --robot tells which it is") from None
+
+    def poll(self, with_states: bool, events: list[Event]) -> Sample | None:
+        """Return the newest sample, if there is a new one.
+
+        Args:
+            with_states: False: nobody looks, so that no state need be sent here.
+            events: to which is added what has happened.
+        """
+        events += self._monitor.poll()
+        while (data := self._law.take()) is not None:
+            events += self._read_law(data)
+        self._choose_topics(with_states)
+        stamp_ns = self._newest_of_all()
+        if stamp_ns is None or stamp_ns == self._stamp_ns:
+            return None
+        self._stamp_ns = stamp_ns
+        for topic in self._topics.values():
+            topic.fill(self._state, stamp_ns)
+        state, passive = self._state, len(self._names.passive)
+        angles = np.concatenate([state.joint_positions, state.passive_positions[:passive]])
+        return Sample(
+            1e-9 * stamp_ns, state.base_position.copy(), state.quaternion.copy(), angles,
+            state.applied_torque.copy(), self._monitor.error,
+        )  # fmt: skip
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self._monitor.simulated_s
+
+    @property
+    def complaints(self) -> dict[str, str]:
+        """The modes of nodes that are not well, by their names, and of a plant with faults."""
+        told = self._monitor.values.get(PLANT, {})
+        faults = {PLANT: f"faults: {told['faults']}"} if "faults" in told else {}
+        return {**faults, **self._monitor.complaints}
+
+    def _choose_topics(self, with_states: bool) -> None:
+        """Listen to the truth where it is sent, else to what the sensors tell, or to neither."""
+        for topic in self._topics.values():
+            topic.take()
+        heard = TruthBase in self._topics and bool(self._topics[TruthBase].rows)
+        is_sent = bool(self._monitor.node.count_publishers(topics.TRUTH_BASE.name))
+        kinds = (TRUE if is_sent or heard else MEASURED) if with_states else ()
+        for kind in [kind for kind in self._topics if kind not in kinds]:
+            self._topics.pop(kind).close()
+        for kind in kinds:
+            if kind not in self._topics:
+                topic = StateTopic(self._monitor.node, self._group, kind)
+                topic.describe(self._names, self._timebase)
+                self._topics[kind] = topic
+
+    def _newest_of_all(self) -> int | None:
+        """Return the newest time for which each topic has a row: base and arm of one tick."""
+        times = [set(topic.rows) for topic in self._topics.values()]
+        return max(set.intersection(*times), default=None) if times else None
+
+    def _read_law(self, data: bytes) -> list[Event]:
+        try:
+            before, self.law = self.law, LawCodec.decode(data, 0).name
+        except MessageError:
+            return []
+        is_news = bool(before) and before != self.law
+        return [Event(self.time, "controller_node", f"flies {self.law}")] if is_news else []
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._monitor.close()

@@ -1,0 +1,124 @@
+"""A flight as it is seen live: the robot, the ways of its tools, its curves, and words on it."""
+
+from __future__ import annotations
+
+import html
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import cycle
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.robot import Robot
+from space_robot_model.robot.tool import tool_pose
+from space_robot_model.robot.transforms import joint_transforms
+
+from ...flight.graph.monitor import Event
+from ..flights import ON_DARK, ON_WHITE
+from ..scene import RobotScene, rgb
+from ..stage import extent, set_stage
+from .trail import Trail
+from .window import Curves
+
+if TYPE_CHECKING:
+    from viser import ViserServer
+
+    from .listener import Listener, Sample
+
+Array = NDArray[np.float64]
+
+ROOT = "/robot"
+TRAIL = 0.0035
+"""Width of a tool's trail by the size of what is seen."""
+ROOM = 1.3
+"""The first camera sees this much more than the robot in its first pose: it will move."""
+MOST_EVENTS = 8
+
+
+class LiveView:
+    """What browsers see of one robot."""
+
+    def __init__(self, server: ViserServer, robot: Robot, sample: Sample, dark: bool) -> None:
+        """Put the robot into the empty scene.
+
+        Args:
+            server: that browsers are connected to.
+            robot: that flies.
+            sample: its pose.
+            dark: whether the page is light on dark.
+        """
+        self._server, self._robot = server, robot
+        colours, ink = (ON_DARK, "#c9d1d9") if dark else (ON_WHITE, "#333333")
+        points = extent(
+            robot, sample.base_position[np.newaxis], _unit(sample), sample.angles[np.newaxis]
+        )
+        middle = points.mean(axis=0)
+        set_stage(server, middle + ROOM * (points - middle), dark)
+        width = TRAIL * float(np.ptp(points, axis=0).max())
+        self._root = server.scene.add_frame(ROOT, show_axes=False)
+        self._scene = RobotScene(server.scene, ROOT, robot)
+        self._tools = [replace(robot, tools=(tool,)) for tool in robot.tools]
+        self._trails = [
+            Trail(server.scene, f"{ROOT}/trail of {tool.name}", rgb(colour), width)
+            for tool, colour in zip(robot.tools, cycle(colours), strict=False)
+        ]
+        self._words = server.gui.add_html("")
+        self._curves = Curves(server.gui, robot, colours, ink)
+        self._events: deque[Event] = deque(maxlen=MOST_EVENTS)
+        self.show(sample)
+
+    def show(self, sample: Sample) -> None:
+        """Move the robot."""
+        position, quaternion = sample.base_position, _unit(sample)
+        # of two rows, since the scene takes what has one for what never moves
+        links = joint_transforms(self._robot, np.tile(sample.angles, (2, 1)))
+        with self._server.atomic():
+            self._scene.move(position, quaternion[0], links, 0)
+            for robot, trail in zip(self._tools, self._trails, strict=True):
+                _, place = tool_pose(robot, quaternion, sample.angles[np.newaxis])
+                trail.add(sample.time, position + place[0])
+        self._curves.add(sample)
+
+    def tell(self, listener: Listener, speed: float, note: str = "") -> None:
+        """Write what the panel says, and draw the curves.
+
+        Args:
+            listener: that heard it.
+            speed: simulated seconds by those of the wall clock.
+            note: a sentence more.
+        """
+        lines = [
+            f"<b>{html.escape(listener.law or '...')}</b>, {html.escape(self._robot.name)}",
+            f"<b>{listener.time:.2f} s</b> {f'&times;{speed:.2f} real time' if speed else ''}",
+        ]
+        lines += [
+            f"<span style='color:#d55e00'>{html.escape(node)}: {html.escape(mode)}</span>"
+            for node, mode in listener.complaints.items()
+        ]
+        lines += [html.escape(str(event).strip()) for event in self._events]
+        lines += [f"<i>{html.escape(note)}</i>"] if note else []
+        content = "<br>".join(lines)
+        with self._server.atomic():
+            self._words.content = f"<div style='font-size:0.9em;padding:0 1em'>{content}</div>"
+            self._curves.draw()
+
+    def note(self, events: Sequence[Event]) -> None:
+        """Keep what happened to be told."""
+        self._events.extend(events)
+
+    def close(self) -> None:
+        """Take all of it away."""
+        for trail in self._trails:
+            trail.clear()
+        self._root.remove()
+        self._words.remove()
+        self._curves.remove()
+
+
+def _unit(sample: Sample) -> Array:
+    """Return the base's attitude, (1, 4): sensors tell one that is not quite a unit quaternion."""
+    unit: Array = sample.base_quaternion[np.newaxis] / np.linalg.norm(sample.base_quaternion)
+    return unit

@@ -1,0 +1,82 @@
+"""What happened in a flight and when: events, faults, changes of law."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import NamedTuple
+
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.law_history import LawChange, laws_of
+from space_robot_msgs_py.errors import InputError
+from space_robot_sim.environment.events import Capture, Event
+from space_robot_sim.faults.grammar import Fault, parse_fault
+
+from ..analysis.described import events_of
+from ..scenario.faults import KINDS
+
+
+class Mark(NamedTuple):
+    """Something to be seen beside the flight's curves."""
+
+    start: float
+    """s."""
+    stop: float
+    """s; that of ``start`` for what takes no time, infinite for what lasts."""
+    text: str
+    kind: str
+    """``event``, ``fault`` or ``law``."""
+
+
+def marks_of(log: FlightLog) -> list[Mark]:
+    """Return what is marked of a flight, by time; what the bag tells wrongly is left out."""
+    period = log.timebase.period
+    start = log.first_tick * period
+    end = start + log.ticks * period
+    found = [_of_event(event) for event in _events(log)]
+    found += [_of_fault(fault) for fault in _faults(log)]
+    found += [
+        Mark(law.tick * period, law.tick * period, str(LawChange(before, law)), "law")
+        for before, law in pairwise(laws_of(log))
+    ]
+    return sorted(mark for mark in found if mark.start < end and mark.stop >= start)
+
+
+def shared_marks(flights: Mapping[str, FlightLog]) -> list[Mark]:
+    """Return the marks of some flights, by time; one that not all have names those that do."""
+    of_each = {name: marks_of(log) for name, log in flights.items()}
+    every = sorted({mark for marks in of_each.values() for mark in marks})
+    found = []
+    for mark in every:
+        names = [name for name, marks in of_each.items() if mark in marks]
+        if len(names) < len(of_each):
+            mark = mark._replace(text=f"{', '.join(names)}: {mark.text}")
+        found.append(mark)
+    return found
+
+
+def _of_event(event: Event) -> Mark:
+    text = f"capture {event.target.name}" if isinstance(event, Capture) else "release"
+    return Mark(event.time_s, event.time_s, text, "event")
+
+
+def _events(log: FlightLog) -> list[Event]:
+    try:
+        return events_of(log)
+    except InputError:
+        return []
+
+
+def _faults(log: FlightLog) -> list[Fault]:
+    found = []
+    for text in log.flight.get("faults", ()):
+        try:
+            found.append(parse_fault(str(text), KINDS))
+        except InputError:
+            continue
+    return found
+
+
+def _of_fault(fault: Fault) -> Mark:
+    stop = fault.stop_s if fault.kind.lasts else fault.start_s
+    return Mark(fault.start_s, stop, f"{fault.kind.name} {fault.argument}".strip(), "fault")

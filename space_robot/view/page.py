@@ -1,0 +1,90 @@
+"""One page with the scene and plots that follow it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from importlib.resources import files
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..analysis.template import template
+from .marks import Mark
+from .plots import Plot
+
+Array = NDArray[np.float64]
+
+
+class Shown(NamedTuple):
+    """A bag on the page."""
+
+    name: str
+    colour: str
+    what: str
+    warnings: Sequence[str] = ()
+    """What is wrong with its recording, a sentence each."""
+
+
+def render(
+    title: str,
+    scene: str,
+    bags: Sequence[Shown],
+    plots: Sequence[Plot],
+    marks: Sequence[Mark],
+    start: float,
+    dark: bool,
+) -> str:
+    """Render the page, without references to anything outside itself.
+
+    Args:
+        title: of the page.
+        scene: viser's own page of the scene.
+        bags: that are shown.
+        plots: in their order.
+        marks: what happened.
+        start: time at which the scene begins, s.
+        dark: whether the page is light on dark.
+    """
+    folder = files(__package__).joinpath("templates")
+    data = {
+        "plots": [
+            {
+                "title": plot.title, "unit": plot.unit, "logarithmic": plot.is_logarithmic,
+                "pulses": plot.are_pulses,
+                "time": _short(plot.time, 4),
+                "series": [
+                    {
+                        "label": s.label, "colour": s.colour,
+                        "values": _digits(s.values, plot.is_logarithmic),
+                    }
+                    for s in plot.series
+                ],
+            }
+            for plot in plots
+        ],
+        "marks": [
+            {"start": m.start, "stop": m.stop if math.isfinite(m.stop) else None, "text": m.text,
+             "kind": m.kind}
+            for m in marks
+        ],
+        "start": start, "dark": dark,
+    }  # fmt: skip
+    return template("space_robot.view", "view.html.j2").render(
+        title=title, scene=scene, bags=bags, dark=dark,
+        uplot=folder.joinpath("uPlot.iife.min.js").read_text("utf-8"),
+        uplot_css=folder.joinpath("uPlot.min.css").read_text("utf-8"),
+        css=folder.joinpath("view.css").read_text("utf-8"),
+        script=folder.joinpath("view.js").read_text("utf-8"),
+        data=data,
+    )  # fmt: skip
+
+
+def _short(values: Array, decimals: int) -> list[float]:
+    return [float(x) for x in np.round(values, decimals)]
+
+
+def _digits(values: Array, is_logarithmic: bool) -> list[Any]:
+    known = np.isfinite(values) & ~(is_logarithmic & (values <= 0.0))
+    return [float(f"{x:.4g}") if k else None for x, k in zip(values, known, strict=True)]

@@ -1,0 +1,110 @@
+"""The quantities of a flight that are plotted beside its scene, each where the flight has it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import InputError
+
+from ..analysis.attitude_drift import attitude_drift, controls_base
+from ..analysis.described import flown_actuators
+from ..analysis.figures.overlay import words
+from ..analysis.metrics import error_columns, torque_columns, tracking_error, unit_of
+
+Array = NDArray[np.float64]
+
+AXES = "xyz"
+
+
+class Quantity(NamedTuple):
+    """Values over the ticks of a flight, all in one unit."""
+
+    title: str
+    unit: str
+    labels: Sequence[str]
+    values: Array
+    """(N, len(labels))."""
+    is_error: bool = False
+    are_pulses: bool = False
+    """True for shares of a tick, from 0 to 1, during which something is open."""
+
+
+def quantities_of(log: FlightLog, robot: Robot) -> list[Quantity]:
+    """Return errors, drift of the base, torques, actuators and passive joints of a flight.
+
+    Args:
+        log: the flight.
+        robot: that flew, with the joints of ``log``.
+    """
+    return [
+        *_errors(log), *_drift(log), *_passive_joints(log, robot), *_torques(log),
+        *_actuators(log),
+    ]  # fmt: skip
+
+
+def _errors(log: FlightLog) -> Iterator[Quantity]:
+    columns = error_columns(log.axes, controls_base(log), log.prismatic, log.branches)
+    names, values = np.array([*AXES, *log.joint_names]), tracking_error(log)
+    for name, axes in columns.items():
+        unit = unit_of(name).strip("-")
+        yield Quantity(f"{words(name)} error", unit, names[axes].tolist(), values[:, axes], True)
+
+
+def _torques(log: FlightLog) -> Iterator[Quantity]:
+    columns = torque_columns(log.axes, controls_base(log), log.prismatic, log.branches)
+    names = np.array([*AXES, *log.joint_names])
+    for name, axes in columns.items():
+        yield Quantity(
+            words(name), unit_of(name), names[axes].tolist(), log.applied_torque[:, axes]
+        )  # fmt: skip
+
+
+def _drift(log: FlightLog) -> Iterator[Quantity]:
+    """Yield how far the base is from where it was in its first known row."""
+    known = np.flatnonzero(log.finite(("base_position", "quaternion")))
+    if not len(known):
+        return
+    first = known[0]
+    if not controls_base(log):
+        turned = attitude_drift(log, log.quaternion[first])
+        yield Quantity("attitude drift", "deg", AXES, turned)
+    yield Quantity("base drift", "m", AXES, log.base_position - log.base_position[first])
+
+
+def _passive_joints(log: FlightLog, robot: Robot) -> Iterator[Quantity]:
+    """Yield the deflection of the joints without motors from where their springs rest."""
+    rest = np.array([spring.rest for spring in robot.springs])
+    slides = np.array(log.prismatic[len(log.joint_names) :], dtype=bool)
+    for chosen, unit in ((~slides, "rad"), (slides, "m")):
+        if chosen.any():
+            names = np.array(log.passive_names)[chosen].tolist()
+            away = (log.passive_positions - rest)[:, chosen]
+            yield Quantity("deflection", unit, names, away)
+
+
+def _actuators(log: FlightLog) -> Iterator[Quantity]:
+    wheels, thrusters = log.wheel_velocities.shape[1], log.thrusts.shape[1]
+    if not wheels and not thrusters:
+        return
+    names = [f"wheel_{k + 1}" for k in range(wheels)]
+    try:
+        actuators = flown_actuators(log)
+    except InputError:  # the bag does not describe them
+        if wheels:
+            yield Quantity("wheel speed", "rad/s", names, log.wheel_velocities)
+        largest = np.nanmax(np.abs(log.thrusts), axis=0, initial=0.0)
+        force = np.where(largest > 0.0, largest, 1.0)
+    else:
+        if wheels:
+            held = actuators.wheels.spin_momenta(log.wheel_velocities)
+            yield Quantity("wheel momentum", "N m s", names, held)
+        force = actuators.thrusters.values("force")
+    if thrusters:
+        names = [f"thruster_{k + 1}" for k in range(thrusters)]
+        yield Quantity("thruster pulses", "", names, log.thrusts / force, are_pulses=True)

@@ -1,0 +1,171 @@
+"""The robot in a viser scene: its shapes below the frames of its bodies, which are then moved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.robot import Robot
+from space_robot_model.robot.frame_names import frame_names
+from space_robot_model.robot.transforms import (
+    Transform,
+    joint_transforms,
+    tool_transforms,
+    wxyz,
+)
+from space_robot_model.robot.tree import Visual
+
+from .mesh import Mesh
+from .meshes import shown_shapes
+
+if TYPE_CHECKING:
+    from viser import FrameHandle, SceneApi, SceneNodeHandle
+
+Array = NDArray[np.float64]
+
+AXES = 0.08
+"""Length of a tool's axes by that of all links."""
+GREY = (0.7, 0.7, 0.7, 1.0)
+"""Of shapes without a colour."""
+
+
+class Look(NamedTuple):
+    """How the shapes of a robot are drawn."""
+
+    tint: str = ""
+    """Colour of all shapes, as ``#E69F00``; empty: their own."""
+    opacity: float = 1.0
+    growth: float = 0.0
+    """m, by which a shape is thicker than it is: so that one drawn over another is not in it."""
+
+
+class RobotScene:
+    """A robot below a name of its own, as ``/tde_stc/base_link/link1``: frames as tf has them."""
+
+    def __init__(self, scene: SceneApi, root: str, robot: Robot, look: Look | None = None) -> None:
+        """Add the robot; it stands at zero.
+
+        Args:
+            scene: of a server.
+            root: name of the robot in the scene, beginning with a slash.
+            robot: its numbers.
+            look: of its shapes.
+        """
+        self._scene, self._robot, self._look = scene, robot, look or Look()
+        self._names = frame_names(robot).bodies
+        base = self._names[0]
+        self._paths = {base: f"{root}/{_part(base)}"}
+        self.base: FrameHandle = scene.add_frame(self._paths[base], show_axes=False)
+        self._frames: dict[str, FrameHandle] = {}
+        links = joint_transforms(robot, np.zeros((1, robot.joint_count)))
+        axes = AXES * sum(float(np.linalg.norm(link.position)) for link in links)
+        for link in links:
+            self._frames[link.child] = self._add_frame(link)
+        for tool in tool_transforms(robot):
+            self._add_frame(tool, axes)
+        drawn = shown_shapes(robot)
+        for number, shape in enumerate(drawn.shapes):
+            self.add_shape(f"shape_{number}", shape, drawn.meshes.get(shape.mesh))
+
+    def _add_frame(self, link: Transform, axes: float = 0.0) -> FrameHandle:
+        path = f"{self._paths[link.parent]}/{_part(link.child)}"
+        while path in self._paths.values():  # a tool may be called as a body is
+            path += "_"
+        self._paths.setdefault(link.child, path)
+        return self._scene.add_frame(
+            path, show_axes=axes > 0.0, axes_length=axes, axes_radius=0.04 * axes,
+            position=link.position[0], wxyz=link.quaternion[0],
+        )  # fmt: skip
+
+    def add_shape(self, name: str, shape: Visual, mesh: Mesh | None = None) -> SceneNodeHandle:
+        """Draw a shape on its body.
+
+        Args:
+            name: of the shape among those of the body.
+            shape: what it is.
+            mesh: of a shape that is one.
+        """
+        path = f"{self._paths[self._names[shape.body]]}/{name}"
+        return add_shape(self._scene, path, shape, self._look, mesh)
+
+    def move(self, position: Array, quaternion: Array, moved: Sequence[Transform], k: int) -> None:
+        """Move base and joints.
+
+        Args:
+            position: (3,) m of the base, inertial frame.
+            quaternion: (4,) of the base.
+            moved: of `joint_transforms`.
+            k: which of their rows.
+        """
+        set_pose(self.base, "position", position)
+        set_pose(self.base, "wxyz", quaternion)
+        for link in moved:
+            frame = self._frames[link.child]
+            if len(link.quaternion) > 1:
+                set_pose(frame, "wxyz", link.quaternion[k])
+            if len(link.position) > 1:
+                set_pose(frame, "position", link.position[k])
+
+
+def set_pose(frame: FrameHandle, what: str, value: Array) -> None:
+    """Set a frame's pose to the last bit.
+
+    viser takes what is close by `numpy.allclose`, 1e-5 of it, for no change and leaves it out.
+    """
+    held = getattr(frame, what)
+    if not np.array_equal(held, value):
+        held[:] = np.nan
+        setattr(frame, what, value)
+
+
+def add_shape(
+    scene: SceneApi, path: str, shape: Visual, look: Look, mesh: Mesh | None = None
+) -> SceneNodeHandle:
+    """Draw a shape below a node of the scene.
+
+    Args:
+        scene: of a server.
+        path: of the shape.
+        shape: what it is; its body does not matter.
+        look: how it is drawn.
+        mesh: of a shape that is one.
+    """
+    *own, alpha = shape.colour or GREY
+    red, green, blue = (round(255 * value) for value in own)
+    colour = rgb(look.tint) if look.tint else (red, green, blue)
+    opacity = alpha * look.opacity if alpha * look.opacity < 1.0 else None
+    position, turn, more = shape.position, wxyz(shape.rotation), look.growth
+    if mesh is not None:
+        vertices = mesh.vertices * shape.size
+        flips = np.prod(shape.size) < 0.0  # mirrored: what was outside is inside
+        return scene.add_mesh_simple(
+            path, vertices, mesh.faces[:, ::-1] if flips else mesh.faces, color=colour,
+            opacity=opacity, flat_shading=True, position=position, wxyz=turn,
+        )  # fmt: skip
+    if shape.shape == "box":
+        x, y, z = (edge + 2.0 * more for edge in shape.size)
+        return scene.add_box(
+            path, colour, (x, y, z), opacity=opacity, position=position, wxyz=turn
+        )  # fmt: skip
+    if shape.shape == "cylinder":
+        radius, length = shape.size[0] + more, shape.size[1] + 2.0 * more
+        return scene.add_cylinder(
+            path, radius, length, colour, opacity=opacity, position=position, wxyz=turn
+        )  # fmt: skip
+    return scene.add_icosphere(
+        path, shape.size[0] + more, colour, opacity=opacity, position=position, wxyz=turn
+    )  # fmt: skip
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Return red, green and blue, from 0 to 255, of a colour as ``#E69F00``."""
+    red, green, blue = bytes.fromhex(colour.removeprefix("#"))
+    return red, green, blue
+
+
+def _part(name: str) -> str:
+    """Return a name as one part of a path in the scene."""
+    return name.replace("/", "_") or "_"

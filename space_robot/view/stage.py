@@ -1,0 +1,149 @@
+"""What surrounds the robots in a scene: stars, inertial axes, light, the first camera."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from space_robot_model.robot import Robot
+from space_robot_model.robot.base_axes import base_axes
+from space_robot_model.robot.frames import body_frames
+from space_robot_model.robot.transforms import wxyz
+from space_robot_model.robot.tree import Visual
+from space_robot_msgs_py.errors import InputError
+
+from .mesh import Mesh
+from .meshes import shown_shapes
+
+if TYPE_CHECKING:
+    from viser import SceneApi, ViserServer
+
+Array = NDArray[np.float64]
+
+FIELD_OF_VIEW = np.radians(35.0)
+DIRECTION = np.array([0.62, -1.0, 0.42])
+"""From what is looked at to the first camera; robots stand side by side along x."""
+SKY = 1.4
+LAMPS = (((0.2, -0.7, 1.0), 2.3), ((-0.8, -0.6, 0.3), 0.6))
+"""From where light comes, and how strong."""
+STARS, STAR_SEED = 500, 1
+STARS_AT, STAR = 40.0, 0.0025
+"""Distance of the stars by the size of what is seen, and their size by that distance."""
+STAR_DARK, STAR_LIGHT = (130, 136, 150), (205, 209, 216)
+"""Their colours on dark and on light pages."""
+CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+
+
+def check_viser() -> None:
+    """See that viser is installed.
+
+    Raises:
+        InputError: it is not; says how to install it.
+    """
+    if find_spec("viser") is None:
+        raise InputError("view needs viser: pip install 'space_robot[view]'")
+
+
+def set_stage(
+    server: ViserServer, points: Array, dark: bool, shadows: bool = True
+) -> None:  # fmt: skip
+    """Put stars, axes, light and camera about some points.
+
+    Args:
+        server: whose scene is set.
+        points: (K, 3) m, what must be seen, inertial frame.
+        dark: whether the page is.
+        shadows: whether there are any; without a graphics card they take five times as long.
+    """
+    scene, camera = server.scene, server.initial_camera
+    scene.set_up_direction("+z")
+    scene.world_axes.visible = False
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, size = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 0.1)
+    _surround(scene, middle, size, low, dark)
+    _light(scene, shadows)
+    camera.fov, camera.near, camera.far = float(FIELD_OF_VIEW), 0.01 * size, 100.0 * size
+    back = DIRECTION / np.linalg.norm(DIRECTION)
+    camera.look_at = middle
+    camera.position = middle + _distance(points - middle, back) * back
+
+
+def _surround(scene: SceneApi, middle: Array, size: float, low: Array, dark: bool) -> None:
+    """Draw what shows that a robot drifts and turns: inertial axes of a round length, and stars."""
+    length = 10.0 ** np.floor(np.log10(0.5 * size))
+    scene.add_frame(
+        "/inertial", axes_length=length, axes_radius=0.002 * size, origin_radius=0.004 * size,
+        position=low - 0.05 * size,
+    )  # fmt: skip
+    scene.add_label("/inertial/length", f"{length:g} m", position=(length, 0.0, 0.0))
+    directions = np.random.default_rng(STAR_SEED).normal(size=(STARS, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    scene.add_point_cloud(
+        "/stars", middle + STARS_AT * size * directions, STAR_DARK if dark else STAR_LIGHT,
+        point_size=STAR * STARS_AT * size, point_shape="circle",
+    )  # fmt: skip
+
+
+def _light(scene: SceneApi, shadows: bool) -> None:
+    """Put lights of our own: viser's map of a city comes late, or not at all."""
+    scene.configure_environment_map(None)
+    scene.configure_default_lights(False)
+    scene.add_light_hemisphere("/sky", ground_color=(110, 112, 125), intensity=SKY)
+    for number, (direction, strength) in enumerate(LAMPS):
+        turn, _ = Rotation.align_vectors([direction], [[0.0, 0.0, 1.0]])
+        scene.add_light_directional(
+            f"/lamp_{number}", color=(255, 250, 240), intensity=strength, position=direction,
+            cast_shadow=shadows and number == 0, wxyz=wxyz(turn.as_matrix()),
+        )  # fmt: skip
+
+
+def _distance(points: Array, back: Array) -> float:
+    """Return how far from the origin a camera sees all points, in a picture higher than wide."""
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    up = np.cross(back, right)
+    slope = np.tan(0.5 * FIELD_OF_VIEW)
+    aside = np.maximum(np.abs(points @ right) / 1.1, np.abs(points @ up))
+    return 1.12 * float(np.max(points @ back + aside / slope))
+
+
+def extent(robot: Robot, position: Array, quaternion: Array, joint_positions: Array) -> Array:
+    """Return where a robot's shapes reach to, (K, 3) m, inertial frame.
+
+    Args:
+        robot: its numbers and visuals.
+        position: (T, 3) m of the base.
+        quaternion: (T, 4) of the base.
+        joint_positions: (T, N) of all joints.
+    """
+    axes = base_axes(quaternion.T)
+    frames = {f.body: f for f in body_frames(robot, tuple(axes), joint_positions.T)}
+    found = []
+    drawn = shown_shapes(robot)
+    for shape in drawn.shapes:
+        frame = frames[shape.body]
+        for corner in _corners(shape, drawn.meshes.get(shape.mesh)):
+            place = frame.on_outer_axes(shape.position + shape.rotation @ corner)
+            found.append(position + (frame.origin + place).T)
+    return np.concatenate(found)
+
+
+def _corners(shape: Visual, mesh: Mesh | None) -> Array:
+    """Return the corners of a box about a shape, (8, 3) m, on the shape's axes."""
+    size = np.array(shape.size)
+    middle = np.zeros(3)
+    if mesh is not None:
+        low, high = mesh.vertices.min(axis=0) * size, mesh.vertices.max(axis=0) * size
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    elif shape.shape == "box":
+        half = 0.5 * size
+    elif shape.shape == "cylinder":
+        half = np.array([size[0], size[0], 0.5 * size[1]])
+    else:
+        half = np.full(3, size[0])
+    corners: Array = middle + CORNERS * half
+    return corners

@@ -1,0 +1,130 @@
+"""The flight software between a law and the base's actuators, a tick of it.
+
+    demand --+--> wheels --> motors' torques (and null motion)
+             |      ^ less the torque expected of the thrusters
+             +--> what the wheels' axes cannot give, and unloading --> thrusters --> pulses
+
+A base without wheels leaves all to the thrusters. What was given comes back in the reported
+torque, so the time-delay estimate is not misled by limits, failures or pulses.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel, subroutine
+from space_robot_msgs_py.compiled.records import Record, assign, nested, shaped
+from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_WHEELS
+
+from .modulation import Modulation, modulate
+from .null_motion import NullMotion, add_null_motion
+from .settings import AllocationSettings
+from .thrusters import Thrusters, expect_torque
+from .unloading import Unloading, find_unloading
+from .wheel_health import WheelHealth, observe_wheels, remember_asked
+from .wheels import Wheels, share_torque
+
+Array = NDArray[np.float64]
+
+
+class Allocation(Record):
+    """Settings and memory of the allocation."""
+
+    is_used: float = shaped(lambda n: ())
+    """0: the base's actuators are ideal, or there are none."""
+    wheels: Wheels = nested(Wheels)
+    health: WheelHealth = nested(WheelHealth)
+    null_motion: NullMotion = nested(NullMotion)
+    thrusters: Thrusters = nested(Thrusters)
+    modulation: Modulation = nested(Modulation)
+    unloading: Unloading = nested(Unloading)
+    of_thrusters: Array = shaped(lambda n: (3,))
+    """Torque demanded of the thrusters, N m."""
+    expected: Array = shaped(lambda n: (3,))
+    """Torque that they are expected to give from the present tick to the next, N m."""
+    of_wheels: Array = shaped(lambda n: (3,))
+    """Torque demanded of the wheels, N m."""
+    demand: Array = shaped(lambda n: (3,))
+    """Torque demanded of the base, N m, base frame."""
+    reported_speeds: Array = shaped(lambda n: (MOST_WHEELS,))
+    """Of the wheels at the present tick, rad/s."""
+    reported_torques: Array = shaped(lambda n: (MOST_WHEELS,))
+    """Those that the wheels' motors gave since the last tick, N m."""
+    command: Array = shaped(lambda n: (MOST_WHEELS + MOST_THRUSTERS,))
+    """Torque of each wheel's motor, N m, then force of each thruster, N."""
+
+    @classmethod
+    def build(
+        cls, n: int, believed: BaseActuatorSettings, settings: AllocationSettings, period: float
+    ) -> Allocation:
+        """Read the settings for a robot of ``n`` joints and ticks of ``period``, s."""
+        allocation = cls.allocate(n)
+        thrusters = Thrusters.build(n, believed.thrusters, settings, period)
+        assign(
+            allocation, is_used=bool(believed.names), thrusters=thrusters,
+            wheels=Wheels.build(n, believed.wheels, settings, period),
+            health=WheelHealth.build(n, settings), null_motion=NullMotion.build(n, settings),
+            modulation=Modulation.build(n, thrusters, settings, period),
+            unloading=Unloading.build(n, settings),
+        )  # fmt: skip
+        return allocation
+
+
+@kernel
+def allocate(allocation: Allocation, tick: float) -> None:
+    """Write the ``command`` that gives the base what is demanded from ``tick`` to the next.
+
+    ``demand`` and what the wheels report at ``tick`` are read.
+    """
+    wheels, thrusters, command = allocation.wheels, allocation.thrusters, allocation.command
+    wheel_count, thruster_count = int(wheels.count), int(thrusters.count)
+    if wheel_count > 0:
+        observe_wheels(
+            allocation.health, wheels, tick, allocation.reported_speeds, allocation.reported_torques
+        )
+    if thruster_count > 0:
+        _allocate_thrusters(allocation, int(tick))
+        for j in range(thruster_count):
+            command[wheel_count + j] = thrusters.is_open[j] * thrusters.force[j]
+    if wheel_count > 0:
+        for i in range(3):
+            allocation.of_wheels[i] = allocation.demand[i] - allocation.expected[i]
+        share_torque(wheels, allocation.of_wheels)
+        add_null_motion(allocation.null_motion, wheels)
+        remember_asked(allocation.health, wheels, tick)
+        for k in range(wheel_count):
+            command[k] = wheels.torque[k]
+
+
+@subroutine
+def _allocate_thrusters(allocation: Allocation, tick: int) -> None:
+    wheels, demand = allocation.wheels, allocation.of_thrusters
+    find_unloading(allocation.unloading, wheels, demand)
+    if wheels.healthy.rank < 3.0:
+        for i in range(3):
+            for j in range(3):
+                demand[i] += wheels.healthy.beyond[i, j] * allocation.demand[j]
+    for i in range(3):
+        if not np.isfinite(demand[i]):  # no law's accident is to be owed for good
+            demand[i] = 0.0
+    modulate(allocation.modulation, allocation.thrusters, tick, demand)
+    expect_torque(allocation.thrusters, tick, allocation.expected)
+
+
+@kernel
+def _leave_alone(allocation: Allocation, tick: float) -> None:
+    """Do what there is to do without hardware: nothing."""
+
+
+@cache
+def allocation_code(is_used: bool) -> RecordFunction:
+    """Return `allocate`, or without hardware nothing, as compiled loops take it.
+
+    Given as a value it is compiled once, and not into every loop; without hardware not at all.
+    """
+    record = (Allocation,)
+    return RecordFunction(allocate if is_used else _leave_alone, record, record)

@@ -1,0 +1,81 @@
+"""A mission held against the limits of a robot's joints.
+
+A leg of a mission stays between its waypoints, so that positions are within the limits if those of
+the waypoints are. The desired velocity is largest halfway, ``15/8`` of the mean one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.errors import InputError
+
+Array = NDArray[np.float64]
+
+ROUNDING = 1e-9
+"""rad or m, by which a waypoint may be beyond a limit: both were written in degrees, maybe."""
+HALFWAY = 15.0 / 8.0
+"""Largest velocity of a quintic leg from rest to rest, as a share of its mean velocity."""
+
+
+class Beyond(NamedTuple):
+    """A number of a mission that a joint cannot follow."""
+
+    joint: str
+    asked: float
+    limit: float
+    unit: str
+
+
+def check_positions(robot: Robot, waypoints: Array) -> None:
+    """See that all ``waypoints`` (K, n), rad or m, are within the joints' limits.
+
+    Raises:
+        InputError: naming the first one beyond.
+    """
+    for number, waypoint in enumerate(waypoints):
+        for joint, (name, limits) in enumerate(zip(robot.joint_names, robot.limits, strict=True)):
+            low, high, position = limits.lower, limits.upper, float(waypoint[joint])
+            if low - ROUNDING <= position <= high + ROUNDING:
+                continue
+            is_prismatic = bool(robot.is_prismatic[joint])
+            scale, unit = (1.0, "m") if is_prismatic else (180.0 / np.pi, "degrees")
+            raise InputError(
+                f"waypoints_deg: waypoint {number + 1} has joint {name!r} at "
+                f"{position * scale:.6g} {unit}, its limits are {low * scale:.6g} to "
+                f"{high * scale:.6g} {unit}"
+            )
+
+
+def too_fast(robot: Robot, times: Array, waypoints: Array) -> list[Beyond]:
+    """Return the joints whose desired velocity is above their limit somewhere, and the largest.
+
+    ``times`` (K,) s, and ``waypoints`` (K, n), rad or m.
+    """
+    if len(times) < 2:
+        return []
+    legs = np.abs(np.diff(waypoints, axis=0)) / np.diff(times)[:, np.newaxis]
+    return [
+        Beyond(name, float(fastest), limits.velocity, "m/s" if is_prismatic else "rad/s")
+        for name, fastest, limits, is_prismatic in zip(
+            robot.joint_names, HALFWAY * legs.max(axis=0), robot.limits,
+            robot.is_prismatic[: robot.n], strict=True,
+        )
+        if fastest > limits.velocity * (1.0 + ROUNDING)
+    ]  # fmt: skip
+
+
+def too_strong(robot: Robot, force: Array) -> list[Beyond]:
+    """Return the joints whose ``force`` (K, n), N m or N, is above their limit, and the largest."""
+    return [
+        Beyond(name, float(largest), limits.effort, "N" if is_prismatic else "N m")
+        for name, largest, limits, is_prismatic in zip(
+            robot.joint_names, np.abs(force).max(axis=0, initial=0.0), robot.limits,
+            robot.is_prismatic[: robot.n], strict=True,
+        )
+        if largest > limits.effort * (1.0 + ROUNDING)
+    ]  # fmt: skip

@@ -1,0 +1,134 @@
+"""The mission node's loop: streams the desired motion in chunks, ahead of need."""
+
+from __future__ import annotations
+
+import time
+
+from space_robot_model.robot.find import find_robot
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.errors import MessageError
+from space_robot_msgs_py.ros.endpoints import (
+    FollowedSubscription,
+    PolledCallbackGroup,
+    RawPublisher,
+)
+from space_robot_msgs_py.ros.health import Health
+from space_robot_msgs_py.ros.loop import Wait
+from space_robot_msgs_py.ros.managed_node import ManagedNode
+from space_robot_msgs_py.wire.cdr import header_stamp_ns
+from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
+from space_robot_msgs_py.wire.stamp_guard import StampGuard
+
+from .mission import Mission
+from .settings import MissionNodeSettings
+
+CLOCK_DEPTH = 1_000
+"""All of a plant's messages are needed to tell them from another's."""
+MOST_AT_ONCE = 100
+"""Messages taken before the stream goes on: somebody may flood the topic."""
+CLOCK_WAIT_S = GREET_S = 0.05
+MOST_OWED_S = 60.0
+"""A mission that was stopped for longer (simulated time) does not send what it owes."""
+
+
+class MissionLoop:
+    """Follows /clock and keeps the stream a lead ahead of it."""
+
+    wait_for = ()
+    is_complete = False
+
+    def __init__(
+        self, node: ManagedNode[MissionNodeSettings], settings: MissionNodeSettings
+    ) -> None:
+        """Read the robot and the mission."""
+        self._node, self._settings = node, settings
+        robot = find_robot(settings.robot)
+        self._mission = Mission(robot, settings, settings.period)
+        self._codec = ReferenceCodec(robot.joint_names, settings.timebase)
+        self._joints = RawPublisher(node, topics.REFERENCE_JOINTS)
+        self._base = RawPublisher(node, topics.REFERENCE_BASE)
+        self.outputs = (self._joints, self._base)
+        self._clock = FollowedSubscription(
+            node, topics.CLOCK, PolledCallbackGroup(), depth=CLOCK_DEPTH
+        )
+        self._for_clock = Wait(CLOCK_WAIT_S, (self._clock,))
+        self._stamps = StampGuard(round(MOST_OWED_S / settings.period))
+        self._next = 0
+        """The first tick that the stream has not reached."""
+        self._invalid_stamps, self._listeners = 0, 0
+        self._greet_at = 0.0
+
+    def begin(self) -> None:
+        """Begin where the stream has ended."""
+
+    def step(self) -> Wait | None:
+        """Send what is due, and take the clock."""
+        now = time.monotonic()
+        if now >= self._greet_at:
+            self._greet_at = now + GREET_S
+            self._greet()
+        has_taken = self._take_clock()
+        if self._next < self._stamps.last + self._settings.lead_ticks:
+            self._send_chunk()
+            return None
+        return None if has_taken else self._for_clock
+
+    def stand_down(self) -> None:
+        """Fall silent: the controller holds the last point."""
+
+    def close(self) -> None:
+        """Keep nothing."""
+
+    def health(self) -> Health:
+        """Tell how far the stream has come."""
+        values = {"tick": max(self._stamps.last, 0), "rejected: stamp": self._invalid_stamps}
+        return Health("nominal", values={**values, **self._clock.counts("rejected")})
+
+    def _greet(self) -> None:
+        """Say again what is still needed if somebody has joined."""
+        listeners = self._joints.listener_count + self._base.listener_count
+        if listeners > self._listeners:
+            self._next = min(self._next, self._chunk_start(max(self._stamps.last, 0)))
+        self._listeners = listeners
+
+    def _chunk_start(self, tick: int) -> int:
+        return tick // self._settings.chunk_ticks * self._settings.chunk_ticks
+
+    def _send_chunk(self) -> None:
+        chunk = self._mission.chunk(self._next, self._settings.chunk_ticks)
+        joints, base = self._codec.encode(chunk)
+        self._joints.publish(joints)
+        self._base.publish(base)
+        self._next = chunk.stop
+
+    def _take_clock(self) -> bool:
+        """Take what has come of the clock; whether there was anything."""
+        for count in range(MOST_AT_ONCE):
+            data = self._clock.take()
+            if data is None:
+                return count > 0
+            try:
+                tick = self._settings.timebase.tick(header_stamp_ns(data))
+            except MessageError:  # not this graph's clock
+                self._invalid_stamps += 1
+                self._clock.source.doubt()
+                continue
+            if tick != self._stamps.last and not self._believe(tick):
+                self._invalid_stamps += 1
+                self._clock.source.doubt()
+            else:
+                self._clock.source.follow()
+        return True
+
+    def _believe(self, tick: int) -> bool:
+        """Let ``tick`` be now if the guard believes it; a new time has a new stream."""
+        stamps, last = self._stamps, self._stamps.last
+        if not stamps.passes(tick):
+            return False
+        start = self._chunk_start(tick)
+        if last < 0:  # in the middle of a flight there is nothing to say of its past
+            self._next = max(self._next, start)
+        elif stamps.is_new_time:
+            self._node.log(f"a new time begins at tick {tick}, after {last}: the stream too")
+            self._next = start
+        return True

@@ -1,0 +1,36 @@
+"""Parameters of mission_node."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+from pydantic import Field
+
+from space_robot_model.robot.find import mission_layers
+from space_robot_msgs_py.config.settings import NodeSettings
+
+from .mission import MissionSettings
+
+
+class MissionNodeSettings(MissionSettings, NodeSettings):
+    """Parameters of mission_node."""
+
+    node: ClassVar[str] = "mission"
+    selectors: ClassVar[tuple[str, ...]] = ("robot", "mission")
+
+    mission: str = Field(
+        "", description="a mission of config/missions (empty: the robot's), or a path"
+    )
+    chunk_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(
+        100, description="ticks in one message of the reference"
+    )
+    lead_ticks: Annotated[int, Field(ge=1, le=10_000)] = Field(
+        1000, description="how far the stream is kept ahead of the plant, ticks"
+    )
+
+    @classmethod
+    def layers(cls, selected: Mapping[str, str]) -> list[Path]:
+        """The mission's own file over the graph's."""
+        return [*super().layers(selected), *mission_layers(selected["robot"], selected["mission"])]

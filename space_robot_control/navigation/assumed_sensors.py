@@ -1,0 +1,110 @@
+"""The numbers of the filter that nobody gave: from the sensors' own file, in the filter's terms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from space_robot_model.elementary.matrices import norm
+from space_robot_model.hardware.encoders import EncoderSettings
+from space_robot_model.hardware.gyro import GyroSettings
+from space_robot_model.hardware.sensors import SensorSettings
+from space_robot_model.hardware.star_tracker import StarTrackerSettings
+from space_robot_msgs_py.config.files import named_file, node_parameters
+from space_robot_msgs_py.config.validation import validate
+
+from .settings import NavigationFilterSettings
+
+OWNER = "plant"
+"""The node whose parameters the sensors' files are."""
+LEAST_ANGLE = 1e-7
+"""rad; no tracker is believed to be better, for nothing else in the filter is that exact."""
+LEAST = 1e-9
+"""No gyro and no encoder is believed to be better, rad and rad/s."""
+MAY_BE_ZERO = (
+    "tracker_delay", "gyro_rate_walk", "joint_rate_noise", "gate", "rate_filter_hz",
+    "joint_bandwidth_hz",
+)  # fmt: skip
+"""Numbers of which 0 says something; where it would say that something is perfect, it counts as
+not given."""
+UNIFORM = 1.0 / math.sqrt(12.0)
+"""Standard deviation of what rounding to whole steps of 1 leaves."""
+
+
+def completed(
+    settings: NavigationFilterSettings, sensors: str, period: float
+) -> NavigationFilterSettings:
+    """Return the settings with a number for each that the sensors are to say.
+
+    Args:
+        settings: as they were given.
+        sensors: a name in config/sensors, or a path; read only where a number lacks.
+        period: s.
+
+    Raises:
+        InputError: there is no such file, or it is wrong.
+    """
+    given = settings.model_dump()
+    lacking = [name for name, value in given.items() if not _is_given(name, value)]
+    if not lacking:
+        return settings
+    believed = believed_numbers(read_sensors(sensors), period)
+    return settings.model_copy(update={name: believed[name] for name in lacking})
+
+
+def read_sensors(name: str) -> SensorSettings:
+    """Read the sensors of a file of config/sensors, or at a path.
+
+    Raises:
+        InputError: there is no such file, or it is wrong.
+    """
+    path = named_file("sensors", name)
+    tree = node_parameters(path, OWNER)
+    own = {key: tree[key] for key in SensorSettings.model_fields if key in tree}
+    return validate(SensorSettings, own, str(path))
+
+
+def believed_numbers(sensors: SensorSettings, period: float) -> Mapping[str, Any]:
+    """Return what the filter is to believe of ``sensors``, by the names of its settings."""
+    return {
+        **_of_tracker(sensors.star_tracker),
+        **_of_gyro(sensors.gyro, period),
+        **_of_encoders(sensors.encoders),
+    }
+
+
+def _of_tracker(tracker: StarTrackerSettings) -> dict[str, Any]:
+    rounding = UNIFORM * tracker.step
+    return {
+        "tracker_across": max(LEAST_ANGLE, norm((tracker.noise_across, rounding))),
+        "tracker_about": max(LEAST_ANGLE, norm((tracker.noise_about, rounding))),
+        "tracker_boresight": list(tracker.boresight),
+        "tracker_delay": tracker.delay,
+    }
+
+
+def _of_gyro(gyro: GyroSettings, period: float) -> dict[str, Any]:
+    """The noise of single samples is as good as an angle random walk of this density."""
+    sample = norm((gyro.noise, UNIFORM * gyro.step)) * math.sqrt(period)
+    return {
+        "gyro_angle_walk": max(LEAST, norm((gyro.angle_random_walk, sample))),
+        "gyro_rate_walk": gyro.rate_random_walk,
+        "gyro_bias": max(LEAST, *(abs(bias) for bias in gyro.initial_bias)),
+    }
+
+
+def _of_encoders(encoders: EncoderSettings) -> dict[str, Any]:
+    """Differenced rates are no news: their noise is that of the angles."""
+    step = 2.0 * math.pi / 2.0**encoders.bits if encoders.bits else 0.0
+    rate = norm((encoders.velocity_noise, UNIFORM * encoders.velocity_step))
+    return {
+        "joint_angle_noise": max(LEAST, norm((encoders.noise, UNIFORM * step))),
+        "joint_rate_noise": 0.0 if encoders.difference_ticks else max(LEAST, rate),
+    }
+
+
+def _is_given(name: str, value: float | list[float]) -> bool:
+    if isinstance(value, list):
+        return any(value)
+    return value > 0.0 or (value == 0.0 and name in MAY_BE_ZERO)

@@ -1,0 +1,300 @@
+"""A multiplicative extended Kalman filter of the base's attitude: star tracker and gyro.
+
+Its six states are the attitude's error, a small rotation on the base's axes, and the gyro's bias
+(Lefferts, Markley & Shuster, J. Guidance 5, 1982; Crassidis & Junkins, Optimal Estimation of
+Dynamic Systems, 7.2.1). The gyro stands in for dynamics: ``omega = gyro - bias - noise``.
+
+A star tracker is late: what it reports at tick k was so at k - D. The filter therefore stands at
+k - D and is fed with the gyro's samples of that time, which a ring has kept. The attitude of k is
+the filter's, turned by the D increments since. That is exact: no measurement is moved in time, no
+covariance is approximated. Whenever attitude or bias change, the increments are summed anew.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_model.dynamics.algebra import inverse_symmetric
+from space_robot_msgs_py.compiled.kernels import kernel
+from space_robot_msgs_py.compiled.records import Record, nested, shaped
+
+from .quaternions import is_same, multiply, small_angle, turn
+
+Array = NDArray[np.float64]
+
+RING = 4096
+"""Samples of the gyro that are kept."""
+LONGEST_DELAY = RING - 2
+"""Ticks by which a tracker may be late."""
+FASTEST = 1.0
+"""No body turns by more in a tick, rad on an axis: a sample beyond is cut, so that a single
+wrong one cannot take the filter out of all arithmetic."""
+MOST_REJECTED = 5
+"""So many measurements in a row beyond the gate, and it is the filter that is wrong."""
+
+NOT_STARTED, STARTED, FILTERING = 0.0, 1.0, 2.0
+"""The stages: nothing seen; begun with a measurement of unknown age; with one of known age."""
+
+
+class Scratch(Record):
+    """Matrices of one call."""
+
+    quaternion: Array = shaped(lambda n: (4,))
+    rotation: Array = shaped(lambda n: (3,))
+    transition: Array = shaped(lambda n: (3, 6))
+    """Upper half of the transition matrix."""
+    upper: Array = shaped(lambda n: (3, 6))
+    gain: Array = shaped(lambda n: (6, 3))
+    weighted: Array = shaped(lambda n: (6, 3))
+    remaining: Array = shaped(lambda n: (6, 6))
+
+
+class AttitudeFilter(Record):
+    """The numbers of the filter: settings, then what it knows and remembers."""
+
+    noise: Array = shaped(lambda n: (3, 3))
+    """Covariance of a tracker's measurement on the base's axes, rad2."""
+    angle_walk: float = shaped(lambda n: ())
+    """Square of the gyro's angle random walk, rad2/s."""
+    rate_walk: float = shaped(lambda n: ())
+    """Square of its rate random walk, rad2/s3."""
+    initial_bias_variance: float = shaped(lambda n: ())
+    """rad2/s2."""
+    gate: float = shaped(lambda n: ())
+    """Square of the largest innovation that is believed, in standard deviations."""
+    delay: float = shaped(lambda n: ())
+    """D, ticks."""
+    stage: float = shaped(lambda n: ())
+    """`NOT_STARTED`, `STARTED` or `FILTERING`."""
+    reported: Array = shaped(lambda n: (4,))
+    """The tracker's last measurement, which is held until the next."""
+    quaternion: Array = shaped(lambda n: (4,))
+    """Estimated attitude at k - D, from the base to the inertial frame."""
+    bias: Array = shaped(lambda n: (3,))
+    """Estimated bias of the gyro, rad/s."""
+    covariance: Array = shaped(lambda n: (6, 6))
+    """Of the errors of attitude (base's axes, rad) and bias (rad/s) at k - D."""
+    present: Array = shaped(lambda n: (4,))
+    """Estimated attitude at k."""
+    innovation: Array = shaped(lambda n: (3,))
+    """Of the last measurement: measured less estimated attitude on the base's axes, rad."""
+    updates: float = shaped(lambda n: ())
+    """Measurements that were used."""
+    rejected: float = shaped(lambda n: ())
+    """Measurements beyond the gate."""
+    rejected_in_a_row: float = shaped(lambda n: ())
+    gyro: Array = shaped(lambda n: (RING, 3))
+    """Samples of the last ticks, rad/s, by tick modulo `RING`."""
+    scratch: Scratch = nested(Scratch)
+
+
+@kernel
+def start(filter: AttitudeFilter, tick: int, quaternion: Array, gyro: Array, period: float) -> None:
+    """Begin at ``tick`` with what the tracker reports, which may be of any age.
+
+    A bias known from before is kept, see `forget`. Before ``tick`` the gyro is taken to have
+    measured what it measures now.
+    """
+    for past in range(int(filter.delay) + 2):
+        _store(filter, tick - past, gyro, period)
+    if filter.stage == NOT_STARTED:
+        forget(filter)
+    filter.stage = STARTED
+    _restart(filter, tick, quaternion, period)
+
+
+@kernel
+def forget(filter: AttitudeFilter) -> None:
+    """Know nothing of the bias but its initial variance."""
+    filter.covariance[:] = 0.0
+    filter.bias[:] = 0.0
+    for i in range(3):
+        filter.covariance[3 + i, 3 + i] = filter.initial_bias_variance
+
+
+@kernel
+def drift(filter: AttitudeFilter, duration: float) -> None:
+    """Let ``duration`` s pass of which no gyro tells: the bias walks on."""
+    for i in range(3):
+        filter.covariance[3 + i, 3 + i] += filter.rate_walk * duration
+
+
+@kernel
+def propagate(filter: AttitudeFilter, tick: int, gyro: Array, period: float) -> None:
+    """Go from the last tick to ``tick``, at which the gyro reports ``gyro`` (3,) rad/s."""
+    _store(filter, tick, gyro, period)
+    delayed, scratch = tick - int(filter.delay), filter.scratch
+    _increment(filter, tick, period)
+    multiply(filter.present, scratch.quaternion, filter.present)
+    _increment(filter, delayed, period)
+    multiply(filter.quaternion, scratch.quaternion, filter.quaternion)
+    propagate_covariance(filter, period)
+
+
+@kernel
+def _store(filter: AttitudeFilter, tick: int, gyro: Array, period: float) -> None:
+    for i in range(3):
+        filter.gyro[tick % RING, i] = min(max(gyro[i], -FASTEST / period), FASTEST / period)
+
+
+@kernel
+def _increment(filter: AttitudeFilter, tick: int, period: float) -> None:
+    """Write into the scratch by how much the base turned in the tick that ended at ``tick``.
+
+    The trapezoid of two samples: its error is of third order in the tick.
+    """
+    last, now = filter.gyro[(tick - 1) % RING], filter.gyro[tick % RING]
+    rotation = filter.scratch.rotation
+    for i in range(3):
+        rotation[i] = (0.5 * (last[i] + now[i]) - filter.bias[i]) * period
+    turn(rotation, filter.scratch.quaternion)
+
+
+@kernel
+def propagate_covariance(filter: AttitudeFilter, period: float) -> None:
+    """Propagate the covariance over a tick in which the base turned by the scratch's rotation r.
+
+    ``P := Phi P Phi^T + Q`` with ``Phi = [[A, B], [0, E]]``, ``A = exp(-[r x])`` and
+    ``B = -integral of exp(-[r x] t/period)``, both to second order in r, and Farrenkopf's exact Q
+    (J. Guidance 1, 1978) of white noise on rate and on bias.
+    """
+    p, scratch = filter.covariance, filter.scratch
+    rotation, transition, upper = scratch.rotation, scratch.transition, scratch.upper
+    x, y, z = rotation[0], rotation[1], rotation[2]
+    square = x * x + y * y + z * z
+    for i in range(3):
+        for j in range(3):
+            same = 1.0 if i == j else 0.0
+            twice = rotation[i] * rotation[j] - same * square  # [r x]^2
+            transition[i, j] = same + 0.5 * twice
+            transition[i, 3 + j] = -period * (same + twice / 6.0)
+    for factor, first in ((1.0, 0), (-0.5 * period, 3)):
+        transition[0, first + 1] += factor * z
+        transition[0, first + 2] -= factor * y
+        transition[1, first] -= factor * z
+        transition[1, first + 2] += factor * x
+        transition[2, first] += factor * y
+        transition[2, first + 1] -= factor * x
+    for i in range(3):
+        for j in range(6):
+            total = 0.0
+            for k in range(6):
+                total += transition[i, k] * p[k, j]
+            upper[i, j] = total
+    angle = (filter.angle_walk + filter.rate_walk * period * period / 3.0) * period
+    both = -0.5 * filter.rate_walk * period * period
+    for i in range(3):
+        for j in range(i, 3):
+            total = angle if i == j else 0.0
+            for k in range(6):
+                total += upper[i, k] * transition[j, k]
+            p[i, j] = total
+            p[j, i] = total
+        for j in range(3):
+            p[i, 3 + j] = upper[i, 3 + j] + (both if i == j else 0.0)
+            p[3 + j, i] = p[i, 3 + j]
+        p[3 + i, 3 + i] += filter.rate_walk * period
+
+
+@kernel
+def observe_tracker(
+    filter: AttitudeFilter, tick: int, quaternion: Array, is_timed: bool, period: float
+) -> None:
+    """Take what the tracker reports at ``tick``; a measurement only if it is not the last one.
+
+    ``is_timed``: the tick before was seen as well, so a new measurement is D ticks old; else it
+    may be older, and it is not used.
+    """
+    if is_same(quaternion, filter.reported):
+        return
+    filter.reported[:] = quaternion
+    if not is_timed:
+        return
+    if filter.stage == STARTED:  # the first of known age
+        filter.stage = FILTERING
+        _restart(filter, tick, quaternion, period)
+        return
+    if update(filter, quaternion):
+        filter.updates += 1.0
+        filter.rejected_in_a_row = 0.0
+    else:
+        filter.rejected += 1.0
+        filter.rejected_in_a_row += 1.0
+        if filter.rejected_in_a_row < MOST_REJECTED:
+            return
+        forget(filter)
+        _restart(filter, tick, quaternion, period)
+    recompute(filter, tick, period)
+
+
+@kernel
+def update(filter: AttitudeFilter, quaternion: Array) -> bool:
+    """Update attitude, bias and covariance (Joseph's form) with a measurement of tick k - D.
+
+    Returns:
+        False if it is beyond the gate: then nothing was changed.
+    """
+    p, noise, scratch = filter.covariance, filter.noise, filter.scratch
+    innovation, gain, weighted, rest = (
+        filter.innovation, scratch.gain, scratch.weighted, scratch.remaining,
+    )  # fmt: skip
+    cosine = small_angle(filter.quaternion, quaternion, innovation)
+    xx, yy, zz, xy, xz, yz = inverse_symmetric((
+        p[0, 0] + noise[0, 0], p[1, 1] + noise[1, 1], p[2, 2] + noise[2, 2],
+        p[0, 1] + noise[0, 1], p[0, 2] + noise[0, 2], p[1, 2] + noise[1, 2],
+    ))  # fmt: skip
+    a, b, c = innovation[0], innovation[1], innovation[2]
+    distance = xx * a * a + yy * b * b + zz * c * c + 2.0 * (xy * a * b + xz * a * c + yz * b * c)
+    if filter.gate > 0.0 and not (cosine > 0.0 and distance <= filter.gate):
+        return False
+    for i in range(6):  # K = P H^T S^-1, H = [E 0]
+        gain[i, 0] = p[i, 0] * xx + p[i, 1] * xy + p[i, 2] * xz
+        gain[i, 1] = p[i, 0] * xy + p[i, 1] * yy + p[i, 2] * yz
+        gain[i, 2] = p[i, 0] * xz + p[i, 1] * yz + p[i, 2] * zz
+    for i in range(6):  # (E - K H) P
+        for j in range(6):
+            rest[i, j] = p[i, j] - (
+                gain[i, 0] * p[0, j] + gain[i, 1] * p[1, j] + gain[i, 2] * p[2, j]
+            )
+    for i in range(6):
+        for j in range(3):
+            weighted[i, j] = (
+                gain[i, 0] * noise[0, j] + gain[i, 1] * noise[1, j] + gain[i, 2] * noise[2, j]
+            ) - rest[i, j]
+    for i in range(6):  # (E - K H) P (E - K H)^T + K R K^T, whose upper triangle is as good
+        for j in range(i, 6):
+            p[i, j] = rest[i, j] + (
+                weighted[i, 0] * gain[j, 0] + weighted[i, 1] * gain[j, 1]
+                + weighted[i, 2] * gain[j, 2]
+            )  # fmt: skip
+            p[j, i] = p[i, j]
+    for i in range(3):
+        scratch.rotation[i] = gain[i, 0] * a + gain[i, 1] * b + gain[i, 2] * c
+        filter.bias[i] += gain[3 + i, 0] * a + gain[3 + i, 1] * b + gain[3 + i, 2] * c
+    turn(scratch.rotation, scratch.quaternion)
+    multiply(filter.quaternion, scratch.quaternion, filter.quaternion)
+    return True
+
+
+@kernel
+def _restart(filter: AttitudeFilter, tick: int, quaternion: Array, period: float) -> None:
+    """Take a measurement for the attitude of k - D; what is known of the bias is kept."""
+    filter.reported[:] = quaternion
+    filter.quaternion[:] = quaternion
+    filter.rejected_in_a_row = 0.0
+    for i in range(3):
+        for j in range(3):
+            filter.covariance[i, j] = filter.noise[i, j]
+            filter.covariance[i, 3 + j] = 0.0
+            filter.covariance[3 + i, j] = 0.0
+    recompute(filter, tick, period)
+
+
+@kernel
+def recompute(filter: AttitudeFilter, tick: int, period: float) -> None:
+    """Turn the attitude of k - D by the increments since, with the bias as it is now."""
+    filter.present[:] = filter.quaternion
+    for past in range(tick - int(filter.delay) + 1, tick + 1):
+        _increment(filter, past, period)
+        multiply(filter.present, filter.scratch.quaternion, filter.present)

@@ -1,0 +1,51 @@
+"""The data sheet of a star tracker."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
+
+from space_robot_msgs_py.config.validation import StrictModel
+
+from ..elementary.matrices import norm
+
+Angle = Annotated[float, Field(ge=0.0, le=1.0)]
+
+LEAST_RATE = 1e-6
+"""Hz; a measurement in eleven days."""
+MOST_UNDER_WAY = 64
+"""Measurements that have been taken and are not released yet."""
+
+
+def has_direction(vector: list[float]) -> list[float]:
+    """Return ``vector`` if it can be made a unit vector.
+
+    Raises:
+        ValueError: it is far too short or too long.
+    """
+    length = norm(vector)
+    if not 1e-3 <= length <= 1e3:
+        raise ValueError(f"the norm must be near 1, not {length:g}")
+    return vector
+
+
+class StarTrackerSettings(StrictModel):
+    """A star tracker; by default without error, at every tick."""
+
+    noise_across: Angle = Field(
+        0.0, description="standard deviation about each axis across the boresight, rad"
+    )
+    noise_about: Angle = Field(0.0, description="standard deviation about the boresight, rad")
+    boresight: Annotated[
+        list[float], Field(min_length=3, max_length=3), AfterValidator(has_direction)
+    ] = Field([0.0, 0.0, 1.0], description="axis of its optics in the base frame")
+    rate: Annotated[float, Field(ge=0.0, le=1e5)] = Field(
+        0.0, description="measurements a second, to a whole number of ticks (0: one a tick)"
+    )
+    delay: Annotated[float, Field(ge=0.0, le=100.0)] = Field(
+        0.0, description="time from exposure to release, s, to a whole number of ticks"
+    )
+    step: Angle = Field(
+        0.0, description="rotation that the last digit of the quaternion stands for, rad"
+    )

@@ -1,0 +1,127 @@
+"""The data sheet of on-off thrusters and their tank."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, Field
+
+from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import MOST_THRUSTERS
+
+from .mounting import (
+    FEWEST,
+    NO_VECTORS,
+    Positive,
+    Vectors,
+    are_directions,
+    are_vectors,
+    directions,
+    values_of,
+    vectors,
+)
+
+Array = NDArray[np.float64]
+
+
+STANDARD_GRAVITY = 9.80665
+"""m/s2."""
+PER_THRUSTER = "one value for all thrusters, or one each"
+Times = Annotated[list[Annotated[float, Field(ge=0.0, le=1.0)]], FEWEST]
+
+
+def _positions(flat: list[float]) -> list[float]:
+    return are_vectors(flat, MOST_THRUSTERS)
+
+
+def _directions(flat: list[float]) -> list[float]:
+    return are_directions(flat, MOST_THRUSTERS)
+
+
+class ThrusterSettings(StrictModel):
+    """Thrusters on the base, fed from one tank; by default none."""
+
+    positions: Annotated[Vectors, AfterValidator(_positions)] = Field(
+        NO_VECTORS,
+        description="from the base's CoM, in the base frame, m: x, y, z of each thruster, one "
+        "behind the other ([0.0]: no thrusters)",
+    )
+    directions: Annotated[Vectors, AfterValidator(_directions)] = Field(
+        NO_VECTORS,
+        description="of the force on the base, in the base frame: x, y, z of each thruster, one "
+        "behind the other",
+    )
+    force: Positive = Field([1.0], description=f"of an open thruster, N; {PER_THRUSTER}")
+    shortest_pulse: Times = Field(
+        [0.0], description="time for which a valve stays open once it is open, s, to a whole "
+        f"number of ticks; {PER_THRUSTER}",
+    )  # fmt: skip
+    delay: Times = Field(
+        [0.0], description="time from a command to its valve, s, to a whole number of ticks; "
+        f"{PER_THRUSTER}",
+    )  # fmt: skip
+    specific_impulse: Positive = Field(
+        [220.0], description=f"impulse for a weight of propellant, s; {PER_THRUSTER}"
+    )
+    propellant: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
+        0.0, description="in the tank at tick 0, kg (0: it never runs out)"
+    )
+
+    @property
+    def count(self) -> int:
+        """Number of thrusters."""
+        return len(vectors(self.positions))
+
+    @property
+    def places(self) -> Array:
+        """(T, 3) positions from the base's CoM, m."""
+        return vectors(self.positions)
+
+    @property
+    def unit_directions(self) -> Array:
+        """(T, 3) unit vectors of the forces on the base."""
+        return directions(self.directions)
+
+    @property
+    def torques(self) -> Array:
+        """(T, 3) torque of each open thruster about the base's CoM, N m, in the base frame."""
+        forces = self.unit_directions * self.values("force")[:, None]
+        return np.asarray(np.cross(self.places, forces), dtype=np.float64)
+
+    def values(self, name: str) -> Array:
+        """Return (T,) values of the setting ``name``, one a thruster.
+
+        Raises:
+            InputError: it has neither one value nor one a thruster.
+        """
+        return values_of(getattr(self, name), f"thrusters.{name}", self.count, "thruster")
+
+    @property
+    def mass_flow(self) -> Array:
+        """(T,) propellant that each open thruster burns, ``F / (I_sp g_0)``, kg/s."""
+        impulse = self.values("specific_impulse") * STANDARD_GRAVITY
+        flow: Array = self.values("force") / impulse
+        return flow
+
+    def ticks(self, name: str, period: float) -> Array:
+        """Return the times of the setting ``name`` in whole ticks of ``period``, s, (T,)."""
+        return np.round(self.values(name) / period)
+
+    def check(self) -> None:
+        """See that the numbers fit one another.
+
+        Raises:
+            InputError: they do not.
+        """
+        pointed = len(vectors(self.directions))
+        if pointed != self.count:
+            raise InputError(
+                f"thrusters.directions are those of {pointed} thrusters, thrusters.positions of "
+                f"{self.count}"
+            )
+        for name in ("force", "shortest_pulse", "delay", "specific_impulse"):
+            if self.count:
+                self.values(name)

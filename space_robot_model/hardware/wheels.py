@@ -1,0 +1,114 @@
+"""The data sheet of reaction wheels."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, Field
+
+from space_robot_msgs_py.config.validation import StrictModel
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import MOST_WHEELS
+
+from .mounting import (
+    NO_VECTORS,
+    Positive,
+    Sizes,
+    Vectors,
+    are_directions,
+    directions,
+    values_of,
+)
+
+Array = NDArray[np.float64]
+
+
+PER_WHEEL = "one value for all wheels, or one each"
+
+
+def _axes(flat: list[float]) -> list[float]:
+    return are_directions(flat, MOST_WHEELS)
+
+
+class WheelSettings(StrictModel):
+    """Balanced reaction wheels on the base; by default none.
+
+    The base's inertia in the robot's file is that with its wheels locked: their rotors' included.
+    """
+
+    axes: Annotated[Vectors, AfterValidator(_axes)] = Field(
+        NO_VECTORS,
+        description="spin axes in the base frame: x, y, z of each wheel, one behind the other "
+        "([0.0]: no wheels)",
+    )
+    rotor_inertia: Positive = Field(
+        [0.01], description=f"of the rotor about its axis, kg m2; {PER_WHEEL}"
+    )
+    max_torque: Sizes = Field(
+        [0.0], description=f"largest torque of the motor, N m (0: no limit); {PER_WHEEL}"
+    )
+    max_momentum: Sizes = Field(
+        [0.0],
+        description="momentum rotor_inertia times speed up to which the motor speeds a wheel up, "
+        f"N m s (0: no limit); {PER_WHEEL}",
+    )
+    coulomb: Sizes = Field([0.0], description=f"Coulomb friction, N m; {PER_WHEEL}")
+    viscous: Sizes = Field([0.0], description=f"viscous friction, N m s/rad; {PER_WHEEL}")
+    initial_speed: Vectors = Field(
+        [0.0], description=f"speed relative to the base at tick 0, rad/s; {PER_WHEEL}"
+    )
+
+    @property
+    def count(self) -> int:
+        """Number of wheels."""
+        return len(directions(self.axes))
+
+    @property
+    def unit_axes(self) -> Array:
+        """(W, 3) unit vectors in the base frame."""
+        return directions(self.axes)
+
+    def values(self, name: str) -> Array:
+        """Return (W,) values of the setting ``name``, one a wheel.
+
+        Raises:
+            InputError: it has neither one value nor one a wheel.
+        """
+        return values_of(getattr(self, name), f"wheels.{name}", self.count, "wheel")
+
+    def limits(self, name: str) -> Array:
+        """Return the `values` of a limit, infinite where its 0 says that there is none."""
+        values = self.values(name)
+        return np.where(values > 0.0, values, np.inf)
+
+    def spin_momenta(self, speeds: Array) -> Array:
+        """Return ``J Omega`` (..., W), N m s, of speeds relative to the base (..., W), rad/s."""
+        return speeds * self.values("rotor_inertia")
+
+    def check(self, base_inertia: Array) -> None:
+        """See that the numbers fit one another and a base.
+
+        Args:
+            base_inertia: (3, 3) kg m2 of the base with its wheels locked, about its CoM.
+
+        Raises:
+            InputError: they do not.
+        """
+        if not self.count:
+            return
+        found = {name: self.values(name) for name in type(self).model_fields if name != "axes"}
+        inertia, axes = found["rotor_inertia"], self.unit_axes
+        stored, limits = inertia * np.abs(found["initial_speed"]), found["max_momentum"]
+        for i in np.flatnonzero((limits > 0.0) & (stored > limits)):
+            raise InputError(
+                f"wheels.initial_speed stores {stored[i]:g} N m s in wheel_{i + 1}, "
+                f"max_momentum is {limits[i]:g}"
+            )
+        moments = np.linalg.eigvalsh(base_inertia - (axes.T * inertia) @ axes)
+        if not moments[0] > 0.0:
+            raise InputError(
+                "wheels.rotor_inertia: the base's inertia must be larger than its rotors', without "
+                f"them its smallest principal moment is {moments[0]:g} kg m2"
+            )

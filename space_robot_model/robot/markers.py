@@ -1,0 +1,102 @@
+"""The robot's shapes as markers: where each of them is in the inertial frame, tick by tick."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.wire.markers import CUBE, CYLINDER, MESH, SPHERE, Marker, MarkersCodec
+
+from .frame_names import frame_names
+from .robot import Robot
+from .shapes import LINK_COLOUR, shapes_of
+from .transforms import wxyz
+from .tree import Visual
+from .urdf_text import mesh_address
+
+Array = NDArray[np.float64]
+Pose = tuple[float, float, float, float, float, float, float]
+"""Position x, y, z, m, and orientation x, y, z, w."""
+
+WHITE = (1.0, 1.0, 1.0, 1.0)
+"""With this a mesh shows its own colours as they are."""
+KINDS = {"box": CUBE, "cylinder": CYLINDER, "sphere": SPHERE, "mesh": MESH}
+
+
+class RobotMarkers:
+    """A marker for each shape of `shapes_of`, named after its body's frame and numbered on it."""
+
+    def __init__(self, robot: Robot, timebase: Timebase, prefix: str = "") -> None:
+        """``prefix``: before the names, as ``sat1/``."""
+        shapes, names = shapes_of(robot), frame_names(robot).bodies
+        bodies = [shape.body for shape in shapes]
+        self._codec = MarkersCodec(
+            [
+                _marker(shape, prefix + names[shape.body], bodies[:i].count(shape.body))
+                for i, shape in enumerate(shapes)
+            ],
+            timebase,
+        )
+        row = {0: 0} | {joint + 1: i + 1 for i, joint in enumerate(robot.order)}
+        self._parents = [row[int(robot.parent[joint])] for joint in robot.order]
+        self._shapes = [(row[shape.body], _pose(shape)) for shape in shapes]
+
+    def encode(self, tick: int, poses: Array) -> bytes:
+        """Return the message of a tick, from the poses of `space_robot_model.robot.poses`."""
+        return self._codec.encode(tick, self.poses(poses))
+
+    def poses(self, poses: Array) -> Array:
+        """Return (K, 7) position, m, and orientation x, y, z, w of all in the inertial frame.
+
+        Args:
+            poses: (M, 7) of the base, then of each body on the one that carries it.
+        """
+        base, *bodies = poses.tolist()
+        placed = [base]
+        for parent, pose in zip(self._parents, bodies, strict=True):
+            placed.append(_on(placed[parent], pose))
+        return np.array([_on(placed[row], pose) for row, pose in self._shapes])
+
+
+def _on(outer: Pose, inner: Pose) -> Pose:
+    """Return a pose, given on the axes of a frame, where that frame's own is given."""
+    x, y, z, a, b, c, w = outer
+    u, v, s, d, e, f, g = inner
+    # p + 2 w (q x r) + 2 q x (q x r)
+    k, m, n = 2.0 * (b * s - c * v), 2.0 * (c * u - a * s), 2.0 * (a * v - b * u)
+    return (
+        x + u + w * k + b * n - c * m,
+        y + v + w * m + c * k - a * n,
+        z + s + w * n + a * m - b * k,
+        w * d + a * g + b * f - c * e,
+        w * e + b * g + c * d - a * f,
+        w * f + c * g + a * e - b * d,
+        w * g - a * d - b * e - c * f,
+    )
+
+
+def _pose(shape: Visual) -> Pose:
+    x, y, z = map(float, shape.position)
+    w, a, b, c = map(float, wxyz(shape.rotation))
+    return x, y, z, a, b, c, w
+
+
+def _marker(shape: Visual, name: str, number: int) -> Marker:
+    colour = shape.colour or LINK_COLOUR
+    if shape.shape == "mesh":
+        x, y, z = shape.size
+        is_plain = shape.colour is None
+        return Marker(
+            name, number, MESH, (x, y, z), WHITE if is_plain else colour, mesh_address(shape.mesh),
+            has_own_colours=is_plain,
+        )  # fmt: skip
+    if shape.shape == "cylinder":
+        radius, length = shape.size
+        scale = (2.0 * radius, 2.0 * radius, length)
+    elif shape.shape == "sphere":
+        scale = (2.0 * shape.size[0],) * 3
+    else:
+        x, y, z = shape.size
+        scale = (x, y, z)
+    return Marker(name, number, KINDS[shape.shape], scale, colour)

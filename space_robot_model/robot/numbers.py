@@ -1,0 +1,133 @@
+"""A robot's own numbers as a mapping, of which the same robot is built to the bit.
+
+So bags keep a robot that no file tells. Who writes a robot by hand has a file's form, see
+`space_robot_model.robot.file`. Numbers that are infinite or NaN are null; visuals are left out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from space_robot_msgs_py.config.validation import StrictModel
+
+from ..dynamics.model import MOST_JOINTS
+from .tree import Body, Joint, JointFriction, JointLimits, Spring, Tool
+
+Array = NDArray[np.float64]
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
+
+
+class ToolNumbers(StrictModel):
+    """See `Tool`."""
+
+    name: str
+    rotation: Matrix
+    position: Vector
+    rank: int
+
+
+class JointNumbers(StrictModel):
+    """See `Joint`; its axis is z."""
+
+    name: str
+    kind: Literal["revolute", "prismatic"]
+    rotation: Matrix
+    offset: Vector
+    limits: Annotated[list[float | None], Field(min_length=4, max_length=4)]
+    friction: Annotated[list[float | None], Field(min_length=2, max_length=2)]
+    spring: Annotated[list[float], Field(min_length=3, max_length=3)] | None
+
+
+class BodyNumbers(StrictModel):
+    """See `Body`."""
+
+    name: str
+    mass: float
+    inertia: Matrix
+    com: Vector
+    parent: str
+    joint: JointNumbers | None
+    tools: list[ToolNumbers]
+
+    @property
+    def body(self) -> Body:
+        """The body that they are of."""
+        joint, given = None, self.joint
+        if given:
+            joint = Joint(
+                given.name, given.kind, np.array(given.rotation), np.array(given.offset),
+                limits=JointLimits(*_or(given.limits, JointLimits())),
+                friction=JointFriction(*_or(given.friction, JointFriction())),
+                spring=Spring(*given.spring) if given.spring else None,
+            )  # fmt: skip
+        tools = (
+            Tool(t.name, np.array(t.rotation), np.array(t.position), rank=t.rank)
+            for t in self.tools
+        )
+        return Body(
+            self.name, self.mass, np.array(self.inertia), np.array(self.com), self.parent, joint,
+            tuple(tools),
+        )  # fmt: skip
+
+
+class RobotNumbers(StrictModel):
+    """A robot's bodies, as a walk down each branch meets them."""
+
+    name: Annotated[str, Field(min_length=1)]
+    bodies: Annotated[list[BodyNumbers], Field(min_length=2, max_length=MOST_JOINTS + 1)]
+
+
+class Document(StrictModel):
+    """The whole mapping."""
+
+    robot: RobotNumbers
+
+
+def are_numbers(content: dict[str, Any]) -> bool:
+    """Tell whether a robot's mapping holds its own numbers; else it has a file's form."""
+    robot = content.get("robot")
+    return isinstance(robot, dict) and "bodies" in robot
+
+
+def numbers_of(name: str, bodies: Sequence[Body]) -> dict[str, Any]:
+    """Return the mapping of a robot's own numbers, as `Document` has it."""
+    return {"robot": {"name": name, "bodies": [_body_numbers(body) for body in bodies]}}
+
+
+def _body_numbers(body: Body) -> dict[str, Any]:
+    """Return those of a body, without a check: that costs more than a short flight's set-up."""
+    joint = body.joint and {
+        "name": body.joint.name,
+        "kind": body.joint.kind,
+        "rotation": body.joint.rotation.tolist(),
+        "offset": body.joint.offset.tolist(),
+        "limits": _known(body.joint.limits),
+        "friction": _known(body.joint.friction),
+        "spring": [float(v) for v in body.joint.spring] if body.joint.spring else None,
+    }
+    tools = [
+        {
+            "name": t.name, "rotation": t.rotation.tolist(), "position": t.position.tolist(),
+            "rank": t.rank,
+        }
+        for t in body.tools
+    ]  # fmt: skip
+    return {
+        "name": body.name, "mass": float(body.mass), "inertia": body.inertia.tolist(),
+        "com": body.com.tolist(), "parent": body.parent, "joint": joint, "tools": tools,
+    }  # fmt: skip
+
+
+def _known(row: Sequence[float]) -> list[float | None]:
+    return [float(value) if math.isfinite(value) else None for value in row]
+
+
+def _or(row: list[float | None], default: Sequence[float]) -> list[float]:
+    return [other if value is None else value for value, other in zip(row, default, strict=True)]

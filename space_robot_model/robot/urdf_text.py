@@ -1,0 +1,158 @@
+"""A robot, whatever it was read from, as the text of a URDF: for RViz, Pinocchio, MuJoCo.
+
+Frames of links are those of `space_robot_model.robot.transforms`: the root is the base's, at its
+centre of mass, and the z axis of every other one is the axis of its joint. A tool is a link without
+mass on a fixed joint.
+
+URDF has no word for springs (their damping is told as the joint's), for wheels, thrusters and
+sensors, nor for which of the tools is *the* tool.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+from urllib.parse import quote
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..elementary.matrices import product
+from ..elementary.rotations import rpy_of_rotation
+from .frame_names import distinct, frame_names, printable, urdf_joint_names
+from .inertia import inertia_elements
+from .robot import Robot
+from .shapes import Colour, shapes_of
+from .tree import JointLimits, Visual
+from .urdf.fields import LARGEST
+from .urdf.links import MOMENTS
+
+Array = NDArray[np.float64]
+Materials = dict[Colour, str]
+
+
+def urdf_text(robot: Robot, name: str = "") -> str:
+    """Return the text of a URDF of a robot, the same for the same robot.
+
+    Joints have their names, links those of `frame_names`. Shapes are those of `shapes_of`.
+
+    Args:
+        robot: with any tree of joints.
+        name: what it is called; its own name if empty.
+    """
+    frames = frame_names(robot)
+    shapes = shapes_of(robot)
+    colours = dict.fromkeys(shape.colour for shape in shapes if shape.colour)
+    materials = {colour: f"colour_{number + 1}" for number, colour in enumerate(colours)}
+    root = Element("robot", name=printable(name or robot.name))
+    for colour, material in materials.items():
+        SubElement(SubElement(root, "material", name=material), "color", rgba=_words(colour))
+    joints = urdf_joint_names(robot)
+    taken = {*joints, *frames.bodies, *frames.tools}
+    for body in (0, *(joint + 1 for joint in robot.order)):
+        if body:
+            parent, child = frames.bodies[robot.parent[body - 1]], frames.bodies[body]
+            _add_joint(root, robot, body - 1, _Ends(joints[body - 1], parent, child))
+        link = SubElement(root, "link", name=frames.bodies[body])
+        _add_inertial(link, robot, body)
+        for shape in shapes:
+            if shape.body == body:
+                _add_visual(link, shape, materials)
+    for tool, frame in zip(robot.tools, frames.tools, strict=True):
+        ends = _Ends(distinct(f"{frame}_joint", "_", taken), frames.bodies[tool.body], frame)
+        _joint(root, ends, "fixed", tool.rotation, tool.position)
+        SubElement(root, "link", name=frame)
+    indent(root)
+    return f'<?xml version="1.0"?>\n{tostring(root, encoding="unicode")}\n'
+
+
+class _Ends(NamedTuple):
+    """A joint's name, and the links that it joins."""
+
+    joint: str
+    parent: str
+    child: str
+
+
+def _joint(root: Element, ends: _Ends, kind: str, rotation: Array, position: Array) -> Element:
+    joint = SubElement(root, "joint", name=ends.joint, type=kind)
+    _add_origin(joint, rotation, position)
+    SubElement(joint, "parent", link=ends.parent)
+    SubElement(joint, "child", link=ends.child)
+    return joint
+
+
+def _add_joint(root: Element, robot: Robot, joint: int, ends: _Ends) -> None:
+    is_actuated, turn = joint < robot.n, robot.rotation[joint]
+    limits = robot.limits[joint] if is_actuated else JointLimits()
+    kind = _kind(limits, bool(robot.is_prismatic[joint]))
+    element = _joint(root, ends, kind, turn, product(turn, robot.offset[joint]))
+    SubElement(element, "axis", xyz="0 0 1")
+    numbers = limits._asdict()
+    if kind == "continuous":
+        numbers = {"velocity": limits.velocity, "effort": limits.effort}
+    if kind != "continuous" or any(map(math.isfinite, numbers.values())):
+        SubElement(element, "limit", {key: _bound(value) for key, value in numbers.items()})
+    coulomb, viscous = robot.friction[joint]
+    if is_actuated and math.isfinite(coulomb):
+        SubElement(element, "dynamics", damping=_word(viscous), friction=_word(coulomb))
+    elif not is_actuated:
+        damping = robot.springs[joint - robot.n].damping
+        friction = coulomb if math.isfinite(coulomb) else 0.0
+        SubElement(element, "dynamics", damping=_word(damping), friction=_word(friction))
+
+
+def _kind(limits: JointLimits, is_prismatic: bool) -> str:
+    if is_prismatic:
+        return "prismatic"
+    is_limited = math.isfinite(limits.lower) or math.isfinite(limits.upper)
+    return "revolute" if is_limited else "continuous"
+
+
+def _add_inertial(link: Element, robot: Robot, body: int) -> None:
+    inertial = SubElement(link, "inertial")
+    _add_origin(inertial, np.eye(3), robot.com[body])
+    SubElement(inertial, "mass", value=_word(robot.mass[body]))
+    elements = map(_word, inertia_elements(robot.inertia[body]))
+    SubElement(inertial, "inertia", dict(zip(MOMENTS, elements, strict=True)))
+
+
+def _add_visual(link: Element, shape: Visual, materials: Materials) -> None:
+    visual = SubElement(link, "visual")
+    _add_origin(visual, shape.rotation, shape.position)
+    geometry = SubElement(visual, "geometry")
+    if shape.shape == "mesh":
+        SubElement(geometry, "mesh", filename=mesh_address(shape.mesh), scale=_words(shape.size))
+    elif shape.shape == "box":
+        SubElement(geometry, "box", size=_words(shape.size))
+    else:
+        sizes = zip(("radius", "length"), map(_word, shape.size), strict=False)
+        SubElement(geometry, shape.shape, dict(sizes))
+    if shape.colour:
+        SubElement(visual, "material", name=materials[shape.colour])
+
+
+def mesh_address(mesh: str) -> str:
+    """Return the address of a mesh file; viewers do not know from which folder a path would be."""
+    return mesh if "://" in mesh else f"file://{quote(str(Path(mesh).absolute()))}"
+
+
+def _add_origin(element: Element, rotation: Array, position: Array) -> None:
+    SubElement(element, "origin", xyz=_words(position), rpy=_words(rpy_of_rotation(rotation)))
+
+
+def _bound(limit: float) -> str:
+    """Return a limit; one that is infinite as the number that `urdf.fields` reads so."""
+    return _word(limit if math.isfinite(limit) else math.copysign(LARGEST, limit))
+
+
+def _words(values: Iterable[float]) -> str:
+    return " ".join(map(_word, values))
+
+
+def _word(value: float) -> str:
+    """Return the shortest number that is read as the same float, without a negative zero."""
+    return repr(float(value) + 0.0).removesuffix(".0")

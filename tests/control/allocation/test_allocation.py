@@ -1,0 +1,209 @@
+"""Wheels, thrusters, and both: what is commanded for a torque on the base."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from allocation_bench import INERTIA, PERIOD, AllocationBench
+from numpy.typing import NDArray
+from wheel_layouts import PYRAMID
+
+from space_robot_control.allocation.allocation import Allocation
+from space_robot_control.allocation.settings import AllocationSettings
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+
+Array = NDArray[np.float64]
+
+
+@pytest.mark.parametrize("sharing", ["pseudo_inverse", "least_largest"])
+def test_wheels_give_the_torque(sharing: str) -> None:
+    rng = np.random.default_rng(1)
+    for axes in (PYRAMID, np.eye(3), rng.normal(size=(8, 3))):
+        bench = AllocationBench(axes, sharing=sharing, null_gain=0.0)
+        for _ in range(10):
+            demand = rng.normal(size=3) * 0.1
+            np.testing.assert_allclose(bench.step(demand), demand, atol=1e-13)
+
+
+def test_null_motion_balances_and_the_base_feels_nothing() -> None:
+    bench = AllocationBench(momenta=[8.0, -5.0, 8.0, -5.0], null_gain=1.0, null_share=1.0)
+    given = bench.fly(np.zeros(3), 20000)
+    np.testing.assert_allclose(given, 0.0, atol=1e-13)
+    stored = np.linalg.pinv(bench.axes.T) @ bench.axes.T @ [8.0, -5.0, 8.0, -5.0]
+    np.testing.assert_allclose(bench.momenta, stored, atol=0.02)
+
+
+@pytest.mark.parametrize("start", [0.0, [8.0, -3.0, -8.0, 1.0]])
+def test_wheels_are_kept_from_zero_speed(start: Any) -> None:
+    bench = AllocationBench(momenta=start, null_gain=1.0, least_speed=50.0)
+    bench.fly(np.zeros(3), 12000)
+    assert np.abs(bench.momenta / INERTIA).min() > 50.0
+
+
+def test_wheel_that_must_cross_zero_does_so_at_once() -> None:
+    """A ramp through the stored momentum: 4 N m s are stored and taken out again and again."""
+    bench = AllocationBench(null_gain=5.0, least_speed=30.0)
+    bench.fly(np.zeros(3), 6000)
+    slow, turns = 0, 0
+    last = bench.momenta.copy()
+    for tick in range(40000):
+        demand = 0.4 * np.array([np.sin(tick * PERIOD), np.cos(tick * PERIOD), 0.2])
+        np.testing.assert_allclose(bench.step(demand), demand, atol=1e-12)
+        slow += int(np.sum(np.abs(bench.momenta) < 0.9 * 30.0 * INERTIA))
+        turns += int(np.sum(bench.momenta * last < 0.0))
+        last = bench.momenta.copy()
+    assert turns <= 40, "chatters"
+    assert slow < 0.02 * 4 * 40000
+
+
+def test_null_motion_leaves_the_demand_what_it_needs() -> None:
+    bench = AllocationBench(momenta=[15.0, -15.0, 15.0, -15.0], null_gain=1e3, null_share=1.0)
+    given = bench.fly([0.9, 0.0, 0.0], 5)
+    np.testing.assert_allclose(given, np.tile([0.9, 0.0, 0.0], (5, 1)), atol=1e-12)
+    assert np.abs(bench.command).max() <= 1.0 + 1e-12
+
+
+def test_three_wheels_have_no_null_motion() -> None:
+    bench = AllocationBench(np.eye(3), momenta=[5.0, 4.0, 3.0], null_gain=10.0, least_speed=100.0)
+    bench.step(np.zeros(3))
+    np.testing.assert_array_equal(bench.command, 0.0)
+
+
+def test_two_failed_wheels_of_four_leave_two_axes() -> None:
+    bench = AllocationBench(failure_ticks=50)
+    bench.fly([0.3, 0.2, 0.1], 100)
+    bench.failed = {1, 3}
+    bench.fly([0.3, 0.2, 0.1], 200)
+    given = bench.step([0.3, 0.2, 0.1])
+    assert bench.allocation.wheels.healthy.rank == 2.0
+    np.testing.assert_allclose(given, [0.3, 0.0, 0.1], atol=1e-12)
+
+
+THRUSTERS = {
+    "positions": [1, 0, 0, 1, 0, 0, -1, 0, 0, -1, 0, 0, 0, 1, 0, 0, 1, 0, 0, -1, 0, 0, -1, 0,
+                  0, 0, 1, 0, 0, 1, 0, 0, -1, 0, 0, -1],
+    "directions": [0, 1, 0, 0, -1, 0, 0, 1, 0, 0, -1, 0, 0, 0, 1, 0, 0, -1, 0, 0, 1, 0, 0, -1,
+                   1, 0, 0, -1, 0, 0, 1, 0, 0, -1, 0, 0],
+    "force": [1.0], "shortest_pulse": [0.01],
+}  # fmt: skip
+
+
+def test_thrusters_take_the_axis_that_wheels_cannot_give() -> None:
+    bench = AllocationBench(thrusters=THRUSTERS, failure_ticks=50)
+    bench.fly([0.3, 0.2, 0.1], 100)
+    assert np.all(bench.command[4:] == 0.0)
+    bench.failed = {1, 3}
+    bench.fly([0.3, 0.2, 0.1], 200)
+    given = bench.fly([0.3, 0.2, 0.1], 8000)
+    np.testing.assert_allclose(given.mean(axis=0), [0.3, 0.2, 0.1], atol=5e-3)
+
+
+def test_thrusters_alone_take_all() -> None:
+    given = AllocationBench(None, thrusters=THRUSTERS).fly([0.3, -0.2, 0.1], 8000)
+    np.testing.assert_allclose(given.mean(axis=0), [0.3, -0.2, 0.1], atol=5e-3)
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_demand_that_is_no_number_is_not_owed(wrong: float) -> None:
+    bench = AllocationBench(thrusters=THRUSTERS, null_gain=0.0)
+    bench.allocation.wheels.healthy.beyond[:] = np.eye(3)  # as without wheels
+    bench.allocation.wheels.healthy.rank = 0.0
+    bench.step([0.3, wrong, 0.1])
+    assert np.isfinite(bench.allocation.modulation.owed).all()
+    assert np.isfinite(bench.command[4:]).all()
+
+
+def test_thrusters_unload_the_wheels_which_hold_the_base() -> None:
+    bench = AllocationBench(
+        thrusters={**THRUSTERS, "force": [0.4]}, momenta=[14.2, 0.0, -14.2, 0.0], unload_above=0.7,
+        unload_to=0.3, unload_time=10.0, null_gain=0.0,
+    )  # fmt: skip
+    given = bench.fly(np.zeros(3), 60000)
+    np.testing.assert_allclose(given, 0.0, atol=1e-12)
+    assert np.abs(bench.momenta).max() < 6.1
+    assert bench.allocation.unloading.is_under_way == 0.0
+    pulses = bench.allocation.modulation.pulses.sum()
+    bench.fly(np.zeros(3), 2000)
+    assert bench.allocation.modulation.pulses.sum() == pulses
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("k", [0, 3])
+def test_unloading_lasts_from_one_threshold_to_the_other(k: int, side: float) -> None:
+    """Shares of each wheel's own largest momentum; the fullest wheel counts."""
+    limits = np.array([40.0, 30.0, 50.0, 20.0])
+    bench = AllocationBench(
+        thrusters=THRUSTERS, wheels={"max_momentum": limits.tolist()}, null_gain=0.0,
+        unload_above=0.7, unload_to=0.3,
+    )  # fmt: skip
+    for share, is_under_way in ((0.69, 0.0), (0.71, 1.0), (0.31, 1.0), (0.29, 0.0), (0.69, 0.0)):
+        bench.momenta[:] = 0.2 * limits
+        bench.momenta[k] = side * share * limits[k]
+        bench.step(np.zeros(3))
+        assert bench.allocation.unloading.is_under_way == is_under_way
+        assert np.any(bench.allocation.of_thrusters) == bool(is_under_way)
+
+
+@pytest.mark.parametrize("count", [3, 4, 6])
+def test_unloading_asks_what_half_of_the_wheels_torque_can_hold(count: int) -> None:
+    """Against the momentum, within the time constant where that leaves the wheels enough."""
+    rng, cut = np.random.default_rng(count), 0
+    for _ in range(20):
+        most = rng.uniform(0.3, 2.0, count)
+        bench = AllocationBench(
+            rng.normal(size=(count, 3)), THRUSTERS, momenta=rng.uniform(-19.0, 19.0, count),
+            wheels={"max_torque": most.tolist()}, unload_above=0.02, unload_to=0.01,
+            unload_time=40.0, null_gain=0.0,
+        )  # fmt: skip
+        wanted = -bench.axes.T @ bench.momenta / 40.0
+        shares = most[:, None] * np.linalg.pinv(bench.axes.T * most)
+        excess = max(1.0, np.max(np.abs(shares @ wanted) / (0.5 * most)))
+        bench.step(np.zeros(3))
+        np.testing.assert_allclose(bench.allocation.of_thrusters, wanted / excess, atol=1e-9)
+        cut += excess > 1.0
+    assert 0 < cut < 20
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_thrusters_are_asked_for_what_the_axes_left_cannot_give(seed: int) -> None:
+    """Any two wheels: the part of the demand that is across both; the wheels get all of it."""
+    rng = np.random.default_rng(seed)
+    bench = AllocationBench(rng.normal(size=(4, 3)), THRUSTERS, failure_ticks=5, null_gain=0.0)
+    bench.failed = set(rng.permutation(4)[:2].tolist())
+    demand = rng.normal(size=3) * 0.1
+    bench.fly(demand, 20)
+    left = bench.axes[sorted({0, 1, 2, 3} - bench.failed)]
+    across = demand - np.linalg.pinv(left) @ (left @ demand)
+    np.testing.assert_allclose(bench.allocation.of_thrusters, across, atol=1e-9)
+
+
+def test_wheels_hold_against_pulses_when_these_come() -> None:
+    """Valves are late by some ticks, each by its own; so is what the wheels do about them."""
+    delays = np.arange(12) % 5
+    bench = AllocationBench(
+        thrusters={**THRUSTERS, "force": [0.2], "delay": (delays * PERIOD).tolist()},
+        momenta=[15.0, 0.0, -15.0, 0.0], null_gain=0.0, unload_above=0.1, unload_to=0.05,
+    )  # fmt: skip
+    opened = []
+    for tick in range(200):
+        bench.step([0.05, -0.02, 0.03])
+        opened.append(bench.command[4:] > 0.0)
+        comes = [opened[tick - d][j] if tick >= d else False for j, d in enumerate(delays)]
+        given = -bench.command[:4] @ bench.axes + np.array(comes) @ bench.torques
+        np.testing.assert_allclose(given, [0.05, -0.02, 0.03], atol=1e-12)
+    assert np.any(opened)
+
+
+def test_ideal_base_has_no_allocation() -> None:
+    allocation = Allocation.build(1, BaseActuatorSettings(), AllocationSettings(), PERIOD)
+    assert allocation.is_used == 0.0
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"unload_to": 0.8}, {"schmitt_off": 1.0}, {"modulation": "pulse"}, {"gain": 1.0}]
+)
+def test_settings_that_cannot_be(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=r"unload_to|schmitt_off|modulation|gain"):
+        AllocationSettings(**wrong)

@@ -1,0 +1,240 @@
+"""Pulses: their mean is the demand, and none is shorter than allowed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from space_robot_control.allocation.modulation import (
+    Modulation,
+    modulate,
+)
+from space_robot_control.allocation.settings import AllocationSettings
+from space_robot_control.allocation.thrusters import (
+    Thrusters,
+    expect_torque,
+    find_times,
+    within_reach,
+)
+from space_robot_model.hardware.thrusters import ThrusterSettings
+
+Array = NDArray[np.float64]
+
+PERIOD = 5e-4
+KINDS = ["pwm", "sigma_delta", "schmitt"]
+
+
+def couples() -> tuple[list[float], list[float]]:
+    """Twelve thrusters, 1 m from the CoM, in pairs of pure couples about each axis."""
+    positions, directions = [], []
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        for arm in (1.0, -1.0):
+            for side in (1.0, -1.0):
+                positions.append(arm * np.eye(3)[j])
+                directions.append(side * np.eye(3)[k])
+    return np.ravel(positions).tolist(), np.ravel(directions).tolist()
+
+
+def slanted() -> tuple[list[float], list[float]]:
+    """Ten that point anywhere, each about all axes at once."""
+    positions, directions = np.random.default_rng(4).normal(size=(2, 10, 3))
+    return positions.ravel().tolist(), directions.ravel().tolist()
+
+
+class Bench:
+    def __init__(self, kind: str, layout: Any = couples, pulse: float = 0.01, **more: Any) -> None:
+        positions, directions = layout()
+        believed = ThrusterSettings(
+            positions=positions, directions=directions, force=[10.0], shortest_pulse=[pulse],
+            delay=[more.pop("delay", 0.0)],
+        )  # fmt: skip
+        settings = AllocationSettings(modulation=kind, **more)  # type: ignore[arg-type]
+        self.count = believed.count
+        self.torques = believed.torques
+        self.forces = believed.unit_directions * 10.0
+        self.thrusters = Thrusters.build(1, believed, settings, PERIOD)
+        self.modulation = Modulation.build(1, self.thrusters, settings, PERIOD)
+
+    def fly(self, demands: Array, first: int = 0) -> Array:
+        """(ticks, T), 1 where open, from a tick on."""
+        rows = []
+        for tick, demand in enumerate(demands, first):
+            modulate(self.modulation, self.thrusters, tick, demand)
+            rows.append(self.thrusters.is_open[: self.count].copy())
+        return np.array(rows)
+
+
+def lengths(row: Array) -> Array:
+    """Ticks of each pulse of a thruster that had ended."""
+    edges = np.diff(np.concatenate([[0.0], row]))
+    begins, ends = np.flatnonzero(edges > 0.0), np.flatnonzero(edges < 0.0)
+    return np.asarray(ends - begins[: ends.size])
+
+
+@pytest.mark.parametrize("layout", [couples, slanted])
+@pytest.mark.parametrize("kind", KINDS)
+def test_mean_torque_follows_the_demand(kind: str, layout: Any) -> None:
+    bench = Bench(kind, layout)
+    demand = np.array([1.3, -0.4, 0.02])
+    opened = bench.fly(np.tile(demand, (8000, 1)))
+    mean = opened.mean(axis=0) @ bench.torques
+    one = np.linalg.norm(bench.torques, axis=1).max() * 0.1 / 4.0  # a whole pulse of 0.1 s in 4 s
+    np.testing.assert_allclose(mean, demand, atol=one)
+    owed = (8000 * demand - opened.sum(axis=0) @ bench.torques) * PERIOD
+    np.testing.assert_allclose(bench.modulation.owed[:3], owed, atol=1e-9)
+
+
+@pytest.mark.parametrize("layout", [couples, slanted])
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_pulse_is_shorter_than_allowed(kind: str, layout: Any) -> None:
+    rng, bench = np.random.default_rng(1), Bench(kind, layout, pulse=0.02)
+    demands = np.repeat(rng.normal(size=(40, 3)) * 3.0, 100, axis=0)
+    opened = bench.fly(demands)
+    pulses = np.concatenate([lengths(row) for row in opened.T])
+    assert pulses.size > 5
+    assert pulses.min() >= 40
+    assert bench.modulation.pulses.sum() >= pulses.size
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_impulses_follow_a_demand_that_varies(kind: str) -> None:
+    bench, t = Bench(kind), np.arange(12000) * PERIOD
+    demands = np.stack([2.0 * np.sin(t), 1.5 * np.cos(0.7 * t), 0.3 * np.sin(3.0 * t)], axis=1)
+    opened = bench.fly(demands)
+    lacking = np.cumsum(demands - opened @ bench.torques, axis=0) * PERIOD
+    assert np.abs(lacking).max() < {"pwm": 1.1, "sigma_delta": 0.15, "schmitt": 0.25}[kind]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_opposite_demands_cancel(kind: str) -> None:
+    """Noise about zero opens no valve."""
+    demands = np.random.default_rng(2).normal(size=(4000, 3)) * 0.3
+    opened = Bench(kind).fly(demands)
+    assert opened.sum() * 10.0 < np.abs(demands).sum() * 0.02
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_demand_beyond_all_thrusters_is_not_owed(kind: str) -> None:
+    bench = Bench(kind)
+    demands = np.zeros((6000, 3))
+    demands[:3000, 0], demands[:3000, 1] = 200.0, 20.0
+    opened = bench.fly(demands)
+    np.testing.assert_allclose(opened[500:2500].mean(axis=0) @ bench.torques, [20, 2, 0], atol=0.7)
+    assert opened[3400:].sum() == 0.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("gap", [300, -50, 0])
+def test_after_a_gap_all_begins_anew(kind: str, gap: int) -> None:
+    """As from the first tick: nothing is owed, no pulse goes on, no decision is waited for.
+
+    Ticks that are skipped, a clock that goes back, the same tick again.
+    """
+    rng = np.random.default_rng(3)
+    demands = np.repeat(rng.normal(size=(100, 3)) * 8.0 + 4.0, 6, axis=0)
+    later = rng.normal(size=(400, 3)) * 4.0
+    bench, fresh = Bench(kind), Bench(kind)
+    last = 99
+    while last < 180 or not np.any(bench.modulation.open_for > 0.0):  # amid a pulse
+        last += 1
+        bench.fly(demands[last - 100 : last - 99], first=last)
+    pulses = bench.modulation.pulses.copy()
+    opened = bench.fly(later, first=last + gap)
+    np.testing.assert_array_equal(opened, fresh.fly(later))
+    np.testing.assert_array_equal(bench.modulation.owed, fresh.modulation.owed)
+    np.testing.assert_array_equal(bench.modulation.pulses - pulses, fresh.modulation.pulses)
+
+
+@pytest.mark.parametrize("after", [1, 20, 300])
+def test_after_a_gap_what_is_under_way_is_expected_and_nothing_else(after: int) -> None:
+    """Pulses commanded before the gap come a valve's delay later, also in it, and never again."""
+    delay, first = 12, 300
+    bench, torque = Bench("pwm", delay=delay * PERIOD), np.zeros(3)
+    given: dict[int, Array] = {}
+    ticks = [*range(60), *range(60 + after, 60 + after + first)]
+    for tick in ticks:
+        demand = np.array([12.0, -8.0, 5.0]) if tick < 60 else np.zeros(3)
+        modulate(bench.modulation, bench.thrusters, tick, demand)
+        expect_torque(bench.thrusters, tick, torque)
+        given[tick + delay] = bench.thrusters.is_open[: bench.count] @ bench.torques
+        np.testing.assert_allclose(torque, given.get(tick, np.zeros(3)), atol=1e-12)
+
+
+def test_an_impulse_beyond_a_period_is_cut_in_its_direction_and_forgotten() -> None:
+    """Pulse width: 50 N m s are owed, a period of 0.1 s pays 2 N m s of them."""
+    bench = Bench("pwm")
+    bench.fly(np.zeros((1, 3)))
+    bench.modulation.slot_left = 0.0
+    bench.modulation.owed[:3] = [50.0, -25.0, 5.0]
+    opened = bench.fly(np.zeros((600, 3)), first=1)
+    np.testing.assert_allclose(opened[:200].sum(axis=0) @ bench.torques * PERIOD, [2, -1, 0.2])
+    assert opened[200:].sum() == 0.0
+    np.testing.assert_allclose(bench.modulation.owed, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("layout", [couples, slanted])
+def test_within_reach_has_the_hardest_worked_thruster_open_all_the_time(
+    kind: str, layout: Any
+) -> None:
+    """The times are a solution of least squares: one of several, where there are several."""
+    rng, bench = np.random.default_rng(8), Bench(kind, layout)
+    columns = bench.thrusters.wrench[: bench.count].T
+    cut = 0
+    for _ in range(40):
+        demand = np.append(rng.normal(size=3) * 10.0 ** rng.uniform(-0.5, 2.0), np.zeros(3))
+        share = within_reach(bench.thrusters, demand)
+        find_times(bench.thrusters, demand)
+        times = bench.thrusters.problem.x[: bench.count].copy()
+        gradient = columns.T @ (demand - columns @ times)
+        assert times.min() >= 0.0  # and Karush, Kuhn and Tucker's other conditions
+        assert gradient.max() <= 1e-9 * np.linalg.norm(demand)
+        assert np.abs(gradient[times > 0.0]).max() <= 1e-9 * np.linalg.norm(demand)
+        largest = linprog(
+            np.append(np.zeros(bench.count), -1.0),
+            A_eq=np.column_stack([columns, -columns @ times]),
+            b_eq=np.zeros(6),
+            bounds=[(0.0, 1.0)] * bench.count + [(0.0, 1.0)],
+        )
+        assert share <= -largest.fun * (1.0 + 1e-6)
+        if share < 1.0:
+            assert share == pytest.approx(1.0 / times.max(), rel=1e-9)
+        cut += share < 1.0
+    assert 5 < cut < 40
+
+
+def test_schmitt_trigger_has_hysteresis() -> None:
+    """Wider thresholds: longer, rarer pulses."""
+    demand = np.tile([1.0, 0.0, 0.0], (8000, 1))
+    narrow = Bench("schmitt").fly(demand)
+    wide = Bench("schmitt", schmitt_on=3.0, schmitt_off=-3.0).fly(demand)
+    few, many = (sum(lengths(row).size for row in opened.T) for opened in (wide, narrow))
+    assert 0 < few < 0.5 * many
+    longest = max(lengths(row).max(initial=0) for row in wide.T)
+    assert longest > 2 * max(lengths(row).max(initial=0) for row in narrow.T)
+
+
+def test_pure_couples_where_the_layout_has_them() -> None:
+    bench, rng = Bench("pwm"), np.random.default_rng(3)
+    for _ in range(20):
+        impulse = rng.normal(size=3)
+        find_times(bench.thrusters, np.append(impulse, np.zeros(3)))
+        times = bench.thrusters.problem.x[: bench.count]
+        np.testing.assert_allclose(times @ bench.torques, impulse, atol=1e-9)
+        np.testing.assert_allclose(times @ bench.forces, 0.0, atol=1e-7)
+
+
+def test_expected_torque_comes_as_late_as_the_valves() -> None:
+    bench, torque, found, opened = Bench("pwm", delay=0.003), np.zeros(3), [], []
+    for tick in range(600):
+        modulate(bench.modulation, bench.thrusters, tick, np.array([2.0, -1.0, 0.5]))
+        expect_torque(bench.thrusters, tick, torque)
+        opened.append(bench.thrusters.is_open[: bench.count] @ bench.torques)
+        found.append(torque.copy())
+    np.testing.assert_allclose(found[6:], opened[:-6], atol=1e-12)
+    np.testing.assert_array_equal(found[:6], 0.0)

@@ -1,0 +1,448 @@
+"""The attitude filter against Farrenkopf's formula, Riccati's equation and true errors."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from attitude_sensors import (
+    Array,
+    Case,
+    Measured,
+    attitude_error,
+    exponential,
+    filtered,
+    measure,
+    product,
+    turned_by,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from oracles import skew
+from paths import ROOT
+from scipy.linalg import expm, solve_discrete_are
+from scipy.stats import chi2
+
+from space_robot_control.navigation.attitude_filter import (
+    MOST_REJECTED,
+    propagate_covariance,
+    update,
+)
+from space_robot_control.navigation.navigation import Navigation
+
+REALITY = Case(across=5e-5, about=5e-5, arw=1e-6, rrw=1e-9, bias=1e-6, period=0.02, interval=5)
+"""Its formula's values are 4.0139e-6 and 4.0010e-6 rad."""
+
+
+def farrenkopf(sigma_n: float, sigma_v: float, sigma_u: float, dt: float) -> tuple[float, float]:
+    """Standard deviation of one axis before and after an update in steady state."""
+    s_v, s_u = sigma_v * dt**0.5 / sigma_n, sigma_u * dt**1.5 / sigma_n
+    g = np.sqrt(1.0 + s_v**2 / 4.0 + s_u**2 / 48.0)
+    z = g + s_u / 4.0 + 0.5 * np.sqrt(2.0 * g * s_u + s_v**2 + s_u**2 / 3.0)
+    return sigma_n * np.sqrt(z**2 - 1.0), sigma_n * np.sqrt(1.0 - z**-2)
+
+
+def riccati(case: Case, omega: Array) -> Array:
+    """(6, 6) covariance before an update, in steady state, of a body that turns at ``omega``."""
+    continuous = np.zeros((6, 6))
+    continuous[:3, :3], continuous[:3, 3:] = -skew(omega), -np.eye(3)
+    density = np.diag([case.arw**2] * 3 + [case.rrw**2] * 3)
+    dt = case.period * case.interval
+    # Van Loan 1978
+    both = expm(np.block([[-continuous, density], [np.zeros((6, 6)), continuous.T]]) * dt)
+    transition = both[6:, 6:].T
+    noise = transition @ both[:6, 6:]
+    of_tracker = np.diag([case.across**2] * 2 + [case.about**2])
+    scale = np.diag([1e5] * 3 + [1e8] * 3)  # rad and rad/s differ by far
+    inverse = np.linalg.inv(scale)
+    found = solve_discrete_are(
+        (scale @ transition @ inverse).T, np.eye(6, 3), scale @ noise @ scale,
+        scale[:3, :3] @ of_tracker @ scale[:3, :3],
+    )  # fmt: skip
+    covariance: Array = inverse @ found @ inverse
+    return covariance
+
+
+def still(case: Case, ticks: int, rng: np.random.Generator, bias: object = None) -> Measured:
+    attitudes = np.tile([1.0, 0.0, 0.0, 0.0], (ticks, 1))
+    return measure(case, attitudes, np.zeros((ticks, 3)), rng, bias)
+
+
+def test_the_formula_is_that_of_the_specification() -> None:
+    before, after = farrenkopf(5e-5, 1e-6, 1e-9, 0.1)
+    assert before == pytest.approx(4.0139e-6, abs=5e-11)
+    assert after == pytest.approx(4.0010e-6, abs=5e-11)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 3.0])
+def test_the_covariance_settles_where_riccati_and_farrenkopf_say(degrees: float) -> None:
+    """Their solution stays over a measurement and the ticks to the next; on a body at rest exactly.
+
+    With a boresight, and turning, so that attitude and axes mix.
+    """
+    case = REALITY if degrees == 0.0 else REALITY._replace(across=1e-5, about=8e-5, rrw=1e-7)
+    omega = np.radians(degrees) * np.array([1.0, -0.5, 0.3])
+    steady, filter = riccati(case, omega), case.filter()
+    filter.quaternion[:], filter.covariance[:] = [0.5, -0.5, 0.5, 0.5], steady
+    assert update(filter, filter.quaternion)
+    after = filter.covariance.copy()
+    for _ in range(case.interval):
+        filter.scratch.rotation[:] = omega * case.period
+        propagate_covariance(filter, case.period)
+    sigma = np.sqrt(np.diag(steady))
+    scale, tolerance = np.outer(sigma, sigma), 1e-3 if degrees else 1e-10
+    np.testing.assert_allclose(filter.covariance / scale, steady / scale, atol=tolerance)
+    if degrees == 0.0:
+        found = np.sqrt([steady[0, 0], after[0, 0]])
+        np.testing.assert_allclose(found, farrenkopf(5e-5, 1e-6, 1e-9, 0.1), rtol=1e-7)
+
+
+def test_true_errors_in_steady_state_are_farrenkopfs() -> None:
+    """Root mean square over 24 seeds, three axes and 300 s, just after updates."""
+    before, after = farrenkopf(5e-5, 1e-6, 1e-9, 0.1)
+    steady = riccati(REALITY, np.zeros(3))
+    case = REALITY._replace(bias=float(np.sqrt(steady[3, 3])))
+    ticks, burnt = 20_000, 5_000
+    squares = {"before": [], "after": []}  # type: dict[str, list[Array]]
+    for seed in range(24):
+        found = filtered(case, still(case, ticks, np.random.default_rng(seed)))
+        error = attitude_error(found.delayed, np.array([1.0, 0.0, 0.0, 0.0]))
+        squares["after"].append(error[burnt :: case.interval] ** 2)
+        squares["before"].append(error[burnt + case.interval - 1 :: case.interval] ** 2)
+    assert np.sqrt(np.mean(squares["after"])) == pytest.approx(after, rel=0.05)
+    assert np.sqrt(np.mean(squares["before"])) == pytest.approx(before, rel=0.05)
+
+
+def nees(case: Case, attitudes: Array, rates: Array, seeds: int, at: list[int]) -> Array:
+    """(seeds, at) normalised squares of the six errors at k - D."""
+    result = np.empty((seeds, len(at)))
+    for seed in range(seeds):
+        measured = measure(case, attitudes, rates, np.random.default_rng(1000 + seed))
+        found = filtered(case, measured)
+        for column, tick in enumerate(at):
+            then = tick - case.delay
+            error = np.r_[
+                attitude_error(found.delayed[tick], attitudes[then]),
+                measured.bias[then] - found.bias[tick],
+            ]
+            result[seed, column] = error @ np.linalg.solve(found.covariance[tick], error)
+    return result
+
+
+@pytest.mark.parametrize("delay", [0, 13])
+def test_the_filter_is_consistent(delay: int) -> None:
+    """NEES of 60 seeds within the 95 % bounds of chi square: turning, late, with a bias.
+
+    At eight moments, of which one may be beyond; and all together.
+    """
+    case = Case(
+        across=1e-5, about=6e-5, arw=1e-6, rrw=2e-8, bias=2e-5, period=0.01, interval=10,
+        delay=delay,
+    )  # fmt: skip
+    ticks, seeds = 5_000, 60
+
+    def rate(t: float) -> Array:
+        return np.radians(3.0) * np.array([np.cos(0.3 * t), 0.5, np.sin(0.2 * t)])
+
+    attitudes = turned_by(rate, ticks, case.period)
+    rates = np.array([rate(case.period * k) for k in range(ticks)])
+    at = [50, 107, 309, 1003, 1499, 2501, 3504, 4999]
+    found = nees(case, attitudes, rates, seeds, at)
+    low, high = chi2.ppf([0.025, 0.975], 6 * seeds) / seeds
+    inside = (found.mean(0) > low) & (found.mean(0) < high)
+    assert inside.sum() >= len(at) - 1, found.mean(0)
+    low, high = chi2.ppf([0.025, 0.975], 6 * seeds * 4) / (seeds * 4)
+    assert low < found[:, ::2].mean() < high
+
+
+def test_the_present_attitude_is_as_good_as_it_can_be() -> None:
+    """Its error: that of k - D, the gyro's noise since, and the bias's since; over 40 seeds.
+
+    A filter that took late measurements for present ones would be wrong by the whole turn.
+    """
+    case = Case(arw=1e-5, rrw=1e-8, bias=1e-5, period=0.01, interval=10, delay=25)
+    omega = np.radians(10.0) * np.array([0.6, 0.0, 0.8])
+    ticks = 4000
+    attitudes = exponential(np.arange(ticks)[:, None] * case.period * omega)
+    rates = np.tile(omega, (ticks, 1))
+    squares, expected = [], []
+    for seed in range(40):
+        found = filtered(case, measure(case, attitudes, rates, np.random.default_rng(seed)))
+        error = attitude_error(found.present, attitudes)[1500:]
+        squares.append((error**2).mean())
+        expected.append(np.trace(found.covariance[2000:2010, :3, :3].mean(0)) / 3.0)
+    since = case.arw**2 * case.delay * case.period
+    assert np.mean(squares) == pytest.approx(np.mean(expected) + since, rel=0.1)
+    assert np.sqrt(np.mean(squares)) < 1e-3 * np.linalg.norm(omega) * case.delay * case.period * 2
+
+
+def test_a_large_slew_is_followed() -> None:
+    """Through one and a half turns at up to 20 degrees a second, a quarter of a second late."""
+    case = Case(across=1e-5, about=8e-5, arw=1e-6, period=0.01, interval=10, delay=25)
+
+    def rate(t: float) -> Array:
+        return np.radians(20.0) * np.sin(np.pi * t / 60.0) ** 2 * np.array([0.36, 0.48, 0.8])
+
+    ticks = 6000
+    attitudes = turned_by(rate, ticks, case.period)
+    rates = np.array([rate(case.period * k) for k in range(ticks)])
+    found = filtered(case, measure(case, attitudes, rates, np.random.default_rng(3)))
+    error = attitude_error(found.present, attitudes)[100:]
+    assert np.abs(error).max() < 2e-4
+    assert np.sqrt((error[-1000:] ** 2).mean()) < 2e-5
+
+
+# A single step
+
+
+def random_covariance(rng: np.random.Generator, sigmas: Array) -> Array:
+    root = rng.normal(size=(6, 6)) * sigmas[:, np.newaxis]
+    covariance: Array = root @ root.T
+    return covariance
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([5e-4, 0.1]))
+@settings(max_examples=40)
+def test_a_propagated_covariance_is_van_loans(seed: int, period: float) -> None:
+    """Of turns of 0.01 rad, and noise and covariance that weigh alike, to third order in the turn.
+
+    Q is Farrenkopf's, of axes at rest: that is to first order, in a term of its own.
+    """
+    rng = np.random.default_rng(seed)
+    arw, turn = 1e-5, 0.01 * rng.normal(size=3)
+    rrw = arw / period * 10.0 ** rng.uniform(-0.5, 0.5)
+    case = Case(arw=arw, rrw=rrw, period=period)
+    sigmas = np.repeat([arw * period**0.5, arw / period**0.5], 3)
+    before = random_covariance(rng, sigmas)
+    drift = np.zeros((6, 6))
+    drift[:3, :3], drift[:3, 3:] = -skew(turn / period), -np.eye(3)
+    transition = expm(drift * period)
+
+    def propagated(covariance: Array) -> Array:
+        filter = case.filter()
+        filter.covariance[:], filter.scratch.rotation[:] = covariance, turn
+        propagate_covariance(filter, period)
+        found: Array = filter.covariance.copy()
+        return found
+
+    scale = np.outer(sigmas, sigmas)
+    noise = propagated(np.zeros((6, 6)))
+    still = np.zeros((6, 6))
+    still[:3, 3:] = -np.eye(3)
+    density = np.diag([arw**2] * 3 + [rrw**2] * 3)
+    both = expm(np.block([[-still, density], [np.zeros((6, 6)), still.T]]) * period)
+    np.testing.assert_allclose(noise / scale, both[6:, 6:].T @ both[:6, 6:] / scale, atol=1e-12)
+    expected = transition @ before @ transition.T + noise
+    error = np.abs(propagated(before) - expected) / scale
+    assert error.max() < 3.0 * np.linalg.norm(turn) ** 3 * np.abs(expected / scale).max()
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0.5, 20.0), st.sampled_from([0.9, 0.999, 1.001, 1.1]))
+@settings(max_examples=60)
+def test_an_update_is_kalmans_within_the_gate_and_none_beyond(
+    seed: int, gate: float, share: float
+) -> None:
+    """The gate is in standard deviations of the innovation, whatever its direction."""
+    rng = np.random.default_rng(seed)
+    across, about = 10.0 ** rng.uniform(-6.0, -5.0, 2)
+    settings = Case(across=across, about=about).settings.model_copy(update={"gate": gate})
+    filter = Navigation.build(1, settings, 0.01).attitude
+    sigmas = np.repeat([1e-5, 1e-7], 3)
+    p = random_covariance(rng, sigmas)
+    filter.covariance[:], filter.bias[:] = p, 1e-6 * rng.normal(size=3)
+    filter.quaternion[:] = exponential(rng.normal(size=3))
+    truth, bias = filter.quaternion.copy(), filter.bias.copy()
+    s = p[:3, :3] + filter.noise
+    direction = rng.normal(size=3)
+    innovation = share * gate * np.linalg.cholesky(s) @ (direction / np.linalg.norm(direction))
+    accepted = update(filter, product(truth, exponential(innovation)))
+    assert accepted == (share < 1.0)
+    scale = np.outer(sigmas, sigmas)
+    if not accepted:
+        np.testing.assert_array_equal(filter.covariance, p)
+        np.testing.assert_array_equal(np.r_[filter.quaternion, filter.bias], np.r_[truth, bias])
+        return
+    gain = np.linalg.solve(s, p[:3]).T
+    after = p - gain @ s @ gain.T
+    np.testing.assert_allclose(filter.covariance / scale, after / scale, atol=1e-9)
+    moved = gain @ innovation
+    np.testing.assert_allclose(filter.bias - bias, moved[3:], rtol=1e-6, atol=1e-14)
+    found = attitude_error(truth, filter.quaternion)
+    np.testing.assert_allclose(found, moved[:3], rtol=1e-6, atol=1e-12)
+
+
+# What the gyro does that the filter does not know
+
+
+@pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
+def test_a_jump_of_the_rate_costs_up_to_half_of_it_times_the_tick(share: float) -> None:
+    """``(s - 1/2) jump h``, at a share s of the tick, until the tracker measures again."""
+    case, jump, when = Case(period=5e-4, interval=400), np.array([0.02, -0.03, 0.01]), 200
+    ticks = np.arange(350)
+    since = np.maximum(0.0, ticks - when - share)[:, np.newaxis]
+    truth = exponential(since * case.period * jump)
+    rates = np.where(ticks[:, np.newaxis] > when, jump, 0.0)
+    found = filtered(case, Measured(np.tile(truth[0], (len(ticks), 1)), rates, 0.0 * rates))
+    error = attitude_error(found.present, truth)
+    np.testing.assert_array_equal(error[: when + 1], 0.0)
+    expected = (0.5 - share) * case.period * jump
+    np.testing.assert_allclose(error[when + 1 :], np.tile(expected, (149, 1)), atol=1e-10)
+
+
+def test_against_a_scale_error_a_walk_of_the_bias_helps_and_its_first_variance_does_not() -> None:
+    """The numbers of docs/manual/navigation.md: RMS an axis in a turn that comes after a rest."""
+    scale, rate, duration = 3e-4, np.radians(1.0), 60.0
+    tactical = Case(
+        across=4e-5, about=3e-4, arw=2.9e-6, rrw=8e-8, bias=4.8e-6, period=5e-3, interval=40,
+        delay=30,
+    )  # fmt: skip
+    time = tactical.period * np.arange(round(2.0 * duration / tactical.period))
+    omega, turning = rate * np.array([0.6, 0.0, 0.8]), (time > duration)[:, np.newaxis]
+    attitudes = exponential(omega * np.maximum(0.0, time - duration)[:, np.newaxis])
+    rates, late = np.where(turning, omega, 0.0), time > duration + 2.0
+    flights = [
+        measure(tactical, attitudes, rates, np.random.default_rng(seed)) for seed in range(8)
+    ]
+
+    def error(case: Case, scale: float) -> float:
+        squares = [
+            attitude_error(
+                filtered(case, seen._replace(gyro=seen.gyro + scale * rates)).present, attitudes
+            )[late] ** 2
+            for seen in flights
+        ]  # fmt: skip
+        return float(np.sqrt(np.mean(squares)))
+
+    found = [
+        error(tactical, scale), error(tactical._replace(bias=scale * rate), scale),
+        error(tactical._replace(rrw=scale * rate / duration**0.5), scale), error(tactical, 0.0),
+    ]  # fmt: skip
+    text = (ROOT / "docs/manual/navigation.md").read_text("utf-8")
+    (paragraph,) = (part for part in text.split("\n\n") if "scale error e is" in part)
+    shown = [float(number) for number in re.findall(r"by (\d\.\de-5)", paragraph)]
+    np.testing.assert_allclose(found, shown, atol=0.06e-5)
+
+
+# Signs, the same twice, outliers
+
+
+def test_the_sign_of_the_quaternion_does_not_matter() -> None:
+    """Bit for bit, in whichever ticks it changes."""
+    case = Case(period=0.01, interval=10, delay=5)
+    rng = np.random.default_rng(4)
+    measured = still(case, 500, rng)
+    signs = np.where(rng.random((500, 1)) < 0.5, -1.0, 1.0)
+    plain = filtered(case, measured)
+    other = filtered(case, measured._replace(quaternions=measured.quaternions * signs))
+    assert abs(np.diff(signs[::10], axis=0)).any()
+    np.testing.assert_array_equal(other.covariance, plain.covariance)
+    same = np.sign((other.present * plain.present).sum(1, keepdims=True))
+    np.testing.assert_array_equal(other.present * same, plain.present)
+
+
+def test_a_measurement_that_is_held_counts_once() -> None:
+    case = Case(period=0.01, interval=10)
+    filter = case.filter()
+    filtered(case, still(case, 1001, np.random.default_rng(5)), filter)
+    assert filter.updates == 99  # of 100 after the first; one of them began the filter
+
+
+def test_a_wrong_measurement_changes_nothing() -> None:
+    """But for the ones that the tracker did not give in its place."""
+    case = Case(period=0.01, interval=10, delay=3)
+    measured = still(case, 2000, np.random.default_rng(6))
+    hit, blind = measured.quaternions.copy(), measured.quaternions.copy()
+    hit[1003:1013] = product(hit[1003], exponential(np.array([0.05, -0.02, 0.0])))
+    blind[1003:1013] = blind[1002]
+    filter = case.filter()
+    found = filtered(case, measured._replace(quaternions=hit), filter)
+    expected = filtered(case, measured._replace(quaternions=blind))
+    assert filter.rejected == 1
+    np.testing.assert_array_equal(found.present, expected.present)
+    np.testing.assert_array_equal(found.covariance, expected.covariance)
+
+
+def test_a_filter_that_is_wrong_begins_anew() -> None:
+    """Here after a jump of the attitude of which the gyro knows nothing."""
+    case = Case(period=0.01, interval=10)
+    measured = still(case, 2000, np.random.default_rng(7))
+    jump = exponential(np.array([0.3, 0.0, 0.0]))
+    measured.quaternions[1000:] = product(jump, measured.quaternions[1000:])
+    filter = case.filter()
+    found = filtered(case, measured, filter)
+    assert filter.rejected == MOST_REJECTED
+    error = np.linalg.norm(attitude_error(found.present, jump), axis=1)
+    again = 1000 + 10 * (MOST_REJECTED - 1)
+    assert (error[1000:again] > 0.2).all()
+    assert (error[again + 10 :] < 5e-4).all()
+    assert found.bias[again - 1].all()
+    assert not found.bias[again].any()
+    unknown = np.diag([case.across**2] * 2 + [case.about**2] + [case.bias**2] * 3)
+    np.testing.assert_allclose(found.covariance[again], unknown, rtol=1e-12, atol=1e-30)
+
+
+def test_only_measurements_in_a_row_make_it_begin_anew() -> None:
+    """Many wrong ones between good ones do not."""
+    case = Case(period=0.01, interval=10)
+    measured = still(case, 1000, np.random.default_rng(9))
+    wrong = measured.quaternions.copy()
+    for first in range(500, 500 + 20 * (MOST_REJECTED + 2), 20):
+        wrong[first : first + 10] = product(wrong[first], exponential(np.array([0.1, 0.0, 0.0])))
+    filter = case.filter()
+    found = filtered(case, measured._replace(quaternions=wrong), filter)
+    assert filter.rejected == MOST_REJECTED + 2
+    assert found.bias[500:].all()
+    assert np.abs(attitude_error(found.present[500:], measured.quaternions[0])).max() < 1e-3
+
+
+# Properties
+
+
+@settings(max_examples=60)
+@given(
+    st.integers(0, 2**32 - 1), st.sampled_from([1e-9, 1e-5, 1e-2]),
+    st.sampled_from([0.0, 1.0, 1e3, 1e25]), st.integers(0, 60),
+)  # fmt: skip
+def test_attitude_stays_unit_and_covariance_positive_definite(
+    seed: int, sigma: float, fastest: float, delay: int
+) -> None:
+    """Whatever the numbers that arrive, so long as they are finite."""
+    rng = np.random.default_rng(seed)
+    case = Case(
+        across=sigma, about=sigma * 10.0 ** rng.uniform(0, 2), arw=10.0 ** rng.uniform(-9, -3),
+        rrw=10.0 ** rng.uniform(-12, -4), bias=10.0 ** rng.uniform(-8, -2), period=5e-4,
+        delay=delay,
+    )  # fmt: skip
+    quaternions = rng.normal(size=(300, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
+    gyro = fastest * rng.normal(size=(300, 3))
+    found = filtered(case, Measured(quaternions, gyro, gyro))
+    for attitudes in (found.delayed, found.present):
+        np.testing.assert_allclose(np.linalg.norm(attitudes, axis=1), 1.0, atol=1e-14)
+    np.testing.assert_array_equal(found.covariance, np.swapaxes(found.covariance, 1, 2))
+    deviation = np.sqrt(np.einsum("kii->ki", found.covariance))
+    correlation = found.covariance / deviation[:, :, None] / deviation[:, None, :]
+    assert np.linalg.eigvalsh(correlation).min() > -1e-9
+
+
+def test_numbers_stay_sound_over_hours() -> None:
+    """200,000 ticks, turning; the last errors are what the covariance says."""
+    case = Case(
+        across=1e-5, about=8e-5, arw=3e-7, rrw=1e-9, bias=1e-6, period=5e-3, interval=20, delay=20
+    )
+    omega = np.array([0.01, -0.02, 0.005])
+    filter, worst = case.filter(), 0.0
+    rng, bias = np.random.default_rng(8), np.zeros(3)
+    for block in range(2):
+        ticks = np.arange(100_000 * block, 100_000 * (block + 1))
+        attitudes = exponential(ticks[:, None] * case.period * omega)
+        measured = measure(case, attitudes, np.tile(omega, (len(ticks), 1)), rng, bias)
+        bias = measured.bias[-1]
+        found = filtered(case, measured, filter)
+        error = attitude_error(found.present, attitudes)[50_000:]
+        worst = max(worst, np.abs(error).max())
+    np.testing.assert_allclose(np.linalg.norm(found.present, axis=1), 1.0, atol=1e-15)
+    np.testing.assert_array_equal(filter.covariance, filter.covariance.T)
+    assert np.linalg.eigvalsh(filter.covariance).min() > 0.0
+    assert worst < 2e-5

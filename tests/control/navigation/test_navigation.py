@@ -1,0 +1,230 @@
+"""From measured to estimated states: gaps, jumps in time, bad states, swaps; and the controller."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from attitude_sensors import attitude_error, exponential
+from closed_loop import NAVIGATION, PERIOD, Loop, law_of
+from numpy.typing import NDArray
+
+from space_robot_control.navigation.navigation import (
+    LONGEST_BRIDGE,
+    Navigation,
+    navigate,
+)
+from space_robot_control.navigation.settings import NavigationFilterSettings
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.errors import InputError, UnusableStateError
+from space_robot_msgs_py.samples import RobotState
+
+Array = NDArray[np.float64]
+
+OMEGA = np.array([0.02, -0.03, 0.01])
+N = 6
+SETTINGS = NAVIGATION.model_copy(update={"tracker_delay": 0.01, "rate_filter_hz": 0.0})
+
+
+def state_at(tick: int) -> RobotState:
+    """Of a robot that turns at `OMEGA` with a tracker of 100 Hz, 10 ms late, without noise."""
+    state = RobotState.allocate(N)
+    t = tick * PERIOD
+    taken = max(0, (tick - 20) // 20 * 20) * PERIOD
+    state.tick = tick
+    state.quaternion[:] = exponential(OMEGA * taken)
+    state.omega_base[:] = OMEGA
+    state.joint_positions[:] = 0.1 * np.sin(t) + np.arange(N)
+    state.joint_velocities[:] = 0.1 * np.cos(t)
+    state.applied_torque[:] = 0.0
+    return state
+
+
+def estimates(navigation: Navigation, ticks: list[int]) -> Array:
+    """Quaternion, rates and angles after each tick."""
+    rows = []
+    for tick in ticks:
+        navigate(navigation, tick, state_at(tick).block[0], PERIOD)
+        e = navigation.estimate
+        rows.append(np.r_[e.quaternion, e.omega_base, e.joint_positions, e.joint_velocities])
+    return np.array(rows)
+
+
+def built(**changes: float) -> Navigation:
+    return Navigation.build(N, SETTINGS.model_copy(update=changes), PERIOD)
+
+
+def test_the_estimate_is_of_now_though_the_tracker_is_late() -> None:
+    found = estimates(built(), list(range(400)))
+    truth = exponential(OMEGA * PERIOD * np.arange(400)[:, None])
+    error = np.abs(attitude_error(found[:, :4], truth))
+    assert error[41:].max() < 1e-7
+    # the first one is taken for as old as the others
+    begun = exponential(OMEGA * PERIOD * 20)
+    np.testing.assert_allclose(found[0, :4], begun, rtol=0.0, atol=1e-15)
+    np.testing.assert_allclose(found[:, 4:7], np.tile(OMEGA, (400, 1)), atol=1e-6)
+
+
+def test_lost_states_are_bridged() -> None:
+    """Up to `LONGEST_BRIDGE` ticks; a tracker's measurement from between is not used."""
+    for lost in (1, LONGEST_BRIDGE - 1):
+        navigation = built()
+        ticks = [k for k in range(600) if not 301 <= k < 301 + lost]
+        found = estimates(navigation, ticks)
+        truth = exponential(OMEGA * PERIOD * np.array(ticks)[:, None])
+        assert np.abs(attitude_error(found[:, :4], truth))[41:].max() < 1e-7
+        assert navigation.attitude.updates == (27 if lost == 1 else 26)
+
+
+def ramped_state_at(tick: int) -> RobotState:
+    """As `state_at`; rates and joint rates rise evenly, from tick 301 on a torque is applied."""
+    state, t = state_at(tick), tick * PERIOD
+    taken = max(0, (tick - 20) // 20 * 20) * PERIOD
+    state.quaternion[:] = exponential(OMEGA * (taken + 2.0 * taken * taken))
+    state.omega_base[:] = OMEGA * (1.0 + 4.0 * t)
+    state.joint_positions[:] = np.arange(N) * (0.1 + 0.5 * t * t)
+    state.joint_velocities[:] = np.arange(N) * t
+    state.applied_torque[:] = 5.0 if tick > 300 else 0.0
+    state.base_position[:], state.base_velocity[:] = [t, 2.0, 3.0], [4.0, t, 5.0]
+    return state
+
+
+def test_lost_states_of_an_even_ramp_are_as_if_they_had_come() -> None:
+    """Rates are interpolated, low-passes and joint filters go on by the time that passed."""
+    whole, *bridged = (built(rate_filter_hz=20.0) for _ in range(3))
+    for tick in range(340):
+        state = ramped_state_at(tick)
+        navigate(whole, tick, state.block[0], PERIOD)
+        for navigation, lost in zip(bridged, (2, LONGEST_BRIDGE - 1), strict=True):
+            if 301 <= tick < 301 + lost:
+                continue
+            navigate(navigation, tick, state.block[0], PERIOD)
+            if tick <= 300:
+                continue
+            for name in ("quaternion", "omega_base", "joint_positions", "joint_velocities"):
+                expected, found = (getattr(n.estimate, name) for n in (whole, navigation))
+                np.testing.assert_allclose(found, expected, rtol=0.0, atol=2e-9, err_msg=name)
+            expected, found = (n.estimate.applied_torque[:3] for n in (whole, navigation))
+            np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12)
+            for name in ("base_position", "base_velocity"):
+                sent = getattr(state, name)
+                np.testing.assert_array_equal(getattr(navigation.estimate, name), sent)
+
+
+@pytest.mark.parametrize("elapsed", [LONGEST_BRIDGE + 1, 30 * LONGEST_BRIDGE])
+def test_after_a_long_gap_the_attitude_begins_anew_and_the_bias_walks_on(elapsed: int) -> None:
+    """Its estimate stays; its variance grows by sigma_u^2 times the gap."""
+    walk = 1e-6
+    navigation = built(gyro_rate_walk=walk)
+    estimates(navigation, list(range(400)))
+    bias = np.array([1e-4, -2e-4, 3e-4])
+    navigation.attitude.bias[:] = bias
+    before = navigation.attitude.covariance.copy()
+    tick = 399 + elapsed
+    (row,) = estimates(navigation, [tick])
+    np.testing.assert_array_equal(navigation.attitude.bias, bias)
+    after = navigation.attitude.covariance
+    walked = before[3:, 3:] + walk**2 * elapsed * PERIOD * np.eye(3)
+    np.testing.assert_allclose(after[3:, 3:], walked, rtol=1e-12, atol=1e-30)
+    np.testing.assert_array_equal(after[:3, :3], navigation.attitude.noise)
+    assert not after[:3, 3:].any()
+    np.testing.assert_array_equal(row[4:7], OMEGA - bias)
+    assert np.abs(attitude_error(row[:4], exponential(OMEGA * PERIOD * tick))).max() < 1e-3
+
+
+def test_the_noise_of_a_tracker_is_that_of_its_axes() -> None:
+    """A boresight of any length: across^2 (E - b b^T) + about^2 b b^T."""
+    boresight = [2.0, -1.0, 2.0]
+    changed = {"tracker_boresight": boresight, "tracker_across": 2e-5, "tracker_about": 7e-5}
+    attitude = Navigation.build(N, SETTINGS.model_copy(update=changed), PERIOD).attitude
+    along = np.outer(boresight, boresight) / 9.0
+    expected = 4e-10 * (np.eye(3) - along) + 49e-10 * along
+    np.testing.assert_allclose(attitude.noise, expected, rtol=1e-13, atol=1e-24)
+
+
+@pytest.mark.parametrize("again", [100, 399])
+def test_after_a_jump_back_in_time_everything_begins_anew(again: int) -> None:
+    """As a filter that has seen nothing, to the last bit."""
+    used, fresh = built(), built()
+    estimates(used, list(range(400)))
+    ticks = list(range(again, again + 100))
+    np.testing.assert_array_equal(estimates(used, ticks), estimates(fresh, ticks))
+
+
+def test_the_torque_of_an_estimate_lags_as_its_rates_do() -> None:
+    navigation = built(rate_filter_hz=20.0)
+    state = state_at(0)
+    for tick in range(3):
+        state.applied_torque[:] = float(tick)
+        navigate(navigation, tick, state.block[0], PERIOD)
+    torque = navigation.estimate.applied_torque
+    assert ((torque > 0.0) & (torque < 1.5)).all()
+    assert (torque[:3] == torque[0]).all()
+    assert (torque[3:] == torque[3]).all()
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "why"),
+    [
+        ("tracker_delay", 2.0, r"tracker_delay must be at most 4094 ticks, 0.4094 s, got 2 s"),
+        ("tracker_boresight", [0.0, 1e-5, 0.0], r"tracker_boresight must have a norm near 1"),
+    ],
+)
+def test_what_does_not_fit_is_refused(key: str, value: object, why: str) -> None:
+    with pytest.raises(InputError, match=why):
+        Navigation.build(N, NAVIGATION.model_copy(update={key: value}), 1e-4)
+
+
+# In the controller
+
+
+def filtered_loop(robot: Robot) -> Loop:
+    return Loop(robot, law_of("tde_stc"), navigation=SETTINGS)
+
+
+@pytest.mark.parametrize("angle", [5e-324, 1e-200, 1e3])
+@pytest.mark.parametrize("rate", [0.0, 5e-324, 1e3])
+def test_noises_whose_squares_vanish_give_a_filter(angle: float, rate: float) -> None:
+    """They count as the least that there is."""
+    given = NAVIGATION.model_dump() | {"joint_angle_noise": angle, "joint_rate_noise": rate}
+    joints = Navigation.build(6, NavigationFilterSettings(**given), PERIOD).joints
+    assert np.isfinite(joints.angle_gain).all()
+    assert np.isfinite(joints.rate_gain).all()
+
+
+@pytest.mark.parametrize(("field", "value"), [("quaternion", 1.1), ("omega_base", np.nan)])
+def test_an_unusable_state_leaves_the_filter_as_it_is(
+    paper_robot: Robot, field: str, value: float
+) -> None:
+    shown, spared = filtered_loop(paper_robot), filtered_loop(paper_robot)
+    for loop in (shown, spared):
+        loop.fly(50)
+    state = shown.plant.state.copy()
+    getattr(state, field)[0] = value
+    with pytest.raises(UnusableStateError):
+        shown.controller.update(state, shown.references.at(50))
+    assert shown.controller.block["navigation"].tobytes() == (
+        spared.controller.block["navigation"].tobytes()
+    )
+    np.testing.assert_array_equal(shown.fly(20)[1], spared.fly(20)[1])
+
+
+def test_a_law_that_takes_over_finds_the_filter_as_it_is(paper_robot: Robot) -> None:
+    loop, other = filtered_loop(paper_robot), filtered_loop(paper_robot)
+    for one in (loop, other):
+        one.fly(200)
+    before = loop.controller.block["navigation"].copy()
+    loop.controller.law = law_of("ctc")
+    assert loop.controller.block["navigation"].tobytes() == before.tobytes()
+
+
+def test_with_perfect_sensors_the_filter_hardly_matters(paper_robot: Robot) -> None:
+    """A tracker in every tick, without delay: errors stay below 1e-6."""
+    perfect = NAVIGATION.model_copy(update={"tracker_delay": 0.0})
+    loop = Loop(paper_robot, law_of("tde_stc"), navigation=perfect)
+    errors, _ = loop.fly(2000)
+    truth = loop.plant.state.copy()
+    loop.fly(1)
+    estimate = loop.controller.block[0].navigation.estimate
+    assert np.abs(errors).max() < 1e-5
+    assert np.abs(attitude_error(estimate.quaternion, truth.quaternion)).max() < 1e-7
+    np.testing.assert_allclose(estimate.joint_positions, truth.joint_positions, atol=1e-7)

@@ -1,0 +1,177 @@
+"""Saturation, latency, and commands that were not applied."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from random_logs import random_log
+
+from space_robot.analysis import analyze
+from space_robot.analysis.actuation import (
+    Latency,
+    MissedDeadlines,
+    Saturation,
+    TorqueLimits,
+)
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import simulate
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import InputError
+
+NONE = TorqueLimits(np.inf, np.inf)
+SOME = TorqueLimits(2.0, 1.5)
+
+
+def flown(**options: Any) -> FlightLog:
+    return simulate(Flight(FlightPlan.model_validate({"duration": 0.2, **options})))
+
+
+def differing(log: FlightLog, latency_ticks: int, limits: TorqueLimits) -> tuple[int, int]:
+    figure = MissedDeadlines(latency_ticks, limits)
+    figure.add(log, np.empty(0))
+    return figure.differing, figure.compared
+
+
+@pytest.mark.parametrize("ticks", [0, 1, 4])
+def test_in_lockstep_every_command_is_applied(ticks: int) -> None:
+    log = flown(command_latency_ticks=ticks)
+    assert differing(log, ticks, NONE) == (0, 399 - ticks)
+    assert differing(log, ticks + 1, NONE)[0] > 300
+
+
+def test_a_command_held_is_one_that_differs() -> None:
+    log = flown()
+    log.applied_torque[100] = log.applied_torque[99]
+    assert differing(log, 0, NONE) == (1, 399)
+
+
+def test_ticks_without_a_command_are_not_compared() -> None:
+    log = flown()
+    assert log.commanded_torque is not None
+    log.commanded_torque[50:60] = np.nan
+    assert differing(log, 0, NONE) == (0, 389)
+
+
+@pytest.mark.parametrize("commands", [None, np.full((20, 9), np.nan)])
+def test_without_commands_nothing_is_known(commands: np.ndarray | None) -> None:
+    log = flown(duration=0.01)
+    log.commanded_torque = commands
+    report = analyze(log)
+    assert report["missed_deadlines"] is None
+    assert report["unavailable"]["missed_deadlines"] == "the commands were not recorded"
+
+
+@given(st.sampled_from([1, 3, 6, 7]), st.integers(0, 99), st.integers(0, 4), st.integers(0, 60))
+def test_missed_deadlines_and_saturation_are_those_of_plain_loops(
+    n: int, seed: int, latency_ticks: int, cut: int
+) -> None:
+    """Filled ticks repeat the state before; what stands there was not measured."""
+    log = random_log(n, 60, seed, latency_ticks)
+    rng = np.random.default_rng(seed)
+    log.applied_torque[rng.random(60) < 0.1, rng.integers(n + 3)] = -2.0
+    if seed % 2:
+        log.filled = 8
+        for k in rng.integers(1, 60, 8):
+            for name in ("quaternion", "omega_base", "joint_positions", "joint_velocities"):
+                getattr(log, name)[k] = getattr(log, name)[k - 1]
+    assert log.commanded_torque is not None
+    limit = [2.0] * 3 + [1.5] * n
+    differ = compared = saturated = 0
+    for k in range(60):
+        applied = log.applied_torque[k].tolist()
+        saturated += any(abs(x) >= y for x, y in zip(applied, limit, strict=True))
+        if k - latency_ticks - 1 < 0:
+            continue
+        commanded = log.commanded_torque[k - latency_ticks - 1].tolist()
+        names = ("quaternion", "omega_base", "joint_positions")
+        repeats = all((getattr(log, x)[k] == getattr(log, x)[k - 1]).all() for x in names)
+        if any(map(math.isnan, commanded)) or (log.filled and repeats):
+            continue
+        compared += 1
+        clipped = [max(-y, min(y, x)) for x, y in zip(commanded, limit, strict=True)]
+        differ += clipped != applied
+    missed_deadlines, saturation = MissedDeadlines(latency_ticks, SOME), Saturation(SOME)
+    for start, stop in ((0, cut), (cut, min(cut + 1, 60)), (min(cut + 1, 60), 60)):
+        if start < stop:
+            missed_deadlines.add(log.rows(start, stop), np.empty(0))
+            saturation.add(log.rows(start, stop), np.empty(0))
+    assert (missed_deadlines.differing, missed_deadlines.compared) == (differ, compared)
+    assert saturation.result() == {
+        "base_torque_limit_n_m": 2.0, "joint_torque_limit_n_m": 1.5, "ticks": saturated,
+        "share": saturated / 60,
+    }  # fmt: skip
+
+
+def test_saturation_is_the_plants() -> None:
+    parameters = {"plant": {"base_torque_limit": 0.05, "joint_torque_limit": 0.02}}
+    flight = Flight(FlightPlan(duration=0.2, parameters=parameters))
+    log = simulate(flight)
+    log.flight["parameters"] = {"plant": {"case": "1", **parameters["plant"]}}
+    limits = TorqueLimits(0.05, 0.02)
+    report = analyze(log)
+    counted = report["saturation"]["ticks"]
+    # the plant's own count has no torque at tick 0, but one more at the end
+    assert 0 < counted <= flight.plant.saturated_ticks <= counted + 1
+    assert differing(log, 0, limits) == (0, 399)
+    assert report["missed_deadlines"] == {
+        "unanswered_ticks": 0, "compared_ticks": 399, "differing_ticks": 0,
+    }  # fmt: skip
+    assert differing(log, 0, NONE)[0] > 0
+    assert report["saturation"]["base_torque_limit_n_m"] == 0.05
+    assert report["saturation"]["joint_torque_limit_n_m"] == 0.02
+    assert report["saturation"]["share"] == counted / 400
+
+
+def test_each_axis_has_its_own_limit() -> None:
+    log = random_log(3, 10, 0)
+    log.applied_torque[:] = 0.0
+    log.applied_torque[2, 2] = -2.0  # the base's last axis, at its limit
+    log.applied_torque[4, 2] = 1.9
+    log.applied_torque[6, 3] = 1.5  # the first joint
+    log.applied_torque[8, 5] = -1.4
+    figure = Saturation(SOME)
+    figure.add(log, np.empty(0))
+    assert figure.result()["ticks"] == 2
+
+
+def test_without_limits_the_report_says_so() -> None:
+    report = analyze(flown(duration=0.01))["saturation"]
+    assert report == {
+        "base_torque_limit_n_m": None, "joint_torque_limit_n_m": None, "ticks": 0, "share": 0.0,
+    }  # fmt: skip
+
+
+def test_percentiles_of_the_latency() -> None:
+    log = random_log(1, 102, 0)
+    log.latency_s = np.append(np.arange(101.0, 0.0, -1.0) * 1e-5, np.nan)
+    for cuts in ((0, 102), (0, 7, 102)):
+        figure = Latency(0.0005)
+        for start, stop in itertools.pairwise(cuts):
+            figure.add(log.rows(start, stop), np.empty(0))
+        found = figure.result()
+        assert found["answers"] == 101
+        assert found["p50_ms"] == pytest.approx(0.51)
+        assert found["p99_ms"] == pytest.approx(1.0)
+        assert found["max_ms"] == pytest.approx(1.01)
+        assert found["p50_ticks"] == pytest.approx(1.02)
+        assert found["p99_ticks"] == pytest.approx(2.0)
+        assert found["max_ticks"] == pytest.approx(2.02)
+
+
+@pytest.mark.parametrize("latency", [None, np.full(102, np.nan)])
+def test_without_answers_there_is_no_latency(latency: np.ndarray | None) -> None:
+    log, figure = random_log(1, 102, 0), Latency(0.0005)
+    log.latency_s = latency
+    figure.add(log, np.empty(0))
+    with pytest.raises(InputError, match="not flown as a graph"):
+        figure.result()
+    assert "not flown as a graph" in analyze(flown(duration=0.01))["unavailable"]["latency"]

@@ -1,0 +1,110 @@
+"""What sets of actuators can give: closed forms, and linear programmes torque by torque."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from actuator_sets import PYRAMID, flat, hardware, random_thrusters
+from allocation_bench import AllocationBench
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull
+
+from space_robot.analysis.capability import (
+    ThrusterTorques,
+    largest_momentum,
+    largest_torque,
+    wheel_shares,
+)
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def test_three_wheels_have_their_own_limits_on_the_axes() -> None:
+    wheels = {"axes": flat(np.eye(3)), "max_torque": [1.0, 2.0, 3.0], "max_momentum": [4.0, 5.0, 0]}
+    found = hardware(wheels=wheels)
+    np.testing.assert_allclose(largest_torque(found), [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(largest_momentum(found.wheels), [4.0, 5.0, np.inf])
+    np.testing.assert_allclose(wheel_shares(found.wheels), np.eye(3), atol=1e-15)
+
+
+def test_a_pyramid_adds_up_along_all_axes() -> None:
+    found = hardware(wheels={"axes": PYRAMID, "max_torque": [0.2]})
+    np.testing.assert_allclose(largest_torque(found), 4.0 * 0.2 / np.sqrt(3.0))
+
+
+def test_thrusters_help_wheels() -> None:
+    """A pair about +x alone: about -x there are the wheels only, so that both ways is theirs."""
+    thrusters = {"positions": [0.0, 1.0, 0.0, 0.0, -1.0, 0.0],
+                 "directions": [0.0, 0.0, 1.0, 0.0, 0.0, -1.0], "force": [5.0]}  # fmt: skip
+    wheels = {"axes": flat(np.eye(3)), "max_torque": [1.0]}
+    assert largest_torque(hardware(wheels=wheels, thrusters=thrusters))[0] == pytest.approx(1.0)
+    both = {**thrusters, "positions": thrusters["positions"] * 2,
+            "directions": [*thrusters["directions"], 0.0, 0.0, -1.0, 0.0, 0.0, 1.0]}  # fmt: skip
+    assert largest_torque(hardware(wheels=wheels, thrusters=both))[0] == pytest.approx(11.0)
+
+
+@settings(deadline=None)
+@given(SEEDS)
+def test_the_share_of_thrusters_is_the_zonotopes(seed: int) -> None:
+    """All of 2^6 corners of what three pairs can give span the same body."""
+    rng = np.random.default_rng(seed)
+    thrusters = random_thrusters(rng, 3).thrusters
+    corners = np.array([*product((0.0, 1.0), repeat=6)]) @ thrusters.torques
+    body = ConvexHull(corners).equations
+    wanted = rng.normal(size=(20, 3)) * np.linalg.norm(thrusters.torques, axis=1).mean()
+    share = np.max(wanted @ (-body[:, :3] / body[:, 3:]).T, axis=1)
+    np.testing.assert_allclose(ThrusterTorques.of(thrusters).share(wanted), share, rtol=1e-6)
+
+
+@settings(deadline=None, max_examples=30)
+@given(SEEDS, st.integers(3, 12))
+def test_the_least_propellant_is_the_linear_programmes(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    thrusters = random_thrusters(rng, count).thrusters
+    rates, torques = thrusters.mass_flow, thrusters.torques
+    np.testing.assert_allclose(
+        rates,
+        np.array(thrusters.force) / np.array(thrusters.specific_impulse) / 9.80665,
+    )
+    wanted = rng.normal(size=(5, 3))
+    found = ThrusterTorques.of(thrusters).propellant(wanted)
+    for torque, rate in zip(wanted, found, strict=True):
+        solved = linprog(rates, A_eq=torques.T, b_eq=torque, bounds=(0.0, None))
+        assert rate == pytest.approx(solved.fun, rel=1e-6)
+    assert ThrusterTorques.of(thrusters).propellant(np.zeros((1, 3))) == 0.0
+
+
+def test_a_torque_at_the_edge_is_the_whole_share() -> None:
+    """A pair of 10 N on levers of 1 m gives 20 N m, for 2 / (I_sp g_0) kg/s a newton."""
+    thrusters = hardware(thrusters={
+        "positions": flat([sign * axis for axis in np.eye(3) for sign in (1, -1, 1, -1)]),
+        "directions": flat([sign * np.roll(axis, 1) for axis in np.eye(3)
+                            for sign in (1, -1, -1, 1)]),
+        "force": [10.0], "specific_impulse": [200.0],
+    }).thrusters  # fmt: skip
+    found = ThrusterTorques.of(thrusters)
+    torque = np.vstack([20.0 * np.eye(3), -10.0 * np.eye(3), 20.0 * np.ones((1, 3))])
+    np.testing.assert_allclose(found.share(torque), [1.0, 1.0, 1.0, 0.5, 0.5, 0.5, 1.0])
+    rate = 20.0 / (200.0 * 9.80665)
+    np.testing.assert_allclose(
+        found.propellant(torque), rate * np.array([1.0, 1.0, 1.0, 0.5, 0.5, 0.5, 3.0])
+    )
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(3, 8))
+def test_wheels_share_as_the_allocation_does(seed: int, count: int) -> None:
+    """Motors of unequal torques: `allocate` by least squares, and what sizing says of them."""
+    rng = np.random.default_rng(seed)
+    most, demand = rng.uniform(0.1, 5.0, count), rng.normal(size=3) * 1e-3
+    bench = AllocationBench(
+        rng.normal(size=(count, 3)), null_gain=0.0, wheels={"max_torque": most.tolist()}
+    )
+    bench.step(demand)
+    shares = wheel_shares(hardware(wheels={
+        "axes": flat(bench.axes), "max_torque": most.tolist(),
+    }).wheels)  # fmt: skip
+    np.testing.assert_allclose(-shares @ demand, bench.command, rtol=1e-6, atol=1e-12)

@@ -1,0 +1,292 @@
+"""What a flight asks of its base: closed forms of a turning base, and plain loops."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from actuator_sets import PYRAMID, flat, hardware, still_log
+from hypothesis import given
+from hypothesis import strategies as st
+from oracles import quaternion_of
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from space_robot.analysis import analyze
+from space_robot.analysis.base_demand import BaseDemand
+from space_robot.analysis.loads import (
+    OtherWheelLoad,
+    Requirement,
+    ThrusterLoad,
+    WheelLoad,
+)
+from space_robot.analysis.sizing import (
+    ActuatorSet,
+    Sizing,
+)
+from space_robot.analysis.sizing_table import sizing_table
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.bag.flight_log import FlightLog
+
+PERIOD = 0.0005
+NOTHING = np.empty(0)
+PAIRS = {
+    "positions": flat([sign * axis for axis in np.eye(3) for sign in (1, -1, 1, -1)]),
+    "directions": flat([sign * np.roll(axis, 1) for axis in np.eye(3) for sign in (1, -1, -1, 1)]),
+    "force": [2.0], "specific_impulse": [200.0],
+}  # fmt: skip
+"""Twelve thrusters, in pairs on levers of 1 m about +z, -z, +x, -x, +y, -y."""
+
+
+def turning_log(robot: Robot, rate: float, ticks: int = 2001) -> FlightLog:
+    """The base turns about z at a constant rate, asked for 2 N m about its own x."""
+    log = still_log(robot, ticks)
+    angle = rate * log.time
+    log.quaternion[:, 0], log.quaternion[:, 3] = np.cos(angle / 2), np.sin(angle / 2)
+    log.omega_base[:, 2] = rate
+    log.applied_torque[1:, 0] = 2.0
+    assert log.commanded_torque is not None
+    log.commanded_torque[:, 0] = 2.0
+    return log
+
+
+def sized(log: FlightLog, flown: BaseActuatorSettings, *cuts: int) -> dict[str, Any]:
+    metric = Sizing(log, ActuatorSet("mine", flown))
+    for start, stop in zip((0, *cuts), (*cuts, log.ticks), strict=True):
+        metric.add(log.rows(start, stop), NOTHING)
+    found: dict[str, Any] = metric.result()
+    return found
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.3, 2.0])
+def test_stored_momentum_is_the_integral_on_inertial_axes(paper_robot: Robot, rate: float) -> None:
+    """``H = -2 [sin(rt), 1 - cos(rt)] / r`` on inertial axes, seen from the base."""
+    log = turning_log(paper_robot, rate)
+    found = BaseDemand(BaseActuatorSettings()).add(log)
+    t = log.time
+    taken = np.array([2.0 * t, 0.0 * t, 0.0 * t]).T
+    if rate:
+        taken = 2.0 / rate * np.array([np.sin(rate * t), 1.0 - np.cos(rate * t), 0.0 * t]).T
+    held = -Rotation.from_rotvec(np.outer(rate * t, [0, 0, 1])).inv().apply(taken)
+    np.testing.assert_allclose(found.momentum, held, atol=1e-6)
+    np.testing.assert_allclose(found.torque[1:], [[2.0, 0.0, 0.0]] * 2000)
+    assert np.all(found.torque[0] == 0.0)
+
+
+def test_stored_momentum_is_scipys_integral_of_any_motion(paper_robot: Robot) -> None:
+    log = still_log(paper_robot, 2001)
+
+    def turned(t: float) -> Rotation:
+        return Rotation.from_euler("zyx", [np.sin(3.0 * t), 0.5 * t, np.cos(2.0 * t)])
+
+    def torque(t: Any) -> Any:
+        return np.array([np.sin(5.0 * t), 2.0 * np.cos(4.0 * t), 1.0 + 0.0 * t])
+
+    log.quaternion[:] = [quaternion_of(turned(t)) for t in log.time]
+    assert log.commanded_torque is not None
+    log.commanded_torque[:, :3] = torque(log.time + 0.5 * PERIOD).T
+    solved = solve_ivp(
+        lambda t, _: turned(t).apply(torque(t)), (0.0, 1.0), np.zeros(3), rtol=1e-10, atol=1e-12
+    )
+    wanted = -turned(1.0).inv().apply(solved.y[:, -1])
+    found = BaseDemand(BaseActuatorSettings()).add(log)
+    np.testing.assert_allclose(found.momentum[-1], wanted, atol=1e-6)
+
+
+def test_a_command_that_is_not_known_was_the_torque_given(paper_robot: Robot) -> None:
+    log = turning_log(paper_robot, 0.0, 10)
+    assert log.commanded_torque is not None
+    log.commanded_torque[3] = np.nan
+    log.applied_torque[4, :3] = [0.5, 0.0, 0.0]
+    asked = BaseDemand(BaseActuatorSettings()).add(log).torque
+    np.testing.assert_array_equal(asked[:, 0], [0.0, *[2.0] * 3, 0.5, *[2.0] * 5])
+    log.commanded_torque = None
+    np.testing.assert_array_equal(
+        BaseDemand(BaseActuatorSettings()).add(log).torque, log.applied_torque[:, :3]
+    )
+
+
+@given(st.integers(1, 1999), st.integers(1, 1999))
+def test_cuts_change_nothing(paper_robot: Robot, one: int, other: int) -> None:
+    log = turning_log(paper_robot, 1.0)
+    cuts = sorted({one, other})
+    whole, parts = (sized(log, BaseActuatorSettings(), *c) for c in ((), cuts))
+    for axis, values in whole["axes"].items():
+        known = {key: value for key, value in values.items() if value is not None}
+        again = {key: parts["axes"][axis][key] for key in known}
+        assert again == pytest.approx(known, rel=1e-12, abs=1e-12)
+
+
+def test_axes_have_peak_rms_impulse_and_momentum(paper_robot: Robot) -> None:
+    log = still_log(paper_robot, 2001)
+    assert log.commanded_torque is not None
+    log.commanded_torque[:1000, 1], log.commanded_torque[1000:, 1] = 3.0, -1.0
+    report = analyze(log)
+    found = report["sizing"]
+    assert found["axes"]["base_y"] == {
+        "peak_torque_n_m": 3.0,
+        "rms_torque_n_m": pytest.approx(np.sqrt((9.0 * 1000 + 1000) / 2001)),
+        "angular_impulse_n_m_s": pytest.approx(2.0),
+        "peak_momentum_n_m_s": pytest.approx(1.5),
+        "pulses": None,
+        "propellant_kg": None,
+    }
+    assert found["axes"]["base_x"]["peak_momentum_n_m_s"] == 0.0
+    assert found["peak_momentum_n_m_s"] == pytest.approx(1.5)
+    assert (found["actuators"], found["flown"], found["requirements"]) == ("mine", True, [])
+    assert report["momentum"] is None
+    assert "momentum" not in report["unavailable"]
+
+
+class TestWheels:
+    def test_those_that_flew_tell_by_their_own_columns(self, paper_robot: Robot) -> None:
+        wheels = hardware(wheels={
+            "axes": PYRAMID, "rotor_inertia": [0.1, 0.2, 0.3, 0.4], "max_torque": [1.0],
+            "max_momentum": [4.0, 5.0, 4.0, 0.0], "initial_speed": [10.0],
+        })  # fmt: skip
+        log = still_log(paper_robot, 10, wheels)
+        log.wheel_velocities[:] = 10.0
+        log.wheel_velocities[5] = [20.0, -25.0, 0.0, 11.0]
+        log.wheel_torques[3] = [0.5, -1.0, 0.0, 0.0]
+        found = sized(log, wheels)["requirements"]
+        of_wheels = [(r["asked"], r["has"], r["is_met"]) for r in found if "wheel" in r["part"]]
+        assert of_wheels == [
+            (0.5, 1.0, True), (2.0, 4.0, True), (1.0, 1.0, False), (5.0, 5.0, False),
+            (0.0, 1.0, True), (3.0, 4.0, True), (0.0, 1.0, True), (pytest.approx(4.4), None, True),
+        ]  # fmt: skip
+        held = wheels.wheels.unit_axes.T @ ([0.1, 0.2, 0.3, 0.4] * (log.wheel_velocities[5] - 10.0))
+        for i, axis in enumerate(("base_x", "base_y", "base_z")):
+            (one,) = [r for r in found if (r["part"], r["quantity"]) == (axis, "stored momentum")]
+            assert one["asked"] == pytest.approx(abs(held[i]))
+
+    def test_others_in_their_place_hold_what_was_asked(self, paper_robot: Robot) -> None:
+        """Base and stored momentum turn: motors give ``P (dh/dt)``, and what friction takes."""
+        wheels = hardware(wheels={
+            "axes": PYRAMID, "rotor_inertia": [0.1], "initial_speed": [5.0], "coulomb": [0.02],
+            "viscous": [1e-3],
+        }).wheels  # fmt: skip
+        log = turning_log(paper_robot, 2.0)
+        demand = BaseDemand(BaseActuatorSettings()).add(log)
+        torque, momentum = OtherWheelLoad(wheels)._series(log, demand)
+        shares = np.linalg.pinv(wheels.unit_axes.T)
+        np.testing.assert_allclose(momentum - 0.5, demand.momentum @ shares.T, atol=1e-12)
+        given = np.gradient(momentum, PERIOD, axis=0)
+        friction = 0.02 * np.sign(momentum) + 1e-3 * momentum / 0.1
+        inside = slice(2, -2)
+        np.testing.assert_allclose((torque - friction)[inside], given[inside], atol=3e-3)
+
+    def test_they_and_the_flown_ones_agree_on_a_base_that_stands(self, paper_robot: Robot) -> None:
+        wheels = hardware(wheels={"axes": flat(np.eye(3)), "rotor_inertia": [0.1]})
+        log = still_log(paper_robot, 101, wheels)
+        assert log.commanded_torque is not None
+        log.commanded_torque[:, 0] = 0.2
+        log.wheel_torques[1:, 0] = -0.2
+        log.wheel_velocities[:, 0] = -0.2 * log.time / 0.1
+        loads = WheelLoad(wheels.wheels), OtherWheelLoad(wheels.wheels)
+        for flown, load in zip((wheels, BaseActuatorSettings()), loads, strict=True):
+            load.add(log, BaseDemand(flown).add(log))
+        for one, other in zip(*(load.requirements(PERIOD) for load in loads), strict=True):
+            assert one.asked == pytest.approx(other.asked, abs=1e-12)
+
+
+class TestThrusters:
+    def test_pulses_and_propellant_by_axis(self, paper_robot: Robot) -> None:
+        thrusters = hardware(thrusters={**PAIRS, "propellant": 0.001})
+        log = still_log(paper_robot, 60, thrusters)
+        log.thrusts[5:15, 0] = log.thrusts[5:15, 1] = 2.0  # +z
+        log.thrusts[20:25, 2] = 2.0  # -z
+        log.thrusts[30, 2] = 1.0  # half a tick
+        log.thrusts[40:60, 10] = 2.0  # -y
+        report = analyze(log)
+        axes = report["sizing"]["axes"]
+        assert [axes[f"base_{i}"]["pulses"] for i in "xyz"] == [0, 1, 4]
+        rate = 2.0 / (200.0 * 9.80665) * PERIOD
+        used = [axes[f"base_{i}"]["propellant_kg"] for i in "xyz"]
+        assert used == [0.0, pytest.approx(20 * rate), pytest.approx(25.5 * rate)]
+        (tank,) = [r for r in report["sizing"]["requirements"] if r["quantity"] == "propellant"]
+        assert tank == {
+            "part": "thrusters", "quantity": "propellant", "unit": "kg", "has": 0.001,
+            "asked": pytest.approx(45.5 * rate), "margin": pytest.approx(1 - 45500 * rate),
+            "is_met": True,
+        }  # fmt: skip
+
+    @given(st.integers(0, 99), st.integers(1, 58))
+    def test_pulses_are_those_of_a_plain_loop(
+        self, paper_robot: Robot, seed: int, cut: int
+    ) -> None:
+        thrusters = hardware(thrusters=PAIRS)
+        log = still_log(paper_robot, 60, thrusters)
+        log.thrusts[:] = 2.0 * (np.random.default_rng(seed).random(log.thrusts.shape) < 0.5)
+        load, demand = ThrusterLoad(thrusters.thrusters, True), BaseDemand(thrusters)
+        for part in (log.rows(0, cut), log.rows(cut, 60)):
+            load.add(part, demand.add(part))
+        begun = [0, 0, 0]
+        for i in range(12):
+            for k in range(60):
+                if log.thrusts[k, i] and not (k and log.thrusts[k - 1, i]):
+                    begun[(2, 0, 1)[i // 4]] += 1
+        assert load.pulses().tolist() == begun
+
+    def test_of_others_the_least_is_known(self, paper_robot: Robot) -> None:
+        log = turning_log(paper_robot, 0.0)
+        found = analyze(log, ActuatorSet("pairs", hardware(thrusters=PAIRS)))["sizing"]
+        asked = {r["quantity"]: r for r in found["requirements"] if r["part"] == "thrusters"}
+        assert asked["share of their torque"]["asked"] == pytest.approx(0.5)
+        assert asked["propellant"]["asked"] == pytest.approx(2.0 * 1.0 / (200.0 * 9.80665))
+        assert found["axes"]["base_x"]["pulses"] is None
+        assert not found["flown"]
+
+    def test_of_others_beside_wheels_nothing_is_known(self, paper_robot: Robot) -> None:
+        both = hardware(thrusters=PAIRS, wheels={"axes": PYRAMID, "max_torque": [1.0]})
+        found = analyze(turning_log(paper_robot, 0.0), ActuatorSet("both", both))["sizing"]
+        assert {r["part"] for r in found["requirements"]} == {
+            "base_x", "base_y", "base_z", "wheel_1", "wheel_2", "wheel_3", "wheel_4",
+        }  # fmt: skip
+        assert found["axes"]["base_x"]["propellant_kg"] is None
+
+
+def test_at_its_limit_a_part_lacks_it() -> None:
+    def of(asked: float, has: float) -> tuple[bool, float | None]:
+        found = Requirement("a", "b", "c", asked, has)
+        return found.is_met, found.margin
+
+    assert of(1.0, 4.0) == (True, 0.75)
+    assert of(4.0, 4.0) == (False, 0.0)
+    assert not of(3.999, 4.0)[0]
+    assert of(3.99, 4.0)[0]
+    assert of(6.0, 4.0) == (False, -0.5)
+    assert of(0.0, 0.0) == (True, None)
+    assert of(9.0, np.inf) == (True, None)
+
+
+def test_of_a_free_base_nothing_was_asked(paper_robot: Robot) -> None:
+    report = analyze(still_log(paper_robot, 9, BaseActuatorSettings(base_actuation="none")))
+    assert report["sizing"] is None
+    assert report["unavailable"]["sizing"] == "the base floated freely: nothing was asked of it"
+
+
+def test_a_bag_whose_columns_are_others_has_none(paper_robot: Robot) -> None:
+    log = still_log(paper_robot, 9)
+    log.flight["base_actuators"] = hardware(wheels={"axes": PYRAMID}).model_dump()
+    why = analyze(log)["unavailable"]["sizing"]
+    assert "describes 4 wheels and 0 thrusters, and has the states of 0 and 0" in why
+
+
+def test_the_table_has_every_number_once(paper_robot: Robot) -> None:
+    report = analyze(turning_log(paper_robot, 0.0))
+    table = sizing_table(report)
+    assert table is not None
+    assert [group.name for group in table.groups] == ["base_x", "base_y", "base_z"]
+    assert [column.heading for column in table.columns] == ["", "unit", "asked"]
+    wheels = {"axes": flat(np.eye(3)), "max_torque": [1.0], "max_momentum": [3.0]}
+    report = analyze(turning_log(paper_robot, 0.0), ActuatorSet("w", hardware(wheels=wheels)))
+    table = sizing_table(report)
+    assert table is not None
+    texts = {(g.name, row[0]): row[2:] for g in table.groups for row in table.texts(g)}
+    assert texts["base_x", "peak torque"] == ["2", "1", "-100 % lacks it"]
+    assert texts["base_x", "stored momentum"] == ["2", "3", "+33 % has it"]
+    assert texts["wheel_1", "peak torque"] == ["2", "1", "-100 % lacks it"]
+    assert texts["wheel_2", "largest momentum"] == ["0", "3", "+100 % has it"]
+    assert len(texts) == 3 * 4 + 3 * 2

@@ -1,0 +1,249 @@
+"""Flights from Python: the command line's bits, objects in the place of names, ends as results."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner
+
+import space_robot
+from space_robot import FlownFlight, Scenario
+from space_robot.analysis import analyze
+from space_robot.cli.main import cli
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import simulate
+from space_robot_control.guidance.mission import MissionSettings
+from space_robot_control.laws import Signals, find_law
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.config.files import config_directory
+from space_robot_msgs_py.errors import DivergedError, InputError
+from space_robot_sim.environment.environment import EnvironmentSettings
+from space_robot_sim.environment.events import Capture, Release
+from space_robot_sim.environment.target import Target
+
+NAMED: dict[str, Any] = {
+    "controller": "tde_stc", "case": "3", "sensors": "fine", "actuators": "wheels", "seed": 3,
+    "duration": 0.1,
+}  # fmt: skip
+
+
+def file_of(name: str, node: str) -> dict[str, Any]:
+    content = yaml.safe_load((config_directory() / f"{name}.yaml").read_text())
+    found: dict[str, Any] = content[f"{node}_node"]["ros__parameters"]
+    return found
+
+
+def same_bits(one: FlightLog, other: FlightLog) -> bool:
+    pairs = [(one.columns, other.columns)]
+    if one.measured and other.measured:
+        pairs.append((one.measured.columns, other.measured.columns))
+    return all(a[key].tobytes() == b[key].tobytes() for a, b in pairs for key in a)
+
+
+@pytest.fixture(scope="module")
+def named() -> FlownFlight:
+    return Scenario(**NAMED).fly()
+
+
+@pytest.fixture(scope="module")
+def paper_mission() -> dict[str, Any]:
+    return file_of("missions/paper", "mission")
+
+
+def pd(signals: Signals) -> Any:
+    """Computed torque with the gains of the tuned set."""
+    u = signals.acceleration_desired + 1e4 * signals.error + 200.0 * signals.error_rate
+    return signals.nominal.inertia @ u + signals.nominal.bias
+
+
+def test_a_scenario_flies_the_plan_of_its_options(named: FlownFlight) -> None:
+    log = simulate(Flight(FlightPlan(**NAMED)))
+    assert same_bits(named.log, log)
+    assert named.outcome == "complete"
+    assert named.reason == ""
+    assert named.is_complete
+    assert named.check() is named
+    metrics = analyze(log)
+    assert named.metrics == {**metrics["rms"]["mean_axis"], **metrics}
+    assert named.metrics["attitude"] == metrics["rms"]["mean_axis"]["attitude"]
+    assert "tde_stc" in repr(named)
+    assert "<table>" in named._repr_html_()
+
+
+def test_its_report_is_what_the_command_prints(named: FlownFlight) -> None:
+    words = [f"--{key}={value}" for key, value in NAMED.items()]
+    result = CliRunner().invoke(cli, ["simulate", *words, "--json"], catch_exceptions=False)
+    assert json.loads(result.stdout) == json.loads(json.dumps(named.report()))
+
+
+def test_objects_in_the_place_of_names_fly_the_same_bits(
+    named: FlownFlight, paper_mission: dict[str, Any], tmp_path: Path
+) -> None:
+    """And a bag tells all of them."""
+    scenario = Scenario(
+        robot=Robot.from_yaml(config_directory() / "robots/paper.yaml"),
+        mission=MissionSettings(**paper_mission),
+        controller=find_law("tde_stc"),
+        gains=file_of("gains/paper/printed/tde_stc", "controller")["tde_stc"],
+        case=EnvironmentSettings(**file_of("cases/3", "plant")),
+        sensors=file_of("sensors/fine", "plant"),
+        actuators=file_of("actuators/wheels", "plant"),
+        seed=3, duration=0.1,
+    )  # fmt: skip
+    flight = scenario.fly(tmp_path / "bag")
+    assert same_bits(flight.log, named.log)
+    recorded = read_flight(tmp_path / "bag")
+    assert same_bits(recorded, named.log)
+    assert recorded.flight["case"] == recorded.flight["sensors"] == "given"
+    assert analyze(recorded)["rms"] == named.metrics["rms"]
+
+
+@pytest.mark.parametrize("own", [pd, type("Own", (find_law("ctc"),), {"name": "own"})])
+def test_robots_and_laws_of_nobody_fly(own: Any, paper_mission: dict[str, Any]) -> None:
+    robot = Robot.from_yaml(config_directory() / "robots/paper.yaml")
+    heavy = replace(robot, name="heavy", mass=1.1 * robot.mass)
+    gains = "default" if own is pd else {"k_p": 1e4, "k_d": [200.0]}
+    flight = Scenario(
+        robot=heavy, mission=paper_mission, controller=own, gains=gains, duration=0.1
+    ).fly()
+    assert flight.metrics["controller"] == own.__name__.lower()
+    assert flight.metrics["attitude"] < 1e-8
+    assert flight.log.flight["robot"] == "heavy"
+    assert Robot.from_dict(flight.log.flight["robot_file"]).mass[0] == heavy.mass[0]
+
+
+def test_events_as_objects(paper_mission: dict[str, Any], tmp_path: Path) -> None:
+    """In the options or in the mission, with a target that no file tells."""
+    capture = Capture(0.02, Target(name="debris", mass=20.0, inertia=[1.0, 1, 1, 0, 0, 0]))
+    given = [capture, Release(0.05)]
+    flight = Scenario(events=given, duration=0.1).fly(tmp_path / "bag")
+    assert flight.metrics["events"] == ["capture@0.02:debris", "release@0.05"]
+    mission = {**paper_mission, "events": given}
+    assert same_bits(Scenario(mission=mission, duration=0.1).fly().log, flight.log)
+    assert not same_bits(Scenario(duration=0.1).fly().log, flight.log)
+    assert read_flight(tmp_path / "bag").flight["events"] == [str(event) for event in given]
+
+
+def test_a_law_as_an_object_brings_gains_and_keeps_its_memory(named: FlownFlight) -> None:
+    kind = find_law("tde_stc")
+    section = file_of("gains/paper/printed/tde_stc", "controller")["tde_stc"]
+    gains = {name: np.broadcast_to(np.array(row), 9).copy() for name, row in section.items()}
+    law = kind(gains, 5e-4)
+    before = law.memory_block.copy()
+    assert same_bits(Scenario(**NAMED).replace(controller=law).fly().log, named.log)
+    assert law.memory_block == before
+    with pytest.raises(InputError, match="the flight has 9 and"):
+        Scenario(controller=law, period=0.001).check()
+
+
+def test_a_diverged_flight_is_a_result() -> None:
+    flight = Scenario(controller=lambda signals: np.full(9, 1e7), duration=0.1).fly()
+    assert flight.outcome == "diverged"
+    assert flight.reason == "the flight diverged at tick 2 (t = 0.0010 s): 1.69e+04 rad/s"
+    assert (flight.log.ticks, flight.ended_at_s) == (2, 0.001)
+    report = flight.report()
+    assert report["diverged"] == {"tick": 2, "time_s": 0.001}
+    assert (report["outcome"], report["planned_ticks"]) == ("diverged", 200)
+    assert "diverged" in repr(flight)
+    with pytest.raises(DivergedError):
+        flight.check()
+
+
+def test_a_flight_that_is_not_answered_is_a_result() -> None:
+    flight = Scenario(parameters={"plant": {"initial_quaternion": [0.0, 1, 0, 0]}}).fly()
+    assert flight.outcome == "unanswered"
+    assert (flight.log.ticks, flight.log.unanswered) == (1, 1)
+    assert flight.report()["diverged"] is None
+
+
+def test_metrics_without_a_log(named: FlownFlight, tmp_path: Path) -> None:
+    seen: list[float] = []
+    scenario = Scenario(**NAMED)
+    flight = scenario.fly(tmp_path / "bag", progress=seen.append, keep_log=False)
+    assert flight.report() == named.report()
+    assert seen[-1] == 0.1
+    with pytest.raises(InputError, match="no log was kept"):
+        _ = flight.log
+    assert same_bits(read_flight(tmp_path / "bag"), named.log)
+
+
+def test_figures_are_drawn_one_by_one(named: FlownFlight, tmp_path: Path) -> None:
+    assert {"control_results", "pointing"} <= set(named.plots)
+    assert named.plot("control_results", tmp_path / "all").axes
+    assert {file.name for file in tmp_path.iterdir()} == {"all.png", "all.svg"}
+    with pytest.raises(InputError, match="unknown figure 'control'"):
+        named.plot("control")
+
+
+def test_scenarios_are_values() -> None:
+    scenario = Scenario(case="2", friction=False)
+    other = scenario.replace(case=4, seed=7)
+    assert scenario.given == {"case": "2", "friction": False}
+    assert other.given == {"case": "4", "friction": False, "seed": 7}
+    assert pickle.loads(pickle.dumps(other)) == other
+    assert repr(other) == "Scenario(case='4', friction=False, seed=7)"
+    assert set(space_robot.__all__) <= set(dir(space_robot))
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"controler": "ctc"}, "unknown option 'controler' of Scenario: did you mean controller"),
+        ({"realtime": True}, "unknown option 'realtime' of Scenario"),
+        ({"duration": -1.0}, "Scenario: duration: Input should be greater than 0, got -1.0"),
+        ({"robot": 3.5j}, "Scenario: robot: a name, a path or a Robot was expected"),
+        ({"controller": int}, "Scenario: controller: a name, a path or a ControlLaw (class or"),
+        ({"sensors": {"gyros": {}}}, "Scenario: sensors: numbers given: gyros: unknown key"),
+        ({"mission": {"waypoint_times": []}}, "mission: numbers given: waypoint_times"),
+        ({"gains": [1.0]}, "Scenario: gains: a name, a path or a mapping of gains"),
+        ({"gains": {"k_9": 1.0}}, "unknown gain of tde_stc 'k_9'"),
+        ({"gains": {"k_1": "much"}}, "tde_stc.k_1: numbers were expected, got ['much']"),
+        ({"robot": "papers"}, "unknown robot 'papers'"),
+        ({"controller": None}, "controller is None, so there is nothing to fly: use bench()"),
+        ({"controller": lambda signals: 0.0}, "9 numbers were expected, got an array of shape ()"),
+        ({"faults": ["kill_recorder@1"]}, "that needs the graph of nodes"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_flown_is_told_in_one_line(options: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError) as caught:
+        Scenario(**options).fly()
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_robot_without_files_needs_a_mission_and_gains(paper_mission: dict[str, Any]) -> None:
+    robot = Robot.from_yaml(config_directory() / "robots/paper.yaml")
+    own = replace(robot, name="mine")
+    with pytest.raises(InputError, match="no mission of its own: give one"):
+        Scenario(robot=own).check()
+    with pytest.raises(InputError, match="no gains of its own: give some"):
+        Scenario(robot=own, mission=paper_mission).check()
+
+
+def test_a_flight_is_a_table_a_row_a_tick() -> None:
+    pytest.importorskip("pandas")
+    flight = Scenario(duration=0.01).fly()
+    assert len(flight.table) == flight.log.ticks == 20
+    assert [*flight.table["q_w"]] == [*flight.log.quaternion[:, 0]]
+
+
+def test_a_replay_has_the_options_of_the_command(tmp_path: Path) -> None:
+    pytest.importorskip("rclpy")
+    from space_robot import replay
+
+    with pytest.raises(InputError, match=r"option.* of replay.*controller, gains"):
+        replay(tmp_path, law="ctc")
+    with pytest.raises(InputError, match=str(tmp_path / "none")):
+        replay(str(tmp_path / "none"))

@@ -1,0 +1,274 @@
+"""What the runs of a campaign fly: keyed draws, designs, grids, robots that can be."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.stats import qmc, truncnorm
+
+from space_robot.api import Scenario
+from space_robot.campaign.draws import Draws
+from space_robot.campaign.draws.designs import shifted
+from space_robot.campaign.draws.principal import (
+    principal,
+    rotation,
+    spread,
+)
+from space_robot.campaign.study import Study
+from space_robot_model.robot import Robot
+from space_robot_model.robot.find import find_robot
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.errors import InputError
+
+VARY: dict[str, Any] = {
+    "robot.links[*].mass": {"normal": 1.0, "sigma": 0.3, "relative": True},
+    "robot.base.inertia": {"scale": 0.3, "rotate_deg": 10},
+    "robot.base.com[*]": {"uniform": [-0.05, 0.05], "offset": True},
+    "faults": {"torque_scale@0:all": {"uniform": [0.98, 1.02]}},
+    "mission.start_deg": {"uniform": [-2, 2], "offset": True},
+}
+OTHER = {"plant.friction.coulomb": {"uniform": [0.0, 0.05]}}
+
+
+def study(vary: dict[str, Any], **keys: Any) -> Study:
+    given = {"scenario": {"duration": 0.05}, "laws": ["ctc", "tde_stc"], "vary": vary, **keys}
+    return Study.model_validate(given)
+
+
+def numbers(draws: Draws) -> NDArray[np.float64]:
+    rows = [[float(v) for v in draws.values(run).values()] for run in range(draws.runs)]
+    return np.array(rows)
+
+
+def test_nothing_else_changes_a_draw() -> None:
+    reordered = {**OTHER, **dict(reversed(VARY.items()))}
+    few, many, other = (
+        Draws(study(vary), 7, runs, check=False)
+        for vary, runs in ((VARY, 5), (VARY, 500), (reordered, 50))
+    )
+    for run in range(5):
+        drawn = few.values(run)
+        assert drawn == many.values(run)
+        assert drawn.items() <= other.values(run).items()
+    assert few.values(3) != Draws(study(VARY), 8, 5, check=False).values(3)
+    assert pickle.loads(pickle.dumps(few)).values(4) == few.values(4)
+    with pytest.raises(InputError, match="runs 0 to 4"):
+        few.values(5)
+
+
+def test_all_laws_fly_the_same_robot_and_noise() -> None:
+    draws = Draws(study(VARY), 7, 5, check=False)
+    one, two = (draws.scenario(3, law) for law in ("ctc", "tde_stc"))
+    assert one.seed == two.seed != draws.scenario(2, "ctc").seed
+    assert np.array_equal(one.plant_robot.mass, two.plant_robot.mass)
+    assert (one.controller, two.controller) == ("ctc", "tde_stc")
+    flight, nominal = one.check(), find_robot("paper")
+    assert flight.controller_settings.robot == "paper"
+    values = draws.values(3)
+    factors = [values[f"robot.links[{name}].mass"] for name in nominal.joint_names]
+    assert flight.robot.mass[1:] == pytest.approx(nominal.mass[1:] * factors, rel=1e-15)
+    start = [values[f"mission.start_deg[{name}]"] for name in nominal.joint_names]
+    begins = flight.mission_settings.waypoints_deg[:6]
+    assert flight.plant_settings.initial_joints_deg == [
+        a + float(b) for a, b in zip(begins, start, strict=True)
+    ]
+    assert flight.faults == [f"torque_scale@0:all={values['faults.torque_scale@0:all']!r}"]
+    assert draws.nominal("ctc").given == {"duration": 0.05, "controller": "ctc"}
+
+
+def test_settings_and_gains_change_from_their_nominal_values() -> None:
+    vary = {
+        "plant.friction.viscous": {"choice": [2.0], "relative": True},
+        "controller.acceleration_filter_hz": 30.0,
+        "gains.h_bar[*]": {"choice": [1.5], "relative": True},
+        "scenario.case": {"choice": [3]},
+        "scenario.navigation": "filtered",
+    }
+    draws = Draws(study(vary), 0, 1)
+    flights = {law: draws.scenario(0, law).check() for law in draws.study.laws}
+    for law, flight in flights.items():
+        nominal = Scenario(case="3", controller=law, duration=0.05).check()
+        assert (
+            flight.plant_settings.friction.viscous == 2.0 * nominal.plant_settings.friction.viscous
+        )
+        assert flight.controller_settings.acceleration_filter_hz == 30.0
+        if law == "tde_stc":
+            assert flight.law.h_bar.tolist() == (1.5 * nominal.law.h_bar).tolist()
+        else:
+            assert flight.gains_used == nominal.gains_used
+    assert draws.values(0)["scenario.case"] == 3.0
+    assert draws.values(0)["scenario.navigation"] == "filtered"
+
+
+def test_faults_of_each_axis_and_times() -> None:
+    grid = {"faults": {"torque_scale@0:[*]": {"grid": [0.9, 1.0]}}}
+    assert Draws(study(grid), 0, 2**9, check=False).grid == {
+        f"faults.torque_scale@0:{axis}": 2
+        for axis in ("base_x", "base_y", "base_z", *(f"joint{k}" for k in range(1, 7)))
+    }
+    vary = {"faults": {
+        "torque_scale@0:[*]": {"uniform": [0.9, 1.1]},
+        "stuck_joint@T:joint1=5": {"uniform": [1, 9]},
+        "drop_state@2-3": {"uniform": [0, 0.5]},
+    }}  # fmt: skip
+    draws = Draws(study(vary), 0, 1)
+    assert draws.names[0] == "faults.torque_scale@0:base_x"
+    faults = draws.scenario(0, "ctc").faults
+    assert len(faults) == 11
+    values = draws.values(0)
+    assert faults[9] == f"stuck_joint@{values['faults.stuck_joint@T:joint1=5']!r}:joint1=5"
+    assert faults[10] == f"drop_state@2-3:{values['faults.drop_state@2-3']!r}"
+
+
+def test_a_grid_is_flown_point_by_point_under_the_same_draws() -> None:
+    vary = {**OTHER, "scenario.case": {"grid": [1, 3]}, "scenario.substeps": {"grid": [1, 2, 3]}}
+    draws = Draws(study(vary), 0, 12)
+    rows = [draws.values(run) for run in range(12)]
+    points = [(row["scenario.case"], row["scenario.substeps"]) for row in rows]
+    assert draws.grid == {"scenario.case": 2, "scenario.substeps": 3}
+    assert points == 2 * [(case, steps) for case in (1, 3) for steps in (1, 2, 3)]
+    name = "plant.friction.coulomb"
+    assert [len({row[name] for row in part}) for part in (rows[:6], rows[6:], rows)] == [1, 1, 2]
+    assert len({draws.scenario(run, "ctc").seed for run in range(6)}) == 1
+    assert draws.scenario(5, "ctc").substeps == 3
+
+
+def test_a_latin_hypercube_has_one_number_in_every_stratum_each_in_its_own_order() -> None:
+    draws = Draws(study(VARY, design="latin_hypercube"), 3, 40, check=False)
+    scaled = (numbers(draws)[:, -6:] + 2.0) / 4.0 * 40
+    strata = scaled.astype(int)
+    assert np.array_equal(np.sort(strata, axis=0), np.tile(np.arange(40)[:, None], 6))
+    for other in (strata, scaled - strata):  # places of the strata, and within them
+        correlation = np.corrcoef(other.T) - np.eye(6)
+        assert np.abs(correlation).max() < 0.55  # 3.4 sigma of 40
+    again = Draws(study(VARY, design="latin_hypercube"), 4, 40, check=False)
+    assert not np.any(numbers(again)[:, -6:] == numbers(draws)[:, -6:])
+    assert draws.needs_all_runs
+
+
+def test_sobol_points_are_scipys_with_their_bits_shifted() -> None:
+    """Whatever the block of points and the variable: the shift alone is ours."""
+    count, indices = 4096, [0, 1, 2, 1022, 1023, 1024, 1025, 2047, 2048, 3071, 3072, 4095]
+    for dimension in (0, 1, 15, 16, 40):
+        sequence = qmc.Sobol(dimension + 1, scramble=False, bits=30)
+        expected = (sequence.random(count)[:, dimension] * 2**30).astype(np.int64)
+        ours = [int(shifted(3, "x", index, dimension) * 2**30) for index in indices]
+        differences = {a ^ int(expected[i]) for a, i in zip(ours, indices, strict=True)}
+        assert len(differences) == 1
+    points = np.array(
+        [[shifted(3, name, i, k) for k, name in enumerate("abc")] for i in range(count)]
+    )
+    assert len(np.unique(points, axis=0)) == count
+    strata = np.sort((points * count).astype(int), axis=0)
+    assert np.array_equal(strata, np.tile(np.arange(count)[:, None], 3))
+    assert len({shifted(3, name, 0, 0) for name in "abcdef"}) == 6
+
+
+def test_a_longer_sobol_campaign_has_the_same_points() -> None:
+    vary = {"mission.start_deg": {"uniform": [0, 1]}}
+    draws = Draws(study(vary, design="sobol"), 3, 256, check=False)
+    assert qmc.discrepancy(numbers(draws)) < 2e-3
+    longer = Draws(study({**vary, **OTHER}, design="sobol"), 3, 1500, check=False)
+    shorter = Draws(study(vary, design="sobol"), 3, 1200, check=False)
+    assert shorter.values(1100).items() <= longer.values(1100).items()
+    assert not longer.needs_all_runs
+
+
+def test_saltellis_rows_take_one_variable_from_the_other_point() -> None:
+    vary = {"mission.start_deg": {"uniform": [0, 1]}}
+    draws = Draws(study(vary, design="saltelli"), 3, 8 * 64, check=False)
+    assert draws.blocks is not None
+    assert draws.blocks.rows == 64
+    table = numbers(draws).reshape(64, 8, 6)
+    a, b = table[:, 0], table[:, -1]
+    assert not np.any(a == b)
+    for variable in range(6):
+        expected = a.copy()
+        expected[:, variable] = b[:, variable]
+        assert np.array_equal(table[:, 1 + variable], expected)
+    assert qmc.discrepancy(np.hstack([a, b])) < 0.1
+    seeds = [draws.scenario(run, "ctc").seed for run in range(8)]
+    assert len(set(seeds[:7])) == 1
+    assert seeds[7] != seeds[0]
+
+
+def test_what_must_stay_positive_is_a_truncated_normal() -> None:
+    """Relative, absolute or an offset: a hundredth of the nominal mass is left at least."""
+    nominal, u = float(find_robot("paper").mass[1]), [0.001, 0.02, 0.5, 0.97]
+    for told, mean, sigma, least in (
+        ({"normal": 0.5, "sigma": 0.5, "relative": True}, 0.5, 0.5, 0.01),
+        ({"normal": 10.0, "sigma": 15.0}, 10.0, 15.0, 0.01 * nominal),
+        ({"normal": -5.0, "sigma": 10.0, "offset": True}, -5.0, 10.0, -0.99 * nominal),
+    ):
+        vary = {"robot.links[1].mass": told}
+        (variable,) = Draws(study(vary), 0, 1, check=False)._variables
+        expected = truncnorm((least - mean) / sigma, np.inf, mean, sigma).ppf(u)
+        assert [variable.distribution.quantile(x) for x in u] == pytest.approx(expected, rel=1e-6)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**30), st.sampled_from(["paper", "flexible_panels", "dual_arm"]))
+def test_every_robot_that_is_drawn_can_be(seed: int, name: str) -> None:
+    vary = {
+        "robot.links[*].mass": {"normal": 1.0, "sigma": 0.5, "relative": True},
+        "robot.base.mass": {"normal": 1.0, "sigma": 0.5, "relative": True},
+        "robot.links[*].inertia": {"scale": 1.0, "rotate_deg": 30},
+        "robot.base.inertia": {"normal": 1.0, "sigma": 0.5, "relative": True},
+        "robot.links[*].com[*]": {"normal": 0.0, "sigma": 0.1, "offset": True},
+        "robot.base.com[*]": {"normal": 0.0, "sigma": 0.1, "offset": True},
+    }
+    draws = DRAWS.setdefault(
+        name, Draws(study(vary, scenario={"robot": name, "duration": 0.1}), 0, 2**31, check=False)
+    )
+    robot = draws.scenario(seed, "ctc").plant_robot
+    assert np.all(robot.mass > 0.0)
+    moments = np.linalg.eigvalsh(robot.inertia)
+    assert np.all(moments > 0.0)
+    assert np.all(moments[:, 2] <= moments[:, :2].sum(axis=1) * (1.0 + 1e-9))
+    assert not robot.com[0].any()
+    again = Robot.from_dict(robot.content)
+    for field in ("mass", "inertia", "com", "offset", "rotation"):
+        assert np.array_equal(getattr(again, field), getattr(robot, field)), field
+
+
+DRAWS: dict[str, Draws] = {}
+
+
+@settings(max_examples=50)
+@given(
+    st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6),
+    st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3),
+)
+def test_principal_axes_are_numpys(six: list[float], turn: list[float]) -> None:
+    xx, yy, zz, xy, xz, yz = six
+    tensor = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+    moments, axes = principal(tensor)
+    assert moments == pytest.approx(np.linalg.eigvalsh(tensor), abs=1e-14)
+    assert np.array(axes) @ np.diag(moments) @ np.array(axes).T == pytest.approx(
+        np.array(tensor), abs=1e-14
+    )
+    r = np.array(rotation(turn))
+    assert r @ r.T == pytest.approx(np.eye(3), abs=1e-15)
+    body = np.diag([2.0, 3.0, 4.0]).tolist()
+    turned = np.array(spread(body, [1.0, 1.0, 1.0], turn))
+    assert turned == pytest.approx(r @ np.diag([2.0, 3.0, 4.0]) @ r.T, abs=1e-13)
+
+
+def test_a_bag_tells_the_robot_that_flew_exactly(tmp_path: Path) -> None:
+    """The plant's of its own numbers, the controller's by its file; flown again, the same bits."""
+    draws = Draws(study(VARY), 7, 5, check=False)
+    scenario = draws.scenario(2, "ctc")
+    flown = scenario.fly(bag=tmp_path / "bag")
+    told = read_flight(tmp_path / "bag").flight
+    assert told["controller_robot"] == "paper"
+    robot = Robot.from_dict(told["robot_file"])
+    again = scenario.replace(plant_robot=robot).fly()
+    assert again.log.applied_torque.tobytes() == flown.log.applied_torque.tobytes()
+    assert again.log.omega_base.tobytes() == flown.log.omega_base.tobytes()

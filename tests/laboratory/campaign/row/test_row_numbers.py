@@ -1,0 +1,184 @@
+"""The numbers of a row against the whole log of the same flight, computed in one go."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from space_robot import FlownFlight, Scenario
+from space_robot.analysis import tracking_error
+from space_robot.campaign.row.bands import Bands
+from space_robot.campaign.row.columns import (
+    Columns,
+    missing_for_ripple,
+)
+from space_robot.campaign.row.measure import (
+    Measure,
+    check_requirements,
+)
+from space_robot.campaign.row.window import (
+    Window,
+    WindowMetrics,
+)
+from space_robot.campaign.study import Requirement
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import Timebase
+
+REQUIRE = {
+    "late": Requirement.model_validate(
+        {"metric": "attitude_max", "from_s": 0.6, "below": 1.0, "in": 0.9}
+    ),
+    "early": Requirement.model_validate(
+        {"metric": "torque_4_6_rms", "to_s": 0.25, "below": 1.0, "in": 0.9}
+    ),
+    "whole": Requirement.model_validate({"metric": "joints_1_3_max", "below": 1.0, "in": 0.9}),
+}
+
+
+@pytest.fixture(scope="module")
+def flown() -> FlownFlight:
+    return Scenario(case="3", sensors="fine", duration=1.2).fly()
+
+
+@pytest.fixture(scope="module", params=[2400, 700])
+def measured(flown: FlownFlight, request: pytest.FixtureRequest) -> Measure:
+    """In one block, and in blocks of 700 ticks."""
+    measure = Measure(flown.flight, REQUIRE)
+    for start in range(0, 2400, request.param):
+        measure.add(flown.log.rows(start, min(start + request.param, 2400)))
+    return measure
+
+
+def test_rms_and_ripple_are_those_of_the_report(flown: FlownFlight, measured: Measure) -> None:
+    found, report = measured.metrics(), flown.metrics
+    expected = {f"{name}_rms": value for name, value in report["rms"]["mean_axis"].items()}
+    for prefix, bands in (("ripple", report["ripple"]), ("fast_ripple", report["ripple"]["fast"])):
+        expected |= {f"{prefix}_{name}": value for name, value in bands["rms"].items()}
+    assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-9)
+    assert list(found) == list(Columns.of_log(flown.log).metrics)
+
+
+def test_maxima_are_norms_of_the_base_and_largest_values_of_joints(
+    flown: FlownFlight, measured: Measure
+) -> None:
+    log, error = flown.log, tracking_error(flown.log)
+    found = measured.metrics()
+    assert found["attitude_max"] == pytest.approx(np.linalg.norm(error[:, :3], axis=1).max())
+    norms = np.linalg.norm(log.applied_torque[:, :3], axis=1)
+    assert found["base_torque_max"] == pytest.approx(norms.max())
+    assert found["joints_4_6_max"] == np.abs(error[:, 6:]).max()
+
+
+def test_requirements_are_measured_in_their_windows(flown: FlownFlight, measured: Measure) -> None:
+    log, error = flown.log, tracking_error(flown.log)
+    found = measured.require()
+    late, early = log.time >= 0.6 - 1e-9, log.time <= 0.25 + 1e-9
+    assert found["late"] == pytest.approx(np.linalg.norm(error[late, :3], axis=1).max())
+    torque = log.applied_torque[early, 6:]
+    assert found["early"] == pytest.approx(np.sqrt((torque**2).mean(axis=0)).mean())
+    assert found["whole"] == np.abs(error[:, 3:6]).max()
+
+
+def test_bands_hold_the_largest_of_each_bin(flown: FlownFlight, measured: Measure) -> None:
+    norms = np.linalg.norm(tracking_error(flown.log)[:, :3], axis=1)
+    expected = norms.reshape(100, 24).max(axis=1)
+    np.testing.assert_allclose(measured.bands()["attitude"], expected, rtol=1e-6)
+
+
+@given(
+    st.integers(1, 350).flatmap(
+        lambda n: st.tuples(st.just(n), st.lists(st.integers(0, n), max_size=4))
+    )
+)
+def test_bins_do_not_depend_on_blocks(case: tuple[int, list[int]]) -> None:
+    ticks, cuts = case
+    sizes = np.random.default_rng(ticks).random(ticks)
+    bands, edges = Bands(ticks), [0, *sorted(cuts), ticks]
+    for start, stop in pairwise(edges):
+        bands.add(start, {"x": sizes[start:stop]})
+    count = min(100, ticks)
+    starts = [k * ticks // count for k in range(count + 1)]
+    expected = [sizes[a:b].max() for a, b in pairwise(starts)]
+    np.testing.assert_array_equal(bands.result()["x"], np.float32(expected))
+
+
+@pytest.mark.parametrize(
+    ("demand", "said"),
+    [
+        ({"metric": "attitude_mx"}, "my.yaml: require.p.metric: choose one of attitude_rms"),
+        ({"metric": "attitude_max", "from_s": 1.2}, "from_s: must be before the end .*1.2 s"),
+        (
+            {"metric": "joints_1_3_rms", "from_s": 0.3001, "to_s": 0.3004},
+            r"my.yaml: require.p.to_s: no tick is from 0.3001 to 0.3004 s",
+        ),
+        (
+            {"metric": "ripple_base_torque", "from_s": 0.5},
+            "my.yaml: require.p.metric: ripple_base_torque needs 1 s of flight, there are 0.7 s",
+        ),
+        (
+            {"metric": "fast_ripple_base_torque", "to_s": 0.9},
+            "my.yaml: require.p.metric: fast_ripple_base_torque needs 1 s of flight",
+        ),
+    ],
+)
+def test_what_no_flight_has_cannot_be_required(
+    flown: FlownFlight, demand: dict[str, object], said: str
+) -> None:
+    require = {"p": Requirement.model_validate({**demand, "below": 1.0, "in": 0.9})}
+    with pytest.raises(InputError, match=said):
+        check_requirements(flown.flight, require, "my.yaml")
+
+
+@given(
+    st.integers(1, 3000), st.floats(0.0, 2.0), st.none() | st.floats(0.0, 2.0),
+    st.sampled_from([0.0005, 0.001, 0.0125]), st.lists(st.integers(1, 3000), max_size=3),
+)  # fmt: skip
+def test_the_ticks_of_a_window_are_those_of_its_rows(
+    ticks: int, from_s: float, to_s: float | None, period: float, cuts: list[int]
+) -> None:
+    """Counted before the flight and cut from the blocks of its log."""
+
+    class Block:
+        def __init__(self, first: int, stop: int) -> None:
+            self.first_tick, self.ticks = first, stop - first
+            self.timebase = SimpleNamespace(period=period)
+
+    window = Window(from_s, to_s)
+    edges = sorted({0, ticks, *(cut for cut in cuts if cut < ticks)})
+    rows: list[int] = []
+    for first, stop in pairwise(edges):
+        own = window.rows(Block(first, stop))  # type: ignore[arg-type]
+        rows += range(first, stop)[own]
+    time = np.arange(ticks) * period
+    end = np.inf if to_s is None else to_s
+    slack = 2e-6 * period
+    sure = np.flatnonzero((time >= from_s + slack) & (time <= end - slack))
+    possible = np.flatnonzero((time >= from_s - slack) & (time <= end + slack))
+    assert rows == list(window.ticks(ticks, period))
+    assert set(sure.tolist()) <= set(rows) <= set(possible.tolist())
+
+
+@pytest.mark.parametrize(
+    ("period", "ticks", "missing"),
+    [(0.0005, 2000, set()), (0.0005, 1999, {"ripple", "fast_ripple"}), (0.02, 80, {"fast_ripple"})],
+)
+def test_ripple_is_measured_exactly_where_it_is_said_to_be(
+    flown: FlownFlight, period: float, ticks: int, missing: set[str]
+) -> None:
+    """A second of flight; above 25 Hz, ticks less than 20 ms apart."""
+    log = replace(flown.log.rows(0, ticks), timebase=Timebase(round(period * 1e9)))
+    columns = Columns.of_flight(flown.flight)
+    window = WindowMetrics(Window(), columns.metrics, columns)
+    error = tracking_error(log)
+    window.add(log, error, columns.sizes(log, error), flown.flight.robot)
+    found = window.result()
+    for kind in ("ripple", "fast_ripple"):
+        name = f"{kind}_base_torque"
+        assert (name not in found) == (kind in missing)
+        assert bool(missing_for_ripple(name, ticks, period)) == (kind in missing)

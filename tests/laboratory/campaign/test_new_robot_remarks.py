@@ -1,0 +1,106 @@
+"""What `new` says of a robot: hinges that may be passive, groups of joints, weak laws."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from space_robot.analysis.metrics import axis_groups
+from space_robot.campaign.new_robot.hinges import (
+    DAMPING_RATIO,
+    FREQUENCY_HZ,
+    hinge_remark,
+)
+from space_robot.tuning.method import (
+    Tuned,
+    Wishes,
+)
+from space_robot.tuning.warning import estimate_remark
+from space_robot_model.robot import Robot
+from space_robot_model.robot.find import (
+    find_robot,
+    robot_names,
+)
+
+LINK = """<link name="{0}"><inertial><origin xyz="{1} 0 0"/><mass value="{2}"/>
+<inertia ixx="0.1" iyy="0.2" izz="{3}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+JOINT = """<joint name="{0}" type="{3}"><parent link="{1}"/><child link="{2}"/>
+<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="9" velocity="1"/></joint>"""
+
+
+def satellite(tmp_path: Path, panel: str = "revolute") -> Robot:
+    """A base with an arm of two joints between two panels, each 3 kg at 0.5 m of its hinge."""
+    links = [("bus", 0, 100, 0.25), ("upper", 0.2, 5, 0.25), ("fore", 0.2, 5, 0.25)]
+    links += [("left", 0.5, 3, 0.25), ("right", 0.5, 3, 0.25)]
+    joints = [
+        ("left_hinge", "bus", "left", panel), ("a", "bus", "upper", "revolute"),
+        ("b", "upper", "fore", "revolute"), ("right_hinge", "bus", "right", panel),
+    ]  # fmt: skip
+    text = "".join(LINK.format(*x) for x in links) + "".join(JOINT.format(*x) for x in joints)
+    file = tmp_path / "satellite.urdf"
+    file.write_text(f'<robot name="satellite">{text}</robot>')
+    return Robot.from_urdf(file)
+
+
+def test_panels_on_hinges_are_proposed_as_passive_joints(tmp_path: Path) -> None:
+    """The proposal is read as it stands, and its springs swing as they are said to."""
+    robot = satellite(tmp_path)
+    remark = hinge_remark(robot)
+    proposed = yaml.safe_load(remark.split("`")[3])["passive"]
+    assert list(proposed) == ["left_hinge", "right_hinge"]
+    (tmp_path / "robot.yaml").write_text(
+        yaml.safe_dump({"robot": {"urdf": "satellite.urdf", "passive": proposed}})
+    )
+    passive = Robot.from_yaml(tmp_path / "robot.yaml")
+    assert (passive.joint_names, set(passive.passive_names)) == (("a", "b"), set(proposed))
+    inertia = 0.25 + 3.0 * 0.5**2  # about the hinge
+    for spring in proposed.values():
+        rate = math.sqrt(spring["stiffness"] / inertia)
+        assert rate / (2.0 * math.pi) == pytest.approx(FREQUENCY_HZ, rel=0.03)
+        ratio = spring["damping"] / (2.0 * inertia * rate)
+        assert ratio == pytest.approx(DAMPING_RATIO, rel=0.05)
+    assert hinge_remark(passive) == ""
+
+
+def test_what_is_no_hinge_is_not_proposed(tmp_path: Path) -> None:
+    assert hinge_remark(satellite(tmp_path, "prismatic")) == ""
+    assert [name for name in robot_names() if hinge_remark(find_robot(name))] == []
+
+
+def test_branches_are_counted_in_the_order_of_the_joints(tmp_path: Path) -> None:
+    assert satellite(tmp_path).branches == (1, 2, 1)
+    counts = {name: find_robot(name).branches for name in robot_names()}
+    assert counts["dual_arm"] == (4, 4)
+    assert counts["paper"] == (6,)
+    assert counts["flexible_panels"] == (3,)  # the panels have no motors
+
+
+@given(st.lists(st.integers(1, 9), min_size=2, max_size=6))
+def test_joints_are_grouped_by_branch(branches: list[int]) -> None:
+    """Each group has the joints of one branch, and its name tells their numbers."""
+    n = sum(branches)
+    groups = axis_groups(n, True, (), branches)
+    axes = [np.arange(n + 3)[index].tolist() for index in groups.values()]
+    assert [axis for group in axes for axis in group] == list(range(n + 3))
+    assert [len(group) for group in axes] == [3, *branches]
+    for name, group in list(zip(groups, axes, strict=True))[1:]:
+        first, last = group[0] - 2, group[-1] - 2
+        assert name == (f"{first}_{last}" if last > first else f"{first}")
+    assert all(before[-1] + 1 == after[0] for before, after in pairwise(axes))
+    assert list(axis_groups(n)) == ["base", f"1_{min(n, 3)}", *([f"4_{n}"] if n > 3 else [])]
+
+
+@pytest.mark.parametrize(("slower", "is_told"), [(1.01, False), (9.9, False), (10.1, True)])
+def test_weak_gains_are_told_with_their_reason(slower: float, is_told: bool) -> None:
+    tuned = Tuned(Wishes(0.05, 0.2), 1.0, 0.0123, 5.0, 5.0 * slower, 0.06, 120.0, np.ones(9), {})
+    remark = estimate_remark(tuned)
+    assert bool(remark) == is_told
+    if is_told:
+        assert all(number in remark for number in ("0.06 to 120", "12.3 ms", "5 rad/s"))

@@ -1,0 +1,124 @@
+"""``space-robot soak`` on the real graph: a few short flights, and what is told of them."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+from flights import COMMAND, ros_environment, space_robot, space_robot_here
+
+from space_robot.campaign.soak import sample_flight
+from space_robot_msgs_py.bag.reader import read_flight
+
+pytest.importorskip("rclpy")
+pytestmark = pytest.mark.ros
+
+SEED, DURATION_S = 3, 0.5
+
+
+@pytest.fixture(scope="module")
+def bags(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("soak") / "bags"
+
+
+@pytest.fixture(scope="module")
+def report(bags: Path) -> dict[str, Any]:
+    file = bags.with_name("soak.json")
+    result = space_robot(
+        "soak", "--minutes", "0.12", "--seed", str(SEED), "--duration", str(DURATION_S),
+        "--bags", str(bags), "--json", "--output", str(file),
+    )  # fmt: skip
+    found: dict[str, Any] = json.loads(result.stdout)
+    assert result.returncode == (0 if found["survived"] == found["flights"] else 1), result.stderr
+    assert json.loads(file.read_text("utf-8")) == found
+    lines = [line for line in result.stderr.splitlines() if ", case " in line]
+    assert len(lines) == found["flights"]
+    return found
+
+
+def test_the_flights_are_those_of_the_seed(report: dict[str, Any]) -> None:
+    assert report["seed"] == SEED
+    for number, flown in enumerate(report["each"], start=1):
+        plan = sample_flight(SEED, number, DURATION_S)
+        assert flown["number"] == number
+        for key in ("controller", "case", "swaps", "faults", "seed"):
+            assert flown[key] == getattr(plan, key), key
+
+
+def test_the_table_adds_up(report: dict[str, Any]) -> None:
+    each = report["each"]
+    assert report["flights"] == len(each) > 0
+    assert report["survived"] == sum(not flown["wrong"] for flown in each)
+    assert not report["interrupted"]
+    assert report["faults"] == sum(len(flown["faults"]) for flown in each)
+    assert report["faults"] == sum(report["faults_by_kind"].values())
+    assert report["restarts"] == sum(flown["restarts"] for flown in each)
+    assert report["messages_lost"] == sum(flown["lost"] for flown in each)
+    for what in ("attitude", "joint"):
+        for name, breaks in (("tracking", False), ("disturbed", True)):
+            of = {
+                flown["number"]: flown[f"{what}_error"]
+                for flown in each
+                if flown["breaks_tracking"] == breaks
+            }
+            largest = report["largest_error"][name][what]
+            assert (largest is None) == (not of)
+            if largest:
+                assert largest["value"] == max(of.values()) == of[largest["flight"]]
+
+
+def test_nodes_are_weighed(report: dict[str, Any]) -> None:
+    for flown in report["each"]:
+        assert set(flown["memory_mb"]) == {"plant", "controller", "mission", "recorder"}
+        assert min(flown["memory_mb"].values()) > 10.0
+        assert flown["own_memory_mb"] > 10.0
+
+
+def test_bags_are_kept_where_that_is_wanted(report: dict[str, Any], bags: Path) -> None:
+    kept = [Path(flown["bag"]) for flown in report["each"]]
+    assert sorted(kept) == sorted(bags.iterdir())
+    assert read_flight(kept[0]).flight["faults"] == report["each"][0]["faults"]
+
+
+def test_ctrl_c_ends_with_the_table(tmp_path: Path) -> None:
+    file = tmp_path / "soak.json"
+    soak = subprocess.Popen(
+        [*COMMAND, "soak", "--duration", "1000", "--output", str(file)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
+    )  # fmt: skip
+    until = time.monotonic() + 60.0
+    while len(nodes := psutil.Process(soak.pid).children(recursive=True)) < 4:
+        assert time.monotonic() < until
+        time.sleep(0.1)
+    os.kill(soak.pid, signal.SIGINT)
+    output, errors = soak.communicate(timeout=60)
+    assert soak.returncode == 130, errors
+    assert errors.strip().splitlines()[-1] == "space-robot: stopped by SIGINT"
+    assert "interrupted" in output
+    assert "Traceback" not in errors
+    assert json.loads(file.read_text("utf-8"))["flights"] == 0
+    assert not any(node.is_running() for node in nodes)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--minutes", "0"), "--minutes"),
+        (("--seed", "-1"), "--seed"),
+        (("--duration", "0.1"), "--duration"),
+        (("--output", "/nowhere/soak.json"), "/nowhere/soak.json: cannot be written"),
+        (("--bags", "."), "is not empty"),
+    ],
+)
+def test_bad_input_is_said_in_a_line(options: tuple[str, ...], words: str) -> None:
+    result = space_robot_here("soak", *options)
+    assert result.returncode == 2
+    assert words in result.stderr.splitlines()[-1]
+    assert "Traceback" not in result.stderr

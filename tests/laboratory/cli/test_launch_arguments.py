@@ -1,0 +1,132 @@
+"""The arguments of launch/fly.launch.py: those of `fly`, and the same flight from them."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import click
+import pytest
+from paths import ROOT
+
+from space_robot.cli.fly import fly
+from space_robot.cli.launch_arguments import (
+    launch_arguments,
+    launched_flight,
+    refuse_unknown,
+)
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot_msgs_py.errors import InputError
+
+LAUNCH = sorted((ROOT / "launch").glob("*.launch.py"))
+ONLY_OF_FLY = {"json", "composed", "restart_controller", "domain"}
+
+
+def names(option: click.Option) -> set[str]:
+    return {text.lstrip("-").replace("-", "_") for text in option.opts}
+
+
+def test_each_option_of_fly_is_an_argument() -> None:
+    options = [option for option in fly.params if isinstance(option, click.Option)]
+    arguments = {argument.name: argument for argument in launch_arguments()}
+    of_fly = set().union(*(names(option) for option in options))
+    assert set(arguments) - of_fly == {"params_file"}
+    assert of_fly - set(arguments) == ONLY_OF_FLY
+    for option in options:
+        if (name := next(iter(names(option)))) in arguments:
+            said = arguments[name].description
+            assert said.startswith((option.help or "")[:20])
+            if isinstance(option.type, click.Choice):
+                assert arguments[name].choices == ("", *option.type.choices)
+
+
+def test_the_flight_is_the_one_of_the_command(tmp_path: Path) -> None:
+    flight, bag = launched_flight({
+        "controller": "tde_tsmc", "case": "4-2", "command_latency_ticks": "2", "friction": "false",
+        "realtime": "true", "namespace": "sat1", "swap": "1:ctc 2:tde_smc", "duration": "3",
+        "fault": "", "bag": str(tmp_path / "bag"),
+    })  # fmt: skip
+    plan = FlightPlan(
+        controller="tde_tsmc", case="4-2", command_latency_ticks=2, friction=False, realtime=True,
+        namespace="/sat1", swaps=["1:ctc", "2:tde_smc"], duration=3.0,
+    )  # fmt: skip
+    assert flight.plan == plan
+    assert bag == tmp_path / "bag"
+
+
+def test_nothing_given_is_the_flight_without_options() -> None:
+    given = {argument.name: "" for argument in launch_arguments()}
+    assert launched_flight(given).flight.plan == FlightPlan()
+
+
+def test_a_parameter_file_goes_over_the_arguments_and_into_the_bag(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(
+        "plant_node: {ros__parameters: {hold_ticks: 40, friction: {viscous: 0.0}}}\n"
+        "/**/controller_node: {ros__parameters: {controller: ctc, ctc: {k_d: [7.0]}}}\n"
+    )
+    flight = launched_flight({"params_file": str(file), "controller": "tde_smc"}).flight
+    assert flight.plant_settings.hold_ticks == 40
+    told = flight.description
+    assert told["parameters"]["plant"]["friction.viscous"] == 0.0
+    assert (told["controller"], told["gains_used"]["k_d"]) == ("ctc", [7.0] * 9)
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"controller": "pid"}, "unknown controller 'pid'"),
+        ({"navigation": "sideways"}, "'sideways' is not one of"),
+        ({"duration": "long"}, "'long' is not a valid float"),
+        ({"duration": "-1"}, "duration"),
+        ({"fault": "kill_controller@1"}, "needs `space-robot fly`"),
+        ({"params_file": "/no/file.yaml"}, "/no/file.yaml"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_line(values: dict[str, str], said: str) -> None:
+    with pytest.raises(InputError, match=re.escape(said)) as refused:
+        launched_flight(values)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("file", LAUNCH, ids=lambda path: path.name)
+def test_launch_files_are_python_with_the_function_that_launch_calls(file: Path) -> None:
+    tree = ast.parse(file.read_text("utf-8"), str(file))
+    functions = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    assert "generate_launch_description" in functions
+
+
+def test_a_launched_flight_is_checked_like_any_other() -> None:
+    """By `Flight`, which needs no files but the package's."""
+    assert isinstance(launched_flight({}).flight, Flight)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["kase:=1"], "fly.launch.py: unknown argument 'kase': did you mean case?"),
+        (["case:=1", "zzz:="], "unknown argument 'zzz': --show-args"),
+        (["case:=kase:=1", "--noninteractive"], ""),
+        ([], ""),
+    ],
+)
+@pytest.mark.parametrize(
+    "command", [["ros2", "launch", "space_robot", "fly.launch.py"], ["-c", "/x/fly.launch.py"]]
+)
+def test_an_argument_that_launch_would_let_pass_is_refused(
+    command: list[str], words: list[str], said: str
+) -> None:
+    names = [argument.name for argument in launch_arguments()]
+    if not said:
+        refuse_unknown([*command, *words], "/y/fly.launch.py", names)
+        return
+    with pytest.raises(InputError, match=re.escape(said)):
+        refuse_unknown([*command, *words], "/y/fly.launch.py", names)
+
+
+def test_arguments_of_a_launch_file_that_includes_ours_are_its_own() -> None:
+    refuse_unknown(["ros2", "launch", "mine.launch.py", "kase:=1"], "/y/fly.launch.py", ["case"])

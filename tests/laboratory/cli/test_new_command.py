@@ -1,0 +1,130 @@
+"""``space-robot new``: a robot's file becomes a folder that flies, or nothing at all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner, Result
+from paths import CONFIG, DATA
+
+from space_robot.campaign.new_robot import robot_texts
+from space_robot.campaign.new_robot.motion import (
+    mission_text,
+    rest_to_rest,
+)
+from space_robot.cli.main import cli
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import simulate
+from space_robot_control.guidance.mission import Mission
+from space_robot_control.laws import laws
+from space_robot_model.robot import Robot
+from space_robot_model.robot.find import find_robot
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import DivergedError, InputError, SpaceRobotError
+
+FILE = str(CONFIG / "robots/ets_vii.yaml")
+ARM = DATA / "arm.urdf"
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def new(*arguments: str) -> Result:
+    return CliRunner().invoke(cli, ["new", *arguments])
+
+
+def test_a_file_becomes_a_folder_that_flies(tmp_path: Path) -> None:
+    result = new(FILE, "--out", "mine", "--json")
+    assert result.exit_code == 0, result.exception
+    assert "made mine/: `space-robot fly --robot mine/` flies it" in result.stderr
+    report = json.loads(result.stdout)
+    assert list(report["laws"]) == sorted(laws())
+    for law in report["laws"].values():
+        assert law["rms"]["attitude"] < 1e-6
+    assert [entry.name for entry in tmp_path.iterdir()] == ["mine"]
+    log = simulate(Flight(FlightPlan(robot="mine", controller="ctc", duration=0.01)))
+    assert log.flight["mission"] == "mine"
+    assert isinstance(new(FILE, "--out", "mine").exception, InputError), "it is there"
+
+
+def test_a_law_that_cannot_fly_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def blocks(flight: Flight) -> Iterator[FlightLog]:
+        if flight.controller.law.name == "tde_smc":
+            raise DivergedError(7, 0.0005, "too fast")
+        yield simulate(Flight(FlightPlan(robot=FILE, duration=0.01)))
+
+    monkeypatch.setattr("space_robot.campaign.new_robot.make.fly_blocks", blocks)
+    result = new(FILE)
+    assert isinstance(result.exception, SpaceRobotError)
+    assert "tde_smc: the flight diverged at tick 7" in str(result.exception)
+    assert result.exception.exit_code == 1
+    assert "ended" in result.stdout
+    assert Path("ets_vii/gains/tuned/tde_smc.yaml").is_file()
+
+
+def test_what_was_there_is_replaced_if_told_so_and_kept_if_anything_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(flight: Flight) -> Iterator[FlightLog]:
+        raise KeyboardInterrupt
+
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    (mine / "robot.yaml").write_text("old")
+    monkeypatch.setattr("space_robot.campaign.new_robot.make.fly_blocks", fail)
+    CliRunner().invoke(cli, ["new", FILE, "--out", "mine", "--force"])
+    assert (mine / "robot.yaml").read_text() == "old"
+    assert list(tmp_path.iterdir()) == [mine]
+    (mine / "thesis.tex").touch()
+    result = new(FILE, "--out", "mine", "--force")
+    assert "holds 'thesis.tex' as well: it is not replaced" in str(result.exception)
+
+
+def test_a_urdf_stays_one_and_has_a_mission_within_its_limits() -> None:
+    texts, robot = robot_texts(ARM, "hull", False, "a command")
+    assert list(texts) == ["robot.yaml", "arm.urdf"]
+    assert yaml.safe_load(texts["robot.yaml"]) == {"robot": {"urdf": "arm.urdf", "base": "hull"}}
+    for name, text in texts.items():
+        Path(name).write_text(text)
+    read = find_robot("./")
+    assert np.array_equal(read.offset, robot.offset)
+    assert len(read.visuals) == len(Robot.from_urdf(ARM).visuals)
+
+    mission = rest_to_rest(robot)
+    written = yaml.safe_load(mission_text(robot, mission, "a command"))["mission_node"]
+    assert written["ros__parameters"]["waypoints_deg"] == mission.waypoints_deg
+    chunk = Mission(robot, mission, 0.05).chunk(0, int(mission.waypoint_times[-1] / 0.05) + 1)
+    positions, velocities, _ = np.moveaxis(chunk.joints, 1, 0)
+    for joint, limit in enumerate(robot.limits):
+        assert limit.lower <= positions[:, joint].min() < positions[:, joint].max() <= limit.upper
+        assert np.abs(velocities[:, joint]).max() <= 0.51 * limit.velocity
+    assert mission.waypoint_times[1] > 10.0, "its joints are slow"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["none.urdf"], "none.urdf: no such file"),
+        ([FILE, "--base", "hull"], "no URDF, so there is no base to choose"),
+        ([str(ARM), "--base", "leg"], "leg"),
+        ([FILE, "--out", "/proc/mine"], "/proc/mine: cannot be written"),
+    ],
+)
+def test_what_cannot_be_is_said_and_leaves_nothing(
+    arguments: list[str], said: str, tmp_path: Path
+) -> None:
+    result = new(*arguments)
+    assert isinstance(result.exception, InputError)
+    assert said in str(result.exception)
+    assert result.exception.exit_code == 2
+    assert not list(tmp_path.iterdir())

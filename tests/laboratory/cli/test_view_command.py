@@ -1,0 +1,234 @@
+"""The command `view`: a page complete in itself, small, and opened; errors in one line."""
+
+from __future__ import annotations
+
+import html
+import re
+import shutil
+from functools import partial
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from command import Run
+from paths import DATA
+from scene_pages import Scene, plot_data
+
+from space_robot.analysis.metrics import tracking_error
+from space_robot.cli.main import main
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import simulate
+from space_robot_msgs_py.bag.reader import read_flight
+
+LARGEST = 3e6
+"""Bytes of a page of a flight of 30 s."""
+
+
+@pytest.fixture
+def view(space_robot: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
+    monkeypatch.chdir(tmp_path)
+    return partial(space_robot, "view")
+
+
+@pytest.fixture(scope="module")
+def bags(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A whole flight of 30 s, and a short one."""
+    folder = tmp_path_factory.mktemp("bags")
+    simulate(Flight(FlightPlan(duration=30.0)), folder / "whole")
+    simulate(Flight(FlightPlan(controller="ctc", duration=0.3)), folder / "short")
+    return folder / "whole", folder / "short"
+
+
+@pytest.fixture(scope="module")
+def whole(bags: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of the flight of 30 s."""
+    out = tmp_path_factory.mktemp("page") / "whole.html"
+    with pytest.raises(SystemExit) as ended:
+        main(["view", str(bags[0]), "--no-open", "--out", str(out)])
+    assert not ended.value.code
+    return out
+
+
+class References(HTMLParser):
+    """What a browser would fetch for a page."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: list[str] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Take the addresses of a tag; a page in a page has its own."""
+        for name, value in attrs:
+            if name == "srcdoc":
+                self.found += References(value or "").found
+            elif name in ("src", "href", "data", "action", "poster", "srcset"):
+                self.found.append(value or "")
+
+
+def test_a_page_of_30_s_is_small_and_needs_no_other_file(whole: Path) -> None:
+    page = whole.read_text("utf-8")
+    assert whole.stat().st_size < LARGEST
+    assert Scene(page).duration == pytest.approx(30.0 - 5e-4)
+    assert [ref for ref in References(page).found if not ref.startswith(("data:", "#"))] == []
+    own = re.sub(r'srcdoc="[^"]*"', "", page)
+    assert not re.search(
+        r"https?:(?!//(?:www\.w3\.org|github\.com/leeoniya))|import\(|fetch\(|url\(", own
+    )
+
+
+def test_the_plots_are_the_bags_errors(whole: Path, bags: tuple[Path, Path]) -> None:
+    plots = plot_data(whole.read_text("utf-8"))["plots"]
+    log = read_flight(bags[0])
+    by_title = {plot["title"]: plot for plot in plots}
+    assert list(by_title)[:3] == ["attitude error", "joints 1-3 error", "joints 4-6 error"]
+    error = tracking_error(log)
+    for axis, series in enumerate(by_title["joints 4-6 error"]["series"]):
+        assert series["label"] == f"joint{axis + 4}"
+        known = [value for value in series["values"] if value is not None]
+        assert max(known) == pytest.approx(np.max(error[:, axis + 6]), rel=1e-3)
+        assert min(known) == pytest.approx(np.min(error[:, axis + 6]), rel=1e-3)
+    torque = by_title["base torque"]["series"][2]["values"]
+    assert max(torque) == pytest.approx(np.max(log.applied_torque[:, 2]), rel=1e-3)
+
+
+def test_a_damaged_bag_is_told_on_the_page_and_beside_it(
+    view: Run, bags: tuple[Path, Path], tmp_path: Path
+) -> None:
+    """In the words of `analyze`; of a whole one nothing is said."""
+    cut = tmp_path / "cut"
+    shutil.copytree(bags[1], cut)
+    file = next(cut.glob("*.mcap"))
+    file.write_bytes(file.read_bytes()[: file.stat().st_size * 2 // 3])
+    result = view(bags[1], cut, "--no-open", "--out", tmp_path / "cut.html")
+    assert result.code == 0
+    page = (tmp_path / "cut.html").read_text("utf-8")
+    words = read_flight(cut).defects
+    assert words
+    assert re.findall('<div class="fault">(.*?)</div>', page) == [html.escape(w) for w in words]
+    assert [line for line in result.err.splitlines() if line.startswith("cut: ")] == [
+        f"cut: {text}" for text in words
+    ]
+    assert "short: " not in result.err
+
+
+def test_several_are_drawn_over_one_another_with_a_legend(
+    view: Run, bags: tuple[Path, Path], tmp_path: Path
+) -> None:
+    out = tmp_path / "new" / "both.html"
+    result = view(*bags, "--no-open", "--out", out, "--title", "law <against> law", "--light")
+    assert result.code == 0, result.err
+    page = out.read_text("utf-8")
+    assert "law &lt;against&gt; law" in page
+    assert "<b>whole</b> tde_stc, paper, case 1" in page
+    assert "<b>short</b> ctc, paper, case 1" in page
+    assert [s["label"] for s in plot_data(page)["plots"][0]["series"]] == ["whole", "short"]
+    poses = Scene(page).poses(0.0)
+    np.testing.assert_array_equal(poses["/short"].position, np.zeros(3))
+    assert "darkMode:false" in html.unescape(page)
+
+
+def test_side_by_side_and_an_excerpt_at_a_rate(
+    view: Run, bags: tuple[Path, Path], tmp_path: Path
+) -> None:
+    result = view(*bags, "--side-by-side", "--from", 0.1, "--to", 0.2, "--rate", 100, "--no-open")
+    assert result.code == 0, result.err
+    page = (tmp_path / "whole_short_view.html").read_text("utf-8")
+    scene = Scene(page)
+    assert scene.poses(0.0)["/short"].position[0] > 1.0
+    assert plot_data(page)["start"] == pytest.approx(0.1)
+    assert len(scene.times()) == 11
+
+
+def test_an_older_page_is_replaced_but_not_by_half_a_one(
+    view: Run, bags: tuple[Path, Path], tmp_path: Path
+) -> None:
+    out = tmp_path / "p.html"
+    out.write_text("older")
+    assert view(bags[1], "--robot", "boom", "--no-open", "--out", out).code == 2
+    assert out.read_text() == "older"
+    assert view(bags[1], "--no-open", "--out", out).code == 0
+    assert "<html" in out.read_text("utf-8")
+
+
+def test_the_page_is_opened_in_the_users_browser(
+    view: Run, bags: tuple[Path, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    browser, opened = tmp_path / "browser", tmp_path / "opened"
+    browser.write_text(f'#!/bin/sh\necho "$1" > {opened}\n')
+    browser.chmod(0o755)
+    monkeypatch.setenv("BROWSER", f"{browser} %s")
+    monkeypatch.setattr("webbrowser._tryorder", None)  # it reads BROWSER once
+    result = view(bags[1])
+    assert (result.code, result.out) == (0, "")
+    assert "wrote short_view.html (" in result.err
+    assert opened.read_text().strip() == (tmp_path / "short_view.html").as_uri()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--robot", "boom"), ["boom", "joints"]),
+        (("--robot", "nobody"), ["unknown robot", "paper"]),
+        (("--from", "5"), ["5"]),
+        (("--rate", "0"), ["--rate"]),
+        (("--out", "."), ["is a directory"]),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(
+    view: Run,
+    bags: tuple[Path, Path],
+    tmp_path: Path,
+    arguments: tuple[str, ...],
+    words: list[str],
+) -> None:
+    result = view(bags[1], "--no-open", *arguments)
+    assert result.code == 2
+    (line,) = [line for line in result.err.splitlines() if "rror: " in line]
+    assert all(word in line for word in words), line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_viser_one_line_says_what_to_install(
+    view: Run, bags: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("space_robot.view.stage.find_spec", lambda name: None)
+    result = view(bags[1], "--no-open")
+    assert result.code == 2
+    assert result.err == "space-robot: error: view needs viser: pip install 'space_robot[view]'\n"
+
+
+def test_a_bag_has_no_shapes_of_a_urdf_until_it_is_named(view: Run, tmp_path: Path) -> None:
+    urdf = tmp_path / "urdf" / "arm.urdf"
+    urdf.parent.mkdir()
+    urdf.write_bytes((DATA / "arm.urdf").read_bytes())
+    trimesh.creation.cone(0.1, 0.4).export(urdf.parent / "fore.stl")
+    urdf.write_text(urdf.read_text().replace("package://arm/", ""))
+    gains, mission = urdf.with_name("ctc.yaml"), urdf.with_name("mission.yaml")
+    gains.write_text("controller_node: {ros__parameters: {ctc: {k_p: [1e4], k_d: [200.0]}}}\n")
+    mission.write_text(
+        "mission_node: {ros__parameters: {waypoint_times: [0.0, 1.0],"
+        " waypoints_deg: [0.0, 0.0, 5.0, 0.1]}}\n"
+        "plant_node: {ros__parameters: {initial_joints_deg: [0.0, 0.0]}}\n"
+    )
+    plan = FlightPlan(
+        robot=str(urdf), mission=str(mission), gains=str(gains), controller="ctc", duration=0.1
+    )
+    simulate(Flight(plan), tmp_path / "flown")
+    hint = f"a bag has no robot's shapes: --robot {urdf} draws those of that file\n"
+    without = view("flown", "--no-open", "--out", "without.html")
+    assert without.code == 0, without.err
+    assert hint in without.err
+    shown = view("flown", "--no-open", "--out", "shown.html", "--robot", urdf)
+    assert shown.code == 0, shown.err
+    assert hint not in shown.err
+    types = {
+        message["type"]
+        for _, message in Scene((tmp_path / "shown.html").read_text("utf-8")).messages
+    }
+    assert {"MeshMessage", "IcosphereMessage", "BoxMessage", "CylinderMessage"} <= types

@@ -1,0 +1,183 @@
+"""launch/fly.launch.py, run by launch itself, where ROS has it: no wheel carries it."""
+
+from __future__ import annotations
+
+import os
+import runpy
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from flights import Flown, ros_environment
+from paths import ROOT
+
+from space_robot.cli.launch_arguments import launch_arguments
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.reader import read_flight
+
+pytest.importorskip("launch_ros")  # not "launch": this repository's folder would do for that
+
+RUN = """
+import sys
+from launch import LaunchDescription, LaunchService
+from launch.actions import IncludeLaunchDescription
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+arguments = [tuple(word.split(":=", 1)) for word in sys.argv[2:]]
+source = PythonLaunchDescriptionSource(sys.argv[1])
+service = LaunchService(argv=sys.argv[2:])
+service.include_launch_description(
+    LaunchDescription([IncludeLaunchDescription(source, launch_arguments=arguments)])
+)
+sys.exit(service.run())
+"""
+"""`ros2 launch FILE NAME:=VALUE...`, which no wheel carries either."""
+SHORT = ("duration:=0.2",)
+
+
+@pytest.fixture
+def prefix(tmp_path: Path) -> Path:
+    """The package as ament finds it: installed, as far as launch needs that."""
+    prefix = tmp_path / "prefix"
+    marker = prefix / "share/ament_index/resource_index/packages/space_robot"
+    marker.parent.mkdir(parents=True)
+    marker.touch()
+    (prefix / "share/space_robot").mkdir()
+    for name in ("launch", "config"):
+        (prefix / "share/space_robot" / name).symlink_to(ROOT / name)
+    (prefix / "bin").mkdir()
+    command = prefix / "bin/space-robot"
+    command.write_text(f'#!/bin/sh\nexec {sys.executable} -m space_robot.cli.main "$@"\n')
+    command.chmod(0o755)
+    shutil.copytree(ROOT / "resource/executables", prefix / "lib/space_robot")
+    return prefix
+
+
+@pytest.fixture
+def launch(prefix: Path, free_domain: int) -> Callable[..., subprocess.Popen[str]]:
+    """Launch a flight in a domain of its own."""
+
+    def start(*words: str) -> subprocess.Popen[str]:
+        found = [str(prefix), *filter(None, [os.environ.get("AMENT_PREFIX_PATH", "")])]
+        environment = {
+            **ros_environment(), "ROS_DOMAIN_ID": str(free_domain),
+            "AMENT_PREFIX_PATH": os.pathsep.join(found), "ROS_LOG_DIR": str(prefix / "log"),
+        }  # fmt: skip
+        return subprocess.Popen(
+            [sys.executable, "-c", RUN, str(ROOT / "launch/fly.launch.py"), *words], text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=environment, cwd=prefix,
+        )  # fmt: skip
+
+    return start
+
+
+def test_it_is_the_flight_of_fly(
+    launch: Callable[..., subprocess.Popen[str]], fly: Callable[..., Flown], tmp_path: Path
+) -> None:
+    bag = tmp_path / "bag"
+    process = launch(*SHORT, "controller:=tde_tsmc", f"bag:={bag}")
+    output, _ = process.communicate(timeout=120)
+    assert process.returncode == 0, output
+    other = fly("--duration", "0.2", "--controller", "tde_tsmc", "--composed").bag
+    for topic in (topics.JOINT_STATES, topics.BASE_STATE, topics.COMMAND):
+        here, there = ([data for _, data in open_bag(b).messages(topic)] for b in (bag, other))
+        assert here == there, topic.full_name
+    log = read_flight(bag)
+    assert log.ticks == 400
+    assert not any(log.lost.values())
+
+
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [("controller:=pid", "unknown controller 'pid'"), ("kase:=1", "unknown argument 'kase'")],
+)
+def test_bad_arguments_start_no_node(
+    launch: Callable[..., subprocess.Popen[str]], word: str, said: str
+) -> None:
+    process = launch(word)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert said in output
+    assert "process started" not in output
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_with_a_whole_bag(
+    launch: Callable[..., subprocess.Popen[str]], tmp_path: Path, number: signal.Signals
+) -> None:
+    bag = tmp_path / "bag"
+    process = launch(f"bag:={bag}")
+    file, until = bag / "bag_0.mcap", time.monotonic() + 100.0
+    while not (file.exists() and file.stat().st_size > 500_000):
+        assert process.poll() is None
+        assert time.monotonic() < until
+        time.sleep(0.05)
+    process.send_signal(number)
+    output, _ = process.communicate(timeout=60)
+    log = read_flight(bag)
+    assert log.ticks > 100, output
+    assert not any(log.lost.values()), output
+
+
+def test_a_node_that_dies_ends_it_with_an_error(
+    launch: Callable[..., subprocess.Popen[str]], tmp_path: Path
+) -> None:
+    process = launch(f"bag:={tmp_path / 'bag'}")
+    assert process.stdout is not None
+    lines = []
+    for line in process.stdout:
+        lines.append(line)
+        if "[mission_node-2]: process started with pid" in line:
+            pid = int(line.split("[")[-1].strip("]\n"))
+        if "[plant_node]: nominal" in line:
+            os.kill(pid, signal.SIGKILL)
+    output = "".join(lines)
+    process.wait(timeout=60)
+    assert process.returncode == 1, output
+    assert "mission_node ended with exit code -9" in output
+
+
+@pytest.mark.parametrize("words", [("play:=mine",), ()])
+def test_rviz_has_simulated_time_and_there_is_one_clock(
+    monkeypatch: pytest.MonkeyPatch, prefix: Path, words: tuple[str, ...]
+) -> None:
+    """RViz on the flight's /clock, or on that of the bag, which `ros2 bag play` plays as it is."""
+    from launch import LaunchContext
+    from launch.actions import ExecuteProcess
+    from launch_ros.actions import Node
+    from launch_ros.utilities import evaluate_parameters
+
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(prefix))
+    monkeypatch.setattr(sys, "argv", ["ros2", "launch", "space_robot", "view.launch.py", *words])
+    view = runpy.run_path(str(ROOT / "launch/view.launch.py"))["view"]
+    context = LaunchContext()
+    context.launch_configurations |= {"viewer": "rviz", "play": words[0][6:] if words else ""}
+    rviz, shown = view(context)
+    assert isinstance(rviz, Node)
+    parameters = evaluate_parameters(context, rviz._Node__parameters)  # no public way
+    assert parameters == ({"use_sim_time": True},)
+    if words:
+        assert isinstance(shown, ExecuteProcess)
+        assert [part[0].text for part in shown.cmd] == ["ros2", "bag", "play", "mine"]
+
+
+@pytest.mark.parametrize(
+    "file", sorted((ROOT / "launch").glob("*.launch.py")), ids=lambda p: p.name
+)
+def test_launch_reads_the_files(file: Path) -> None:
+    """With every argument declared, each with a description and a default: none must be given."""
+    from launch.launch_description_sources import get_launch_description_from_python_launch_file
+
+    description = get_launch_description_from_python_launch_file(str(file))
+    declared = {argument.name: argument for argument in description.get_launch_arguments()}
+    assert declared
+    for name, argument in declared.items():
+        assert argument.default_value is not None, name
+        assert len(argument.description) > 10, name
+    if file.name == "fly.launch.py":
+        assert {a.name for a in launch_arguments()} == set(declared) - {"autostart"}

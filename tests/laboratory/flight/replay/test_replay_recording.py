@@ -1,0 +1,200 @@
+"""A bag as a replay reads it, and the controller it asks for."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.replay.choice import ControllerChoice
+from space_robot.flight.replay.recording import Recording
+from space_robot.flight.simulate import simulate
+from space_robot_control.controller.gains import build_law
+from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.bag.recorder import BagRecorder
+from space_robot_msgs_py.config.files import named_file
+from space_robot_msgs_py.config.validation import read_yaml
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.wire.definitions import jazzy
+
+STATES = (topics.JOINT_STATES, topics.BASE_STATE)
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("replay") / "bag"
+    simulate(Flight(FlightPlan(duration=0.2)), path)
+    return path
+
+
+def test_states_come_as_recorded_each_with_both_halves(bag: Path) -> None:
+    recording = Recording(bag)
+    states = list(recording.states(STATES))
+    assert [state.tick for state in states] == list(range(400))
+    recorded = [data for _, data in open_bag(bag).messages(topics.BASE_STATE)]
+    assert [state.messages[1] for state in states] == recorded
+    assert [state.tick for state in recording.states(STATES, 100, 300)] == list(range(100, 300))
+
+
+def test_a_state_without_its_other_half_is_passed_over(bag: Path, tmp_path: Path) -> None:
+    recorder = BagRecorder(tmp_path / "holes", {}, Recording(bag).timebase)
+    counts = dict.fromkeys(topics.BY_NAME, 0)
+    for name, data in open_bag(bag).messages(*topics.ALL):
+        counts[name] += 1
+        lost = {"/joint_states": 11, "/base/state": 21}.get(name)
+        if counts[name] != lost:
+            recorder.record(topics.BY_NAME[name], data)
+    recorder.close()
+    ticks = [state.tick for state in Recording(tmp_path / "holes").states(STATES)]
+    assert ticks == [tick for tick in range(400) if tick not in (10, 20)]
+
+
+def test_commands_that_the_recorder_missed_are_known(bag: Path, tmp_path: Path) -> None:
+    """By what their sender says: where the controller died, ticks without an answer are none."""
+    died = {"faults": ["kill_controller@0.05"], "restart_controller": True}
+    recorder = BagRecorder(tmp_path / "late", died, Recording(bag).timebase)
+    counts = dict.fromkeys(topics.BY_NAME, 0)
+    for name, data in open_bag(bag).messages(*topics.ALL):
+        counts[name] += 1
+        if name != topics.COMMAND.full_name or not 100 < counts[name] <= 130:
+            recorder.record(topics.BY_NAME[name], data, 1, b"participant " + b"0001", counts[name])
+    recorder.close()
+    assert Recording(bag).lost_commands == 0
+    assert Recording(tmp_path / "late").lost_commands == 30
+
+
+@pytest.mark.parametrize("topic", [topics.REFERENCE_JOINTS, topics.REFERENCE_BASE])
+def test_references_begin_with_the_one_that_covers_the_start(
+    bag: Path, topic: topics.Topic
+) -> None:
+    recording = Recording(bag)
+    assert [r.tick for r in recording.references(topic)] == [0, 100, 200, 300]
+    assert [r.tick for r in recording.references(topic, 250)] == [200, 300]
+    assert [r.tick for r in recording.references(topic, 300)] == [300]
+    assert [r.tick for r in recording.references(topic, 10_000)] == [300]
+
+
+def test_topics_of_other_names_are_remapped(bag: Path, tmp_path: Path) -> None:
+    with Writer(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections: dict[str, Any] = {
+            topic.full_name: writer.add_connection(
+                f"/arm{topic.full_name}_1", topic.type, typestore=jazzy()
+            )
+            for topic in topics.ALL
+        }
+        for number, (name, data) in enumerate(open_bag(bag).messages(*topics.ALL)):
+            writer.write(connections[name], number, data)
+    with pytest.raises(InputError, match=r"on /joint_states \(it has /arm/command_1, /arm/j"):
+        Recording(tmp_path / "bag")
+    remapped = Recording(tmp_path / "bag", {f"/arm{name}_1": name for name in topics.BY_NAME})
+    here = Recording(bag)
+    assert list(remapped.states(STATES)) == list(here.states(STATES))
+    axes = Flight(FlightPlan()).robot.axis_names
+    np.testing.assert_array_equal(remapped.commands(axes).torque, here.commands(axes).torque)
+
+
+def described(**options: Any) -> dict[str, Any]:
+    """A flight's description with all a bag may hold."""
+    flight = Flight(FlightPlan.model_validate(options))
+    law = flight.controller.law
+    return {
+        **flight.description,
+        "parameters": {"controller": flight.parameters["controller"]},
+        "gains_used": {name: row.tolist() for name, row in law.gain_values.items()},
+        "robot_file": read_yaml(named_file("robots", flight.plan.robot)),
+    }
+
+
+def test_robot_and_gains_are_the_recorded_numbers(tmp_path: Path) -> None:
+    """Whatever the files of their names say here."""
+    flight = described(swaps=["0.1:ctc"])
+    flight["gains_used"]["k_1"] = [7.0] * 9
+    flight["robot_file"]["robot"]["base"]["mass"] = 1234.5
+    choice = ControllerChoice(flight, tmp_path)
+    assert choice.is_as_flown
+    assert choice.robot.mass[0] == 1234.5
+    assert choice.swaps == ["0.1:ctc"]
+    settings = ControllerNodeSettings.resolve(choice.parameters)
+    assert build_law("tde_stc", settings, 9).gains.k_1.tolist() == [7.0] * 9
+    assert build_law("ctc", settings, 9).name == "ctc"
+
+
+def test_a_bag_from_elsewhere_needs_no_files_of_its_names(tmp_path: Path) -> None:
+    flight = described()
+    flight["parameters"]["controller"] |= {"robot": "/else/where.yaml", "gains": "/else/gains"}
+    choice = ControllerChoice(flight, tmp_path)
+    assert choice.robot.name == "paper"
+    assert choice.law_name == "tde_stc"
+
+
+@pytest.mark.parametrize(
+    ("controller", "gains", "is_as_flown"),
+    [
+        ("", "", True), ("tde_stc", "", True), ("", "default", True), ("", "printed", True),
+        ("", "tuned", False), ("ctc", "", False),
+    ],
+)  # fmt: skip
+def test_law_and_gains_that_flew_are_recognised(
+    tmp_path: Path, controller: str, gains: str, is_as_flown: bool
+) -> None:
+    """By their numbers: the default gains of this law are the printed ones."""
+    choice = ControllerChoice(described(), tmp_path, controller, gains)
+    assert choice.is_as_flown is is_as_flown
+
+
+def test_older_bags_have_names_only(tmp_path: Path) -> None:
+    flight = {
+        key: value for key, value in described(gains="tuned").items()
+        if key not in ("parameters", "gains_used", "robot_file")
+    }  # fmt: skip
+    parameters = ControllerChoice(json.loads(json.dumps(flight)), tmp_path).parameters
+    assert parameters["gains"] == "tuned"
+    assert parameters["robot"] == "paper"
+
+
+@pytest.mark.parametrize(
+    ("flight", "options", "said"),
+    [
+        ({}, {}, "does not say which law was flown"),
+        (None, {"controller": "pid"}, "unknown controller 'pid'"),
+        (None, {"gains": "old"}, "unknown gain set 'old'"),
+        (None, {"given": {"tde_stc.k_9": [1.0]}}, "unknown gain of tde_stc 'k_9'"),
+        (None, {"given": {"pid.k": [1.0]}}, "unknown law 'pid' in controller parameters"),
+        (None, {"given": {"tde_stc.h_bar": [-1.0]}}, "above 0"),
+        (None, {"given": {"hold_tick": 1}}, "unknown key"),
+    ],
+)
+def test_what_cannot_be_is_named(
+    tmp_path: Path, flight: dict[str, Any] | None, options: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(InputError, match=said):
+        ControllerChoice(described() if flight is None else flight, tmp_path, **options)
+
+
+def test_a_bag_without_references_is_refused(bag: Path, tmp_path: Path) -> None:
+    recorder = BagRecorder(tmp_path / "bag", {}, Recording(bag).timebase)
+    for name, data in open_bag(bag).messages(topics.JOINT_STATES, topics.BASE_STATE):
+        recorder.record(topics.BY_NAME[name], data)
+    recorder.close()
+    with pytest.raises(InputError, match="no messages on /reference/joints"):
+        Recording(tmp_path / "bag")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="not a bag"):
+        Recording(tmp_path / "empty")
+
+
+def test_the_gains_file_is_what_a_node_reads(tmp_path: Path) -> None:
+    choice = ControllerChoice(described(controller="ctc"), tmp_path)
+    content = yaml.safe_load((Path(choice.parameters["gains"]) / "ctc.yaml").read_text("utf-8"))
+    assert list(content) == ["controller_node"]

@@ -1,0 +1,113 @@
+"""Long flights of `simulate`: flat memory, told what does not fit, ended when asked to."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from collections import namedtuple
+from pathlib import Path
+
+import psutil
+import pytest
+from flights import COMMAND, ros_environment, space_robot
+
+from space_robot.flight import disk_space as room
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import simulate
+from space_robot.processes import memory
+from space_robot_msgs_py.bag.reader import read_flight
+from space_robot_msgs_py.errors import InputError
+
+PEAK = """
+import resource, sys
+from space_robot_msgs_py.bag import blocks
+blocks.BLOCK_TICKS = 4000
+from space_robot_control.cli.main import cli
+cli.main(sys.argv[1:], standalone_mode=False)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+"""The command, with blocks of 2 s and so short flights that are long."""
+
+
+def peak(*arguments: str) -> int:
+    done = subprocess.run(
+        [sys.executable, "-c", PEAK, "simulate", *arguments], capture_output=True, text=True,
+        timeout=150, check=True, env=ros_environment(),
+    )  # fmt: skip
+    return int(done.stdout.splitlines()[-1])
+
+
+@pytest.mark.parametrize("recorded", [False, True])
+def test_memory_does_not_grow_with_the_flight(recorded: bool, tmp_path: Path) -> None:
+    """Many blocks need what two do; a log of the whole would need a fifth more."""
+    bags = [("--bag", str(tmp_path / name)) if recorded else () for name in "ab"]
+    two = peak("--duration", "4", *bags[0])
+    many = peak("--duration", "16" if recorded else "24", *bags[1])
+    assert many < 1.08 * two
+
+
+def test_the_longest_flight_flies_and_can_be_interrupted(tmp_path: Path) -> None:
+    """It ended in a traceback before its first tick."""
+    bag = tmp_path / "bag"
+    with subprocess.Popen(
+        [*COMMAND, "simulate", "--duration", "1e6", "--bag", str(bag)], stderr=subprocess.PIPE,
+        text=True, env=ros_environment(),
+    ) as process:  # fmt: skip
+        while not (bag / "bag_0.mcap").exists() or (bag / "bag_0.mcap").stat().st_size < 1_000_000:
+            assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    assert read_flight(bag).unfinished == ""
+    assert not list(bag.glob("*.part"))
+
+
+def test_a_whole_flight_in_memory_that_does_not_fit_is_refused() -> None:
+    """Of those who need it whole: `stability`, and Python."""
+    with pytest.raises(InputError, match=r"duration 1e\+06 s: the whole flight .* GB are free"):
+        simulate(Flight(FlightPlan(duration=1e6)))
+    result = space_robot("stability", "--duration", "1e6")
+    assert result.returncode == 2
+    assert result.stderr.splitlines()[-1].startswith("space-robot: error: duration 1e+06 s")
+    assert "Traceback" not in result.stderr
+
+
+def test_memory_that_is_there_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan = FlightPlan(duration=0.01)
+    monkeypatch.setattr(memory, "available_bytes", lambda: 20 * 1000)
+    simulate(Flight(plan))
+    monkeypatch.setattr(memory, "available_bytes", lambda: 20 * 800)
+    with pytest.raises(InputError, match="fly a shorter one"):
+        simulate(Flight(plan))
+
+
+def test_what_is_available_is_what_psutil_says() -> None:
+    told = psutil.virtual_memory().available
+    assert memory.available_bytes() == pytest.approx(told, rel=0.2)
+
+
+def test_a_bag_without_room_is_told_before(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    flight, usage = Flight(FlightPlan(duration=20.0)), namedtuple("usage", "free")
+    bag = tmp_path / "not there yet" / "bag"
+    monkeypatch.setattr(room.shutil, "disk_usage", lambda path: usage(10_000_000))
+    said = room.room_remark(flight, bag)
+    assert "20 s make about" in said
+    assert "0.01 GB are free" in said
+    monkeypatch.setattr(room.shutil, "disk_usage", lambda path: usage(100_000_000))
+    assert room.room_remark(flight, bag) == ""
+    assert not bag.parent.exists()
+
+
+def test_the_estimate_of_a_bag_is_about_right(tmp_path: Path) -> None:
+    """What does not fit uncompressed needs no estimate, so no bag may be larger than that."""
+    flight = Flight(FlightPlan(duration=5.0, compression="none"))
+    estimate = room.bag_bytes(flight)
+    simulate(flight, tmp_path / "bag")
+    size = sum(file.stat().st_size for file in (tmp_path / "bag").iterdir())
+    assert 0.9 * size < estimate < 1.2 * size
+    assert size < flight.ticks * room.largest_tick(flight.robot.n)

@@ -1,0 +1,133 @@
+"""Flights in one process whose messages fail, against flights in compiled code and the rules."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bags import COLUMNS, messages_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import (
+    fly_blocks,
+    simulate,
+)
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import DivergedError, InputError
+from space_robot_sim.plant.faults import MESSAGE_KINDS
+
+NOTHING = "drop_state@0:0"
+"""A fault of messages that never happens."""
+TICKS = 200
+
+
+def flown(*faults: str, bag: Path | None = None, **options: Any) -> FlightLog:
+    options = {"duration": TICKS * 5e-4, **options}
+    return simulate(Flight(FlightPlan(faults=list(faults), **options)), bag)
+
+
+def assert_same(one: FlightLog, other: FlightLog) -> None:
+    for name in COLUMNS:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), name)
+
+
+@pytest.mark.parametrize("law", ["ctc", "ctc_smc", "tde_smc", "tde_tsmc", "tde_stc"])
+def test_message_by_message_is_as_in_compiled_code(law: str) -> None:
+    """To the bit, over a swap of laws too."""
+    options: dict[str, Any] = {"controller": law, "case": "3", "swaps": ["0.05:tde_stc"]}
+    one, other = flown(NOTHING, **options), flown(**options)
+    assert_same(one, other)
+    assert one.laws == other.laws
+    assert (one.unanswered, one.filled) == (0, 0)
+
+
+@pytest.mark.parametrize("ticks", [1, 3])
+def test_late_commands_are_a_plant_that_applies_them_late(ticks: int) -> None:
+    assert_same(flown(f"delay_command@0:{ticks}"), flown(command_latency_ticks=ticks))
+
+
+def test_part_faults_fly_along() -> None:
+    parts = ("noise_gyro@0:1e-6", "saturate_base@0.02-0.05:0.001", "torque_scale@0.03:base=0.9")
+    """Where a fault stands in the list seeds its random numbers."""
+    one, other = flown(*parts, NOTHING, seed=4), flown(*parts, seed=4)
+    assert_same(one, other)
+
+
+def test_lost_commands_hold_the_torque_and_then_there_is_none() -> None:
+    log = flown("drop_command@0.02-0.07", parameters={"plant": {"hold_ticks": 50}})
+    held, gone = log.applied_torque[41:90], log.applied_torque[91:141]
+    np.testing.assert_array_equal(held, np.tile(held[0], (49, 1)))
+    assert np.abs(held).max() > 0.0
+    assert not gone.any()
+    assert np.abs(log.applied_torque[141:]).max() > 0.0
+
+
+def test_lost_states_have_no_command_and_are_filled() -> None:
+    log = flown("drop_state@0.02-0.03")
+    assert log.commanded_torque is not None
+    assert np.flatnonzero(np.isnan(log.commanded_torque[:, 0])).tolist() == list(range(40, 60))
+    assert (log.filled, log.unanswered, log.damage) == (20, 20, ())
+
+
+@pytest.mark.parametrize("fault", ["kill_controller@0.05", "stop_mission@0.05:1"])
+def test_processes_fail_in_a_graph_only(fault: str) -> None:
+    with pytest.raises(InputError, match=rf"^faults \['{fault}'\]: that needs the graph of nodes"):
+        flown(NOTHING, fault)
+
+
+def test_a_flight_that_diverges_hands_out_what_was_flown(tmp_path: Path) -> None:
+    wild = {"plant": {"drive_scale": [-1.0]}}  # every torque the wrong way round
+    options: dict[str, Any] = {"controller": "ctc", "duration": 5.0, "parameters": wild}
+    flight = Flight(FlightPlan(faults=[NOTHING], **options))
+    with pytest.raises(DivergedError) as caught:
+        simulate(flight, tmp_path / "bag")
+    assert caught.value.log.ticks == flight.plant.tick
+    blocks = fly_blocks(Flight(FlightPlan(faults=[NOTHING], **options)))
+    assert next(blocks).ticks == flight.plant.tick
+    with pytest.raises(DivergedError):
+        next(blocks)
+
+
+ARGUMENTS = {"P": ["0.02", "0.3", "1"], "TICKS": ["0", "1", "4"]}
+
+
+@st.composite
+def message_faults(draw: st.DrawFn) -> str:
+    """One of any kind, in the first 0.09 s."""
+    kind = draw(st.sampled_from(list(MESSAGE_KINDS.values())))
+    start, stop = sorted(draw(st.lists(st.integers(0, 90), min_size=2, max_size=2, unique=True)))
+    assert kind.argument
+    argument = draw(st.sampled_from(ARGUMENTS[kind.argument.symbol]))
+    return f"{kind.name}@{start / 1000}-{stop / 1000}:{argument}"
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.lists(message_faults(), min_size=1, max_size=5), st.integers(0, 1000))
+def test_whatever_fails_the_rules_hold(faults: list[str], seed: int) -> None:
+    """The flight repeats, and no torque is wild, neither asked for nor applied."""
+    log = flown(*faults, seed=seed)
+    again = flown(*faults, seed=seed)
+    assert_same(log, again)
+    usual = np.abs(flown().applied_torque).max()
+    for torque in (log.applied_torque, log.commanded_torque):
+        assert torque is not None
+        assert not np.any(np.abs(torque) > 100.0 * usual)
+
+
+def test_the_bag_has_every_message_once_and_in_order(tmp_path: Path) -> None:
+    flown("repeat_state@0:0.5", "jitter_state@0:2", "repeat_command@0", bag=tmp_path / "bag")
+    found: dict[str, list[bytes]] = {}
+    for topic, message in messages_of(tmp_path / "bag"):
+        found.setdefault(topic.full_name, []).append(message)
+    for topic in (topics.JOINT_STATES, topics.BASE_STATE, topics.COMMAND):
+        assert len(set(found[topic.full_name])) == len(found[topic.full_name])
+    assert len(found[topics.JOINT_STATES.full_name]) in range(TICKS - 2, TICKS + 1)
+    assert len(found[topics.COMMAND.full_name]) < TICKS, "overtaken states are not answered"

@@ -1,0 +1,374 @@
+"""One resolved plan: what is set by any way is flown, sent to the nodes and told alike."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from flights import Flown, space_robot_here
+from hypothesis import given
+from hypothesis import strategies as st
+
+from space_robot.analysis import analyze
+from space_robot.flight.bag_path import default_bag
+from space_robot.flight.graph.orchestrator import flight_parameters
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.flight.simulate import (
+    simulate,
+    unflown,
+)
+from space_robot.scenario.node_settings import (
+    NODES,
+    NOT_TO_BE_SET,
+    SCHEMAS,
+)
+from space_robot_control.allocation.assumed_actuators import believed_actuators
+from space_robot_control.controller.controller import Controller
+from space_robot_control.controller.gains import build_laws, split_gains
+from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.guidance.mission import Mission
+from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_control.laws import laws
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.bag.message_accounting import topics_with_allowed_gaps
+from space_robot_msgs_py.config.files import config_directory, named_file
+from space_robot_msgs_py.config.settings import leaves
+from space_robot_msgs_py.errors import InputError
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import PlantNodeSettings
+
+Parameters = dict[str, dict[str, Any]]
+
+
+def heavy_robot(folder: Path) -> Path:
+    """The paper's robot with a heavier last link."""
+    content = yaml.safe_load((config_directory() / "robots" / "paper.yaml").read_text())
+    content["robot"]["links"][-1]["mass"] *= 4.0
+    content["robot"]["name"] = "heavy"
+    path = folder / "heavy.yaml"
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+def flight_of(parameters: Parameters, **options: Any) -> Flight:
+    return Flight(FlightPlan(duration=0.05, parameters=parameters, **options))
+
+
+def test_a_parameter_is_the_same_as_its_option() -> None:
+    """Settings, labels and objects; the plan alone keeps how it was said."""
+    pairs: list[tuple[Parameters, dict[str, Any]]] = [
+        ({"controller": {"controller": "ctc"}}, {"controller": "ctc"}),
+        ({"controller": {"gains": "tuned"}}, {"gains": "tuned"}),
+        ({"controller": {"navigation": "filtered"}}, {"navigation": "filtered"}),
+        ({"controller": {"swaps": ["0.01:ctc"]}}, {"swaps": ["0.01:ctc"]}),
+        ({"plant": {"case": 3}}, {"case": "3"}),
+        ({"plant": {"realtime": True}}, {"realtime": True}),
+        ({"plant": {"faults": ["nan_state@0-1"], "fault_seed": 7}},
+         {"faults": ["nan_state@0-1"], "seed": 7}),
+        ({"plant": {"friction": {"coulomb": 0.0, "viscous": 0}}}, {"friction": False}),
+        ({"plant": {"command_latency_ticks": 2}}, {"command_latency_ticks": 2}),
+        ({"recorder": {"compression": "zstd"}}, {"compression": "zstd"}),
+    ]  # fmt: skip
+    for parameters, options in pairs:
+        one, other = flight_of(parameters), flight_of({}, **options)
+        assert one.description == other.description, options
+        assert one.plant_settings == other.plant_settings
+        assert one.controller_settings == other.controller_settings
+        assert one.recorder_settings == other.recorder_settings
+        assert topics_with_allowed_gaps(one.description) == topics_with_allowed_gaps(
+            other.description
+        )
+        assert (
+            default_bag(one).name.partition("_2")[0] == (default_bag(other).name.partition("_2")[0])
+        )
+
+
+def test_gains_are_parameters_as_at_the_node() -> None:
+    flight = flight_of({"controller": {"tde_stc.k_1": [0.5], "tde_smc": {"g": [1]}}})
+    assert flight.gains_used["k_1"] == [0.5] * 9
+    assert flight.parameters["controller"]["tde_stc.k_1"] == [0.5] * 9
+    assert flight.parameters["controller"]["tde_smc.g"] == [1.0] * 9
+    plain = simulate(flight_of({}))
+    assert not np.array_equal(simulate(flight).applied_torque, plain.applied_torque)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({"plant": {"ticks": 5}}, "plant.ticks cannot be set: use --duration"),
+        ({"recorder": {"bag": "b"}}, "recorder.bag cannot be set: use --bag"),
+        ({"recorder": {"flight": "{}"}}, "recorder.flight cannot be set"),
+        ({"recorder": {"robot": "seven_joint"}}, "recorder.robot cannot be set: use --robot"),
+        ({"plant": {"wait_for": ["x"]}}, "plant.wait_for cannot be set"),
+        ({"mission": {"autostart": False}}, "mission.autostart cannot be set"),
+        ({"plant": {"hold_tick": 5}}, "hold_tick: unknown key, got 5: did you mean hold_ticks?"),
+        ({"controller": {"tde_stc.k_9": [1.0]}}, "unknown gain of tde_stc 'k_9'"),
+        ({"controller": {"pid.k_1": [1.0]}}, "unknown law 'pid' in controller parameters"),
+        ({"plnt": {"hold_ticks": 5}}, "unknown node 'plnt'"),
+        ({"controller": {"period": 0.001}}, "controller.period cannot be set: use --period"),
+        ({"plant": {"robot": "seven_joint", "mission": "seven_joint"}},
+         "the robots of plant and controller must have the same joints"),
+        ({"mission": {"robot": "seven_joint"}},
+         "the robots of plant and mission must have the same joints"),
+        ({"controller": {"swaps": ["1:pid"]}}, "unknown controller 'pid' of swaps"),
+        ({"plant": {"friction": 1.0, "friction.viscous": 1.0}}, "given as a value, and as a group"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_set_is_refused(parameters: Parameters, said: str) -> None:
+    with pytest.raises(InputError) as caught:
+        flight_of(parameters)
+    assert said in str(caught.value)
+
+
+def test_every_parameter_that_is_refused_is_one() -> None:
+    known = {f"{schema.node}.{name}" for schema in SCHEMAS for name, _ in leaves(schema)}
+    known |= {f"{node}.autostart" for node in NODES}
+    assert set(NOT_TO_BE_SET) <= known
+
+
+def test_one_period_for_all_is_flown() -> None:
+    flight = Flight(FlightPlan(duration=0.05, period=0.001, substeps=4))
+    assert (flight.period, flight.ticks) == (0.001, 50)
+    assert flight.description["period"] == 0.001
+    assert all(flight.parameters[node]["period"] == 0.001 for node in NODES)
+    assert flight.plant.memory.substeps == 4
+
+
+def test_files_that_give_nodes_different_periods_are_refused(tmp_path: Path) -> None:
+    case = tmp_path / "slow.yaml"
+    case.write_text("plant_node: {ros__parameters: {period: 0.001}}\n")
+    with pytest.raises(InputError, match=r"got plant 0\.001, controller"):
+        Flight(FlightPlan(case=str(case)))
+    assert Flight(FlightPlan(case=str(case), period=0.0005, duration=1.0)).ticks == 2000
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({"plant": {"realtime": True}}, "realtime: that needs the graph of nodes: use `fly`"),
+        ({"controller": {"fifo_priority": 5}}, "fifo_priority: that needs the graph"),
+    ],
+)
+def test_simulate_refuses_what_needs_the_graph(parameters: Parameters, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        simulate(flight_of(parameters))
+
+
+def test_longer_than_a_flight_may_last() -> None:
+    assert Flight(FlightPlan(duration=1e6)).ticks == 2 * 10**9
+    with pytest.raises(InputError, match="duration must be at most 100000 s"):
+        Flight(FlightPlan(duration=1e6, period=1e-5))
+
+
+def test_a_heavy_plant_under_a_nominal_controller(tmp_path: Path) -> None:
+    path = heavy_robot(tmp_path)
+    nominal = flight_of({})
+    flight = flight_of({"plant": {"robot": str(path), "mission": "paper"}})
+    log = simulate(flight)
+    assert not np.array_equal(log.applied_torque, simulate(nominal).applied_torque)
+    said = flight.description
+    assert (said["robot"], said["controller_robot"]) == ("heavy", "paper")
+    assert Robot.from_dict(said["robot_file"]).mass[-1] == flight.plant.robot.mass[-1]
+    assert said["controller_robot_file"] == nominal.description["robot_file"]
+    assert "controller_robot_file" not in nominal.description
+    assert analyze(log)["robot"] == "heavy"
+
+
+def test_a_controller_with_another_model(tmp_path: Path) -> None:
+    """Of the laws that use one: its robot is the controller's, not the plant's."""
+    path = str(heavy_robot(tmp_path))
+    plan: dict[str, Any] = {"controller": "ctc", "gains": "tuned"}
+    wrong = flight_of({"controller": {"robot": path, "gains": _tuned()}}, **plan)
+    torque = simulate(wrong).applied_torque
+    assert not np.array_equal(torque, simulate(flight_of({}, **plan)).applied_torque)
+    assert wrong.plant.robot.name == "paper"
+    assert wrong.description["controller_robot"] == "heavy"
+
+
+def _tuned() -> str:
+    return str(config_directory() / "gains" / "paper" / "tuned")
+
+
+_LAWS = st.sampled_from(sorted(laws()))
+_AXES = st.lists(st.floats(1e-3, 1e3) | st.integers(1, 100), min_size=9, max_size=9)
+_QUATERNION = st.lists(st.integers(1, 3) | st.floats(0.1, 1.0), min_size=4, max_size=4)
+_AXIS = st.lists(st.integers(1, 3) | st.floats(0.1, 1.0), min_size=3, max_size=3)
+_SPECIAL: dict[str, st.SearchStrategy[Any]] = {
+    "controller": _LAWS,
+    "gains": st.sampled_from(["default", "tuned", "printed"]),
+    "swaps": st.lists(st.builds("0.0{}:{}".format, st.integers(1, 9), _LAWS), max_size=1),
+    "robot": st.just("paper"),
+    "mission": st.sampled_from(["", "paper"]),
+    "case": st.sampled_from(["1", 2, "4-1"]),
+    "faults": st.lists(st.sampled_from(["nan_state@1", "drop_command@2-3:0.5"]), max_size=1),
+    "events": st.lists(st.sampled_from(["", "capture@0.1:small_satellite"]), max_size=1),
+    "payload.inertia": st.just([1, 1, 1.5, 0, 0, 0]),
+    "initial_joints_deg": st.lists(st.integers(-90, 90) | st.floats(-9, 9), min_size=6, max_size=6),
+    "initial_quaternion": _QUATERNION,
+    "base_quaternion": _QUATERNION,
+    "star_tracker.boresight": _AXIS,
+    "star_tracker.rate": st.sampled_from([0, 2.5, 100]),
+    "star_tracker.delay": st.floats(0.0, 0.03),
+    "gyro.initial_bias": _AXIS,
+    "gyro.scale_factor_error": _AXIS,
+    **dict.fromkeys(
+        (
+            "drive_scale",
+            "drive_bias",
+            "drive_lag",
+            "drive_step",
+            "drive_dead_band",
+            "echo_scale",
+            "echo_bias",
+        ),
+        st.lists(st.integers(0, 3) | st.floats(0.0, 1.0), min_size=1, max_size=1),
+    ),
+    "torque_echo": st.sampled_from(["command", "given"]),
+    "actuators": st.just("wheels"),
+    "base_actuation": st.just("hardware"),
+    "base_torque_limit": st.just(0),
+    "wheels.axes": st.just([1, 0, 0, 0, 1.5, 0, 0, 0, 1, 1, 1, 1]),
+    "thrusters.positions": st.just([0.0]),
+    "thrusters.directions": st.just([0.0]),
+    **dict.fromkeys(
+        (
+            "wheels.rotor_inertia",
+            "wheels.max_torque",
+            "wheels.coulomb",
+            "wheels.viscous",
+            "thrusters.force",
+            "thrusters.shortest_pulse",
+            "thrusters.delay",
+            "thrusters.specific_impulse",
+        ),
+        st.lists(st.just(1) | st.floats(0.01, 1.0), min_size=1, max_size=1),
+    ),
+    "wheels.max_momentum": st.lists(st.integers(2, 30), min_size=4, max_size=4),
+    "wheels.initial_speed": st.lists(st.floats(-1, 1), min_size=4, max_size=4),
+    "allocation.wheels": st.sampled_from(["pseudo_inverse", "least_largest"]),
+    "allocation.modulation": st.sampled_from(["pwm", "sigma_delta", "schmitt"]),
+    "allocation.schmitt_on": st.just(1) | st.floats(1.0, 5.0),
+    "allocation.schmitt_off": st.just(0) | st.floats(-1.0, 0.5),
+    "allocation.unload_above": st.just(1) | st.floats(0.7, 1.0),
+    "allocation.unload_to": st.just(0) | st.floats(0.0, 0.2),
+    "waypoint_times": st.just([0, 1.5, 3]),
+    "waypoints_deg": st.lists(st.integers(-90, 90), min_size=18, max_size=18),
+    "compression": st.sampled_from(["none", "lz4", "zstd"]),
+    "split_size": st.sampled_from([0, 100_000, "2M"]),
+    "sensors": st.sampled_from(["ideal", "white_l1"]),
+    "navigation_sensors": st.sampled_from(["ideal", "coarse"]),
+    "navigation": st.sampled_from(["direct", "filtered"]),
+    "navigation_filter.tracker_boresight": st.sampled_from([[0, 0, 0], [1, 0, 2.5]]),
+}
+_NOT_ALONE = {"waypoint_times", "waypoints_deg"}
+
+
+def _values(name: str, field: Any) -> st.SearchStrategy[Any]:
+    if name in _SPECIAL:
+        return _SPECIAL[name]
+    bounds = {k: getattr(m, k) for m in field.metadata for k in ("ge", "le") if hasattr(m, k)}
+    low, high = bounds.get("ge"), bounds.get("le")
+    if field.annotation is bool:
+        return st.booleans()
+    if field.annotation is int:
+        return st.integers(low, high)
+    if field.annotation is float:
+        whole = st.integers(int(np.ceil(low)), int(high)) if high >= 1 else st.nothing()
+        return st.floats(low, high) | whole
+    return st.lists(st.integers(0, 5) | st.floats(0, 5), min_size=2, max_size=2)  # frequencies
+
+
+def _any_parameters() -> st.SearchStrategy[Parameters]:
+    gains = {
+        f"{name}.{gain}": _AXES for name, law in laws().items() for gain in law.gain_descriptions()
+    }
+    nodes = {}
+    for schema in SCHEMAS:
+        allowed = {
+            name: _values(name, field)
+            for name, field in leaves(schema)
+            if name not in _NOT_ALONE and f"{schema.node}.{name}" not in NOT_TO_BE_SET
+        }
+        allowed |= gains if schema is ControllerNodeSettings else {}
+        nodes[schema.node] = st.fixed_dictionaries({}, optional=allowed)
+    return st.fixed_dictionaries({}, optional=nodes)
+
+
+@given(_any_parameters())
+def test_all_that_is_made_of_a_plan_agrees(parameters: Parameters) -> None:
+    """Settings and objects as the nodes make them of what they are sent; labels; `simulate`."""
+    flight = flight_of(parameters, actuators="wheels")
+    sent = json.loads(json.dumps(flight.parameters))
+    for schema in SCHEMAS:
+        for name in parameters.get(schema.node, {}):
+            assert name in sent[schema.node]
+    plant = PlantNodeSettings.resolve(sent["plant"])
+    own, gains = split_gains(sent["controller"])
+    controller = ControllerNodeSettings.resolve(own)
+    mission = MissionNodeSettings.resolve(sent["mission"])
+    assert plant == flight.plant_settings
+    assert controller == flight.controller_settings
+    assert mission == flight.mission_settings
+    said = unflown(flight).flight
+    assert said == flight.description
+    assert said["parameters"] == sent
+    assert (said["case"], said["realtime"]) == (plant.case, plant.realtime)
+    assert (said["gains"], said["seed"]) == (controller.gains, plant.fault_seed)
+    assert said.get("faults", []) == [text for text in plant.faults if text]
+    assert said.get("swaps", []) == [text for text in controller.swaps if text]
+    assert said["command_latency_ticks"] == plant.command_latency_ticks
+    assert said["friction"] is bool(plant.friction.coulomb or plant.friction.viscous)
+    # as the nodes build them
+    built = build_laws(controller, 9, gains)
+    law = next(iter(built.values()))
+    assert said["controller"] == law.name
+    assert said["gains_used"] == {name: row.tolist() for name, row in law.gain_values.items()}
+    theirs = Plant(Robot.from_yaml(named_file("robots", plant.robot)), plant, plant.period)
+    assert theirs.block.tobytes() == flight.plant.block.tobytes()
+    assert theirs.command_delay_buffer.shape == flight.plant.command_delay_buffer.shape
+    robot = Robot.from_yaml(named_file("robots", controller.robot))
+    assert believed_actuators(controller.actuators, robot) == flight.believed_actuators
+    loop = Controller(
+        robot, law, controller.period, controller.acceleration_filter_hz,
+        controller.filter_settings, believed_actuators(controller.actuators, robot),
+        controller.allocation,
+    )  # fmt: skip
+    assert loop.block.tobytes() == flight.controller.block.tobytes()
+    assert law.gains_block.tobytes() == flight.controller.law.gains_block.tobytes()
+    reference = Mission(robot, mission, mission.period).chunk(0, 100)
+    np.testing.assert_array_equal(reference.joints, flight.mission.chunk(0, 100).joints)
+
+
+def test_lists_go_to_the_nodes_as_declared(tmp_path: Path) -> None:
+    """ROS takes no list of whole and decimal numbers."""
+    flight = flight_of({"plant": {"initial_quaternion": [0.9, 1, 0, 0], "case": 2}})
+    sent = flight_parameters(flight, tmp_path / "bag")["plant"]
+    assert json.dumps(sent["initial_quaternion"]) == "[0.9, 1.0, 0.0, 0.0]"
+    assert sent["case"] == "2"
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("controller.controller=ctc", "controller.gains=tuned", "plant.case=3"),
+        ("controller.tde_stc.k_1=[0.5]", "plant.initial_quaternion=[0.9,0.1,0,0]"),
+    ],
+)
+def test_graph_and_process_fly_and_say_the_same(
+    fly: Callable[..., Flown], tmp_path: Path, options: tuple[str, ...]
+) -> None:
+    given = ["--duration", "0.2", *(word for text in options for word in ("--set", text))]
+    flown = fly(*given, "--composed")
+    result = space_robot_here("simulate", *given, "--json", "--bag", str(tmp_path / "bag"))
+    assert result.returncode == 0, result.stderr
+    report = json.loads(result.stdout)
+    for key in ("controller", "case", "gains", "robot", "rms", "chatter", "lost"):
+        assert flown.report[key] == report[key], key

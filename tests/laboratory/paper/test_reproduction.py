@@ -1,0 +1,269 @@
+"""Table V flown again: the numbers it must show, and the files it writes."""
+
+from __future__ import annotations
+
+import csv
+import json
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlparse
+
+import pytest
+from click.testing import CliRunner
+
+from space_robot.cli.main import cli
+from space_robot.paper.reproduction.claims import claims
+from space_robot.paper.reproduction.flights import (
+    ROWS,
+    VARIANTS,
+    Equipment,
+    Planned,
+    Result,
+    Row,
+    Variant,
+    fly,
+    plan,
+)
+from space_robot.paper.reproduction.reproduce import (
+    check_folder,
+    reproduce,
+)
+from space_robot.paper.reproduction.table import cells
+from space_robot.paper.reproduction.table_v import (
+    COLUMNS,
+    printed,
+)
+from space_robot_msgs_py.errors import InputError
+
+SHORT = 0.4
+
+
+@pytest.fixture(scope="module")
+def time_delay_flights() -> list[Result]:
+    """Every TDE row of Table V over the whole mission, printed gains, with friction and without."""
+    return [
+        fly(Planned(row, Variant("printed", friction), shown=False), None, None)
+        for row in ROWS
+        if row.controller.startswith("tde")
+        for friction in (True, False)
+    ]
+
+
+def test_verdicts_on_the_claims(time_delay_flights: list[Result]) -> None:
+    """Torques within 1 %, errors below the printed ones, 5 and 100 times smoother; and what fails.
+
+    Tuned TDE-TSMC is the smoother one, and payload and disturbance more than double an error.
+    """
+    tuned = fly(Planned(Row("tde_tsmc", "1"), Variant("tuned", True), shown=False), None, None)
+    judged = claims([*time_delay_flights, tuned], cells(time_delay_flights))
+    assert [claim.holds for claim in judged] == [True] * 4 + [False, True, False, False, False]
+    smoothest, *growth = judged[4:]
+    assert smoothest.value == pytest.approx(0.95, rel=0.01)
+    assert [claim.value for claim in growth] == pytest.approx([1.86, 2.41, 2.38, 3.97], rel=0.02)
+
+
+def test_torques_of_the_time_delay_laws_in_every_cell(time_delay_flights: list[Result]) -> None:
+    """Each of the fifteen cells by itself, TDE-STC within 1 % of Table V, friction-free."""
+    for result in time_delay_flights:
+        if result.row.controller != "tde_stc" or result.variant.friction:
+            continue
+        assert result.rms is not None
+        for column in ("base_torque", "torque_1_3", "torque_4_6"):
+            measured = result.rms["mean_axis"][column]
+            expected = printed(result.row.controller, result.row.case, column)
+            assert measured == pytest.approx(expected, rel=0.01), (result.row, column)
+
+
+def test_errors_are_below_the_printed_ones_in_every_cell(time_delay_flights: list[Result]) -> None:
+    for cell in cells(time_delay_flights):
+        if cell.column in ("attitude", "joints_1_3", "joints_4_6"):
+            assert cell.ratio is not None
+            assert cell.ratio < 0.01, cell
+
+
+def test_tde_smc_chatters_as_the_prototype_did(time_delay_flights: list[Result]) -> None:
+    """103, 2.6 and 0.33 N m/s."""
+    variation = {
+        r.row.controller: r.chatter["total_variation_per_s"]["base_torque"]
+        for r in time_delay_flights
+        if r.chatter is not None
+    }
+    assert variation["tde_smc"] == pytest.approx(103.0, rel=0.05)
+    assert variation["tde_tsmc"] == pytest.approx(2.6, rel=0.05)
+    assert variation["tde_stc"] == pytest.approx(0.33, rel=0.05)
+
+
+def test_rows_fly_with_sensors_that_are_not_ideal() -> None:
+    """And with the ideal ones if none are named."""
+    planned = Planned(Row("tde_stc", "1"), Variant("printed", True), shown=False)
+    ideal, noisy = (
+        fly(planned, 0.05, None),
+        fly(planned, 0.05, None, Equipment("white_l1", "filtered")),
+    )
+    told = [result.parameters["plant"] for result in (ideal, noisy)]
+    assert [(plant["sensors"], plant["gyro"]["noise"]) for plant in told] == [
+        ("ideal", 0.0),
+        ("white_l1", 1e-6),
+    ]
+    assert ideal.parameters["navigation"] == "direct"
+    assert noisy.parameters["navigation"]["tracker_across"] == 1e-5
+    assert ideal.rms != noisy.rms
+    result = CliRunner().invoke(cli, ["reproduce", "--sensors", "best"])
+    assert isinstance(result.exception, InputError)
+    assert str(result.exception).startswith("unknown sensor 'best': choose one of coarse, fine")
+
+
+def test_printed_computed_torque_gains_diverge_within_ticks() -> None:
+    result = fly(Planned(Row("ctc", "1"), Variant("printed", True), shown=False), None, None)
+    assert result.rms is None
+    assert result.diverged_tick is not None
+    assert result.diverged_tick < 20
+    (cell, *_) = cells([result])
+    assert cell.measured is None
+    assert cell.ratio is None
+    assert not claims([result], cells([result])), "a diverged flight decides no claim"
+
+
+def test_table_v_has_seventeen_rows() -> None:
+    assert len(ROWS) == 17
+    cases = [row.case for row in ROWS if row.controller == "tde_stc"]
+    assert cases == ["1", "2", "3", "4-1", "4-2"]
+    assert Row.parse("tde_stc/4-2") in ROWS
+
+
+def test_what_is_flown_in_brief() -> None:
+    """All 17 rows with friction and without; the printed gains too where they are not flown."""
+    planned = list(plan(ROWS, brief=True))
+    assert len(planned) == len(set(planned)) == 17 * 2 + 6
+    for row in ROWS:
+        flown = [flight for flight in planned if flight.row == row]
+        default = "tuned" if row.controller.startswith("ctc") else "printed"
+        expected = {Variant(default, True), Variant(default, False), Variant("printed", True)}
+        assert {flight.variant for flight in flown} == expected
+        assert [f.variant for f in flown if f.shown] == [Variant(default, True)]
+    assert sum(flight.compared for flight in planned) == 5
+
+
+def test_every_variant_is_flown() -> None:
+    planned = list(plan(ROWS))
+    assert [flight.variant for flight in planned] == list(VARIANTS) * 17
+    assert sum(flight.shown for flight in planned) == 17
+
+
+@pytest.mark.parametrize("text", ["", "tde_stc", "tde_stc/5", "ctc/4-1", "pid/1", "tde_stc/1/1"])
+def test_unknown_rows_are_named(text: str) -> None:
+    with pytest.raises(InputError, match="choose from ctc/1") as caught:
+        Row.parse(text)
+    assert repr(text) in str(caught.value)
+
+
+class References(HTMLParser):
+    """Tags, and where the page points to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.targets: list[str] = []
+        self.images = 0
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.images += tag == "img"
+        assert tag not in ("script", "link", "iframe"), "nothing comes from outside"
+        self.targets += [v for k, v in attrs if k in ("src", "href") and v]
+
+
+@pytest.fixture(scope="module")
+def twice(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, dict[str, Any]]:
+    """Two reproductions of two rows, one after the other."""
+    folder = tmp_path_factory.mktemp("reproduction")
+    rows = [Row("ctc", "1"), Row("tde_stc", "4-2")]
+    first, second = folder / "first", folder / "below" / "second"
+    record = reproduce(rows, first, duration=SHORT, jobs=2)
+    reproduce(rows, second, duration=SHORT, jobs=1)
+    return first, second, record
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def test_two_runs_write_the_same_bytes(twice: tuple[Path, Path, dict[str, Any]]) -> None:
+    """Whatever the number of processes."""
+    first, second, _ = twice
+    written = files(first)
+    assert written == files(second)
+    assert {"report.html", "table_v.md", "table_v.csv", "table_v.json"} <= set(written)
+    for stem in ("case1_ctc", "case4-2_tde_stc", "figure5_desired_joints", "chatter", "junctions"):
+        assert f"figures/{stem}.svg" in written
+        assert f"figures/{stem}.png" in written
+    leftovers = [p.name for p in first.parent.iterdir() if p.name.startswith(".")]
+    assert not leftovers
+
+
+def test_csv_json_and_markdown_say_the_same(twice: tuple[Path, Path, dict[str, Any]]) -> None:
+    folder, _, record = twice
+    assert json.loads((folder / "table_v.json").read_text()) == record
+    rows = list(csv.DictReader((folder / "table_v.csv").read_text().splitlines()))
+    assert len(rows) == len(record["cells"]) == 2 * len(VARIANTS) * 2 * len(COLUMNS)
+    for row, cell in zip(rows, record["cells"], strict=True):
+        assert row["printed"] == str(cell["printed"])
+        assert row["measured"] == ("" if cell["measured"] is None else repr(cell["measured"]))
+    markdown = (folder / "table_v.md").read_text()
+    assert "diverged at tick" in markdown
+    cell = next(c for c in record["cells"] if c["column"] == "base_torque" and c["measured"])
+    assert f"{cell['measured']:.4f} / {cell['printed']:.4f} ({cell['ratio']:.3f})" in markdown
+
+
+def test_report_is_one_page_by_itself(twice: tuple[Path, Path, dict[str, Any]]) -> None:
+    folder, _, record = twice
+    page = (folder / "report.html").read_text()
+    parser = References()
+    parser.feed(page)
+    assert parser.images == 5, "Figure 5, two comparisons, two flights"
+    for target in parser.targets:
+        assert urlparse(target).scheme in ("data", "", "https"), target
+        if not urlparse(target).scheme:
+            assert target.startswith("#") or target.endswith(".md"), target
+    assert record["provenance"]["versions"]["numba"] in page
+    assert "Table III" in page, "the errata are part of it"
+    assert "diverged at tick" in page
+
+
+def test_parameters_of_every_flight_are_told(twice: tuple[Path, Path, dict[str, Any]]) -> None:
+    told = twice[2]["parameters"]
+    assert set(told) == {
+        "ctc, case 1, printed gains", "ctc, case 1, tuned gains",
+        "tde_stc, case 4-2, printed gains", "tde_stc, case 4-2, tuned gains",
+    }  # fmt: skip
+    flown = told["tde_stc, case 4-2, printed gains"]
+    assert flown["plant"]["payload"]["mass"] == 20.0
+    assert flown["gains"]["h_bar"] == [50.0] * 3 + [5.0] * 3 + [0.5] * 3
+
+
+def test_an_older_reproduction_is_replaced(twice: tuple[Path, Path, dict[str, Any]]) -> None:
+    _, folder, _ = twice
+    (folder / "figures" / "old.svg").write_text("of an older run")
+    reproduce([Row("tde_stc", "1")], folder, duration=SHORT, brief=True)
+    assert not (folder / "figures" / "old.svg").exists()
+    assert not (folder / "figures" / "case1_ctc.svg").exists()
+    assert (folder / "figures" / "case1_tde_stc.svg").is_file()
+    assert not (folder / "figures" / "case1_tde_stc.png").exists()
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(InputError, match="holds other files"):
+        check_folder(tmp_path)
+    with pytest.raises(InputError, match="is no folder"):
+        check_folder(tmp_path / "thesis.tex")
+    assert files(tmp_path) == {"thesis.tex": b"years of work"}
+
+
+def test_a_base_that_nothing_turns_is_not_table_vs(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="actuators none: Table V has attitude errors"):
+        reproduce(ROWS[:1], tmp_path / "out", equipment=Equipment(actuators="none"))
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,120 @@
+"""H_S in many configurations at once, against Pinocchio."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from oracles import pinocchio_mass_matrix, rho_space_inertia
+from passive_robot import PASSIVE_ROBOT
+from random_robots import State, random_quaternion, random_robot
+
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.tuning.inertia import (
+    free_inertia,
+    inertia_along,
+    inertia_in_rho,
+    loose_inertia,
+    semi_floating_inertia,
+)
+from space_robot.tuning.spectrum import eigenvalues
+from space_robot_model.robot.dynamics import mass_matrix
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 6, 9]))
+@settings(max_examples=25, deadline=None)
+def test_it_is_pinocchios(seed: int, n: int) -> None:
+    rng = np.random.default_rng(seed)
+    robot, quaternion = random_robot(rng, n), random_quaternion(rng)
+    if abs(quaternion[0]) < 0.05:  # near 180 degrees it has no bound
+        quaternion = np.array([1.0, 0.0, 0.0, 0.0])
+    theta = rng.uniform(-np.pi, np.pi, (3, n))
+    found = inertia_in_rho(quaternion, semi_floating_inertia(robot, theta))
+    for inertia, positions in zip(found, theta, strict=True):
+        expected = rho_space_inertia(robot, quaternion, positions)
+        np.testing.assert_allclose(inertia, expected, rtol=1e-9, atol=1e-9 * np.max(expected))
+
+
+def test_both_ends_of_a_mission_are_looked_at() -> None:
+    flight = Flight(FlightPlan(robot="seven_joint"))
+    found = inertia_along(flight.robot, flight.mission_settings, step=7.0)
+    assert found.shape == (6, 10, 10)  # 0, 7, ... 28 and beyond the end at 30 s
+    waypoints = np.radians(flight.mission_settings.waypoints_deg).reshape(3, 7)
+    upright = np.array([1.0, 0.0, 0.0, 0.0])
+    for row, theta in ((0, waypoints[0]), (-1, waypoints[-1])):
+        expected = rho_space_inertia(flight.robot, upright, theta)
+        np.testing.assert_allclose(found[row], expected, rtol=1e-10, atol=1e-8)
+
+
+def test_a_mission_that_does_not_fit_is_refused() -> None:
+    flight = Flight(FlightPlan())
+    with pytest.raises(ValueError, match="need 21"):
+        inertia_along(Flight(FlightPlan(robot="seven_joint")).robot, flight.mission_settings)
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 6, 9]))
+@settings(max_examples=25, deadline=None)
+def test_without_base_it_is_pinocchios_with_six_coordinates_eliminated(seed: int, n: int) -> None:
+    """From H_r and from H_S at any attitude."""
+    rng = np.random.default_rng(seed)
+    robot, quaternion = random_robot(rng, n), random_quaternion(rng)
+    theta = rng.uniform(-np.pi, np.pi, (2, n))
+    h_r = semi_floating_inertia(robot, theta)
+    zero = np.zeros(3)
+    for k, inertia in enumerate(free_inertia(h_r)):
+        h = pinocchio_mass_matrix(robot, State(quaternion, theta[k], zero, zero, 0.0 * theta[k]))
+        expected = h[6:, 6:] - h[6:, :6] @ np.linalg.solve(h[:6, :6], h[:6, 6:])
+        np.testing.assert_allclose(inertia, expected, rtol=0, atol=1e-10 * np.abs(h).max())
+    if abs(quaternion[0]) > 0.1:
+        found = free_inertia(inertia_in_rho(quaternion, h_r))
+        np.testing.assert_allclose(found, free_inertia(h_r), rtol=0, atol=1e-8 * np.max(h_r))
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 6, 9]))
+@settings(max_examples=25, deadline=None)
+def test_a_free_base_takes_no_margin_away(seed: int, n: int) -> None:
+    """Cauchy's interlacing: eigenvalues of H_f^-1 h_bar lie between those of H_S^-1 h_bar."""
+    rng = np.random.default_rng(seed)
+    robot, h_bar = random_robot(rng, n), rng.uniform(0.1, 100.0, n + 3)
+    upright = np.array([1.0, 0.0, 0.0, 0.0])
+    h_r = semi_floating_inertia(robot, rng.uniform(-np.pi, np.pi, (3, n)))
+    whole = eigenvalues(inertia_in_rho(upright, h_r), h_bar)
+    joints = eigenvalues(free_inertia(h_r), h_bar[3:])
+    slack = 1e-9 * whole[:, -1]
+    assert (joints[:, 0] >= whole[:, 0] - slack).all()
+    assert (joints[:, -1] <= whole[:, -1] + slack).all()
+
+
+def test_along_a_mission_without_base_no_attitude_is_singular() -> None:
+    flight = Flight(FlightPlan(actuators="none"))
+    found = inertia_along(flight.robot, flight.mission_settings, step=5.0, controls_base=False)
+    turned = flight.mission_settings.model_copy(update={"base_quaternion": [0.0, 1.0, 0.0, 0.0]})
+    again = inertia_along(flight.robot, turned, step=5.0, controls_base=False)
+    assert found.shape == (7, 6, 6)
+    np.testing.assert_array_equal(again, found)
+
+
+def test_loose_joints_give_way_and_locked_ones_do_not() -> None:
+    """The accelerations of attitude and motors under their forces alone, from the whole inertia."""
+    flight = Flight(FlightPlan(robot=PASSIVE_ROBOT))
+    robot, rest = flight.robot, [spring.rest for spring in flight.robot.springs]
+    theta = np.array([[0.3, 0.5, -0.8, 0.1, -0.4, 1.0], [-1.2, 1.1, 2.0, -0.7, 0.6, 0.2]])
+    moved = range(3, 12)
+    for positions, found in zip(theta, loose_inertia(robot, theta), strict=True):
+        whole = mass_matrix(robot, [1.0, 0.0, 0.0, 0.0], [*positions, *rest])
+        expected = np.linalg.inv(np.linalg.inv(whole)[np.ix_(moved, moved)])
+        np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-10)
+        locked = semi_floating_inertia(robot.nominal, positions[np.newaxis])[0]
+        assert np.linalg.eigvalsh(locked - found).min() > -1e-12
+    both = inertia_along(robot, flight.mission_settings, step=2.0)
+    assert both.shape == (10, 9, 9)
+    quaternion = np.array([1.0, 0.0, 0.0, 0.0])
+    start = robot.from_degrees(flight.mission_settings.waypoints_deg[:6])[np.newaxis]
+    for row, inertia in (
+        (0, semi_floating_inertia(robot.nominal, start)), (5, loose_inertia(robot, start))
+    ):  # fmt: skip
+        np.testing.assert_allclose(both[row], inertia_in_rho(quaternion, inertia)[0], rtol=1e-12)

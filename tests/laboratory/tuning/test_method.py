@@ -1,0 +1,193 @@
+"""The method of ``gains tune`` against what it promises."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from space_robot.flight.plan import (
+    Flight,
+    FlightPlan,
+)
+from space_robot.tuning.demand import (
+    Demand,
+    demand,
+)
+from space_robot.tuning.inertia import inertia_along
+from space_robot.tuning.method import (
+    Tuned,
+    Wishes,
+    axis_inertia,
+    tune,
+)
+from space_robot.tuning.noise import Noise
+from space_robot.tuning.spectrum import eigenvalues
+from space_robot_control.laws import laws
+from space_robot_msgs_py.errors import InputError
+
+Array = np.ndarray
+PERIOD = 5e-4
+
+
+@functools.cache
+def scene(robot: str = "paper") -> tuple[Array, Demand]:
+    """H_S along the mission with the least and the largest payload, and what is asked for."""
+    flights = [Flight(FlightPlan(robot=robot, case=case)) for case in ("1", "4-2")]
+    first = flights[0]
+    inertias = [inertia_along(x.plant.robot, first.mission_settings) for x in flights]
+    cases = [x.plant_settings for x in flights]
+    return np.concatenate(inertias), demand(first.robot, first.mission_settings, cases)
+
+
+def tuned(wishes: Wishes, robot: str = "paper", lag: float = 0.0) -> Tuned:
+    still = np.zeros((100, scene(robot)[0].shape[-1]))
+    return tune(*scene(robot), wishes, PERIOD, Noise(still, still, lag, PERIOD))
+
+
+@pytest.mark.parametrize("robot", ["paper", "seven_joint"])
+@pytest.mark.parametrize("margin", [0.01, 0.05])
+@pytest.mark.parametrize("share", [0.0, 0.2])
+def test_the_margin_is_left_with_the_worst_masses(robot: str, margin: float, share: float) -> None:
+    found, (inertia, _) = tuned(Wishes(margin, share), robot), scene(robot)
+    h_bar = np.asarray(found.gains["tde_stc"]["h_bar"])
+    heavy, light = (eigenvalues(factor * inertia, h_bar) for factor in (1.0 + share, 1.0 - share))
+    assert heavy.min() == pytest.approx(margin, rel=0.01)  # gains are rounded
+    weight = 1.0 - np.exp(-2.0 * np.pi * found.corner_hz * PERIOD) if found.corner_hz else 1.0
+    assert weight * light.max() < 1.01
+    for law in ("tde_smc", "tde_tsmc"):
+        np.testing.assert_array_equal(found.gains[law]["h_bar"], h_bar)
+
+
+def test_poles_are_those_of_the_bandwidth() -> None:
+    found = tuned(Wishes(0.05, 0.2))
+    assert found.bandwidth == pytest.approx(0.05 / found.delay / 4.0)
+    for law, bandwidth in (("tde_tsmc", found.bandwidth), ("ctc", found.model_bandwidth)):
+        roots = np.roots([1.0, *(float(found.gains[law][name][0]) for name in ("k_d", "k_p"))])
+        assert np.abs(roots) == pytest.approx([bandwidth] * 2, rel=0.02)
+    assert found.model_bandwidth == pytest.approx(0.05 / PERIOD)
+    assert tuned(Wishes(0.05, 0.2), lag=0.02).model_bandwidth == pytest.approx(12.5)
+    # with the lag of the estimate, a pole at margin / T
+    pole = 0.05 / found.delay
+    slow = np.roots([1.0 / pole, 1.0, 2.0 * found.bandwidth, found.bandwidth**2])
+    pair = slow[np.abs(slow.imag) > 0.0]
+    assert -pair[0].real / abs(pair[0]) == pytest.approx(0.7, abs=0.02)
+
+
+def test_conditions_of_the_laws_hold() -> None:
+    found = tuned(Wishes(0.05, 0.2))
+    stc, smc, layer = (found.gains[law] for law in ("tde_stc", "tde_smc", "ctc_smc"))
+    rate = found.bandwidth * found.error
+    assert np.all(stc["k_2"] > rate)
+    assert np.all(stc["k_1"] ** 2 > 4.0 * stc["k_2"])
+    np.testing.assert_allclose(smc["g"], smc["h_bar"] * found.error, rtol=0.02)
+    inertia = scene()[0]
+    inside = eigenvalues(0.8 * inertia, layer["g"] / layer["delta"])  # s fades with these, 1/s
+    assert inside.max() == pytest.approx(found.model_bandwidth, rel=0.02)
+
+
+def test_a_lag_of_the_navigation_makes_it_slower_not_weaker() -> None:
+    quick, slow = (tuned(Wishes(0.05, 0.2), lag=lag) for lag in (0.0, 0.02))
+    assert slow.delay == pytest.approx(quick.delay + 0.02)
+    assert slow.bandwidth < quick.bandwidth / 5.0
+    np.testing.assert_array_equal(
+        slow.gains["tde_stc"]["h_bar"], quick.gains["tde_stc"]["h_bar"]
+    )  # fmt: skip
+
+
+def test_a_bandwidth_beyond_the_estimates_is_refused() -> None:
+    assert tuned(Wishes(0.05, 0.2, bandwidth=3.0)).gains["ctc"]["k_p"][0] == 9.0
+    with pytest.raises(InputError, match=r"at most 13\.\d rad/s.*got 20"):
+        tuned(Wishes(0.05, 0.2, bandwidth=20.0))
+
+
+def test_all_laws_of_the_house_get_all_their_gains() -> None:
+    found = tuned(Wishes(0.05, 0.2))
+    assert found.gains.keys() == laws().keys()
+    for name, law in laws().items():
+        assert found.gains[name].keys() == law.gain_descriptions().keys()
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 9))
+@settings(max_examples=30, deadline=None)
+def test_the_shape_is_near_the_best_diagonal(seed: int, m: int) -> None:
+    """Van der Sluis: no diagonal matrix has a ratio of eigenvalues m times smaller."""
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(m, m)) * 10.0 ** rng.uniform(-2.0, 2.0, m)
+    inertia = (root.T @ root + 1e-3 * np.diag(np.diag(root.T @ root)))[np.newaxis]
+
+    def ratio(diagonal: Array) -> float:
+        values = eigenvalues(inertia, diagonal)
+        return float(values.max() / values.min())
+
+    ours = ratio(axis_inertia(inertia))
+    for _ in range(20):
+        other = axis_inertia(inertia) * 10.0 ** rng.uniform(-1.0, 1.0, m)
+        assert ours <= m * ratio(other) * (1.0 + 1e-6)
+
+
+def test_demand_is_what_a_flight_commands() -> None:
+    """CTC's torque along case 1 at a high gain is that of inverse dynamics."""
+    from space_robot.flight.simulate import simulate
+
+    log = simulate(Flight(FlightPlan(controller="ctc")))
+    assert log.commanded_torque is not None
+    asked = scene()[1]
+    flight = Flight(FlightPlan(controller="ctc"))
+    case_1 = demand(flight.robot, flight.mission_settings, [flight.plant_settings])
+    peak = np.abs(log.commanded_torque).max(axis=0)
+    peak[:3] *= 2.0  # J0 = E / 2
+    np.testing.assert_allclose(case_1.peak, peak, rtol=0.02, atol=2e-3)
+    assert np.all(asked.peak >= case_1.peak)
+
+
+def white(rate: float, angle: float = 0.0) -> Noise:
+    """White noise of rates, rad/s (eps: 1/s), and of angles, rad, alike on all axes."""
+    rng, shape = np.random.default_rng(1), (8000, 9)
+    return Noise(rate * rng.normal(size=shape), angle * rng.normal(size=shape), 0.0, PERIOD)
+
+
+def test_noise_is_kept_within_the_ripple_allowed() -> None:
+    inertia, asked = scene()
+    wishes = Wishes(0.05, 0.2, ripple=0.1)
+    quiet, loud = (tune(inertia, asked, wishes, PERIOD, noise=white(x)) for x in (1e-9, 1e-5))
+    assert quiet.corner_hz == tuned(wishes).corner_hz
+    weight = 1.0 - np.exp(-2.0 * np.pi * loud.corner_hz * PERIOD)
+    share = loud.gains["tde_stc"]["h_bar"] * weight / PERIOD * 1e-5 / asked.peak
+    assert share.max() == pytest.approx(0.1, rel=0.05)
+    assert loud.bandwidth == pytest.approx(0.05 / loud.delay / 4.0, rel=1e-3)
+
+
+def test_bandwidth_is_also_what_computed_torque_allows() -> None:
+    inertia, asked = scene()
+    noise = white(1e-9, angle=1e-3)
+    found = tune(inertia, asked, Wishes(0.05, 0.2), PERIOD, noise)
+    own = np.diagonal(inertia, axis1=1, axis2=2).max(axis=0)
+    gains = found.gains["ctc"]
+    command = gains["k_d"] * noise.rates + gains["k_p"] * noise.errors
+    assert (own * command.std(axis=0) / asked.peak).max() == pytest.approx(0.1, rel=0.02)
+
+
+def test_noise_beyond_any_low_pass_is_refused() -> None:
+    with pytest.raises(InputError, match="allow more ripple"):
+        tune(*scene(), Wishes(0.05, 0.2), PERIOD, white(10.0))
+
+
+def test_axes_that_nothing_is_asked_of_have_gains_as_well() -> None:
+    """A motion in a plane asks the base for nothing about two of its axes, but for rounding."""
+    inertia, asked = scene()
+    idle = [0, 2]
+    factor = np.ones(len(asked.peak))
+    factor[idle] = 0.0, 1e-17
+    planar = Demand(asked.peak * factor, asked.slope * factor, asked.unknown * factor,
+                    asked.nominal * factor)  # fmt: skip
+    found = tune(inertia, planar, Wishes(0.05, 0.2), PERIOD)
+    usual = tuned(Wishes(0.05, 0.2))
+    for law, gains in found.gains.items():
+        for name, values in gains.items():
+            assert np.all(values > 0.0), (law, name)
+            busy = np.delete(np.arange(len(values)), idle)
+            np.testing.assert_array_equal(values[busy], usual.gains[law][name][busy])

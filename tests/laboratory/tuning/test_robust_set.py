@@ -1,0 +1,61 @@
+"""The shipped set ``robust``: made by the command it names, and flying what it is made for."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from paths import CONFIG
+
+from space_robot.campaign.sweep import (
+    sweep,
+    sweep_study,
+)
+from space_robot.cli.main import cli
+from space_robot_control.laws import laws
+
+ROBOTS = ("paper", "seven_joint")
+CASES = ("1", "2", "3", "4-1", "4-2")
+
+
+def files(folder: Path) -> dict[str, list[str]]:
+    return {file.name: file.read_text("utf-8").splitlines() for file in folder.glob("*.yaml")}
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_the_command_in_the_files_makes_them(robot: str, tmp_path: Path) -> None:
+    shipped = files(CONFIG / "gains" / robot / "robust")
+    line = shipped["tde_stc.yaml"][0]
+    program, *words, _, _ = shlex.split(line.removeprefix("# Made by `").removesuffix("`."))
+    assert program == "space-robot"
+    result = CliRunner().invoke(cli, [*words, "-o", str(tmp_path)])
+    assert result.exit_code == 0, result.exception
+    made = files(tmp_path)
+    assert made.keys() == shipped.keys()
+    for name, lines in made.items():
+        assert lines[1:] == shipped[name][1:], name
+        assert shipped[name][0] == line
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_it_is_sound(robot: str) -> None:
+    for case in ("1", "4-2"):
+        command = ["gains", "check", "--robot", robot, "--gains", "robust", "--case", case]
+        assert CliRunner().invoke(cli, command).exit_code == 0
+
+
+@pytest.mark.parametrize("law", sorted(laws()))
+@pytest.mark.parametrize("case", CASES)
+def test_all_laws_fly_all_cases_with_what_reality_brings(law: str, case: str) -> None:
+    """Fine sensors, filtered navigation, masses within 20 %, 2 % too much or too little torque."""
+    for seed, echo in ((1, 1.02), (2, 0.98)):
+        common = {
+            "case": case, "navigation": "filtered", "duration": 10.0,
+            "parameters": {"plant": {"echo_scale": [echo]}},
+        }  # fmt: skip
+        (row,) = sweep(sweep_study([f"{law}=robust"], ["fine"], spread=0.2, common=common), seed)
+        assert row.is_complete
+        assert row.metrics["attitude_rms"] < 1e-3
+        assert row.metrics["joints_4_6_rms"] < 0.05

@@ -1,0 +1,210 @@
+"""The live scene: what a browser is sent of a graph are the poses that its bag has."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from flights import COMMAND, ros_environment, space_robot_here
+from numpy.typing import NDArray
+
+from space_robot.view.live import serve as serving
+from space_robot.view.live.serve import (
+    LiveOptions,
+    serve,
+)
+from space_robot_model.robot.find import find_robot
+from space_robot_model.robot.transforms import joint_transforms
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.bag.reader import read_flight
+
+msgspec = pytest.importorskip("msgspec")
+pytest.importorskip("viser")
+zstandard = pytest.importorskip("zstandard")
+websockets = pytest.importorskip("websockets.sync.client")
+
+Array = NDArray[np.float64]
+Poses = dict[str, tuple[float, ...]]
+PATIENCE_S = 120.0
+CLOSE = 3e-5
+"""viser sends no pose again that has changed by less than a hundred-thousandth."""
+ORIGIN, UNTURNED = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
+"""Of a frame whose position or attitude nobody has sent."""
+CAMERA = {
+    "type": "ViewerCameraMessage", "wxyz": (1.0, 0.0, 0.0, 0.0), "position": (5.0, 5.0, 5.0),
+    "fov": 1.0, "near": 0.1, "far": 100.0, "image_height": 100, "image_width": 100,
+    "look_at": (0.0, 0.0, 0.0), "up_direction": (0.0, 0.0, 1.0),
+}  # fmt: skip
+
+
+class EndedError(Exception):
+    """The test has seen enough."""
+
+
+class Server(threading.Thread):
+    """Serves in a thread until it has waited for flights so many times."""
+
+    def __init__(self, domain: int, flights: int) -> None:
+        super().__init__(daemon=True)
+        self._options, self._left = LiveOptions(domain=domain, port=0), flights + 1
+        self.lines: list[str] = []
+        self.address = ""
+        self.waits = threading.Event()
+        self.error: BaseException | None = None
+
+    def run(self) -> None:
+        try:
+            serve(self._options, self._say, self._set_address)
+        except BaseException as error:
+            self.error = error
+
+    def _say(self, line: str) -> None:
+        self.lines.append(line)
+        if line == serving.WAITING:
+            self._left -= 1
+            self.waits.set()
+            if not self._left:
+                raise EndedError
+
+    def _set_address(self, address: str) -> None:
+        self.address = address
+
+
+def frames(server: Server) -> Iterator[Poses]:
+    """Yield all poses that a browser is shown, by name in the scene, after each change."""
+    import viser
+
+    poses: Poses = {}
+    with websockets.connect(
+        server.address.replace("http", "ws"), subprotocols=[f"viser-v{viser.__version__}"],
+        max_size=None,
+    ) as socket:  # fmt: skip
+        socket.send(msgspec.msgpack.encode(CAMERA))  # a browser without one is none yet
+        while server.is_alive():
+            try:
+                data = socket.recv(timeout=0.2)
+            except TimeoutError:
+                continue
+            except Exception:  # the server is gone
+                return
+            before = dict(poses)
+            for message in messages(data):
+                if message["type"] == "FrameMessage":
+                    for part in ("Pos", "Ori"):
+                        poses.pop(part + message["name"], None)
+                if message["type"] in ("SetPositionMessage", "SetOrientationMessage"):
+                    value = message.get("position", message.get("wxyz"))
+                    poses[f"{message['type'][3:6]}{message['name']}"] = tuple(value)
+            if poses != before:
+                yield dict(poses)
+
+
+def messages(data: bytes) -> list[dict[str, Any]]:
+    """Decode what viser sends at once."""
+    size = int.from_bytes(data[8:16], "little")
+    inner = zstandard.ZstdDecompressor().decompress(data[16 : 16 + size])
+    found: list[dict[str, Any]] = msgspec.msgpack.decode(inner)["messages"]
+    return found
+
+
+def fly(domain: int, bag: Path, shown: list[Poses], *options: str) -> FlightLog:
+    """Fly by the wall clock, once the first steps have been shown."""
+
+    def sim(*words: str) -> bool:
+        return space_robot_here("sim", *words, "--domain", str(domain)).returncode == 0
+
+    with subprocess.Popen(
+        [
+            *COMMAND, "fly", "--paused", "--realtime", "--duration", "3", "--domain", str(domain),
+            "--bag", str(bag), *options,
+        ],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
+    ) as process:  # fmt: skip
+        until = time.monotonic() + PATIENCE_S
+        while not (sim("step", "--ticks", "50") and any(is_robot_in(poses) for poses in shown)):
+            assert time.monotonic() < until
+        assert sim("resume")
+        _, errors = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 0, errors
+    return read_flight(bag)
+
+
+def is_robot_in(poses: Poses) -> bool:
+    return any(name.startswith("Ori/robot/base_link/") for name in poses)
+
+
+def shown_rows(log: FlightLog, shown: list[Poses]) -> list[int]:
+    """Return the row of the log that each frame shows; fail where there is none."""
+    rests = {"Pos/robot/base_link": ORIGIN, "Ori/robot/base_link": UNTURNED}
+    truths = [log.base_position, log.quaternion]
+    path = "/robot/base_link"
+    for link in joint_transforms(find_robot("paper"), log.joint_positions):
+        path = f"{path}/{link.child}"
+        rests[f"Ori{path}"] = UNTURNED
+        truths.append(link.quaternion)
+    truth = np.hstack(truths)
+    rows = []
+    for poses in shown:
+        if not is_robot_in(poses):
+            continue
+        seen = np.concatenate([poses.get(name, rest) for name, rest in rests.items()])
+        away = np.abs(truth - seen).max(axis=1)
+        rows.append(int(away.argmin()))
+        assert away[rows[-1]] < CLOSE
+    return rows
+
+
+def test_two_flights_one_after_the_other(tmp_path: Path, free_domain: int) -> None:
+    # the second one's sensors are so far off that their poses are none of the truth's
+    given = ((), ("--sensors", "tactical"))
+    server = Server(free_domain, len(given))
+    server.start()
+    assert server.waits.wait(PATIENCE_S)
+    shown: list[list[Poses]] = []
+    done = threading.Event()
+
+    def watch() -> None:
+        for poses in frames(server):
+            shown[-1].append(poses)
+        done.set()
+
+    shown.append([])
+    threading.Thread(target=watch, daemon=True).start()
+    for k, options in enumerate(given):
+        log = fly(free_domain, tmp_path / f"bag{k}", shown[-1], *options)
+        seen, _ = shown[-1], shown.append([])
+        rows = shown_rows(log, seen)
+        assert len(set(rows)) > 3
+        assert rows == sorted(rows)
+    server.join(PATIENCE_S)
+    assert isinstance(server.error, EndedError)
+    assert done.wait(PATIENCE_S)
+    following = f"following the flight in ROS domain {free_domain}"
+    robot, showing = "its robot is paper; waiting for its first state", "showing it from "
+    once = [serving.WAITING, following, robot, showing, serving.OVER]
+    lines = [line for line in server.lines if not line.startswith("still ")]
+    assert [showing if line.startswith(showing) else line for line in lines] == [
+        *once, *once, serving.WAITING,
+    ]  # fmt: skip
+
+
+def test_ctrl_c_ends_it(free_domain: int) -> None:
+    with subprocess.Popen(
+        [*COMMAND, "view", "--live", "--no-open", "--port", "0", "--domain", str(free_domain)],
+        stderr=subprocess.PIPE, text=True, env=ros_environment(),
+    ) as process:  # fmt: skip
+        assert process.stderr is not None
+        assert process.stderr.readline().strip() == "starting the scene ..."
+        address, waiting = process.stderr.readline(), process.stderr.readline()
+        assert address.startswith("the scene is at http://127.0.0.1:")
+        assert waiting.strip() == serving.WAITING
+        process.send_signal(signal.SIGINT)
+        assert process.stderr.read().strip() == "ended"
+        assert process.wait(PATIENCE_S) == 0

@@ -1,0 +1,200 @@
+"""The curves beside the scene, by search over stretches, and the data of the page."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from html.parser import HTMLParser
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from moving_logs import moving_log
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from space_robot.view.page import (
+    Shown,
+    render,
+)
+from space_robot.view.plots import (
+    STRETCHES,
+    Plot,
+    Series,
+    extremes,
+    plots_of,
+)
+from space_robot.view.quantities import quantities_of
+from space_robot_control.allocation.assumed_actuators import believed_actuators
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.robot import Robot
+from space_robot_model.robot.find import find_robot
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.samples import Timebase
+
+Array = NDArray[np.float64]
+NUMBERS = st.one_of(st.floats(-1e3, 1e3), st.sampled_from([0.0, np.nan, np.inf, -np.inf]))
+
+
+@given(
+    st.lists(NUMBERS, min_size=1, max_size=60), st.integers(0, 40), st.integers(1, 30), st.data()
+)
+def test_each_stretch_has_its_lowest_and_highest_known_value(
+    values: list[float], first: int, stretches: int, data: Any
+) -> None:
+    log = FlightLog.allocate(len(values), (), Timebase(250_000_000))  # exact in binary
+    log.first_tick = first
+    begin = data.draw(st.integers(0, first))
+    edges = 0.25 * np.linspace(
+        begin, first + len(values) - 1 + data.draw(st.integers(0, 20)), stretches + 1
+    )
+    shown = extremes(log, np.array(values), edges).reshape(-1, 2)
+    times = 0.25 * (first + np.arange(len(values)))
+    for k in range(stretches):
+        inside = (times >= edges[k]) & ((times < edges[k + 1]) | (k == stretches - 1))
+        known = np.array(values)[inside]
+        known = known[np.isfinite(known)]
+        expected = [known.min(), known.max()] if len(known) else [np.nan, np.nan]
+        np.testing.assert_array_equal(shown[k], expected)
+
+
+def flight(robot: Robot, actuators: str) -> FlightLog:
+    """A log of 30 rows with the actuators of a name, its numbers at random."""
+    hardware = believed_actuators(actuators, robot) if actuators else BaseActuatorSettings()
+    log, rng = moving_log(robot, 30), np.random.default_rng(7)
+    log.wheel_velocities = rng.normal(size=(30, hardware.wheel_count))
+    log.thrusts = rng.uniform(size=(30, hardware.thruster_count))
+    log.passive_positions[:] = rng.normal(size=log.passive_positions.shape)
+    log.applied_torque[:] = rng.normal(size=log.applied_torque.shape)
+    log.base_position[:] = rng.normal(size=(30, 3))
+    if actuators:
+        log.flight = {"base_actuators": hardware.model_dump(), "robot": robot.name}
+    return log
+
+
+def test_drift_is_counted_from_the_first_known_row(paper_robot: Robot) -> None:
+    log = flight(paper_robot, "none")
+    log.quaternion[:3] = log.base_position[1] = np.nan
+    shown = {quantity.title: quantity for quantity in quantities_of(log, paper_robot)}
+    assert not {"attitude error", "base torque", "wheel momentum", "thruster pulses"} & set(shown)
+    np.testing.assert_array_equal(
+        shown["base drift"].values, log.base_position - log.base_position[3]
+    )
+    axes = Rotation.from_quat(log.quaternion[3:], scalar_first=True)
+    turned = np.degrees((axes[0].inv() * axes).as_rotvec())
+    assert shown["attitude drift"].unit == "deg"
+    np.testing.assert_allclose(shown["attitude drift"].values[3:], turned, atol=1e-6)
+
+
+def test_actuators_are_plotted_in_their_units(paper_robot: Robot) -> None:
+    log = flight(paper_robot, "wheels_and_thrusters")
+    hardware = believed_actuators("wheels_and_thrusters", paper_robot)
+    shown = {quantity.title: quantity for quantity in quantities_of(log, paper_robot)}
+    inertia = np.broadcast_to(hardware.wheels.rotor_inertia, hardware.wheel_count)
+    np.testing.assert_allclose(shown["wheel momentum"].values, log.wheel_velocities * inertia)
+    force = np.broadcast_to(hardware.thrusters.force, hardware.thruster_count)
+    np.testing.assert_allclose(shown["thruster pulses"].values, log.thrusts / force)
+    assert shown["thruster pulses"].are_pulses
+    log.flight = {}  # a bag of others
+    log.thrusts[:, 1] = 0.0
+    shown = {quantity.title: quantity for quantity in quantities_of(log, paper_robot)}
+    np.testing.assert_array_equal(shown["wheel speed"].values, log.wheel_velocities)
+    largest = shown["thruster pulses"].values.max(axis=0)
+    np.testing.assert_allclose(largest, np.arange(hardware.thruster_count) != 1)
+
+
+def test_passive_joints_are_counted_from_their_rest() -> None:
+    robot = find_robot("flexible_panels")
+    rest = 0.1 * (1 + np.arange(len(robot.springs)))
+    bent = replace(
+        robot,
+        springs=tuple(s._replace(rest=r) for s, r in zip(robot.springs, rest, strict=True)),
+    )
+    log = flight(robot, "")
+    log.flight = {"prismatic_joints": [robot.passive_names[1]]}
+    turning, sliding = [q for q in quantities_of(log, bent) if q.title == "deflection"]
+    away = log.passive_positions - rest
+    assert (turning.unit, sliding.unit, sliding.labels) == ("rad", "m", [robot.passive_names[1]])
+    np.testing.assert_array_equal(turning.values, np.delete(away, 1, axis=1))
+    np.testing.assert_array_equal(sliding.values, away[:, 1:2])
+
+
+def test_of_several_flights_each_has_the_size_of_each_quantity(paper_robot: Robot) -> None:
+    logs = {"a": flight(paper_robot, ""), "b": flight(paper_robot, "none")}
+    plots = {p.title: p for p in plots_of(logs, dict.fromkeys(logs, paper_robot), ["#1", "#2"])}
+    assert [s.label for s in plots["torque 1-3"].series] == ["a", "b"]
+    assert [s.label for s in plots["base torque"].series] == ["a"]
+    assert [(s.label, s.colour) for s in plots["attitude drift"].series] == [("b", "#2")]
+    assert plots["attitude error"].is_logarithmic
+    assert not plots["base drift"].is_logarithmic
+    size = np.linalg.norm(logs["a"].applied_torque[:, 3:6], axis=1)
+    shown = plots["torque 1-3"].series[0].values
+    assert len(shown) == 2 * STRETCHES
+    np.testing.assert_array_equal(shown[np.isfinite(shown)], np.repeat(size, 2))
+
+
+class Scripts(HTMLParser):
+    """The contents of a page's scripts, by their ids."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.contents: dict[str, str] = {}
+        self._open: str | None = None
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self._open = dict(attrs).get("id") or f"{len(self.contents)}" if tag == "script" else None
+
+    def handle_data(self, data: str) -> None:
+        if self._open is not None:
+            self.contents[self._open] = data
+            self._open = None
+
+
+NAMES = st.one_of(
+    st.text(max_size=8),
+    st.sampled_from(["<!--<script>", "</script>", "]]>", "\u2028", "&lt;", "'\""]),
+)
+
+
+def rendered(names: list[str], values: Array, is_logarithmic: bool) -> str:
+    series = [Series(name, "#112233", values) for name in names]
+    plot = Plot(names[0], "", np.arange(len(values)) / 3.0, series, is_logarithmic)
+    return render(names[0], "", [Shown(names[0], "#112233", names[0])], [plot], [], 0.0, True)
+
+
+@settings(max_examples=15)
+@given(st.lists(NAMES, min_size=1, max_size=3))
+def test_whatever_names_are_the_page_has_its_data_and_its_script(names: list[str]) -> None:
+    page = rendered(names, np.array([1.0]), False)
+    scripts = Scripts(page).contents
+    assert len(scripts) == 3
+    assert "<" not in scripts["data"]
+    (plot,) = json.loads(scripts["data"])["plots"]
+    assert [series["label"] for series in plot["series"]] == names
+    assert "uPlot.sync" in list(scripts.values())[-1]
+
+
+@settings(max_examples=20)
+@given(st.lists(NUMBERS, min_size=1, max_size=20), st.booleans())
+def test_values_have_four_digits_and_none_where_nothing_can_be_drawn(
+    values: list[float], is_logarithmic: bool
+) -> None:
+    data = json.loads(Scripts(rendered(["a"], np.array(values), is_logarithmic)).contents["data"])
+    (plot,) = data["plots"]
+    assert plot["logarithmic"] == is_logarithmic
+    for value, shown in zip(values, plot["series"][0]["values"], strict=True):
+        if not np.isfinite(value) or (is_logarithmic and value <= 0.0):
+            assert shown is None
+        else:
+            assert shown == pytest.approx(value, rel=5e-4, abs=0.0)
+    np.testing.assert_allclose(plot["time"], np.arange(len(values)) / 3.0, atol=5e-5)
+
+
+def test_a_name_of_100000_letters_is_shortened(paper_robot: Robot) -> None:
+    log = flight(paper_robot, "")
+    log.joint_names = ("j" * 100_000, *log.joint_names[1:])
+    plots = plots_of({"one": log}, {"one": paper_robot}, ["#112233"])
+    assert max(len(series.label) for plot in plots for series in plot.series) == 40

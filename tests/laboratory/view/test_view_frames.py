@@ -1,0 +1,127 @@
+"""Which row of a flight is shown when, and the ways of the tools: by search, row by row."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from moving_logs import moving_log
+from numpy.typing import NDArray
+
+from space_robot.view.frames import (
+    MOST_FRAMES,
+    Frames,
+    shown_times,
+)
+from space_robot.view.trails import (
+    PIECES,
+    trails,
+)
+from space_robot_model.robot import Robot
+from space_robot_model.robot.tool import tool_pose
+from space_robot_msgs_py.bag.flight_log import FlightLog
+from space_robot_msgs_py.errors import InputError
+from space_robot_msgs_py.samples import Timebase
+
+Array = NDArray[np.float64]
+
+
+@settings(max_examples=50)
+@given(
+    st.integers(0, 50), st.integers(2, 40), st.integers(1, 7),
+    st.lists(st.integers(0, 39), max_size=25), st.data(),
+)  # fmt: skip
+def test_a_frame_shows_the_last_known_row_that_has_begun(
+    paper_robot: Robot, first: int, ticks: int, milliseconds: int, gaps: list[int], data: Any
+) -> None:
+    log = moving_log(paper_robot, ticks, first, 100_000 * milliseconds)
+    log.quaternion[[row for row in gaps if row < ticks]] = np.nan
+    known = [row for row in range(ticks) if np.isfinite(log.quaternion[row]).all()]
+    asked = data.draw(
+        st.lists(st.integers(first, first + ticks + 5), min_size=1, unique=True).map(sorted)
+    )
+    # a time is a tick's, a third of a period later, or off by rounding
+    off = data.draw(st.sampled_from([0.0, 1.0 / 3.0, -1e-9, 1e-9]))
+    times = (np.array(asked) + off) * log.timebase.period
+    if not known:
+        with pytest.raises(InputError):
+            Frames.of(log, paper_robot, times)
+        return
+    frames = Frames.of(log, paper_robot, times)
+    rows = [max([row for row in known if first + row <= tick], default=known[0]) for tick in asked]
+    assert frames.base_position[:, 0].tolist() == rows
+    np.testing.assert_array_equal(frames.joint_positions, log.joint_positions[rows])
+    _, place = tool_pose(paper_robot, log.quaternion[rows], log.joint_positions[rows])
+    (shown,) = frames.tools.values()
+    np.testing.assert_allclose(shown, log.base_position[rows] + place, atol=1e-12)
+    _, place = tool_pose(
+        paper_robot, log.reference_base[rows, :4], log.reference_joints[rows, 0]
+    )  # fmt: skip
+    assert frames.desired is not None
+    np.testing.assert_allclose(frames.desired, log.base_position[rows] + place, atol=1e-12)
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 30), st.integers(1, 9000)), min_size=1, max_size=4),
+    st.floats(0.5, 3000.0),
+)
+def test_frames_are_at_ticks_from_the_first_flights_begin_to_the_last_ones_end(
+    paper_robot: Robot, flights: list[tuple[int, int]], rate: float
+) -> None:
+    logs = []
+    for first, ticks in flights:
+        log = FlightLog.allocate(ticks, (), Timebase(500_000))
+        log.first_tick = first
+        logs.append(log)
+    start, end = min(f for f, _ in flights), max(f + n - 1 for f, n in flights)
+    times = shown_times(logs, rate)
+    ticks = times / 5e-4
+    np.testing.assert_allclose(ticks, np.round(ticks), atol=1e-6)
+    assert round(ticks[0]) == start
+    assert round(ticks[-1]) == max(end, start + 1)  # a scene that plays has two frames
+    assert len(times) <= max(2, MOST_FRAMES // len(logs) + 2)
+    asked = min((end - start) * 5e-4 * rate, end - start, MOST_FRAMES / len(logs))
+    assert abs(len(times) - 1 - max(1.0, asked)) <= 1.0
+    steps = np.diff(np.round(ticks))
+    assert steps.min() >= 1
+    assert steps.max() - steps.min() <= 1
+
+
+class DrawnLines:
+    """A scene that keeps the lines drawn in it."""
+
+    def __init__(self) -> None:
+        self.lines: dict[str, Any] = {}
+
+    def add_line_segments(self, path: str, points: Array, *_: Any, **options: Any) -> Any:
+        self.lines[path] = type("Line", (), {"points": points, **options})()
+        return self.lines[path]
+
+
+@pytest.mark.parametrize("count", [2, 3, PIECES, PIECES + 1, 4 * PIECES + 7])
+def test_a_trail_is_the_whole_way_and_no_more_than_has_been_flown(
+    paper_robot: Robot, count: int
+) -> None:
+    log = moving_log(paper_robot, count)
+    frames = Frames.of(log, paper_robot, np.arange(count) * log.timebase.period)
+    scene: Any = DrawnLines()
+    (move,) = trails(scene, "/one", frames, (1, 2, 3), 0.1)
+    ways = {path: line for path, line in scene.lines.items() if "/trail_" in path}
+    (places,) = frames.tools.values()
+    segments = np.concatenate([line.points for line in ways.values()])
+    np.testing.assert_array_equal(segments, np.stack([places[:-1], places[1:]], axis=1))
+    desired = scene.lines["/one/desired"]
+    assert desired.visible
+    np.testing.assert_array_equal(
+        desired.points, np.stack([frames.desired[:-1], frames.desired[1:]], axis=1)
+    )
+    ends = np.cumsum([len(line.points) for line in ways.values()])
+    assert len(ends) == min(PIECES, count - 1)
+    for k in range(count):
+        move(k)
+        assert [line.visible for line in ways.values()] == (ends <= k).tolist()
+    assert all(len(a.points) - len(b.points) in (-1, 0, 1) for a, b in pairwise(ways.values()))

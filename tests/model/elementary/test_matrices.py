@@ -1,0 +1,168 @@
+"""Small matrices against NumPy and exact fractions; Fourier's transform; rotations by angles."""
+
+from __future__ import annotations
+
+import math
+from decimal import Decimal
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from space_robot_model.elementary.arctangent import (
+    angle_of,
+    arctan2,
+)
+from space_robot_model.elementary.fourier import squared_spectrum
+from space_robot_model.elementary.matrices import (
+    norm,
+    principal_axes,
+    product,
+    solve,
+    turned_tensor,
+)
+from space_robot_model.elementary.rotations import (
+    exact_sines_cosines,
+    rotation_of_rpy,
+    rpy_of_rotation,
+)
+
+Array = NDArray[np.float64]
+seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
+
+
+@given(seeds, st.integers(1, 7), st.integers(0, 3))
+def test_products_are_numpys(rng: np.random.Generator, size: int, columns: int) -> None:
+    """Of vectors, matrices and stacks; a length; a tensor on other axes."""
+    a, b = rng.normal(size=(4, 3, size)), rng.normal(size=(size, columns) if columns else size)
+    for left in (a, a[0], a[0, 0]):
+        np.testing.assert_allclose(product(left, b), left @ b, rtol=0.0, atol=1e-13)
+    assert norm(a[0]) == pytest.approx(np.linalg.norm(a[0]), rel=1e-14)
+    tensor = rng.normal(size=(size, size))
+    expected = a[0] @ tensor @ a[0].T
+    np.testing.assert_allclose(turned_tensor(a[0], tensor), expected, rtol=0.0, atol=1e-12)
+
+
+def exact_solution(matrix: Array, right: Array) -> Array:
+    """By Gauss and Jordan in fractions."""
+    size = len(matrix)
+    rows = [[Fraction(float(x)) for x in row] for row in np.column_stack([matrix, right])]
+    for k in range(size):
+        pivot = next(i for i in range(k, size) if rows[i][k])
+        rows[k], rows[pivot] = rows[pivot], rows[k]
+        rows[k] = [x / rows[k][k] for x in rows[k]]
+        for i in range(size):
+            if i != k:
+                rows[i] = [x - rows[i][k] * y for x, y in zip(rows[i], rows[k], strict=True)]
+    return np.array([[float(x) for x in row[size:]] for row in rows])
+
+
+@settings(max_examples=60)
+@given(seeds, st.integers(1, 7))
+def test_equations_are_solved_as_exactly_as_their_condition_lets(
+    rng: np.random.Generator, size: int
+) -> None:
+    """Against fractions: columns whose largest number is negative, tiny pivots, and none."""
+    matrix = rng.normal(size=(size, size))
+    matrix[np.diag_indices(size)] *= rng.choice([0.0, 1e-14, 1.0], size)
+    matrix[:, 0] = -np.abs(matrix[:, 0])
+    matrix[0, 0] = 1e-15
+    if size == 1 or np.linalg.cond(matrix) > 1e6:
+        matrix += 10.0 * np.eye(size)[::-1]
+    right = rng.normal(size=(size, 2))
+    kept = matrix.copy(), right.copy()
+    expected = exact_solution(matrix, right)
+    bound = 1e-14 * np.linalg.cond(matrix) * np.abs(expected).max()
+    np.testing.assert_allclose(solve(matrix, right), expected, rtol=0.0, atol=bound)
+    np.testing.assert_allclose(solve(matrix, right[:, 0]), expected[:, 0], rtol=0.0, atol=bound)
+    np.testing.assert_array_equal(matrix, kept[0])
+    np.testing.assert_array_equal(right, kept[1])
+
+
+@settings(max_examples=40)
+@given(seeds, st.integers(1, 5), st.booleans())
+def test_principal_axes_diagonalise(
+    rng: np.random.Generator, size: int, has_equal_ones: bool
+) -> None:
+    """Values rise and are NumPy's; the axes are orthonormal, and those of the values."""
+    values = 10.0 ** rng.uniform(-3.0, 3.0, size)
+    if has_equal_ones:
+        values[:2] = values[0]
+    turn = np.linalg.qr(rng.normal(size=(size, size)))[0]
+    tensor = turn @ np.diag(values) @ turn.T
+    found, axes = principal_axes(tensor)
+    scale = values.max()
+    np.testing.assert_allclose(found, np.sort(values), rtol=0.0, atol=1e-13 * scale)
+    np.testing.assert_allclose(axes.T @ axes, np.eye(size), rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(axes @ np.diag(found) @ axes.T, tensor, atol=1e-12 * scale)
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4, 12, 30, 49, 64, 97, 210, 360])
+def test_the_spectrum_is_numpys(size: int) -> None:
+    """Of lengths with one factor and with many, even and odd."""
+    rows = np.random.default_rng(size).normal(size=(size, 2))
+    expected = np.abs(np.fft.rfft(rows, axis=0)) ** 2
+    np.testing.assert_allclose(squared_spectrum(rows), expected, rtol=0.0, atol=1e-11 * size)
+
+
+def decimal_arctangent(t: float) -> Decimal:
+    """By Newton's method on the tangent of Taylor's sine and cosine, from the float next to it."""
+    angle, slope = Decimal(math.atan(t)), Decimal(t)
+    for _ in range(2):
+        sine, cosine, term = Decimal(0), Decimal(0), Decimal(1)
+        for k in range(40):
+            if k % 2:
+                sine += term * (-1) ** (k // 2)
+            else:
+                cosine += term * (-1) ** (k // 2)
+            term *= angle / (k + 1)
+        angle -= (sine - slope * cosine) / (cosine + slope * sine)
+    return angle
+
+
+@given(st.floats(0.0, 1.0))
+def test_an_arctangent_is_right_up_to_its_last_places(t: float) -> None:
+    if t > 1e-300:
+        error = abs(Decimal(angle_of(t, 1.0)) - decimal_arctangent(t))
+        assert error < 2 * Decimal(math.ulp(math.atan(t)))
+
+
+@given(seeds)
+def test_angles_in_all_quarters_are_the_c_librarys(rng: np.random.Generator) -> None:
+    """Also along the axes, with zeros of either sign; NaN of what is not finite."""
+    y, x = rng.normal(size=(2, 2, 3)) * 10.0 ** rng.uniform(-8, 8, (2, 2, 3))
+    np.testing.assert_allclose(arctan2(y, x), np.arctan2(y, x), rtol=1e-15)
+    sides = np.array([-1.0, -0.0, 0.0, 1.0])
+    y, x = np.meshgrid(sides, sides)
+    found, expected = arctan2(y, x), np.arctan2(y, x)
+    np.testing.assert_allclose(found, expected, rtol=1e-15)
+    np.testing.assert_array_equal(np.signbit(found), np.signbit(expected))
+    assert np.isnan(arctan2([np.nan, np.inf, 1.0], [1.0, 1.0, -np.inf])).all()
+
+
+@given(seeds, st.sampled_from([None, 0.5 * np.pi, -0.5 * np.pi, 0.5 * np.pi - 1e-9]))
+def test_roll_pitch_and_yaw_are_scipys(rng: np.random.Generator, pitch: float | None) -> None:
+    """There and back; where pitch is a right angle the yaw is 0."""
+    rpy = rng.uniform(-np.pi, np.pi, 3) * [1.0, 0.49, 1.0]
+    if pitch is not None:
+        rpy[1] = pitch
+    rotation = rotation_of_rpy(rpy)
+    expected = Rotation.from_euler("xyz", rpy).as_matrix()
+    np.testing.assert_allclose(rotation, expected, rtol=0.0, atol=2e-15)
+    back = rpy_of_rotation(rotation)
+    np.testing.assert_allclose(rotation_of_rpy(back), rotation, rtol=0.0, atol=1e-14)
+    if pitch is None:
+        np.testing.assert_allclose(back, rpy, rtol=0.0, atol=1e-12)
+    elif abs(pitch) == 0.5 * np.pi:
+        assert back[2] == 0.0
+
+
+def test_right_angles_are_exact() -> None:
+    sines, cosines = exact_sines_cosines(0.5 * np.pi * np.arange(-4, 5).reshape(3, 3))
+    np.testing.assert_array_equal(sines, [[0, 1, 0], [-1, 0, 1], [0, -1, 0]])
+    np.testing.assert_array_equal(cosines, [[1, 0, -1], [0, 1, 0], [-1, 0, 1]])
+    assert exact_sines_cosines(1e-9)[0] == 1e-9

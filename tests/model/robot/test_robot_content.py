@@ -1,0 +1,64 @@
+"""A robot's own numbers as a mapping: through text and back to the bit, whatever built it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from random_robots import random_robot
+from random_trees import random_bodies
+
+from space_robot_model.robot import Robot
+from space_robot_msgs_py.errors import InputError
+
+KINDS = ("revolute", "prismatic", "fixed", "passive revolute", "passive prismatic", "revolute")
+
+
+def same(one: Robot, other: Robot) -> None:
+    for field in fields(Robot):
+        if field.name in ("visuals", "repairs"):
+            continue
+        a, b = getattr(one, field.name), getattr(other, field.name)
+        if isinstance(a, np.ndarray):
+            assert a.tobytes() == b.tobytes(), field.name
+        else:
+            assert repr(a) == repr(b), field.name
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_trees_come_back_to_the_bit(seed: int) -> None:
+    bodies = [  # the tools in another order than their bodies
+        replace(body, tools=tuple(replace(tool, rank=-number) for tool in body.tools))
+        for number, body in enumerate(random_bodies(np.random.default_rng(seed), KINDS))
+    ]
+    for robot in (Robot.of_tree("tree", bodies), random_robot(np.random.default_rng(seed), 3)):
+        content = json.loads(json.dumps(robot.content))
+        again = Robot.from_dict(content)
+        same(robot, again)
+        assert again.model.tobytes() == robot.model.tobytes()
+        assert again.content == robot.content
+
+
+def test_the_shipped_robot(paper_robot: Robot) -> None:
+    same(paper_robot, Robot.from_dict(paper_robot.content))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("weight", 1.0, "weight: unknown key"),
+        ("bodies", [], "bodies"),
+    ],
+)
+def test_wrong_numbers_are_refused(paper_robot: Robot, key: str, value: Any, said: str) -> None:
+    content = paper_robot.content
+    content["robot"][key] = value
+    with pytest.raises(InputError) as caught:
+        Robot.from_dict(content)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)

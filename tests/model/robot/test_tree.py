@@ -1,0 +1,223 @@
+"""A tree of bodies becomes the robot that moves as they would: compared with Pinocchio's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from random_trees import BASE, KINDS, random_axis, random_bodies
+from scipy.spatial.transform import Rotation
+from tree_oracle import TreeOracle, assert_same_dynamics, pinocchio_tree
+
+from space_robot_model.robot import Robot
+from space_robot_model.robot.tree import (
+    Body,
+    Joint,
+    Spring,
+    Tool,
+    flatten,
+)
+from space_robot_model.robot.tree.flatten import axes_with_z
+from space_robot_msgs_py.errors import InputError
+
+Array = NDArray[np.float64]
+SEEDS = st.integers(0, 2**32 - 2)
+TREES = st.lists(st.sampled_from(KINDS), max_size=11)
+
+
+def tree_of(seed: int, kinds: list[str]) -> list[Body]:
+    """A random tree with one actuated joint at least."""
+    return random_bodies(np.random.default_rng(seed), ["revolute", *kinds])
+
+
+@settings(max_examples=60)
+@given(seed=SEEDS, kinds=TREES)
+def test_dynamics_are_pinocchios(seed: int, kinds: list[str]) -> None:
+    """Branches, prismatic, fixed and passive joints about any axis, told in any order."""
+    bodies = tree_of(seed, kinds)
+    robot = Robot.of_tree("tree", bodies)
+    oracle = TreeOracle(pinocchio_tree(bodies), BASE, robot.all_joint_names, seed)
+    assert_same_dynamics(robot, oracle, seed)
+
+
+@settings(max_examples=30)
+@given(seed=SEEDS, kinds=TREES)
+def test_nominal_robot_is_locked_at_rest(seed: int, kinds: list[str]) -> None:
+    """Pinocchio's tree with fixed joints where the springs are at rest."""
+    bodies = tree_of(seed, kinds)
+    robot = Robot.of_tree("tree", bodies)
+    oracle = TreeOracle(
+        pinocchio_tree([_locked(body) for body in bodies]), BASE, robot.joint_names, seed
+    )
+    assert robot.nominal.joint_names == robot.joint_names
+    assert not robot.nominal.passive_names
+    assert_same_dynamics(robot.nominal, oracle, seed)
+
+
+def _locked(body: Body) -> Body:
+    joint = body.joint
+    if joint is None or joint.spring is None:
+        return body
+    rest, offset, turn = joint.spring.rest, joint.offset, np.eye(3)
+    if joint.kind == "prismatic":
+        offset = offset + rest * joint.axis
+    else:
+        turn = Rotation.from_rotvec(rest * joint.axis).as_matrix()
+    return replace(body, joint=Joint(joint.name, "fixed", joint.rotation @ turn, turn.T @ offset))
+
+
+@given(seed=SEEDS, kinds=TREES)
+def test_structure(seed: int, kinds: list[str]) -> None:
+    bodies = tree_of(seed, kinds)
+    robot, by_name = Robot.of_tree("tree", bodies), {body.name: body for body in bodies}
+    joints = {body.joint.name: body.joint for body in bodies if body.joint}
+    moving = {name for name, joint in joints.items() if joint.kind != "fixed"}
+    assert set(robot.all_joint_names) == moving
+    assert all(joints[name].spring is None for name in robot.joint_names)
+    assert robot.springs == tuple(joints[name].spring for name in robot.passive_names)
+    assert robot.mass.sum() == pytest.approx(sum(body.mass for body in bodies))
+    for number, name in enumerate(robot.body_names[1:]):
+        above = by_name[by_name[name].parent]
+        while above.joint and above.joint.kind == "fixed":
+            above = by_name[above.parent]
+        assert robot.body_names[robot.parent[number]] == above.name
+        assert robot.is_prismatic[number] == (by_name[name].joint.kind == "prismatic")  # type: ignore[union-attr]
+    seen = {-1}
+    for joint in robot.order:
+        assert robot.parent[joint] - 1 in seen, "a parent's before its children's"
+        seen.add(joint)
+    assert seen == set(range(-1, robot.joint_count))
+    assert len(robot.tools) == len(bodies), "those of merged bodies are kept"
+    for array in (robot.mass, robot.com, robot.inertia, robot.rotation, robot.offset):
+        assert np.all(np.isfinite(array))
+
+
+@given(seed=SEEDS, kinds=TREES)
+def test_the_bodies_of_a_robot_make_the_same_robot(seed: int, kinds: list[str]) -> None:
+    robot = Robot.of_tree("tree", tree_of(seed, kinds))
+    again = Robot.of_tree("tree", robot.bodies())
+    assert again.all_joint_names == robot.all_joint_names
+    for name in ("mass", "inertia", "com", "parent", "rotation", "offset", "is_prismatic"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(robot, name))
+    assert (again.limits, again.springs) == (robot.limits, robot.springs)
+    assert [tool.name for tool in again.tools] == [tool.name for tool in robot.tools]
+
+
+@given(seed=SEEDS)
+def test_axes_with_z(seed: int) -> None:
+    axis = random_axis(np.random.default_rng(seed))
+    axes = axes_with_z(axis)
+    np.testing.assert_allclose(axes[:, 2], axis, atol=1e-15)
+    np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-14)
+    assert np.linalg.det(axes) > 0.0
+
+
+def test_two_bodies_become_one_about_their_common_com() -> None:
+    """Parallel axes by hand: 1 kg and 3 kg, 4 m apart."""
+    point, turn = np.eye(3), Rotation.from_euler("z", 90, degrees=True).as_matrix()
+    arm = [
+        Body("hull", 2.0, point, np.zeros(3)),
+        Body("arm", 1.0, np.diag([1.0, 2.0, 3.0]), np.zeros(3), "hull", Joint("j")),
+        Body(
+            "tip", 3.0, np.diag([1.0, 2.0, 3.0]), np.zeros(3), "arm",
+            Joint("glue", "fixed", turn, turn.T @ np.array([4.0, 0.0, 0.0])),
+            (Tool("hand", np.eye(3), np.array([0.0, 1.0, 0.0])),),
+        ),
+    ]  # fmt: skip
+    robot = Robot.of_tree("glued", arm)
+    assert robot.body_names == ("hull", "arm")
+    np.testing.assert_allclose(robot.com[1], [3.0, 0.0, 0.0])
+    lever = 1.0 * 3.0**2 + 3.0 * 1.0**2
+    expected = np.diag([1.0 + 2.0, 2.0 + 1.0 + lever, 6.0 + lever])
+    np.testing.assert_allclose(robot.inertia[1], expected, atol=1e-14)
+    np.testing.assert_allclose(robot.tool.position, [3.0, 0.0, 0.0], atol=1e-15)  # y is -x there
+    assert robot.tool.body == 1
+
+
+def test_the_base_frame_is_at_its_com() -> None:
+    com = np.array([0.1, -0.2, 0.3])
+    joint = Joint("j", rotation=Rotation.from_euler("x", 0.4).as_matrix(), offset=np.ones(3))
+    bodies = [Body("arm", 1.0, np.eye(3), com, "hull", joint), Body("hull", 5.0, np.eye(3), com)]
+    robot = Robot.of_tree("shifted", bodies)
+    np.testing.assert_array_equal(robot.com, [[0.0, 0.0, 0.0], com])
+    place = joint.rotation @ joint.offset - com
+    np.testing.assert_allclose(robot.rotation[0] @ robot.offset[0], place, atol=1e-15)
+
+
+def test_a_robot_without_tools_has_one_on_its_last_body() -> None:
+    bodies = [replace(body, tools=()) for body in tree_of(1, ["prismatic"])]
+    robot = Robot.of_tree("bare", bodies)
+    assert (robot.tool.name, robot.tool.body) == ("tool", 2)
+
+
+HULL = Body("hull", 5.0, np.eye(3), np.zeros(3))
+ARM = Body("arm", 1.0, np.eye(3), np.zeros(3), "hull", Joint("j"))
+BAD: dict[str, tuple[Callable[[], list[Body]], str]] = {
+    "two of a name": (
+        lambda: [HULL, ARM, replace(ARM, joint=Joint("k"))],
+        "body names must differ, 'arm' occurs twice",
+    ),
+    "two joints of a name": (
+        lambda: [HULL, ARM, replace(ARM, name="leg")],
+        "joint names must differ, 'j' occurs twice",
+    ),
+    "no base": (lambda: [replace(ARM, parent="arm")], "one base, here are 0"),
+    "two bases": (lambda: [HULL, replace(HULL, name="moon"), ARM], "one base, here are 2"),
+    "unknown parent": (
+        lambda: [HULL, replace(ARM, parent="x")],
+        "parent 'x' of 'arm' is no body: choose one of hull, arm",
+    ),
+    "circle": (
+        lambda: [HULL, ARM, replace(ARM, name="leg", parent="leg", joint=Joint("k"))],
+        "not joined to the base, but in a circle",
+    ),
+    "no mass": (lambda: [HULL, replace(ARM, mass=0.0)], "'arm' moves and has no mass"),
+    "no inertia": (
+        lambda: [HULL, replace(ARM, inertia=np.zeros((3, 3)))],
+        "the inertia of body 'arm' must be positive definite",
+    ),
+    "nothing actuated": (
+        lambda: [HULL, replace(ARM, joint=Joint("j", spring=Spring(1.0, 0.0)))],
+        "a robot needs one actuated joint at least",
+    ),
+    "too many joints": (
+        lambda: [HULL, *(replace(ARM, name=f"a{k}", joint=Joint(f"j{k}")) for k in range(65))],
+        "at most 64 moving joints can be flown, here are 65",
+    ),
+    "too many passive ones": (
+        lambda: [
+            HULL, ARM,
+            *(
+                replace(ARM, name=f"a{k}", joint=Joint(f"j{k}", spring=Spring(1.0, 0.0)))
+                for k in range(25)
+            ),
+        ],
+        "at most 24 passive joints can be flown, here are 25",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_is_no_tree_is_said_in_one_line(name: str) -> None:
+    bodies, said = BAD[name]
+    with pytest.raises(InputError) as raised:
+        Robot.of_tree("bad", bodies(), "file.yaml")
+    assert str(raised.value).startswith("file.yaml: ")
+    assert said in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_many_bodies_in_a_row_are_walked_without_recursion() -> None:
+    chain = [
+        replace(ARM, name=f"b{k}", parent=f"b{k - 1}" if k else "hull",
+                joint=Joint(f"j{k}", "revolute" if k == 0 else "fixed"))
+        for k in range(3000)
+    ]  # fmt: skip
+    walked = flatten([HULL, *chain[::-1]])
+    assert len(walked) == 2
+    assert walked[1].body.mass == 3000.0
