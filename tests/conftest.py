@@ -57,14 +57,14 @@ sys.meta_path.append(_MissingTool())
 OF_ROS = {"domain", "free_domain", "fly", "start", "ground"}
 """Fixtures of tests that start ROS processes, or are a node of their own."""
 WITH_ROS = (
-    "control/flight/graph/", "control/flight/replay/", "test_examples.py",
+    "laboratory/flight/graph/", "laboratory/flight/replay/", "test_examples.py",
     "test_pages_with_graphs.py",
 )  # fmt: skip
 SLOW = (
-    "benchmarks/", "control/campaign/", "control/paper/", "control/cli/test_output.py",
-    "control/cli/test_view_command.py", "control/view/test_in_browser.py",
-    "control/cli/test_stability_command.py", "control/flight/test_interruption.py",
-    "control/flight/test_long_flights.py", "control/flight/test_shipped_robots.py",
+    "benchmarks/", "laboratory/campaign/", "laboratory/paper/", "laboratory/cli/test_output.py",
+    "laboratory/cli/test_view_command.py", "laboratory/view/test_in_browser.py",
+    "laboratory/cli/test_stability_command.py", "laboratory/processes/test_interruption.py",
+    "laboratory/flight/test_long_flights.py", "laboratory/flight/test_shipped_robots.py",
     "msgs/bag/test_bag_fuzz.py", "test_notebooks.py", "test_examples.py", "test_tutorial.py",
     "msgs/bag/test_description_fuzz.py", "test_packaging.py", "test_pages.py",
     "test_shown_outputs.py",

@@ -1,6 +1,6 @@
 """A plugin of pytest that runs kernels as plain Python, so that coverage sees their lines.
 
-    python -m pytest -p interpreted_kernels tests/sim/dynamics
+    python -m pytest -p interpreted_kernels tests/model/dynamics
 
 Compiled code runs past every tracer. Here the decorators hand the functions back as they are,
 before any module uses them; so it is a hundred times slower, and for short tests only.

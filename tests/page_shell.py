@@ -43,7 +43,7 @@ OF_GRAPHS = re.compile(
     r"fly .*(--(composed|domain|realtime|restart-controller|scenario)|list|\w:[A-Z])|replay|soak"
 )
 """Commands that need a graph. All other options of `fly` are those of `simulate`, which flies the
-same bits (tests/control/flight/graph holds it to that) and is asked in its place."""
+same bits (tests/laboratory/flight/graph holds it to that) and is asked in its place."""
 PLACEHOLDERS = {
     "CASE": "3", "COMMAND": "fly", "D": "2", "F": "100", "FOLDER": "flights/one", "LAW": "ctc",
     "LINK": "upper_arm", "MODE": "filtered", "NAME": "ets_vii", "S": "tactical", "SIGMA": "1e-4",
@@ -64,20 +64,20 @@ NOT_RUN = {
     r"(git|mkdir -p ws|cp TraceableRobotModels|pip|python3 -m venv|sudo apt)\b": "from elsewhere",
     r"make\b|BAG_FUZZ_EXAMPLES": "runs these tests, or for long",
     r"nft\b": "the machine's firewall",
-    r"dask\b|.*--scheduler": "a cluster: tests/control/campaign/runner/test_cluster.py has one",
+    r"dask\b|.*--scheduler": "a cluster: tests/laboratory/processes/pool/test_cluster.py has one",
     r"python docs/law_league.py": "4,000 flights",
     r"python docs/campaign_statistics.py": "a minute: test_share_test.py compares its table",
     r"python tests/hostile": "half an hour",
-    r"python docs/view_picture.py": "a browser: tests/control/view has one",
+    r"python docs/view_picture.py": "a browser: tests/laboratory/view has one",
     r"space-robot (sim|fly --paused)\b": "two terminals: test_pause_and_step.py flies and steps",
     r"space-robot analyze flights/tde_stc_case1_": "printed at a flight's end",
-    r"space-robot view flights/mine": "a flight of the reader's robot: tests/control/view",
-    r"space-robot view (--live|.*\.webp)": "never ends; a browser: tests/control/view",
+    r"space-robot view flights/mine": "a flight of the reader's robot: tests/laboratory/view",
+    r"space-robot view (--live|.*\.webp)": "never ends; a browser: tests/laboratory/view",
 }
 """Commands that are not run, and why."""
 PYTHON_ELSEWHERE = {
     "docs/explanation/errata.md": "tests/test_docs.py",
-    "docs/manual/python.md": "tests/control/scenario/test_python_manual.py",
+    "docs/manual/python.md": "tests/laboratory/api/test_python_manual.py",
 }
 """Pages whose snippets another test runs."""
 

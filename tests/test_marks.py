@@ -16,10 +16,10 @@ def test_folders_and_files_that_are_marked_exist() -> None:
     ("where", "fixtures", "given"),
     [
         ("msgs/ros/test_lifecycle.py", {"domain", "ground"}, {"ros"}),
-        ("control/flight/test_closed_loop.py", {"fly", "tmp_path"}, {"ros"}),
-        ("control/flight/graph/test_graph_failures.py", set(), {"ros"}),
-        ("control/paper/test_reproduction.py", set(), {"slow"}),
-        ("sim/dynamics/test_aba.py", {"paper_robot"}, set()),
+        ("laboratory/flight/test_closed_loop.py", {"fly", "tmp_path"}, {"ros"}),
+        ("laboratory/flight/graph/test_graph_failures.py", set(), {"ros"}),
+        ("laboratory/paper/test_reproduction.py", set(), {"slow"}),
+        ("model/dynamics/test_aba.py", {"paper_robot"}, set()),
     ],
 )
 def test_what_starts_ros_or_takes_long_is_marked(

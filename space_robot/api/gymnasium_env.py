@@ -1,6 +1,6 @@
 """A bench as an environment of Gymnasium, for learning: to follow the mission with torques.
 
-from space_robot_control.scenario.gymnasium_env import SpaceRobotEnv
+from space_robot.api.gymnasium_env import SpaceRobotEnv
 env = SpaceRobotEnv(Scenario(controller=None, sensors="fine"))
 """
 

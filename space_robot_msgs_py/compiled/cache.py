@@ -24,7 +24,7 @@ def cache_directory() -> Path:
     here = Path(__file__).resolve()
     root = here.parents[2]
     digest = hashlib.sha256(str(root).encode())  # Numba keeps installations apart, so do we
-    for source in sorted(root.glob("space_robot_*/**/*.py")):
+    for source in sorted(root.glob("space_robot*/**/*.py")):
         text = source.read_bytes()
         if b"@kernel" in text or b"@subroutine" in text or source.parent == here.parent:
             digest.update(text)

@@ -42,8 +42,10 @@ def _paths(pattern: str) -> list[Path]:
 
 PACKAGES = {
     "msgs": "space_robot_msgs_py",
+    "model": "space_robot_model",
     "sim": "space_robot_sim",
     "control": "space_robot_control",
+    "laboratory": "space_robot",
 }
 
 
@@ -67,52 +69,58 @@ def _files(place: str, *tests: str, marks: str = Area(sources=(), tests=()).mark
 FURTHER = (
     "tests/test_reference.py",
     "tests/test_start_up.py",
-    "tests/control/cli/test_output.py",
-    "tests/control/scenario/test_scenario.py",
-    "tests/control/flight/graph/test_graph_nodes.py",
+    "tests/laboratory/cli/test_output.py",
+    "tests/laboratory/api/test_scenario.py",
+    "tests/laboratory/flight/graph/test_graph_nodes.py",
 )
 """Pages made from the code, commands with their output, flights in process and on the graph."""
 CLOSED_LOOP = (
-    "control/flight/test_compiled_loop.py", "control/flight/test_closed_loop.py",
+    "laboratory/flight/test_compiled_loop.py", "laboratory/flight/test_closed_loop.py",
 )  # fmt: skip
 AREAS = {
     "messages": _files("msgs", "msgs/test_*.py", "msgs/bag/test_*.py", marks="not slow"),
     "bag": _room("msgs/bag"),
     "compiled": _room("msgs/compiled"),
-    "config": _room("msgs/config", "control/cli/test_options.py"),
-    "ros": _room("msgs/ros", "control/flight/graph/test_graph_nodes.py", marks=""),
+    "config": _room("msgs/config", "laboratory/cli/test_options.py"),
+    "ros": _room("msgs/ros", "laboratory/flight/graph/test_graph_nodes.py", marks=""),
     "wire": _room("msgs/wire"),
     "actuators": _room(
-        "sim/actuators", "sim/plant/test_*.py", "control/controller/allocation/test_*.py"
+        "sim/actuators", "sim/plant/test_*.py", "control/allocation/test_*.py"
     ),
     "dynamics": _room(
-        "sim/dynamics", "sim/robot/test_*.py", "sim/plant/test_conservation.py",
+        "model/dynamics", "model/robot/test_*.py", "sim/plant/test_conservation.py",
         "sim/plant/test_plant.py",
     ),
-    "elementary": _room("sim/elementary"),
+    "elementary": _room("model/elementary"),
     "environment": _room("sim/environment", "sim/plant/test_*.py"),
     "faults": _room("sim/faults", "sim/sensors/test_*.py", "sim/plant/test_*.py"),
     "plant": _room("sim/plant"),
-    "robot": _room("sim/robot", "sim/dynamics/test_equations_of_motion.py"),
+    "robot": _room("model/robot", "model/dynamics/test_equations_of_motion.py"),
     "sensors": _room("sim/sensors", "sim/plant/test_*.py"),
     "nodes": Area(
-        (f"{PACKAGES['sim']}/*.py", f"{PACKAGES['control']}/*.py"),
-        ("tests/control/flight/graph/test_graph_nodes.py",), "",
+        (f"{PACKAGES['sim']}/*.py", f"{PACKAGES['control']}/*.py", f"{PACKAGES['laboratory']}/*.py"),
+        ("tests/laboratory/flight/graph/test_graph_nodes.py",), "",
     ),
-    "analysis": _room("control/analysis", marks="not ros"),
-    "campaign": _room("control/campaign", marks="not ros"),
-    "cli": _room("control/cli", "test_start_up.py", marks="not ros"),
+    "analysis": _room("laboratory/analysis", marks="not ros"),
+    "campaign": _room("laboratory/campaign", marks="not ros"),
+    "cli": _room("laboratory/cli", "test_start_up.py", marks="not ros"),
     "controller": _room("control/controller", *CLOSED_LOOP),
-    "flight": _files("control/flight", "control/flight/test_*.py"),
-    "graph": _room("control/flight/graph", marks=""),
-    "replay": _room("control/flight/replay", marks=""),
+    "flight": _files("laboratory/flight", "laboratory/flight/test_*.py"),
+    "graph": _room("laboratory/flight/graph", marks=""),
+    "replay": _room("laboratory/flight/replay", marks=""),
     "laws": _room("control/laws", "control/controller/test_takeover.py", *CLOSED_LOOP),
-    "mission": _room(
-        "control/mission", *CLOSED_LOOP, "control/flight/graph/test_graph_nodes.py", marks=""
+    "guidance": _room(
+        "control/guidance", *CLOSED_LOOP, "laboratory/flight/graph/test_graph_nodes.py", marks=""
     ),
-    "paper": _room("control/paper", "control/cli/test_stability_command.py", marks="not ros"),
-    "scenario": _room("control/scenario", marks="not ros"),
-    "tuning": _room("control/tuning", "control/cli/test_gains_command.py", marks="not ros"),
-    "view": _room("control/view", "control/cli/test_view_command.py", marks="not ros"),
+    "paper": _room("laboratory/paper", "laboratory/cli/test_stability_command.py", marks="not ros"),
+    "api": _room("laboratory/api", marks="not ros"),
+    "scenario": _room("laboratory/scenario", "laboratory/api/test_*.py", "laboratory/flight/test_*.py", marks="not ros"),
+    "console": _room("laboratory/console", "laboratory/cli/test_output.py", marks="not ros"),
+    "processes": _room("laboratory/processes", marks="not ros"),
+    "navigation": _room("control/navigation"),
+    "allocation": _room("control/allocation"),
+    "hardware": _room("model/hardware", "sim/actuators/test_*.py", "sim/sensors/test_*.py"),
+    "tuning": _room("laboratory/tuning", "laboratory/cli/test_gains_command.py", marks="not ros"),
+    "view": _room("laboratory/view", "laboratory/cli/test_view_command.py", marks="not ros"),
 }  # fmt: skip
-"""Every module of the three packages is in one of them, by what is said on the command line."""
+"""Every module of the five packages is in one of them, by what is said on the command line."""

@@ -26,7 +26,7 @@ PEAK = """
 import resource, sys
 from space_robot_msgs_py.bag import blocks
 blocks.BLOCK_TICKS = 4000
-from space_robot_control.cli.main import cli
+from space_robot.cli.main import cli
 cli.main(sys.argv[1:], standalone_mode=False)
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """

@@ -21,7 +21,7 @@ from space_robot.processes.pool import (
 
 STARTER = """
 import os, time
-from space_robot_control.campaign.runner import run_many, worker
+from space_robot.processes.pool import run_many, worker
 
 def name(_):
     os.write(1, f"{os.getpid()} {os.getppid()}\\n".encode())
