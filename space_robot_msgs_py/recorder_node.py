@@ -37,7 +37,7 @@ LOOK_PERIOD_S = 0.02
 """Between two looks for publishers of topics that only some flights have."""
 AHEAD_OF_NEED = (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
 """Topics of which messages that came while nothing was recorded are of the time after it, too."""
-PATIENCE_S = 0.002
+TIMEOUT_S = 0.002
 """For which messages may wait longer, in a process of several nodes, until those rest. In ten times
 as long so much would queue up that the middleware handed it out at half the speed."""
 NEVER_NS = 1 << 63
@@ -91,7 +91,7 @@ class RecorderLoop:
         self.outputs: tuple[RawPublisher, ...] = ()
         self._ours = {name: topic.full_name for topic, name in self._names.items()}
         """Names in the root namespace by those that are heard."""
-        self._pause = Wait(settings.drain_period, patience_s=PATIENCE_S)
+        self._pause = Wait(settings.drain_period, patience_s=TIMEOUT_S)
         self._diagnostics = RawSubscription(node, topics.DIAGNOSTICS, self._group)
         self._description = RawSubscription(node, topics.PLANT_DESCRIPTION, self._group)
         self._told = False
@@ -124,7 +124,7 @@ class RecorderLoop:
         _, is_busy = self._take_round()
         return None if is_busy else self._pause
 
-    def stand_down(self) -> None:
+    def deactivate(self) -> None:
         """Take what was sent until now, and no more: an inactive recorder's file does not grow."""
         if self._until_ns is not None:
             return

@@ -24,7 +24,7 @@ AHEAD_S = 1000
 MALFORMED = b"\x00\x01\x00\x00junk"
 
 
-def _spoil(kind: str, data: bytes) -> bytes:
+def _corrupt(kind: str, data: bytes) -> bytes:
     if kind == "malformed":
         return MALFORMED
     if kind == "future":
@@ -50,7 +50,7 @@ def main(kind: str, rate_hz: float) -> None:
         for topic, out in outs.items():
             newest[topic] = heard[topic].take() or newest.get(topic, b"")
             if newest[topic] or kind == "malformed":
-                out.publish(_spoil(kind, newest[topic]))
+                out.publish(_corrupt(kind, newest[topic]))
         time.sleep(max(0.0, begin + rounds / rate_hz - time.monotonic()))
 
 

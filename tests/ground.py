@@ -20,7 +20,7 @@ from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 
 from space_robot.flight.graph.monitor import Monitor  # noqa: E402
 
-PATIENCE_S = 30.0
+TIMEOUT_S = 30.0
 
 
 class Ground:
@@ -42,9 +42,9 @@ class Ground:
     def call(self, service: Any, name: str, request: Any) -> Any:
         client = self.node.create_client(service, name)
         try:
-            assert client.wait_for_service(PATIENCE_S), name
+            assert client.wait_for_service(TIMEOUT_S), name
             future = client.call_async(request)
-            self._executor.spin_until_future_complete(future, PATIENCE_S)
+            self._executor.spin_until_future_complete(future, TIMEOUT_S)
             assert future.done(), name
             return future.result()
         finally:
@@ -61,7 +61,7 @@ class Ground:
         """Ask for several transitions that a node finds together when it looks."""
         client = self.node.create_client(ChangeState, f"/{node}_node/change_state")
         try:
-            assert client.wait_for_service(PATIENCE_S), node
+            assert client.wait_for_service(TIMEOUT_S), node
             process.send_signal(signal.SIGSTOP)
             futures = []
             for transition in transitions:
@@ -71,7 +71,7 @@ class Ground:
             time.sleep(0.1)
             process.send_signal(signal.SIGCONT)
             for future in futures:
-                self._executor.spin_until_future_complete(future, PATIENCE_S)
+                self._executor.spin_until_future_complete(future, TIMEOUT_S)
             return [future.done() and bool(future.result().success) for future in futures]
         finally:
             self.node.destroy_client(client)
@@ -84,7 +84,7 @@ class Ground:
         return float(self.monitor.values.get(f"{node}_node", {}).get(key, 0))
 
     def until(self, done: Callable[[], bool], what: str) -> None:
-        until = time.monotonic() + PATIENCE_S
+        until = time.monotonic() + TIMEOUT_S
         while not done():
             assert time.monotonic() < until, (what, self.monitor.values)
             self.monitor.poll()

@@ -16,7 +16,7 @@ from space_robot_msgs_py.samples import RobotNames, RobotState
 from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule
 from space_robot_sim.plant.faults import PLANT_KINDS
-from space_robot_sim.sensors.noise import Draws
+from space_robot_sim.sensors.noise import NoiseDraws
 from space_robot_sim.sensors.sensors import (
     FAULTS,
     Sensors,
@@ -60,7 +60,7 @@ class Bench:
         )
         self.block["are_ideal"] = False
         self.faults = [(part, fault(schedule)) for part, fault in FAULTS.items() if faults]
-        self.draws = Draws(seed, arrays_of_draws(self.block[0]))
+        self.draws = NoiseDraws(seed, arrays_of_draws(self.block[0]))
         self.period, self.measured = period, RobotState.allocate(N)
 
     def measure(self, truth: RobotState) -> RobotState:

@@ -10,8 +10,8 @@ from import_graph import PACKAGES, cycles, edges, folders, imports, modules, str
 
 ROOMS = {
     "space_robot_msgs_py": (
-        "errors", "deprecation", "simulated_time", "topics", "compiled", "samples", "config", "wire",
-        "bag", "ros", "recorder_node",
+        "errors", "deprecation", "simulated_time", "topics", "compiled", "samples", "config",
+        "wire", "bag", "ros", "recorder_node",
     ),
     "space_robot_model": ("elementary", "dynamics", "robot", "hardware"),
     "space_robot_sim": (

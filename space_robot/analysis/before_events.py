@@ -14,10 +14,10 @@ from space_robot_model.elementary.matrices import (
 from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_model.robot.base_axes import base_axes
 from space_robot_msgs_py.bag.flight_log import FlightLog
-from space_robot_sim.environment.captures import Exchange
+from space_robot_sim.environment.captures import CaptureEvent
 
 
-def state_before(exchange: Exchange, row: FlightLog, wheels: WheelSettings) -> FlightLog:
+def state_before(exchange: CaptureEvent, row: FlightLog, wheels: WheelSettings) -> FlightLog:
     """Return the one row of an event's tick with the velocities that led to those it has.
 
     Args:

@@ -32,7 +32,7 @@ AT_LIMIT = 1e-3
 at a limit little by little."""
 
 
-class Requirement(NamedTuple):
+class LoadRequirement(NamedTuple):
     """A number that is asked of a part of the base's actuators, and what the part has."""
 
     part: str
@@ -64,7 +64,7 @@ class Load(ABC):
         """Take further rows."""
 
     @abstractmethod
-    def requirements(self, period: float) -> list[Requirement]:
+    def requirements(self, period: float) -> list[LoadRequirement]:
         """Return what all rows so far asked for; ticks are ``period`` s apart."""
 
 
@@ -83,7 +83,7 @@ class WheelLoad(Load):
         self._torque = np.maximum(self._torque, np.max(np.abs(torque), axis=0))
         self._momentum = np.maximum(self._momentum, np.max(np.abs(momentum), axis=0))
 
-    def requirements(self, period: float) -> list[Requirement]:
+    def requirements(self, period: float) -> list[LoadRequirement]:
         """Return both of every wheel."""
         limits = [self._wheels.limits(f"max_{key}") for key in ("torque", "momentum")]
         found = []
@@ -91,8 +91,8 @@ class WheelLoad(Load):
             name = f"wheel_{i + 1}"
             torque, momentum = float(self._torque[i]), float(self._momentum[i])
             found += [
-                Requirement(name, "peak torque", "N m", torque, float(limits[0][i])),
-                Requirement(name, "largest momentum", "N m s", momentum, float(limits[1][i])),
+                LoadRequirement(name, "peak torque", "N m", torque, float(limits[0][i])),
+                LoadRequirement(name, "largest momentum", "N m s", momentum, float(limits[1][i])),
             ]
         return found
 
@@ -148,15 +148,17 @@ class ThrusterLoad(Load):
             self._share = max(self._share, float(np.max(self._torques.share(demand.torque))))
         self._use(log, demand)
 
-    def requirements(self, period: float) -> list[Requirement]:
+    def requirements(self, period: float) -> list[LoadRequirement]:
         """Return what is asked of all together."""
         found = []
         if self._torques:
-            found.append(Requirement("thrusters", "share of their torque", "-", self._share, 1.0))
+            found.append(
+                LoadRequirement("thrusters", "share of their torque", "-", self._share, 1.0)
+            )
         if self._rate_of_axes is not None:
             tank = self._thrusters.propellant or np.inf
             mass = period * self._rate
-            found.append(Requirement("thrusters", "propellant", "kg", mass, tank))
+            found.append(LoadRequirement("thrusters", "propellant", "kg", mass, tank))
         return found
 
     def pulses(self) -> NDArray[np.intp] | None:

@@ -8,8 +8,8 @@ from typing import Any
 
 from ..console.tables import (
     Column,
+    JudgedCell,
     Table,
-    Verdict,
 )
 from .report_tables import comparison_table
 from .sizing_table import sizing_table
@@ -47,7 +47,7 @@ def _recorded(reports: Mapping[str, Report]) -> Table:
             name, law_of(report) or "not said",
             *(report[key] or "not said" for key in ("case", "gains", "robot")),
             f"{report['from_s']:g} to {report['to_s']:g} s", report["ticks"],
-            Verdict("", "whole", "good") if _whole(report) else Verdict("", "not whole", "bad"),
+            JudgedCell("", *(("whole", "good") if _whole(report) else ("not whole", "bad"))),
         ]
         for name, report in reports.items()
     ]  # fmt: skip

@@ -16,7 +16,7 @@ from space_robot_msgs_py.topics import BASE_AXES
 
 from .base_demand import BaseDemand
 from .capability import largest_momentum, largest_torque
-from .loads import Load, OtherThrusterLoad, OtherWheelLoad, Requirement, ThrusterLoad, WheelLoad
+from .loads import Load, LoadRequirement, OtherThrusterLoad, OtherWheelLoad, ThrusterLoad, WheelLoad
 from .metrics import AxisMaximum, AxisRms
 
 Array = NDArray[np.float64]
@@ -99,22 +99,22 @@ class Sizing(Metric):
             "requirements": [_as_data(found) for found in self._requirements()],
         }
 
-    def _requirements(self) -> Iterator[Requirement]:
+    def _requirements(self) -> Iterator[LoadRequirement]:
         if not self._loads:
             return
         torque = largest_torque(self._set)
         for i, axis in enumerate(BASE_AXES):
             asked = float(self._torque.value[i])
-            yield Requirement(axis, "peak torque", "N m", asked, float(torque[i]))
+            yield LoadRequirement(axis, "peak torque", "N m", asked, float(torque[i]))
         if self._set.wheel_count:
             momentum = largest_momentum(self._set.wheels)
             for i, axis in enumerate(BASE_AXES):
                 asked = float(self._momentum.value[i])
-                yield Requirement(axis, "stored momentum", "N m s", asked, float(momentum[i]))
+                yield LoadRequirement(axis, "stored momentum", "N m s", asked, float(momentum[i]))
         for load in self._loads:
             yield from load.requirements(self._period)
 
 
-def _as_data(found: Requirement) -> dict[str, Any]:
+def _as_data(found: LoadRequirement) -> dict[str, Any]:
     has = found.has if np.isfinite(found.has) else None
     return {**found._asdict(), "has": has, "margin": found.margin, "is_met": found.is_met}

@@ -9,9 +9,9 @@ from typing import Any
 from ..console.tables import (
     Column,
     Group,
+    JudgedCell,
     Row,
     Table,
-    Verdict,
 )
 from .words import Report
 
@@ -61,7 +61,7 @@ def _row(quantity: str, unit: str, asked: float, judged: dict[str, Any] | None) 
     has = "no limit" if judged["has"] is None else f"{judged['has']:.4g}"
     margin = "" if judged["margin"] is None else f"{100.0 * judged['margin']:+.0f} %"
     verdict = ("has it", "good") if judged["is_met"] else ("lacks it", "bad")
-    return quantity, unit, asked, has, Verdict(margin, *verdict)
+    return quantity, unit, asked, has, JudgedCell(margin, *verdict)
 
 
 def _title(found: dict[str, Any]) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 from space_robot_msgs_py.config.arguments import as_path
 from space_robot_msgs_py.config.validation import one_of
 
-from ..flight.replay.outcome import Options, Replay
+from ..flight.replay.outcome import Replay, ReplayOptions
 from ..flight.replay.run import replay as run
 
 
@@ -20,14 +20,14 @@ def replay(bag: str | Path, **options: Any) -> Replay:
 
     Args:
         bag: folder of the recorded flight.
-        options: those of `Options`: ``controller``, ``gains``, ``parameters`` of the controller,
-            ``start_s``, ``end_s``, ...
+        options: those of `ReplayOptions`: ``controller``, ``gains``, ``parameters`` of the
+            controller, ``start_s``, ``end_s``, ...
 
     Raises:
         InputError: bag or options cannot be used; nothing was started.
         FlightError: the controller did not start.
     """
-    allowed = [field.name for field in fields(Options) if field.name != "bag"]
+    allowed = [field.name for field in fields(ReplayOptions) if field.name != "bag"]
     for name in options:
         one_of(name, allowed, "option", " of replay")
-    return run(Options(as_path(bag, "bag"), **options))
+    return run(ReplayOptions(as_path(bag, "bag"), **options))

@@ -24,12 +24,15 @@ from ..scenario.robots import Robots
 from ..tuning.demand import demand
 from ..tuning.gain_file import gain_files
 from ..tuning.inertia import inertia_along
-from ..tuning.method import Tuned, Wishes, tune
+from ..tuning.method import Tuned, TuningOptions, tune
 from ..tuning.noise import listen
 
 
 def tuned_set(
-    options: Mapping[str, Any], cases: Sequence[str], wishes: Wishes, step: Callable[[str], None]
+    options: Mapping[str, Any],
+    cases: Sequence[str],
+    wishes: TuningOptions,
+    step: Callable[[str], None],
 ) -> Tuned:
     """Make the set.
 

@@ -19,7 +19,7 @@ from ..console.tables import (
     Column,
     Table,
 )
-from ..console.tables import Verdict as Judged
+from ..console.tables import JudgedCell as Judged
 from ..console.terminal import say
 from ..console.terminal_tables import print_table
 

@@ -108,11 +108,11 @@ def tune(context: click.Context, /, output: Path, **options: Any) -> None:
     """
     from ..campaign.gain_set import tuned_set, write_set
     from ..console.terminal import terminal
-    from ..tuning.method import Wishes
+    from ..tuning.method import TuningOptions
     from ..tuning.warning import estimate_remark
 
     names = ("margin", "mass_uncertainty", "bandwidth", "ripple")
-    wishes, cases = Wishes(*(options.pop(name) for name in names)), options.pop("cases")
+    wishes, cases = TuningOptions(*(options.pop(name) for name in names)), options.pop("cases")
     with terminal(stderr=True).status("tuning") as status:
         tuned = tuned_set(options, cases, wishes, status.update)
     for path in write_set(tuned, _command(context), output):

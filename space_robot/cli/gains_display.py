@@ -6,8 +6,8 @@ from rich.console import Console
 
 from ..console.tables import (
     Column,
+    JudgedCell,
     Table,
-    Verdict,
 )
 from ..console.terminal import say
 from ..console.terminal_tables import print_table
@@ -42,8 +42,8 @@ def _margins(found: Checked) -> Table:
             word = "sound" if spectrum.margin >= LEAST_MARGIN else "small"
             rows.append([
                 check.law, spectrum.smallest, spectrum.largest,
-                Verdict(f"{spectrum.radius:.4f} < 1", *_holds(spectrum.contracts)),
-                Verdict(f"{spectrum.margin:.2%}", word if spectrum.contracts else "none", small),
+                JudgedCell(f"{spectrum.radius:.4f} < 1", *_holds(spectrum.contracts)),
+                JudgedCell(f"{spectrum.margin:.2%}", word if spectrum.contracts else "none", small),
             ])  # fmt: skip
     inertia = "H_S" if found.flight.controls_base else "H_f"
     table = Table.of(f"Eigenvalues of {inertia}^-1 h_bar along the mission", columns, rows)

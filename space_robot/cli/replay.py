@@ -81,7 +81,7 @@ def replay(
         echo_json,
         terminal,
     )
-    from ..flight.replay.outcome import Options
+    from ..flight.replay.outcome import ReplayOptions
     from ..flight.replay.run import replay as run
 
     if other := sorted(set(parameters) - {"controller"}):
@@ -91,7 +91,7 @@ def replay(
     for file in filter(None, (table, plot and plot.with_suffix(".png"))):
         check_writable(file)
     done = run(
-        Options(
+        ReplayOptions(
             bag, parameters=parameters.get("controller", {}), start_s=start,
             end_s=math.inf if end is None else end, **options,
         )

@@ -63,12 +63,12 @@ def reproduce(
 
     from ..console.progress import counting_progress
     from ..flight.compilation import compile_kernels
-    from ..paper.reproduction.flights import ROWS, Equipment, Row
+    from ..paper.reproduction.flights import ROWS, Equipment, TableRow
     from ..paper.reproduction.reproduce import check_folder
     from ..paper.reproduction.reproduce import reproduce as run
     from ..processes.pool import cores
 
-    rows = [Row.parse(text) for text in dict.fromkeys(only)] or list(ROWS)
+    rows = [TableRow.parse(text) for text in dict.fromkeys(only)] or list(ROWS)
     check_folder(out)
     named_file("sensors", sensors)
     named_file("actuators", actuators)

@@ -84,7 +84,7 @@ def view(
     )
     from ..console.progress import counting_progress
     from ..view.animation import FORMATS
-    from ..view.flights import Options, flights_page, picture_of, remarks_on, shown_robot
+    from ..view.flights import ViewOptions, flights_page, picture_of, remarks_on, shown_robot
     from ..view.stage import check_viser
     from .analyze import bag_names
     from .view_live import check_options, serve_live
@@ -105,7 +105,7 @@ def view(
     robots = {name: shown_robot(log, robot) for name, log in logs.items()}
     for line in remarks_on(logs, robots):
         click.echo(line, err=True)
-    options = Options(side_by_side, rate, title, not light)
+    options = ViewOptions(side_by_side, rate, title, not light)
     with counting_progress("drawing") as advance:
         if page.suffix in FORMATS:
             data = picture_of(logs, robots, title, page, advance)

@@ -31,7 +31,7 @@ class Column(NamedTuple):
         return f"{self.name}, {self.unit}" if self.unit else self.name
 
 
-class Verdict(NamedTuple):
+class JudgedCell(NamedTuple):
     """A cell that ends in a judgement."""
 
     text: str
@@ -45,7 +45,7 @@ class Verdict(NamedTuple):
         return f"{self.text} {self.word}".strip()
 
 
-Value = str | float | Verdict | None
+Value = str | float | JudgedCell | None
 Row = Sequence[Any]
 """A `Value` a column."""
 
@@ -89,7 +89,7 @@ def text_of(value: Value, column: Column) -> str:
     """Write a value as its column asks for."""
     if value is None:
         return NONE
-    return str(value) if isinstance(value, (str, Verdict)) else format(value, column.spec)
+    return str(value) if isinstance(value, (str, JudgedCell)) else format(value, column.spec)
 
 
 def as_markdown(title: str, tables: Sequence[Table]) -> str:

@@ -11,9 +11,9 @@ from rich.text import Text
 
 from .tables import (
     Column,
+    JudgedCell,
     Table,
     Value,
-    Verdict,
     text_of,
 )
 from .terminal import (
@@ -55,7 +55,7 @@ def print_table(table: Table, console: Console, *, dense: bool = False) -> None:
 
 
 def _cell(value: Value, column: Column) -> str | Text:
-    if isinstance(value, Verdict):
+    if isinstance(value, JudgedCell):
         return Text.assemble(
             f"{value.text} " if value.text else "", (value.word, TONES[value.tone])
         )

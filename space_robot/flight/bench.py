@@ -241,7 +241,7 @@ class Bench(RecordOwner):
             raise InputError(
                 f"torque: {counts} numbers were expected, got an array of shape {numbers.shape}"
             )
-        return self.controller.share_out(self._plant.state, numbers)
+        return self.controller.allocate_torque(self._plant.state, numbers)
 
     def _law_at(self, tick: int) -> ControlLaw:
         """Return the law in force: the one swapped to last."""

@@ -34,7 +34,7 @@ def bag_bytes(flight: Flight) -> float:
     return size / SAMPLE_TICKS * flight.ticks
 
 
-def room_remark(flight: Flight, bag: Path) -> str:
+def disk_space_warning(flight: Flight, bag: Path) -> str:
     """Return a line that says that ``bag`` will not have room; empty if it will."""
     free = shutil.disk_usage(next(p for p in bag.absolute().parents if p.exists())).free
     if flight.ticks * largest_tick(flight.robot.joint_count) <= free:

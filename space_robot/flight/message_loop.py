@@ -9,19 +9,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from space_robot_control.controller.answering import (
-    Answering,
-    Standing,
-)
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
+from space_robot_control.controller.state_responder import (
+    StampStatus,
+    StateResponder,
+)
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.stamp_guard import AGREEING
 from space_robot_sim.plant.command_guard import CommandGuard
-from space_robot_sim.plant.exchange import NONE, SentState, exchange_of
+from space_robot_sim.plant.messages import (
+    NONE,
+    SentState,
+    exchange_of,
+)
 
 from .plan import Flight
 
@@ -32,19 +36,19 @@ class MessageLoop:
     """Flies tick by tick; every message is handed to ``record``, as it is sent."""
 
     def __init__(
-        self, flight: Flight, record: Record, tell_truth: Callable[[RobotState], None]
+        self, flight: Flight, record: Record, update_true_state: Callable[[RobotState], None]
     ) -> None:
-        """``tell_truth``: called with every true state that differs from what is told of it."""
+        """``update_true_state``: called with every true state that differs from the measured one."""
         robot, settings = flight.robot, flight.plant_settings
         names = flight.plant.names
         self._flight, self._plant, self._record = flight, flight.plant, record
-        self._tell_truth = tell_truth
+        self._tell_truth = update_true_state
         self._guard = CommandGuard(len(names.commanded), settings.hold_ticks)
         self._states = StateCodec(names, flight.timebase)
         self._commands = CommandCodec(names.commanded, flight.timebase)
         self._exchange = exchange_of(settings, names, flight.period, self._states, self._guard)
         self._references = ReferenceBuffer(robot.n)
-        self._answering = Answering(
+        self._answering = StateResponder(
             flight.controller, LawChoice(flight.law, flight.swaps), self._references,
             flight.controller_settings,
         )  # fmt: skip
@@ -95,7 +99,7 @@ class MessageLoop:
             stamp, *_ = [self._states.decode(topic, data, state) for topic, data in parts]
         except MessageError:
             return NONE
-        if self._answering.judge(stamp) is not Standing.NEW:
+        if self._answering.judge(stamp) is not StampStatus.NEW:
             return NONE
         reference = references.at(stamp) if references.covers(stamp) else references.hold(stamp)
         if reference is None:

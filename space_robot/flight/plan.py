@@ -35,7 +35,7 @@ from ..scenario.faults import (
     PROCESS_KINDS,
 )
 from ..scenario.node_settings import FlightSettings
-from ..scenario.objects import law_given
+from ..scenario.objects import resolve_law
 from ..scenario.options import (
     NO_FRICTION,
     FlightPlan,
@@ -73,7 +73,7 @@ class Flight:
         axes = self.robot.n + 3
         laws: dict[str, ControlLaw] = {NoLaw.name: NoLaw({}, self.period, axes)}
         if plan.controller is not None:
-            own = law_given(plan.controller)
+            own = resolve_law(plan.controller)
             laws = build_laws(settings.controller, axes, settings.gains, own or "")
         self.swaps = [
             (tick, laws[one_of(name, laws, "controller", " of swaps")])

@@ -68,7 +68,7 @@ class Messages:
         if tick % flight.plant_settings.clock_decimation == 0:
             self.record(topics.CLOCK, self._clock.encode(flight.timebase.stamp_ns(tick)))
 
-    def tell_truth(self, state: RobotState) -> None:
+    def update_true_state(self, state: RobotState) -> None:
         """Write the true state of a tick, with some before it."""
         self._record_all(self._truth.add(state))
 
@@ -101,7 +101,7 @@ class Messages:
             for topic, data in zip(self._states.topics, parts, strict=True):
                 record(topic, data)
             if told is not log:
-                self.tell_truth(log.state(tick))
+                self.update_true_state(log.state(tick))
             self.show(tick, log.state)
             if tick >= answered:
                 continue
@@ -133,7 +133,7 @@ def _recording(flight: Flight, bag: Path | None) -> Iterator[Messages | None]:
         recorder.close()
 
 
-def unflown(flight: Flight, start: int = 0, stop: int | None = None) -> FlightLog:
+def empty_log(flight: Flight, start: int = 0, stop: int | None = None) -> FlightLog:
     """The log of the ticks ``start`` to ``stop`` (None: the last) before they are flown.
 
     The reference alone is known.
@@ -150,7 +150,7 @@ def unflown(flight: Flight, start: int = 0, stop: int | None = None) -> FlightLo
     reference = flight.mission.chunk(start, log.ticks)
     log.reference_joints, log.reference_base = reference.joints, reference.base
     if not flight.plant.measures_truth:
-        log.measure_apart()
+        log.record_measured()
     return log
 
 
@@ -183,7 +183,7 @@ def fly_blocks(
     if flight.plant_settings.has_message_faults:
         yield from _fly_by_messages(flight, bag, progress)
         return
-    block_of = block_of or (lambda start, stop: unflown(flight, start, stop))
+    block_of = block_of or (lambda start, stop: empty_log(flight, start, stop))
     laws: tuple[LawInForce, ...] = ()
     changes = LawChanges()
     with _recording(flight, bag) as messages:
@@ -216,7 +216,7 @@ def simulate(
     if flight.plant_settings.has_message_faults:
         return _flown_by_messages(flight, bag, progress)
     _check_memory(flight)
-    log, flown = unflown(flight), 0
+    log, flown = empty_log(flight), 0
     try:
         for block in fly_blocks(flight, bag, progress, log.rows):
             flown += block.ticks
@@ -248,7 +248,7 @@ def _flown_by_messages(
         try:
             with _recording(flight, path) as messages:
                 assert messages
-                loop = MessageLoop(flight, messages.record, messages.tell_truth)
+                loop = MessageLoop(flight, messages.record, messages.update_true_state)
                 for tick in range(flight.plant.tick, flight.ticks):
                     if tick % STRETCH_OF_MESSAGES == 0:
                         progress(tick)
@@ -316,7 +316,7 @@ def _check_memory(flight: Flight) -> None:
     """
     from ..processes.memory import available_bytes
 
-    row = unflown(flight, 0, 1)
+    row = empty_log(flight, 0, 1)
     columns = [*row.columns.values(), *(row.measured.columns.values() if row.measured else ())]
     needed, free = flight.ticks * sum(column.nbytes for column in columns), available_bytes()
     if needed > free:

@@ -126,13 +126,13 @@ def robot_setting(robot: str | Robot) -> str:
     return robot.name if is_named(ROBOTS, robot.name) else GIVEN
 
 
-def law_given(law: Any) -> str | type[ControlLaw] | ControlLaw | None:
+def resolve_law(law: Any) -> str | type[ControlLaw] | ControlLaw | None:
     """Return a law as it was given, a function as the law that it is."""
     is_function = callable(law) and not isclass(law) and not isinstance(law, ControlLaw)
     return law_of(law) if is_function else law
 
 
-def law_setting(law: str | type[ControlLaw] | ControlLaw | None) -> str:
+def law_parameter(law: str | type[ControlLaw] | ControlLaw | None) -> str:
     """Return what the parameter ``controller`` says; `importable_name` of a law not shipped."""
     if law is None:
         return ""

@@ -25,10 +25,10 @@ from .objects import (
     RobotGiven,
     Sensors,
     gains_of,
-    law_given,
-    law_setting,
+    law_parameter,
     mission_of,
     numbers_of,
+    resolve_law,
     robot_setting,
 )
 
@@ -104,7 +104,7 @@ class FlightPlan(StrictModel):
         (case, world), (sensors, errors), (actuators, hardware) = (
             numbers_of(value) for value in (self.case, self.sensors, self.actuators)
         )
-        law = law_given(self.controller)
+        law = resolve_law(self.controller)
         gains, values = gains_of(self.gains, law)
         period = {} if self.period is None else {"period": self.period}
         return {
@@ -132,7 +132,7 @@ class FlightPlan(StrictModel):
             "controller": {
                 **period,
                 "robot": robot,
-                "controller": law_setting(law),
+                "controller": law_parameter(law),
                 "gains": gains,
                 **values,
                 "fifo_priority": self.fifo_priority,

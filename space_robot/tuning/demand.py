@@ -28,7 +28,7 @@ NOTHING = 1e-9
 
 
 @dataclass(frozen=True)
-class Demand:
+class ForceDemand:
     """Generalised forces F_S that hold a mission's reference, per axis (m,), N m."""
 
     peak: Array
@@ -40,13 +40,13 @@ class Demand:
     nominal: Array
     """Largest |F_S| of the nominal robot, alone in space."""
 
-    def on_all_axes(self, inertia: Array) -> Demand:
+    def on_all_axes(self, inertia: Array) -> ForceDemand:
         """Return the same with a demand on the axes that the mission asks nothing of.
 
         A motion in a plane leaves some axes alone; gains of zero would as well. They count as if
         they were asked for the smallest acceleration of all others. ``inertia``: (m,) of each axis.
         """
-        return Demand(*(_filled(force, inertia) for force in astuple(self)))
+        return ForceDemand(*(_filled(force, inertia) for force in astuple(self)))
 
 
 def _filled(force: Array, inertia: Array) -> Array:
@@ -56,7 +56,9 @@ def _filled(force: Array, inertia: Array) -> Array:
     return np.where(is_asked, force, inertia * least) if is_asked.any() else force
 
 
-def demand(robot: Robot, mission: MissionSettings, cases: Sequence[EnvironmentSettings]) -> Demand:
+def demand(
+    robot: Robot, mission: MissionSettings, cases: Sequence[EnvironmentSettings]
+) -> ForceDemand:
     """Return what the mission asks for in any of the ``cases``.
 
     Args:
@@ -72,7 +74,7 @@ def demand(robot: Robot, mission: MissionSettings, cases: Sequence[EnvironmentSe
     coulomb = [_coulomb(robot, mission, case) for case in cases]
     whole = [force + friction for force, friction in zip(smooth, coulomb, strict=True)]
     slopes = [np.abs(np.diff(force, axis=0)).max(axis=0) / SAMPLING for force in smooth]
-    return Demand(
+    return ForceDemand(
         peak=np.max([np.abs(force).max(axis=0) for force in whole], axis=0),
         slope=np.max(slopes, axis=0),
         unknown=np.max([np.abs(force - nominal).max(axis=0) for force in whole], axis=0),

@@ -42,7 +42,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.errors import InputError
 
-from .demand import Demand
+from .demand import ForceDemand
 from .noise import Noise
 from .spectrum import eigenvalues
 
@@ -61,7 +61,7 @@ DIGITS = 3
 
 
 @dataclass(frozen=True)
-class Wishes:
+class TuningOptions:
     """What the set is to stand."""
 
     margin: float
@@ -78,7 +78,7 @@ class Wishes:
 class Tuned:
     """A gain set, and the numbers of the method behind it."""
 
-    wishes: Wishes
+    wishes: TuningOptions
     corner_hz: float
     """Corner of the low-pass of the time-delay pair, Hz."""
     delay: float
@@ -98,7 +98,11 @@ class Tuned:
 
 
 def tune(
-    inertia: Array, asked: Demand, wishes: Wishes, period: float, noise: Noise | None = None
+    inertia: Array,
+    asked: ForceDemand,
+    wishes: TuningOptions,
+    period: float,
+    noise: Noise | None = None,
 ) -> Tuned:
     """Make a set.
 

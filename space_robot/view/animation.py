@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..analysis.plot_series import tick_times
 from .browser import FRAME_TIMEOUT_S, headless_browser
-from .film import Flown, add_flights
+from .film import FilmedFlight, add_flights
 from .local_server import local_server
 from .plots import Plot
 
@@ -36,7 +36,7 @@ TOP, BOTTOM = (13, 17, 23), (27, 35, 48)
 
 
 def animate(
-    flight: Flown, plots: Sequence[Plot], caption: str,
+    flight: FilmedFlight, plots: Sequence[Plot], caption: str,
     advance: Callable[[int], Callable[[], None]],
 ) -> list[Image]:  # fmt: skip
     """Draw the frames of a flight.

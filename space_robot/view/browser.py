@@ -23,7 +23,7 @@ OPTIONS = (
     "--no-first-run",
 )  # fmt: skip
 """It draws without a graphics card, and asks nobody but this process."""
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 LOOK_S = 0.1
 FRAME_TIMEOUT_S = 120.0
 """The first one is slow where there is no graphics card."""
@@ -71,7 +71,7 @@ def headless_browser(server: ViserServer) -> Iterator[ClientHandle]:
 
 
 def _client(server: ViserServer, process: subprocess.Popen[bytes]) -> ClientHandle:
-    until = time.monotonic() + PATIENCE_S
+    until = time.monotonic() + TIMEOUT_S
     while not (clients := server.get_clients()):
         if process.poll() is not None or time.monotonic() > until:
             raise FlightError("the browser did not open the scene")

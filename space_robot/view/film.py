@@ -14,7 +14,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 
 from .frames import Frames
 from .local_server import local_server
-from .scene import Look, RobotScene, rgb
+from .scene import RobotScene, SceneStyle, rgb
 from .stage import extent, set_stage
 from .targets import targets
 from .trails import Move, trails
@@ -32,7 +32,7 @@ GHOST = 0.4
 """Opacity of robots that are drawn over another one."""
 
 
-class Flown(NamedTuple):
+class FilmedFlight(NamedTuple):
     """A flight to be shown."""
 
     name: str
@@ -44,7 +44,7 @@ class Flown(NamedTuple):
 
 
 def film(
-    flights: Sequence[Flown], times: Array, side_by_side: bool, dark: bool,
+    flights: Sequence[FilmedFlight], times: Array, side_by_side: bool, dark: bool,
     advance: Callable[[int], Callable[[], None]],
 ) -> str:  # fmt: skip
     """Return the page of a scene with the flights, from the first time on.
@@ -72,8 +72,8 @@ def film(
 
 
 def add_flights(
-    server: ViserServer, flights: Sequence[Flown], times: Array, side_by_side: bool, dark: bool,
-    shadows: bool = True,
+    server: ViserServer, flights: Sequence[FilmedFlight], times: Array, side_by_side: bool,
+    dark: bool, shadows: bool = True,
 ) -> list[Move]:  # fmt: skip
     """Add robots, trails and targets to a server's empty scene; return what moves them.
 
@@ -100,7 +100,7 @@ def add_flights(
         scene.add_frame(root, show_axes=False, position=place)
         over = index > 0 and not side_by_side
         size = float(np.ptp(seen[index], axis=0).max())
-        look = Look(flight.colour, GHOST, 0.004 * size * index) if over else Look()
+        look = SceneStyle(flight.colour, GHOST, 0.004 * size * index) if over else SceneStyle()
         robot = RobotScene(scene, root, flight.robot, look)
         moves.append(_moving(robot, of))
         moves += trails(scene, root, of, rgb(flight.colour), 0.0035 * size)

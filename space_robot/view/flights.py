@@ -19,7 +19,7 @@ from space_robot_msgs_py.errors import InputError
 
 from ..analysis.described import check_joints, robot_of
 from .animation import animate, encoded
-from .film import Flown, film
+from .film import FilmedFlight, film
 from .frames import RATE_HZ, shown_times
 from .marks import shared_marks
 from .meshes import shown_shapes
@@ -35,7 +35,7 @@ PICTURED, MOST_PLOTS = ("attitude", "base torque", "torque"), 3
 
 
 @dataclass(frozen=True)
-class Options:
+class ViewOptions:
     """What may be asked of a page."""
 
     side_by_side: bool = False
@@ -49,7 +49,7 @@ class Options:
 
 
 def flights_page(
-    logs: Mapping[str, FlightLog], robots: Mapping[str, Robot], options: Options,
+    logs: Mapping[str, FlightLog], robots: Mapping[str, Robot], options: ViewOptions,
     advance: Callable[[int], Callable[[], None]],
 ) -> str:  # fmt: skip
     """Return the page of some flights, complete in itself.
@@ -65,7 +65,7 @@ def flights_page(
     """
     colours = ON_DARK if options.dark else ON_WHITE
     flights = [
-        Flown(name, log, robots[name], _law(log), colours[k % len(colours)])
+        FilmedFlight(name, log, robots[name], _law(log), colours[k % len(colours)])
         for k, (name, log) in enumerate(logs.items())
     ]
     of_one = len({(flight.robot.name, flight.robot.body_names) for flight in flights}) == 1
@@ -98,7 +98,7 @@ def picture_of(
     if len(logs) > 1:
         raise InputError(f"{file}: an animated picture shows one flight, got {len(logs)} bags")
     ((name, log),) = logs.items()
-    flight = Flown(name, log, robots[name], _law(log), OF_TRAIL)
+    flight = FilmedFlight(name, log, robots[name], _law(log), OF_TRAIL)
     shown = [p for p in plots_of(logs, robots, ON_DARK) if p.title.startswith(PICTURED)]
     return encoded(animate(flight, shown[:MOST_PLOTS], title or _told(flight), advance), file)
 
@@ -138,7 +138,7 @@ def _law(log: FlightLog) -> str:
     return in_words(as_data(laws_of(log), log.timebase)) or str(log.flight.get("controller", ""))
 
 
-def _told(flight: Flown) -> str:
+def _told(flight: FilmedFlight) -> str:
     case = flight.log.flight.get("case")
     words = [flight.law, flight.robot.name, f"case {case}" if case else ""]
     return ", ".join(filter(None, words))

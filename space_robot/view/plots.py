@@ -14,7 +14,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.config.text import shortened
 
 from ..analysis.plot_series import tick_times
-from .quantities import Quantity, quantities_of
+from .quantities import PlottedQuantity, quantities_of
 
 Array = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ def plots_of(
 
 
 def _of_axes(
-    log: FlightLog, quantity: Quantity, colours: Sequence[str], edges: Array
+    log: FlightLog, quantity: PlottedQuantity, colours: Sequence[str], edges: Array
 ) -> list[Series]:
     return [
         Series(shortened(label, MOST_LETTERS), colour, extremes(log, axis, edges))
@@ -95,7 +95,9 @@ def _of_axes(
     ]
 
 
-def _of_size(log: FlightLog, name: str, colour: str, quantity: Quantity, edges: Array) -> Series:
+def _of_size(
+    log: FlightLog, name: str, colour: str, quantity: PlottedQuantity, edges: Array
+) -> Series:
     size = np.linalg.norm(quantity.values, axis=1)
     return Series(shortened(name, MOST_LETTERS), colour, extremes(log, size, edges))
 

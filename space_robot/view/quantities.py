@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 AXES = "xyz"
 
 
-class Quantity(NamedTuple):
+class PlottedQuantity(NamedTuple):
     """Values over the ticks of a flight, all in one unit."""
 
     title: str
@@ -35,7 +35,7 @@ class Quantity(NamedTuple):
     """True for shares of a tick, from 0 to 1, during which something is open."""
 
 
-def quantities_of(log: FlightLog, robot: Robot) -> list[Quantity]:
+def quantities_of(log: FlightLog, robot: Robot) -> list[PlottedQuantity]:
     """Return errors, drift of the base, torques, actuators and passive joints of a flight.
 
     Args:
@@ -48,24 +48,26 @@ def quantities_of(log: FlightLog, robot: Robot) -> list[Quantity]:
     ]  # fmt: skip
 
 
-def _errors(log: FlightLog) -> Iterator[Quantity]:
+def _errors(log: FlightLog) -> Iterator[PlottedQuantity]:
     columns = error_columns(log.axes, controls_base(log), log.prismatic, log.branches)
     names, values = np.array([*AXES, *log.joint_names]), tracking_error(log)
     for name, axes in columns.items():
         unit = unit_of(name).strip("-")
-        yield Quantity(f"{words(name)} error", unit, names[axes].tolist(), values[:, axes], True)
+        yield PlottedQuantity(
+            f"{words(name)} error", unit, names[axes].tolist(), values[:, axes], True
+        )
 
 
-def _torques(log: FlightLog) -> Iterator[Quantity]:
+def _torques(log: FlightLog) -> Iterator[PlottedQuantity]:
     columns = torque_columns(log.axes, controls_base(log), log.prismatic, log.branches)
     names = np.array([*AXES, *log.joint_names])
     for name, axes in columns.items():
-        yield Quantity(
+        yield PlottedQuantity(
             words(name), unit_of(name), names[axes].tolist(), log.applied_torque[:, axes]
         )  # fmt: skip
 
 
-def _drift(log: FlightLog) -> Iterator[Quantity]:
+def _drift(log: FlightLog) -> Iterator[PlottedQuantity]:
     """Yield how far the base is from where it was in its first known row."""
     known = np.flatnonzero(log.finite(("base_position", "quaternion")))
     if not len(known):
@@ -73,11 +75,11 @@ def _drift(log: FlightLog) -> Iterator[Quantity]:
     first = known[0]
     if not controls_base(log):
         turned = attitude_drift(log, log.quaternion[first])
-        yield Quantity("attitude drift", "deg", AXES, turned)
-    yield Quantity("base drift", "m", AXES, log.base_position - log.base_position[first])
+        yield PlottedQuantity("attitude drift", "deg", AXES, turned)
+    yield PlottedQuantity("base drift", "m", AXES, log.base_position - log.base_position[first])
 
 
-def _passive_joints(log: FlightLog, robot: Robot) -> Iterator[Quantity]:
+def _passive_joints(log: FlightLog, robot: Robot) -> Iterator[PlottedQuantity]:
     """Yield the deflection of the joints without motors from where their springs rest."""
     rest = np.array([spring.rest for spring in robot.springs])
     slides = np.array(log.prismatic[len(log.joint_names) :], dtype=bool)
@@ -85,10 +87,10 @@ def _passive_joints(log: FlightLog, robot: Robot) -> Iterator[Quantity]:
         if chosen.any():
             names = np.array(log.passive_names)[chosen].tolist()
             away = (log.passive_positions - rest)[:, chosen]
-            yield Quantity("deflection", unit, names, away)
+            yield PlottedQuantity("deflection", unit, names, away)
 
 
-def _actuators(log: FlightLog) -> Iterator[Quantity]:
+def _actuators(log: FlightLog) -> Iterator[PlottedQuantity]:
     wheels, thrusters = log.wheel_velocities.shape[1], log.thrusts.shape[1]
     if not wheels and not thrusters:
         return
@@ -97,14 +99,14 @@ def _actuators(log: FlightLog) -> Iterator[Quantity]:
         actuators = flown_actuators(log)
     except InputError:  # the bag does not describe them
         if wheels:
-            yield Quantity("wheel speed", "rad/s", names, log.wheel_velocities)
+            yield PlottedQuantity("wheel speed", "rad/s", names, log.wheel_velocities)
         largest = np.nanmax(np.abs(log.thrusts), axis=0, initial=0.0)
         force = np.where(largest > 0.0, largest, 1.0)
     else:
         if wheels:
             held = actuators.wheels.spin_momenta(log.wheel_velocities)
-            yield Quantity("wheel momentum", "N m s", names, held)
+            yield PlottedQuantity("wheel momentum", "N m s", names, held)
         force = actuators.thrusters.values("force")
     if thrusters:
         names = [f"thruster_{k + 1}" for k in range(thrusters)]
-        yield Quantity("thruster pulses", "", names, log.thrusts / force, are_pulses=True)
+        yield PlottedQuantity("thruster pulses", "", names, log.thrusts / force, are_pulses=True)

@@ -32,7 +32,7 @@ GREY = (0.7, 0.7, 0.7, 1.0)
 """Of shapes without a colour."""
 
 
-class Look(NamedTuple):
+class SceneStyle(NamedTuple):
     """How the shapes of a robot are drawn."""
 
     tint: str = ""
@@ -45,7 +45,9 @@ class Look(NamedTuple):
 class RobotScene:
     """A robot below a name of its own, as ``/tde_stc/base_link/link1``: frames as tf has them."""
 
-    def __init__(self, scene: SceneApi, root: str, robot: Robot, look: Look | None = None) -> None:
+    def __init__(
+        self, scene: SceneApi, root: str, robot: Robot, look: SceneStyle | None = None
+    ) -> None:
         """Add the robot; it stands at zero.
 
         Args:
@@ -54,7 +56,7 @@ class RobotScene:
             robot: its numbers.
             look: of its shapes.
         """
-        self._scene, self._robot, self._look = scene, robot, look or Look()
+        self._scene, self._robot, self._look = scene, robot, look or SceneStyle()
         self._names = frame_names(robot).bodies
         base = self._names[0]
         self._paths = {base: f"{root}/{_part(base)}"}
@@ -122,7 +124,7 @@ def set_pose(frame: FrameHandle, what: str, value: Array) -> None:
 
 
 def add_shape(
-    scene: SceneApi, path: str, shape: Visual, look: Look, mesh: Mesh | None = None
+    scene: SceneApi, path: str, shape: Visual, look: SceneStyle, mesh: Mesh | None = None
 ) -> SceneNodeHandle:
     """Draw a shape below a node of the scene.
 

@@ -21,7 +21,7 @@ from space_robot_sim.environment.grasp import Grasp
 
 from ..analysis.described import events_of
 from .free_body import FreeBody, before_capture
-from .scene import Look, RobotScene, add_shape, set_pose
+from .scene import RobotScene, SceneStyle, add_shape, set_pose
 from .trails import Move
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def _drifting(scene: SceneApi, path: str, grasp: Grasp, free: FreeBody, times: A
     """Draw a target up to its capture, at times (K,) s before it."""
     frame = scene.add_frame(path, show_axes=False)
     box = even_box(grasp.mass, grasp.inertia, np.zeros(3), 0, COLOUR)
-    add_shape(scene, f"{path}/box", box, Look())
+    add_shape(scene, f"{path}/box", box, SceneStyle())
     positions, quaternions = free.poses(times)
 
     def drift(k: int) -> None:

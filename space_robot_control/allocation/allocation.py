@@ -23,10 +23,10 @@ from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_WHEELS
 from .modulation import Modulation, modulate
 from .null_motion import NullMotion, add_null_motion
 from .settings import AllocationSettings
-from .thrusters import Thrusters, expect_torque
+from .thrusters import AssumedThrusters, expect_torque
 from .unloading import Unloading, find_unloading
 from .wheel_health import WheelHealth, observe_wheels, remember_asked
-from .wheels import Wheels, share_torque
+from .wheels import AssumedWheels, share_torque
 
 Array = NDArray[np.float64]
 
@@ -36,10 +36,10 @@ class Allocation(Record):
 
     is_used: float = shaped(lambda n: ())
     """0: the base's actuators are ideal, or there are none."""
-    wheels: Wheels = nested(Wheels)
+    wheels: AssumedWheels = nested(AssumedWheels)
     health: WheelHealth = nested(WheelHealth)
     null_motion: NullMotion = nested(NullMotion)
-    thrusters: Thrusters = nested(Thrusters)
+    thrusters: AssumedThrusters = nested(AssumedThrusters)
     modulation: Modulation = nested(Modulation)
     unloading: Unloading = nested(Unloading)
     of_thrusters: Array = shaped(lambda n: (3,))
@@ -63,10 +63,10 @@ class Allocation(Record):
     ) -> Allocation:
         """Read the settings for a robot of ``n`` joints and ticks of ``period``, s."""
         allocation = cls.allocate(n)
-        thrusters = Thrusters.build(n, believed.thrusters, settings, period)
+        thrusters = AssumedThrusters.build(n, believed.thrusters, settings, period)
         assign(
             allocation, is_used=bool(believed.names), thrusters=thrusters,
-            wheels=Wheels.build(n, believed.wheels, settings, period),
+            wheels=AssumedWheels.build(n, believed.wheels, settings, period),
             health=WheelHealth.build(n, settings), null_motion=NullMotion.build(n, settings),
             modulation=Modulation.build(n, thrusters, settings, period),
             unloading=Unloading.build(n, settings),

@@ -45,7 +45,7 @@ def diagnose(allocation: Allocation) -> Diagnosis:
     if thrusters.count:
         values["pulses"] = int(allocation.modulation.pulses.sum())
     if thrusters.count and count:
-        values["unloading"] = "yes" if allocation.unloading.is_under_way else "no"
+        values["unloading"] = "yes" if allocation.unloading.is_active else "no"
     return Diagnosis(failed, _summary(failed, rank, bool(thrusters.count)), values)
 
 

@@ -28,7 +28,7 @@ from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.samples import MOST_THRUSTERS
 
 from .settings import AllocationSettings
-from .thrusters import Thrusters, along, find_times, forget_missed, within_reach
+from .thrusters import AssumedThrusters, along, find_times, forget_missed, within_reach
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class Modulation(Record):
     reach: float = shaped(lambda n: ())
     """Share of the demand that the thrusters can give, as it was at the last decision."""
     demand: Array = shaped(lambda n: (6,))
-    """N m; see `Thrusters.wrench`. No force is demanded."""
+    """N m; see `AssumedThrusters.wrench`. No force is demanded."""
     owed: Array = shaped(lambda n: (6,))
     """e, N m s."""
     open_for: Array = shaped(lambda n: (MOST_THRUSTERS,))
@@ -74,7 +74,7 @@ class Modulation(Record):
 
     @classmethod
     def build(
-        cls, n: int, thrusters: Thrusters, settings: AllocationSettings, period: float
+        cls, n: int, thrusters: AssumedThrusters, settings: AllocationSettings, period: float
     ) -> Modulation:
         """Read the settings; ``period`` of a tick in s."""
         modulation = cls.allocate(n)
@@ -93,7 +93,7 @@ class Modulation(Record):
 
 
 @kernel
-def modulate(modulation: Modulation, thrusters: Thrusters, tick: int, demand: Array) -> None:
+def modulate(modulation: Modulation, thrusters: AssumedThrusters, tick: int, demand: Array) -> None:
     """Write the thrusters that are to be open from ``tick`` on, for a ``demand`` (3,) N m."""
     count, owed, open_for = int(thrusters.count), modulation.owed, modulation.open_for
     if tick != modulation.tick + 1.0:  # nobody knows what was given meanwhile
@@ -123,7 +123,7 @@ def modulate(modulation: Modulation, thrusters: Thrusters, tick: int, demand: Ar
 
 
 @subroutine
-def _decide(modulation: Modulation, thrusters: Thrusters) -> None:
+def _decide(modulation: Modulation, thrusters: AssumedThrusters) -> None:
     """Set for how long each valve stays open."""
     impulse, open_for, period = modulation.impulse, modulation.open_for, thrusters.period
     for i in range(6):
@@ -145,7 +145,7 @@ def _decide(modulation: Modulation, thrusters: Thrusters) -> None:
 
 
 @subroutine
-def _trigger(modulation: Modulation, thrusters: Thrusters) -> None:
+def _trigger(modulation: Modulation, thrusters: AssumedThrusters) -> None:
     """Open and close thrusters by the Schmitt trigger; ``impulse`` is what is owed."""
     impulse, open_for = modulation.impulse, modulation.open_for
     for j in range(int(thrusters.count)):  # what is under way is as good as given
@@ -161,7 +161,7 @@ def _trigger(modulation: Modulation, thrusters: Thrusters) -> None:
 
 
 @kernel
-def owed_ticks(modulation: Modulation, thrusters: Thrusters, j: int) -> float:
+def owed_ticks(modulation: Modulation, thrusters: AssumedThrusters, j: int) -> float:
     """Return for how many ticks a thruster should be open to bring ``impulse`` nearest to zero."""
     square = thrusters.problem.gram[j, j] * thrusters.period
     ticks: float = along(thrusters, j, modulation.impulse) / square if square > 0.0 else 0.0
@@ -170,7 +170,7 @@ def owed_ticks(modulation: Modulation, thrusters: Thrusters, j: int) -> float:
 
 @subroutine
 def _open_best(
-    modulation: Modulation, thrusters: Thrusters, threshold: float, slot: float
+    modulation: Modulation, thrusters: AssumedThrusters, threshold: float, slot: float
 ) -> bool:  # fmt: skip
     """Open the thruster of which most is owed, if that is ``threshold`` pulses or more.
 
@@ -192,14 +192,14 @@ def _open_best(
 
 
 @subroutine
-def _open(modulation: Modulation, thrusters: Thrusters, j: int, ticks: float) -> None:
+def _open(modulation: Modulation, thrusters: AssumedThrusters, j: int, ticks: float) -> None:
     modulation.open_for[j] = ticks
     for i in range(6):
         modulation.impulse[i] -= thrusters.wrench[j, i] * ticks * thrusters.period
 
 
 @subroutine
-def _cut(modulation: Modulation, thrusters: Thrusters) -> None:
+def _cut(modulation: Modulation, thrusters: AssumedThrusters) -> None:
     """Cut the times to a period, and what is owed with them."""
     excess, longest = 1.0, modulation.slot * thrusters.period
     for j in range(int(thrusters.count)):

@@ -26,7 +26,7 @@ from space_robot_msgs_py.samples import MOST_WHEELS
 
 from .settings import AllocationSettings
 from .wheel_set import LEAST_PART
-from .wheels import FULL, Wheels, momentum_room
+from .wheels import FULL, AssumedWheels, momentum_room
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ class NullMotion(Record):
 
 
 @kernel
-def add_null_motion(motion: NullMotion, wheels: Wheels) -> None:
+def add_null_motion(motion: NullMotion, wheels: AssumedWheels) -> None:
     """Add the null motion to the motors' torques of the present tick."""
     count, healthy = int(wheels.count), wheels.healthy
     members = 0.0
@@ -94,7 +94,7 @@ def add_null_motion(motion: NullMotion, wheels: Wheels) -> None:
 
 
 @subroutine
-def _find_stored(motion: NullMotion, wheels: Wheels) -> None:
+def _find_stored(motion: NullMotion, wheels: AssumedWheels) -> None:
     x, y, z = 0.0, 0.0, 0.0
     for k in range(int(wheels.count)):
         h, axis = wheels.momentum[k] * wheels.healthy.takes_part[k], wheels.axis[k]
@@ -107,7 +107,7 @@ def _find_stored(motion: NullMotion, wheels: Wheels) -> None:
 
 
 @subroutine
-def _choose(motion: NullMotion, wheels: Wheels) -> None:
+def _choose(motion: NullMotion, wheels: AssumedWheels) -> None:
     """Change c if it leaves a wheel too near to zero, or beyond its largest momentum."""
     if motion.least_speed == 0.0:
         return
@@ -130,7 +130,7 @@ def _choose(motion: NullMotion, wheels: Wheels) -> None:
 
 
 @kernel
-def badness(motion: NullMotion, wheels: Wheels, c: float) -> float:
+def badness(motion: NullMotion, wheels: AssumedWheels, c: float) -> float:
     """Return by how much wheels lack the least speed, or exceed `FULL`, under ``c``; relative."""
     total = 0.0
     for k in range(int(wheels.count)):

@@ -26,7 +26,7 @@ LONGEST_DELAY = 256
 """Ticks; later valves are taken to be this late."""
 
 
-class Thrusters(Record):
+class AssumedThrusters(Record):
     """The thrusters of one base as the flight software believes them to be."""
 
     count: float = shaped(lambda n: ())
@@ -54,7 +54,7 @@ class Thrusters(Record):
     @classmethod
     def build(
         cls, n: int, believed: ThrusterSettings, settings: AllocationSettings, period: float
-    ) -> Thrusters:
+    ) -> AssumedThrusters:
         """Read the numbers of the settings; ``period`` of a tick in s."""
         thrusters, count = cls.allocate(n), believed.count
         wrench = np.zeros((MOST_THRUSTERS, 6))
@@ -79,7 +79,7 @@ class Thrusters(Record):
 
 
 @kernel
-def find_times(thrusters: Thrusters, impulse: Array) -> None:
+def find_times(thrusters: AssumedThrusters, impulse: Array) -> None:
     """Write into ``problem.x`` the times, s, that give an ``impulse`` (6,) N m s."""
     problem = thrusters.problem
     for j in range(int(thrusters.count)):
@@ -88,7 +88,7 @@ def find_times(thrusters: Thrusters, impulse: Array) -> None:
 
 
 @kernel
-def along(thrusters: Thrusters, j: int, impulse: Array) -> float:
+def along(thrusters: AssumedThrusters, j: int, impulse: Array) -> float:
     """Return the product of a thruster's wrench and an ``impulse`` (6,)."""
     total, wrench = 0.0, thrusters.wrench[j]
     for i in range(6):
@@ -97,7 +97,7 @@ def along(thrusters: Thrusters, j: int, impulse: Array) -> float:
 
 
 @kernel
-def within_reach(thrusters: Thrusters, demand: Array) -> float:
+def within_reach(thrusters: AssumedThrusters, demand: Array) -> float:
     """Return the share of a ``demand`` (6,) N m that thrusters open all the time can give.
 
     Its force is zero.
@@ -115,7 +115,7 @@ def within_reach(thrusters: Thrusters, demand: Array) -> float:
 
 
 @kernel
-def expect_torque(thrusters: Thrusters, tick: int, torque: Array) -> None:
+def expect_torque(thrusters: AssumedThrusters, tick: int, torque: Array) -> None:
     """Take the valves commanded at ``tick``; write the ``torque`` (3,) N m that acts from there."""
     for j in range(int(thrusters.count)):
         if thrusters.is_open[j] == 1.0:
@@ -129,7 +129,7 @@ def expect_torque(thrusters: Thrusters, tick: int, torque: Array) -> None:
 
 
 @kernel
-def forget_missed(thrusters: Thrusters, last: int, tick: int) -> None:
+def forget_missed(thrusters: AssumedThrusters, last: int, tick: int) -> None:
     """Clear the torque expected between the ``last`` tick and ``tick``, for nobody took it.
 
     What is commanded and comes later stays; of a clock that goes back all is cleared.

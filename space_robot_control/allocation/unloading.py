@@ -14,7 +14,7 @@ from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 
 from .settings import AllocationSettings
-from .wheels import Wheels
+from .wheels import AssumedWheels
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ class Unloading(Record):
     """Shares of the largest momentum."""
     rate: float = shaped(lambda n: ())
     """1/s."""
-    is_under_way: float = shaped(lambda n: ())
+    is_active: float = shaped(lambda n: ())
     """0 or 1."""
 
     @classmethod
@@ -45,7 +45,7 @@ class Unloading(Record):
 
 
 @kernel
-def find_unloading(unloading: Unloading, wheels: Wheels, torque: Array) -> None:
+def find_unloading(unloading: Unloading, wheels: AssumedWheels, torque: Array) -> None:
     """Write the ``torque`` (3,) N m asked of the thrusters, zero unless wheels are unloaded."""
     fullest, x, y, z = 0.0, 0.0, 0.0, 0.0
     for k in range(int(wheels.count)):
@@ -55,10 +55,10 @@ def find_unloading(unloading: Unloading, wheels: Wheels, torque: Array) -> None:
         y += axis[1] * h
         z += axis[2] * h
     if fullest > unloading.above:
-        unloading.is_under_way = 1.0
+        unloading.is_active = 1.0
     elif fullest < unloading.to:
-        unloading.is_under_way = 0.0
-    rate, excess = unloading.rate * unloading.is_under_way, 1.0
+        unloading.is_active = 0.0
+    rate, excess = unloading.rate * unloading.is_active, 1.0
     for k in range(int(wheels.count)):
         row = wheels.healthy.inverse[k]
         load = abs(row[0] * x + row[1] * y + row[2] * z) * rate

@@ -11,7 +11,7 @@ from space_robot_msgs_py.samples import MOST_WHEELS
 
 from .settings import AllocationSettings
 from .wheel_set import tabulate
-from .wheels import FULL, Wheels
+from .wheels import FULL, AssumedWheels
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ class WheelHealth(Record):
 
 @kernel
 def observe_wheels(
-    health: WheelHealth, wheels: Wheels, tick: float, speeds: Array, torques: Array
+    health: WheelHealth, wheels: AssumedWheels, tick: float, speeds: Array, torques: Array
 ) -> None:
     """Take the wheels' speeds and torques at ``tick``; take failed ones out of the allocation.
 
@@ -81,7 +81,7 @@ def observe_wheels(
 
 
 @subroutine
-def _is_asked(health: WheelHealth, wheels: Wheels, k: int) -> bool:
+def _is_asked(health: WheelHealth, wheels: AssumedWheels, k: int) -> bool:
     """Tell if a wheel that has not failed, and is not full, should have given something."""
     return bool(
         wheels.healthy.takes_part[k] == 1.0
@@ -91,7 +91,7 @@ def _is_asked(health: WheelHealth, wheels: Wheels, k: int) -> bool:
 
 
 @kernel
-def remember_asked(health: WheelHealth, wheels: Wheels, tick: float) -> None:
+def remember_asked(health: WheelHealth, wheels: AssumedWheels, tick: float) -> None:
     """Remember what is asked for at ``tick``."""
     health.tick = tick
     for k in range(int(wheels.count)):

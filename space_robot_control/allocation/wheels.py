@@ -25,7 +25,7 @@ FULL = 0.99
 """Share of its largest momentum up to which a wheel is sped up."""
 
 
-class Wheels(Record):
+class AssumedWheels(Record):
     """The wheels of one base as the flight software believes them to be."""
 
     count: float = shaped(lambda n: ())
@@ -61,7 +61,7 @@ class Wheels(Record):
     @classmethod
     def build(
         cls, n: int, believed: WheelSettings, settings: AllocationSettings, period: float
-    ) -> Wheels:
+    ) -> AssumedWheels:
         """Read the numbers of the settings; ``period`` of a tick in s."""
         wheels, count = cls.allocate(n), believed.count
         torque, momentum = np.full((2, MOST_WHEELS), np.inf)
@@ -85,7 +85,7 @@ class Wheels(Record):
 
 
 @kernel
-def share_torque(wheels: Wheels, demand: Array) -> None:
+def share_torque(wheels: AssumedWheels, demand: Array) -> None:
     """Write the motors' ``torque`` that turns the base with ``demand`` (3,) N m, base frame."""
     count, torque, wanted = int(wheels.count), wheels.torque, wheels.wanted
     for i in range(3):
@@ -127,7 +127,7 @@ def least_squares(wheels: WheelSet, count: int, wanted: Array, torque: Array) ->
 
 
 @kernel
-def scale_down(wheels: Wheels, torque: Array) -> bool:
+def scale_down(wheels: AssumedWheels, torque: Array) -> bool:
     """Scale all torques to what the motors can give; return whether they could not.
 
     No torque is above its limit by so much as a rounding, and the largest one is exactly at it.
@@ -146,7 +146,7 @@ def scale_down(wheels: Wheels, torque: Array) -> bool:
 
 
 @kernel
-def momentum_room(wheels: Wheels, k: int, side: float) -> float:
+def momentum_room(wheels: AssumedWheels, k: int, side: float) -> float:
     """Return the torque that fills wheel ``k`` up to `FULL` within a tick, N m.
 
     ``side``: direction of the torque, 1 or -1. The motor's largest torque is not looked at.
@@ -157,7 +157,7 @@ def momentum_room(wheels: Wheels, k: int, side: float) -> float:
 
 
 @subroutine
-def _is_any_full(wheels: Wheels) -> bool:
+def _is_any_full(wheels: AssumedWheels) -> bool:
     for k in range(int(wheels.count)):
         side = 1.0 if wheels.torque[k] > 0.0 else -1.0
         if abs(wheels.torque[k]) > momentum_room(wheels, k, side):
@@ -166,7 +166,7 @@ def _is_any_full(wheels: Wheels) -> bool:
 
 
 @subroutine
-def _take_out_full(wheels: Wheels) -> bool:
+def _take_out_full(wheels: AssumedWheels) -> bool:
     """Leave each wheel that has no room what it has, out of the `free`; tell if there were any."""
     is_any = False
     for k in range(int(wheels.count)):

@@ -183,9 +183,9 @@ class Controller(RecordOwner):
             raise unusable(status, state.tick, state.quaternion)
         force = force_of(law, self.signals, state.tick)
         apply_transfer(self.block, state.tick, force, command.torque)
-        return self._share_out(state.tick)
+        return self._allocate(state.tick)
 
-    def share_out(self, state: RobotState, torque: Array) -> Command:
+    def allocate_torque(self, state: RobotState, torque: Array) -> Command:
         """The command for a torque (m,), N m, that no law asked for; see `update`."""
         allocation = self._memory.allocation
         assign(
@@ -193,9 +193,9 @@ class Controller(RecordOwner):
             reported_torques=state.wheel_torques, demand=torque[:3],
         )  # fmt: skip
         self.last_command.torque[: len(torque)] = torque
-        return self._share_out(state.tick)
+        return self._allocate(state.tick)
 
-    def _share_out(self, tick: int) -> Command:
+    def _allocate(self, tick: int) -> Command:
         """Ask the base's actuators, if it has any, for the torque demanded of the base."""
         command = self.last_command
         if self._actuators.size:

@@ -15,12 +15,15 @@ from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.paused import PausedInput
 
 from ..allocation.assumed_actuators import believed_actuators
-from .answering import Answering, Standing
 from .controller import Controller
 from .law_set import LawSet
 from .reference_input import ReferenceInput
 from .settings import ControllerNodeSettings
 from .state_input import StateInput
+from .state_responder import (
+    StampStatus,
+    StateResponder,
+)
 from .supervisor import Mode
 
 FLUSH_S = 1.0
@@ -52,7 +55,7 @@ class ControllerLoop:
         timebase = settings.timebase
         self._states = StateInput(node, self._controller.names, timebase)
         self._references = ReferenceInput(node, robot, timebase, settings.reference_timeout)
-        self._answering = Answering(
+        self._answering = StateResponder(
             self._controller, self._laws.choice, self._references.buffer, settings,
             node.get_fully_qualified_name(),
         )  # fmt: skip
@@ -92,10 +95,10 @@ class ControllerLoop:
             tick = found
             last = self._answering.stamps.last
             standing = self._answering.judge(tick)
-            if standing is Standing.ANSWERED:  # the plant asked again: the same answer
+            if standing is StampStatus.ANSWERED:  # the plant asked again: the same answer
                 self._command_out.publish(self._answering.answer)
                 return None
-            if standing is Standing.REFUSED:
+            if standing is StampStatus.REFUSED:
                 self._states.reject("stamp")
                 return None
             if tick != last:
@@ -110,7 +113,7 @@ class ControllerLoop:
         self._look_ahead(self._state_at)
         return None
 
-    def stand_down(self) -> None:
+    def deactivate(self) -> None:
         """Answer one more state, with no torque: the plant holds that."""
         answering, answered = self._answering, self._answering.answered
         if answered >= 0 and self._node.count_publishers(self._states.inputs[0].full_name):
@@ -121,7 +124,7 @@ class ControllerLoop:
                 found = self._states.take()
                 tick = answered if found is None else found
             if tick > answered:
-                none = answering.supervisor.stand_down(tick)
+                none = answering.supervisor.deactivate(tick)
                 self._command_out.publish(answering.encode(none))
         flush(self.outputs, FLUSH_S)
 

@@ -28,7 +28,7 @@ MOST_AT_ONCE = 100
 """Messages looked at before other work goes on: somebody may flood a topic."""
 DRAIN_S = 0.01
 """How long a reference is looked for among those that have come already."""
-PATIENCE_S = 0.02
+TIMEOUT_S = 0.02
 WAIT_TOLD_S = 0.5
 """A wait that lasts longer is told."""
 
@@ -63,7 +63,7 @@ class ReferenceInput:
             ),
         )  # fmt: skip
         self.inputs = tuple(half.input for half in self._halves)
-        self.wait = Wait(PATIENCE_S, self.inputs)
+        self.wait = Wait(TIMEOUT_S, self.inputs)
         """The wait while `at` has no row."""
 
     @property

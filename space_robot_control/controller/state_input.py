@@ -14,7 +14,7 @@ from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.codecs import StateCodec
 
-PATIENCE_S = 0.02
+TIMEOUT_S = 0.02
 MOST_KEPT = 1_000
 """Messages of a part, of unknown senders, that may find the other parts."""
 
@@ -39,7 +39,7 @@ class StateInput:
         self.inputs = (first, *others)
         self._first = first
         self._parts = [_LaterPart(entry, self.codec, timebase, self.rejected) for entry in others]
-        self._waits = {entry: Wait(PATIENCE_S, (entry,), is_brief=True) for entry in self.inputs}
+        self._waits = {entry: Wait(TIMEOUT_S, (entry,), is_brief=True) for entry in self.inputs}
         self._tick = -1
         """Tick of the first part in `state`, of which others have not come yet; -1: none."""
         self._lacking: deque[_LaterPart] = deque()
@@ -67,7 +67,7 @@ class StateInput:
                 return None
             if found is None:  # it may still come
                 now = time.monotonic()
-                self._until = self._until or now + PATIENCE_S
+                self._until = self._until or now + TIMEOUT_S
                 if now < self._until:
                     return None
             if not found:

@@ -73,7 +73,7 @@ class Supervisor:
         self.mode, self.reason = Mode.NOMINAL, ""
         return self._command
 
-    def stand_down(self, tick: int) -> Command:
+    def deactivate(self, tick: int) -> Command:
         """The command of no torque that ends a flight."""
         self._command = Command(tick, np.zeros_like(self._command.torque))
         self._last_tick = -1

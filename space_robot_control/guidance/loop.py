@@ -66,14 +66,14 @@ class MissionLoop:
         now = time.monotonic()
         if now >= self._greet_at:
             self._greet_at = now + GREET_S
-            self._greet()
+            self._resend_pending()
         has_taken = self._take_clock()
         if self._next < self._stamps.last + self._settings.lead_ticks:
             self._send_chunk()
             return None
         return None if has_taken else self._for_clock
 
-    def stand_down(self) -> None:
+    def deactivate(self) -> None:
         """Fall silent: the controller holds the last point."""
 
     def close(self) -> None:
@@ -84,7 +84,7 @@ class MissionLoop:
         values = {"tick": max(self._stamps.last, 0), "rejected: stamp": self._invalid_stamps}
         return Health("nominal", values={**values, **self._clock.counts("rejected")})
 
-    def _greet(self) -> None:
+    def _resend_pending(self) -> None:
         """Say again what is still needed if somebody has joined."""
         listeners = self._joints.listener_count + self._base.listener_count
         if listeners > self._listeners:

@@ -36,7 +36,7 @@ class Navigation(Record):
 
     is_filtered: float = shaped(lambda n: ())
     """0: the laws see the measured state itself."""
-    is_under_way: float = shaped(lambda n: ())
+    is_active: float = shaped(lambda n: ())
     """1 from the first state on."""
     tick: float = shaped(lambda n: ())
     """Of the last state."""
@@ -99,7 +99,7 @@ def navigate(navigation: Navigation, tick: int, measured: State, period: float) 
     """
     attitude, estimate = navigation.attitude, navigation.estimate
     elapsed = tick - int(navigation.tick)
-    if navigation.is_under_way == 0.0 or elapsed < 1:
+    if navigation.is_active == 0.0 or elapsed < 1:
         attitude.stage = NOT_STARTED
         _begin(navigation, tick, measured, period)
     elif elapsed > LONGEST_BRIDGE:
@@ -121,7 +121,7 @@ def navigate(navigation: Navigation, tick: int, measured: State, period: float) 
 
 @kernel
 def _begin(navigation: Navigation, tick: int, measured: State, period: float) -> None:
-    navigation.is_under_way = 1.0
+    navigation.is_active = 1.0
     start(navigation.attitude, tick, measured.quaternion, measured.omega_base, period)
     _unbiased(navigation, measured.omega_base)
     begin_low_pass(navigation.low_pass, navigation.between, measured.applied_torque)

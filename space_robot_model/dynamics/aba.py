@@ -35,7 +35,7 @@ from .algebra import (
     transform_transposed,
     vector,
 )
-from .branches import hand_in, keep_motion, kept_motion, taken_in
+from .branches import accumulate, collect_children, keep_motion, kept_motion
 from .model import Data, Model
 from .wheels import take_wheels, turn_wheels
 
@@ -62,7 +62,7 @@ def aba(
     for j in range(int(model.joint_count) - 1, -1, -1):
         i = j + 1
         if model.branches[i] != 0.0:
-            inertia, coupling, mass, bias_moment, bias_force = taken_in(
+            inertia, coupling, mass, bias_moment, bias_force = collect_children(
                 data.inwards[i], inertia, coupling, mass, bias_moment, bias_force
             )
         inertia = add_symmetric(inertia, symmetric(data.inertia[i]))
@@ -98,12 +98,12 @@ def aba(
         bias_force = add(bias_force, transform_symmetric(mass, linear))
         if model.continues[j] == 0.0:
             row = data.inwards[int(model.parent[j])]
-            hand_in(row, inertia, coupling, mass, bias_moment, bias_force)
+            accumulate(row, inertia, coupling, mass, bias_moment, bias_force)
             inertia = mass = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
             coupling = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
             bias_moment = bias_force = (0.0, 0.0, 0.0)
     if model.branches[0] != 0.0:
-        inertia, coupling, mass, bias_moment, bias_force = taken_in(
+        inertia, coupling, mass, bias_moment, bias_force = collect_children(
             data.inwards[0], inertia, coupling, mass, bias_moment, bias_force
         )
     inertia = add_symmetric(inertia, symmetric(data.inertia[0]))

@@ -49,7 +49,7 @@ def kept_motion(row: Array) -> Wrench:
 
 
 @subroutine
-def hand_in(
+def accumulate(
     row: Array, inertia: Symmetric, coupling: Matrix, mass: Symmetric, moment: Vector, force: Vector
 ) -> None:
     """Add the articulated inertia and bias of a branch to its parent's ``row`` (27,)."""
@@ -62,7 +62,7 @@ def hand_in(
 
 
 @subroutine
-def taken_in(
+def collect_children(
     row: Array, inertia: Symmetric, coupling: Matrix, mass: Symmetric, moment: Vector, force: Vector
 ) -> Articulated:
     """Return the sum of the arguments and of what branches have handed in; clear ``row`` (27,)."""

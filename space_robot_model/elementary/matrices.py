@@ -26,7 +26,7 @@ def product(a: ArrayLike, b: ArrayLike) -> Array:
     return found
 
 
-def turned_tensor(rotation: Array, tensor: Array) -> Array:
+def rotate_tensor(rotation: Array, tensor: Array) -> Array:
     """Return ``R T R^T``."""
     return product(product(rotation, tensor), rotation.T)
 
@@ -81,7 +81,7 @@ def principal_axes(tensor: Array) -> tuple[Array, Array]:
             turn = np.eye(len(a))
             turn[p, p] = turn[q, q] = cosine
             turn[p, q], turn[q, p] = tangent * cosine, -tangent * cosine
-            a, axes = turned_tensor(turn.T, a), product(axes, turn)
+            a, axes = rotate_tensor(turn.T, a), product(axes, turn)
             a[p, q] = a[q, p] = 0.0
     order = np.argsort(np.diagonal(a), kind="stable")
     return np.diagonal(a)[order], axes[:, order]

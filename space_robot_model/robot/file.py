@@ -227,5 +227,5 @@ def _body(link: LinkFile, parent: str) -> Body:
     )  # fmt: skip
 
 
-class _Document(StrictModel):
+class _RobotDocument(StrictModel):
     robot: RobotFile

@@ -18,7 +18,7 @@ from space_robot_msgs_py.topics import BASE_AXES
 from ..dynamics.model import Model
 from ..elementary.matrices import product
 from ..elementary.series import plain_sin_cos
-from .file import _Document
+from .file import _RobotDocument
 from .inertia import inertia_tensor
 from .model import model_of
 from .numbers import Document, are_numbers, numbers_of
@@ -72,7 +72,7 @@ class Robot(TreeArrays):
         if are_numbers(content):
             numbers = validate(Document, content, where).robot
             return cls.of_tree(numbers.name, [b.body for b in numbers.bodies], where)
-        file = validate(_Document, content, where).robot
+        file = validate(_RobotDocument, content, where).robot
         return cls.of_tree(file.name, file.bodies(), where)
 
     @classmethod

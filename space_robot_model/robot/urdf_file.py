@@ -65,7 +65,7 @@ class UrdfFile(StrictModel):
         return replace(found, name=self.name or found.name)
 
 
-class _Document(StrictModel):
+class _UrdfDocument(StrictModel):
     robot: UrdfFile
 
 
@@ -86,12 +86,12 @@ def read_urdf_content(content: dict[str, Any], folder: Path, where: str) -> Urdf
     Raises:
         InputError: the YAML or the URDF is wrong.
     """
-    return validate(_Document, content, where).robot.read(folder, where)
+    return validate(_UrdfDocument, content, where).robot.read(folder, where)
 
 
 def complete_content(content: dict[str, Any], folder: Path, where: str) -> dict[str, Any]:
     """Return the content of a YAML with the URDF's text in the place of its path."""
-    file = validate(_Document, content, where).robot
+    file = validate(_UrdfDocument, content, where).robot
     found = file.read(folder, where)
     robot = {key: value for key, value in content["robot"].items() if key != "urdf"}
     return {"robot": {"name": found.name, **robot, "urdf_text": found.text}}

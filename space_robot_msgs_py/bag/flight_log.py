@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 REFERENCE = ("reference_joints", "reference_base")
 """The columns the desired motion fills."""
-TOLD = STATE_FIELDS + PASSIVE_FIELDS
+MEASURED_COLUMNS = STATE_FIELDS + PASSIVE_FIELDS
 """The columns of a `FlightLog` that `MeasuredStates` has once more."""
 
 
@@ -55,7 +55,7 @@ class MeasuredStates:
     @classmethod
     def of(cls, log: FlightLog) -> MeasuredStates:
         """Return the state columns of ``log`` themselves, not copies."""
-        return cls(*(getattr(log, name) for name in TOLD))
+        return cls(*(getattr(log, name) for name in MEASURED_COLUMNS))
 
     @classmethod
     def unknown(cls, log: FlightLog) -> MeasuredStates:
@@ -70,7 +70,7 @@ class MeasuredStates:
     @property
     def columns(self) -> dict[str, Array]:
         """All of them, by name."""
-        return {name: getattr(self, name) for name in TOLD}
+        return {name: getattr(self, name) for name in MEASURED_COLUMNS}
 
     def each(self, change: Callable[[str, Array], Array]) -> MeasuredStates:
         """Return what ``change`` makes of each column, given its name."""
@@ -205,7 +205,7 @@ class FlightLog:
     @property
     def whole(self) -> NDArray[np.bool_]:
         """(N,) whether state and reference of a row are there and finite."""
-        return self.finite(TOLD) & self.finite(REFERENCE)
+        return self.finite(MEASURED_COLUMNS) & self.finite(REFERENCE)
 
     def finite(self, columns: Iterable[str]) -> NDArray[np.bool_]:
         """(N,) whether a row has no NaN in some of the columns."""
@@ -255,7 +255,7 @@ class FlightLog:
     def put_measured(self, start: int, states: Block) -> None:
         """Copy what the sensors told of each tick from ``start`` on into its row of `measured`."""
         if self.measured is not None:
-            _put(self.measured, start - self.first_tick, states, TOLD)
+            _put(self.measured, start - self.first_tick, states, MEASURED_COLUMNS)
 
     def put_commands(self, start: int, torques: Array) -> None:
         """Copy what was commanded (k, n+3+W+T) in each tick from ``start`` on, see `Command`."""
@@ -265,7 +265,7 @@ class FlightLog:
         self.commanded_torque[rows] = torques[:, : self.axes]
         self.actuator_commands[rows] = torques[:, self.axes :]
 
-    def measure_apart(self) -> None:
+    def record_measured(self) -> None:
         """Make room, NaN, for what the sensors tell and the law believes beside the truth."""
         self.measured = MeasuredStates.unknown(self)
         self.believed_error = np.full_like(self.applied_torque, np.nan)

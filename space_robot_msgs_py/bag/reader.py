@@ -78,7 +78,7 @@ def _read(bag: Bag, remap: Mapping[str, str], namespace: str | None) -> FlightLo
     for topic in REQUIRED:
         if not rows.counts[topic.full_name]:
             raise missing(topic, bag, selection)
-    rows.tell_apart()
+    rows.split_truth()
     log, excused = rows.log, topics_with_allowed_gaps(flight)
     log.flight, log.namespace = flight, selection.namespace
     gone = _gone(selection, rows)
@@ -90,7 +90,7 @@ def _read(bag: Bag, remap: Mapping[str, str], namespace: str | None) -> FlightLo
     ticks = len(whole) - int(np.argmax(whole[::-1])) if whole.any() else 0
     damage += [*bag.damage, *unread_messages(selection.recorded() or {}, gone)]
     damage += [f"{name} is left out: {wrong}" for name, wrong in selection.wrong.items()]
-    damage += rows.oddities(bool(excused)) + paused(accounts) + half_truth(rows.counts)
+    damage += rows.anomalies(bool(excused)) + paused(accounts) + half_truth(rows.counts)
     if not ticks:
         context = "; ".join(_not_finished(bag) + damage)
         raise InputError(f"not one tick with its state and reference ({context})")

@@ -69,13 +69,13 @@ class Rows:
         self._unnamed = set(MOST_ACTUATORS)
         """Those of which no message has told the actuators' names yet."""
         self._apart: MeasuredStates | None = None
-        """The true states, once one has come; after `tell_apart` what the sensors told."""
+        """The true states, once one has come; after `split_truth` what the sensors told."""
         self._errors: list[tuple[NDArray[np.int64], Array]] = []
         """Ticks and e of the telemetry."""
         self._laws: list[LawInForce] = []
         self._law_faults: list[str] = []
 
-    def oddities(self, excused: bool) -> list[str]:
+    def anomalies(self, excused: bool) -> list[str]:
         """Messages that could not be used; invalid stamps are no news if ``excused``."""
         found = [
             f"{reader.misfits} messages on {topic.full_name} do not fit ({reader.fault})"
@@ -134,7 +134,7 @@ class Rows:
             if name in ACTUATOR_COLUMNS:
                 setattr(log, name, np.full((self._rows, width), np.nan))
 
-    def tell_apart(self) -> None:
+    def split_truth(self) -> None:
         """Make the true states those of the log, if both their halves came; call it at the end."""
         if not all(self.counts[topic.full_name] for topic in topics.TRUTH):
             self._apart = None

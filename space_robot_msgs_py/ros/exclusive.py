@@ -21,7 +21,7 @@ UNNAMED = "_NODE_NAME_UNKNOWN_"
 """Name that discovery gives to a publisher's node until its participant has told its own."""
 
 
-class Claim:
+class TopicClaim:
     """This process' right to publish some topics of its domain, until it ends or lets go."""
 
     def __init__(self, node: Node, topic_names: Sequence[str]) -> None:

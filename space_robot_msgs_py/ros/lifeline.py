@@ -14,7 +14,7 @@ import time
 
 VARIABLE = "SPACE_ROBOT_LIFELINE"
 """In a process' environment: its standard input is a lifeline, held by the process of this pid."""
-PATIENCE_S = 15.0
+TIMEOUT_S = 15.0
 """For ending well after SIGTERM; then SIGKILL."""
 
 
@@ -44,5 +44,5 @@ def _wait(descriptor: int) -> None:
     while os.read(descriptor, 4096):
         pass
     os.kill(os.getpid(), signal.SIGTERM)
-    time.sleep(PATIENCE_S)
+    time.sleep(TIMEOUT_S)
     os.kill(os.getpid(), signal.SIGKILL)

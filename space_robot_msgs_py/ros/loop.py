@@ -53,7 +53,7 @@ class Loop(Protocol):
             What to wait for; None if something was done and there may be more.
         """
 
-    def stand_down(self) -> None:
+    def deactivate(self) -> None:
         """Leave the graph safe: called on deactivate, and before the end of an active node."""
 
     def close(self) -> None:

@@ -17,7 +17,7 @@ from ..config.settings import NodeSettings
 from ..errors import InputError, SpaceRobotError
 from ..samples import Timebase
 from .diagnostics import Diagnostics
-from .exclusive import Claim, claim_name, foreign_publishers
+from .exclusive import TopicClaim, claim_name, foreign_publishers
 from .health import SENT, Health, Level
 from .locks import FileLock
 from .loop import Loop
@@ -59,7 +59,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         self._topics: list[str] = []
         self._foreign, self._look_at = "", 0.0
         """Foreign publishers when they were looked for last, and when to look again."""
-        self._claim: Claim | None = None
+        self._claim: TopicClaim | None = None
         self._name: FileLock | None = None
         self.error: SpaceRobotError | None = None
         """Why the last transition failed."""
@@ -169,7 +169,9 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
             refuse_unknown(self)
             self._topics = [output.topic.name for output in self.loop.outputs]
             own = {*self._topics, *(topic.name for topic in self._schema.sends)}
-            self._claim = Claim(self, sorted(own))  # what it never sends is nobody else's either
+            self._claim = TopicClaim(
+                self, sorted(own)
+            )  # what it never sends is nobody else's either
             self.times_configured += 1
 
         return self._try(configure, undo=self._release)
@@ -244,7 +246,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
     def _stand_down(self) -> None:
         if self.is_active and self.loop is not None:
             self.is_active = False
-            self.loop.stand_down()
+            self.loop.deactivate()
 
     def _release(self) -> None:
         """Close the loop, take back what configure made."""

@@ -28,7 +28,7 @@ from ..errors import InputError, SpaceRobotError  # noqa: E402
 from .lifeline import hold_to_standard_input  # noqa: E402
 from .loop import Loop  # noqa: E402
 from .managed_node import AUTOSTART, ManagedNode  # noqa: E402
-from .turns import Turns  # noqa: E402
+from .node_scheduler import NodeScheduler  # noqa: E402
 
 Schema = TypeVar("Schema", bound=NodeSettings)
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
@@ -57,7 +57,7 @@ class NodeHost:
     def __init__(self, nodes: Sequence[ManagedNode[Any]]) -> None:
         """Take the nodes, in the order in which they are started."""
         self._nodes = nodes
-        self._turns = Turns(nodes)
+        self._turns = NodeScheduler(nodes)
         self._is_signalled = False
         for number in ENDING_SIGNALS:
             signal.signal(number, self._stop)

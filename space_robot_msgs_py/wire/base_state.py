@@ -8,7 +8,7 @@ from typing import Any
 from .. import topics
 from ..errors import MessageError
 from ..samples import Timebase
-from .message import Column, MessageDescription, Run, name_order
+from .message import MessageDescription, Run, SampleColumn, name_order
 
 XYZ = (0, 1, 2)
 WXYZ = (3, 0, 1, 2)
@@ -20,11 +20,11 @@ class BaseState(MessageDescription):
 
     topic = topics.BASE_STATE
     columns = (
-        Column("base_position", 0, 3),
-        Column("quaternion", 0, 4),
-        Column("base_velocity", 0, 3),
-        Column("omega_base", 0, 3),
-        Column("applied_torque", 0, 3),
+        SampleColumn("base_position", 0, 3),
+        SampleColumn("quaternion", 0, 4),
+        SampleColumn("base_velocity", 0, 3),
+        SampleColumn("omega_base", 0, 3),
+        SampleColumn("applied_torque", 0, 3),
     )
 
     def __init__(self, names: Sequence[str], timebase: Timebase) -> None:

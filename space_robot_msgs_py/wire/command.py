@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from .. import topics
 from ..samples import RobotNames, Timebase
 from .joint_states import JointStates
-from .message import Column
+from .message import SampleColumn
 
 
 class Commands(JointStates):
@@ -20,9 +20,9 @@ class Commands(JointStates):
     def __init__(self, names: Sequence[str], timebase: Timebase, actuators: int = 0) -> None:
         """``actuators``: so many of the names, the last ones, are of the base's actuators."""
         super().__init__(names, timebase)
-        self.columns = (Column("commanded_torque", 0, len(self.names) - actuators),)
+        self.columns = (SampleColumn("commanded_torque", 0, len(self.names) - actuators),)
         if actuators:
-            self.columns += (Column("actuator_commands", 0, actuators),)
+            self.columns += (SampleColumn("actuator_commands", 0, actuators),)
 
     @classmethod
     def of_robot(cls, names: RobotNames, timebase: Timebase) -> Commands:

@@ -8,7 +8,7 @@ from typing import Any
 from .. import topics
 from ..errors import MessageError
 from ..samples import RobotNames, Timebase
-from .message import Column, MessageDescription, Run, name_order
+from .message import MessageDescription, Run, SampleColumn, name_order
 
 
 class JointStates(MessageDescription):
@@ -27,11 +27,11 @@ class JointStates(MessageDescription):
         self._passive = passive
         n = len(self.names) - passive
         self.columns = (
-            Column("joint_positions", 0, n),
-            Column("passive_positions", 0, passive),
-            Column("joint_velocities", 0, n),
-            Column("passive_velocities", 0, passive),
-            Column("applied_torque", 3, n),
+            SampleColumn("joint_positions", 0, n),
+            SampleColumn("passive_positions", 0, passive),
+            SampleColumn("joint_velocities", 0, n),
+            SampleColumn("passive_velocities", 0, passive),
+            SampleColumn("applied_torque", 3, n),
         )
 
     @classmethod

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 Offsets = NDArray[np.uint64]
 
 
-class Column(NamedTuple):
+class SampleColumn(NamedTuple):
     """The place of some of a sample's numbers: in a `State`, and in the rows of a flight log."""
 
     name: str
@@ -70,7 +70,7 @@ class MessageDescription(ABC):
     """The messages of one topic, and what their numbers mean."""
 
     topic: ClassVar[Topic]
-    columns: tuple[Column, ...] = ()
+    columns: tuple[SampleColumn, ...] = ()
     """The columns of one row, in the order of its numbers; of several rows each is a tick."""
 
     def __init__(self, names: Sequence[str], timebase: Timebase) -> None:

@@ -9,7 +9,7 @@ from .. import topics
 from ..errors import MessageError
 from ..samples import Timebase
 from .base_state import WXYZ, XYZ
-from .message import Column, Run
+from .message import Run, SampleColumn
 from .trajectory import Trajectory
 
 
@@ -17,7 +17,7 @@ class ReferenceBase(Trajectory):
     """A trajectory_msgs/MultiDOFJointTrajectory of one body; its linear parts are zero."""
 
     topic = topics.REFERENCE_BASE
-    columns = (Column("reference_base", 0, 10),)
+    columns = (SampleColumn("reference_base", 0, 10),)
     frame_id = topics.INERTIAL_FRAME
 
     def __init__(self, names: Sequence[str], timebase: Timebase) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from .. import topics
 from ..errors import MessageError
 from ..samples import Timebase
-from .message import Column, Run
+from .message import Run, SampleColumn
 from .trajectory import Trajectory
 
 FIELDS = ("positions", "velocities", "accelerations")
@@ -21,7 +21,7 @@ class ReferenceJoints(Trajectory):
 
     def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
         super().__init__(names, timebase)
-        self.columns = (Column("reference_joints", 0, len(FIELDS) * len(self.names)),)
+        self.columns = (SampleColumn("reference_joints", 0, len(FIELDS) * len(self.names)),)
 
     def point(self) -> Mapping[str, Any]:
         """A number a joint of each field."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from .. import topics
 from ..samples import RobotNames, Timebase
 from .joint_states import JointStates
-from .message import Column
+from .message import SampleColumn
 
 
 class ThrustersState(JointStates):
@@ -20,7 +20,7 @@ class ThrustersState(JointStates):
     def __init__(self, names: Sequence[str], timebase: Timebase) -> None:
         """``names``: of the thrusters."""
         super().__init__(names, timebase)
-        self.columns = (Column("thrusts", 0, len(self.names)),)
+        self.columns = (SampleColumn("thrusts", 0, len(self.names)),)
 
     @classmethod
     def of_robot(cls, names: RobotNames, timebase: Timebase) -> ThrustersState:

@@ -9,7 +9,7 @@ from .. import topics
 from ..errors import MessageError
 from ..samples import Timebase
 from .base_state import WXYZ, XYZ
-from .message import Column, Run
+from .message import Run, SampleColumn
 from .trajectory import Trajectory
 
 
@@ -18,10 +18,10 @@ class TruthBase(Trajectory):
 
     topic = topics.TRUTH_BASE
     columns = (
-        Column("base_position", 0, 3),
-        Column("quaternion", 0, 4),
-        Column("base_velocity", 0, 3),
-        Column("omega_base", 0, 3),
+        SampleColumn("base_position", 0, 3),
+        SampleColumn("quaternion", 0, 4),
+        SampleColumn("base_velocity", 0, 3),
+        SampleColumn("omega_base", 0, 3),
     )
     frame_id = topics.INERTIAL_FRAME
 

@@ -8,7 +8,7 @@ from typing import Any
 from .. import topics
 from ..errors import MessageError
 from ..samples import RobotNames, Timebase
-from .message import Column, Run
+from .message import Run, SampleColumn
 from .trajectory import Trajectory
 
 FIELDS = ("positions", "velocities", "effort")
@@ -29,13 +29,13 @@ class TruthJoints(Trajectory):
         super().__init__((*topics.BASE_AXES, *names), timebase)
         self._passive = passive
         self.columns = (
-            Column("quaternion", 1, 3),
-            Column("joint_positions", 0, n),
-            Column("passive_positions", 0, passive),
-            Column("omega_base", 0, 3),
-            Column("joint_velocities", 0, n),
-            Column("passive_velocities", 0, passive),
-            Column("applied_torque", 0, n + 3),
+            SampleColumn("quaternion", 1, 3),
+            SampleColumn("joint_positions", 0, n),
+            SampleColumn("passive_positions", 0, passive),
+            SampleColumn("omega_base", 0, 3),
+            SampleColumn("joint_velocities", 0, n),
+            SampleColumn("passive_velocities", 0, passive),
+            SampleColumn("applied_torque", 0, n + 3),
         )
 
     @classmethod

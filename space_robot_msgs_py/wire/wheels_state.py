@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from .. import topics
 from ..samples import RobotNames, Timebase
 from .joint_states import JointStates
-from .message import Column
+from .message import SampleColumn
 
 
 class WheelsState(JointStates):
@@ -21,7 +21,10 @@ class WheelsState(JointStates):
         """``names``: of the wheels."""
         super().__init__(names, timebase)
         count = len(self.names)
-        self.columns = (Column("wheel_velocities", 0, count), Column("wheel_torques", 0, count))
+        self.columns = (
+            SampleColumn("wheel_velocities", 0, count),
+            SampleColumn("wheel_torques", 0, count),
+        )
 
     @classmethod
     def of_robot(cls, names: RobotNames, timebase: Timebase) -> WheelsState:

@@ -21,7 +21,7 @@ from .impact import Impact
 Array = NDArray[np.float64]
 
 
-class Exchange(NamedTuple):
+class CaptureEvent(NamedTuple):
     """An event in ticks: the robot before it, the one after it, and which of them holds."""
 
     tick: float
@@ -63,26 +63,26 @@ class Captures:
             InputError: they cannot follow one another, or name a tool that ``robot`` has not.
         """
         self._robot = robot
-        self.exchanges: list[Exchange] = []
+        self.exchanges: list[CaptureEvent] = []
         """By their ticks."""
         for event in in_order(events):
             tick = tick_from(event.time_s, period)
             if isinstance(event, Capture):
                 grasp = Grasp.of(robot, event.target)
-                found = Exchange(tick, event, robot, grasp.holding(robot), grasp)
+                found = CaptureEvent(tick, event, robot, grasp.holding(robot), grasp)
             else:
                 last = self.exchanges[-1]
-                found = Exchange(tick, event, last.after, robot, last.grasp)
+                found = CaptureEvent(tick, event, last.after, robot, last.grasp)
             self.exchanges.append(found)
             found.impact(*self._at_zero)  # its compiled code is loaded now, not in flight
 
     @property
     def _at_zero(self) -> tuple[Array, Array, Array, Array]:
-        """A configuration of the robot, for `Exchange.impact`."""
+        """A configuration of the robot, for `CaptureEvent.impact`."""
         joints = np.zeros(self._robot.joint_count)
         return np.array([1.0, 0.0, 0.0, 0.0]), joints, np.zeros((0, 3)), np.zeros(0)
 
-    def at(self, tick: int) -> list[Exchange]:
+    def at(self, tick: int) -> list[CaptureEvent]:
         """Return what happens at the begin of ``tick``."""
         return [exchange for exchange in self.exchanges if exchange.tick == tick]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import (
     product,
-    turned_tensor,
+    rotate_tensor,
 )
 from space_robot_model.robot import Robot
 from space_robot_model.robot.inertia import inertia_tensor
@@ -51,7 +51,7 @@ class Grasp(NamedTuple):
         axes = product(tool.rotation, target.rotation)
         return cls(
             tool.body, target.mass, tool.position + product(tool.rotation, target.place.position),
-            turned_tensor(axes, inertia_tensor(target.inertia)), tool.rotation,
+            rotate_tensor(axes, inertia_tensor(target.inertia)), tool.rotation,
         )  # fmt: skip
 
     def holding(self, robot: Robot) -> Robot:

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import (
     product,
+    rotate_tensor,
     solve,
-    turned_tensor,
 )
 from space_robot_model.robot import Robot
 from space_robot_model.robot.base_axes import base_axes
@@ -33,7 +33,7 @@ from space_robot_model.robot.frames import (
 )
 
 from .grasp import Grasp
-from .target import Motion
+from .target import TargetMotion
 
 Array = NDArray[np.float64]
 
@@ -71,7 +71,7 @@ class Impact:
         self._fill_jacobian(holding, frames, grasp)
         mass = np.zeros((6, 6))
         mass[:3, :3] = grasp.mass * np.eye(3)
-        mass[3:, 3:] = turned_tensor(axes, grasp.inertia)
+        mass[3:, 3:] = rotate_tensor(axes, grasp.inertia)
         inertia = _with_wheels(
             mass_matrix(holding, quaternion, joint_positions),
             product(wheel_axes, base[:, :, 0]), wheel_inertia,
@@ -79,12 +79,12 @@ class Impact:
         self._gain = solve(inertia, product(mass, self.jacobian).T)
         """(N+6+W, 6) change of qdot by u."""
 
-    def capture(self, motion: Motion, velocity: Array) -> Array:
+    def capture(self, motion: TargetMotion, velocity: Array) -> Array:
         """Return qdot after a capture at ``velocity``."""
         found: Array = velocity + product(self._gain, self._relative(motion, velocity))
         return found
 
-    def before_capture(self, motion: Motion, velocity: Array) -> Array:
+    def before_capture(self, motion: TargetMotion, velocity: Array) -> Array:
         """Return qdot before a capture that led to ``velocity``."""
         if motion.relative_to == "tool":
             return velocity - product(self._gain, self._relative(motion, velocity))
@@ -102,7 +102,7 @@ class Impact:
         """Return qdot before a release that led to ``velocity``."""
         return self.release(-speed, velocity)
 
-    def _relative(self, motion: Motion, velocity: Array) -> Array:
+    def _relative(self, motion: TargetMotion, velocity: Array) -> Array:
         """Return u of a target before its capture."""
         if motion.relative_to == "tool":
             parts = motion.velocity, motion.angular_velocity
@@ -132,7 +132,7 @@ def _axes(frame: BodyFrame) -> Array:
     return np.column_stack([frame.x, frame.y, frame.z])
 
 
-def _spatial(motion: Motion) -> Array:
+def _spatial(motion: TargetMotion) -> Array:
     return np.array([*motion.velocity, *motion.angular_velocity])
 
 

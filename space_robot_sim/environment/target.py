@@ -36,7 +36,7 @@ Quaternion = Annotated[list[float], Field(min_length=4, max_length=4), AfterVali
 Name = Annotated[str, Field(min_length=1, max_length=80, pattern=r"^[\w .+-]+$")]
 
 
-class Place(StrictModel):
+class TargetPlace(StrictModel):
     """``target.place``: where the target is in the frame of the tool that holds it."""
 
     position: Vector = Field([0.0, 0.0, 0.0])
@@ -45,7 +45,7 @@ class Place(StrictModel):
     """``[w, x, y, z]`` of its axes; its norm does not count."""
 
 
-class Motion(StrictModel):
+class TargetMotion(StrictModel):
     """``target.motion``: how the target moves when it is grasped.
 
     On inertial axes, as seen from the inertial frame; or on the tool's axes, as seen from a tool
@@ -67,8 +67,8 @@ class Target(StrictModel):
     inertia: Inertia
     tool: str = ""
     """The tool that grasps it, by name; empty: the robot's first."""
-    place: Place = Place()
-    motion: Motion = Motion()
+    place: TargetPlace = TargetPlace()
+    motion: TargetMotion = TargetMotion()
 
     @classmethod
     def from_yaml(cls, path: str | Path) -> Target:
@@ -82,7 +82,7 @@ class Target(StrictModel):
     @classmethod
     def from_dict(cls, content: dict[str, Any], where: str = "target") -> Target:
         """Build from the mapping a target's file holds (key ``target`` at its top)."""
-        return validate(_Document, content, where).target
+        return validate(_TargetDocument, content, where).target
 
     @property
     def inline(self) -> str:
@@ -97,7 +97,7 @@ class Target(StrictModel):
         return out
 
 
-class _Document(StrictModel):
+class _TargetDocument(StrictModel):
     target: Target
 
 

@@ -51,7 +51,7 @@ class Corruption:
         self._back = schedule.of(STAMP_BACK)
         self._jump = schedule.of(STAMP_JUMP)
 
-    def spoil_state(self, state: RobotState, tick: int) -> None:
+    def corrupt_state(self, state: RobotState, tick: int) -> None:
         """Spoil the numbers measured at ``tick``, but not the echo of the applied torque."""
         for fault in self._quaternions:
             if fault.happens_at(tick):
@@ -66,7 +66,7 @@ class Corruption:
                         array[place] = value
                     place -= array.size
 
-    def spoil_command(self, command: Command, tick: int) -> None:
+    def corrupt_command(self, command: Command, tick: int) -> None:
         """Spoil a command that has come to the plant at ``tick``."""
         for fault, value in self._commands:
             if fault.happens_at(tick):

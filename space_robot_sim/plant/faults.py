@@ -142,6 +142,6 @@ class MessageFaults:
         """
         measured = self._measured
         measured.block[:] = state.block
-        self.corruption.spoil_state(measured, state.tick)
+        self.corruption.corrupt_state(measured, state.tick)
         measured.tick = self.corruption.stamp(state.tick)
         return measured

@@ -31,8 +31,12 @@ from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from .actuator_health import ActuatorHealth
 from .command_guard import CommandGuard
 from .description import plant_description
-from .exchange import NONE, SentState, exchange_of
 from .late_listeners import LateListeners
+from .messages import (
+    NONE,
+    SentState,
+    exchange_of,
+)
 from .plant import Plant
 from .run_control import PAUSED, RunControl
 from .scene_output import SceneOutput
@@ -40,7 +44,7 @@ from .settings import PlantNodeSettings
 from .truth_output import TruthOutput
 from .wall_clock import WallClock
 
-PATIENCE_S = 0.02
+TIMEOUT_S = 0.02
 ASK_AGAIN_S = 0.2
 """Without an answer for this long the state is sent again (lockstep): well before a listener takes
 this plant for silent, and soon enough for one that believes a new time only after some states."""
@@ -86,7 +90,7 @@ class PlantLoop:
         self._state_out = tuple(RawPublisher(node, topic) for topic in self._states.topics)
         self._clock_out = RawPublisher(node, topics.CLOCK)
         self._command_in = FollowedSubscription(node, topics.COMMAND, PolledCallbackGroup())
-        self._for_answer = Wait(PATIENCE_S, (self._command_in,), is_brief=True)
+        self._for_answer = Wait(TIMEOUT_S, (self._command_in,), is_brief=True)
         self._truth = TruthOutput(node, self._plant, timebase)
         self._scene = SceneOutput(node, robot, timebase)
         self._description_out = RawPublisher(node, topics.PLANT_DESCRIPTION)
@@ -152,7 +156,7 @@ class PlantLoop:
         if self._awaits:
             data = self._command_in.take()
             if data is None:
-                return self._be_patient()
+                return self._wait_for_answer()
             if self._receive(data) != self._answered_by:
                 return None
             self._time_answer()
@@ -165,7 +169,7 @@ class PlantLoop:
             self._end_tick()
         return None
 
-    def stand_down(self) -> None:
+    def deactivate(self) -> None:
         """Leave the actuators at zero, and let the listeners have all that was sent."""
         self._guard.release()
         self._truth.flush()
@@ -236,7 +240,7 @@ class PlantLoop:
             output.publish(message)
         self._sent_at = time.monotonic()
 
-    def _be_patient(self) -> Wait | None:
+    def _wait_for_answer(self) -> Wait | None:
         """Wait on for the answer; ask for it again, or give the controller up for silent."""
         now = time.monotonic()
         if now > self._awaited_since + self._silence_s and self._heard >= 0:

@@ -30,7 +30,7 @@ from ..actuators.actuators import (
 from ..environment.captures import Captures
 from ..environment.environment import Environment, EnvironmentSettings
 from ..environment.payload import with_payload
-from ..sensors.noise import Draws
+from ..sensors.noise import NoiseDraws
 from ..sensors.sensors import (
     Sensors,
     arrays_of_draws,
@@ -93,7 +93,7 @@ class PlantSnapshot(NamedTuple):
     command_delay_buffer: Array
     next_change: float
     drawn: tuple[int, int]
-    """See `Draws`."""
+    """See `NoiseDraws`."""
     part_faults: PartFaults
 
 
@@ -156,7 +156,7 @@ class Plant(RecordOwner):
         self.truth.passive_positions[: len(robot.springs)] = positions[n:]
         self.truth.wheel_velocities[:] = speeds
         if self.captures.exchanges:  # so that no tick has to wait for it
-            tell_truth(self.block)
+            update_true_state(self.block)
         sensors = Sensors.build(n, settings, period, memory.truth, robot.is_prismatic[:n])
         schedule = settings.schedule(self.names, period)
         check_faults(schedule, settings)
@@ -180,7 +180,7 @@ class Plant(RecordOwner):
         """The true state at the current tick."""
         self.state = RobotState(0, self.block["measured"])
         """What the sensors tell of it."""
-        self._draws = Draws(0, arrays_of_draws(self.memory.sensors))
+        self._draws = NoiseDraws(0, arrays_of_draws(self.memory.sensors))
 
     def __getstate__(self) -> dict[str, Any]:
         """Return all attributes but the views, and what these know beside the block."""
@@ -240,7 +240,7 @@ class Plant(RecordOwner):
         self.state.tick = self.truth.tick = tick
         memory = self.memory
         if self.captures.apply(tick, memory.model, memory.x):
-            tell_truth(self.block)
+            update_true_state(self.block)
         self.next_change = min(
             self._part_faults.apply(tick, memory), self.captures.next_tick(tick)
         )  # fmt: skip
@@ -286,7 +286,7 @@ def step(
 
 
 @kernel
-def tell_truth(block: Block) -> None:
+def update_true_state(block: Block) -> None:
     """Call `write_truth` from Python."""
     memory = block[0]
     write_truth(memory.model, memory.x, memory.rotation, memory.truth)

@@ -12,7 +12,7 @@ from .loop import PlantLoop
 from .settings import PlantNodeSettings
 
 
-class State(Enum):
+class SimulationState(Enum):
     """States of a simulation, as simulation_interfaces has them."""
 
     STOPPED = "stopped"
@@ -31,11 +31,11 @@ class Simulation:
         """True from a reset that was to stop until told anything else."""
 
     @property
-    def state(self) -> State:
+    def state(self) -> SimulationState:
         """The present state."""
         if not self._is_running or self._is_stopped:
-            return State.STOPPED
-        return State.PAUSED if self._loop.control.is_paused else State.PLAYING
+            return SimulationState.STOPPED
+        return SimulationState.PAUSED if self._loop.control.is_paused else SimulationState.PLAYING
 
     def pause(self) -> str:
         """Hold the plant at the present tick; return what to say of it.

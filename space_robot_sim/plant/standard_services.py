@@ -10,7 +10,7 @@ from typing import Any
 
 from space_robot_msgs_py.errors import FlightError, InputError
 
-from .simulation import Simulation, State
+from .simulation import Simulation, SimulationState
 
 FEATURES = (
     "SIMULATION_RESET", "SIMULATION_STATE_GETTING", "SIMULATION_STATE_SETTING",
@@ -50,9 +50,9 @@ class StandardServices:
         self._features, self._result, self._srv = msg.SimulatorFeatures, msg.Result, srv
         states = msg.SimulationState
         self._numbers = {
-            State.STOPPED: states.STATE_STOPPED,
-            State.PLAYING: states.STATE_PLAYING,
-            State.PAUSED: states.STATE_PAUSED,
+            SimulationState.STOPPED: states.STATE_STOPPED,
+            SimulationState.PLAYING: states.STATE_PLAYING,
+            SimulationState.PAUSED: states.STATE_PAUSED,
         }
 
     def get_features(self, request: Any, response: Any) -> Any:
@@ -76,9 +76,9 @@ class StandardServices:
         if wanted is simulation.state:
             return self._end(response, kind.ALREADY_IN_TARGET_STATE)
         try:
-            if wanted is State.PLAYING:
+            if wanted is SimulationState.PLAYING:
                 simulation.resume()
-            elif wanted is State.PAUSED:
+            elif wanted is SimulationState.PAUSED:
                 simulation.pause()
             else:
                 await simulation.reset(stop=True)

@@ -45,7 +45,7 @@ def integrate(
     left = period
     stages.held[: int(environment.friction.count)] = 0.0
     for _ in range(MOST_CUTS):
-        slide_or_stand(model, environment, x, time, stages)
+        slip_or_stick(model, environment, x, time, stages)
         rk4_step(model, environment, x, time, left, stages)
         joint = first_at_rest(model, environment, x, stages)
         if joint == NONE:
@@ -65,7 +65,7 @@ def integrate(
         stages.held[: int(environment.friction.count)] = 0.0
         time += length
         left -= length
-    slide_or_stand(model, environment, x, time, stages)
+    slip_or_stick(model, environment, x, time, stages)
     rk4_step(model, environment, x, time, left, stages)
     _take(model, stages, x)
 
@@ -77,7 +77,7 @@ def _take(model: Model, stages: Stages, x: Array) -> None:
 
 
 @kernel
-def slide_or_stand(
+def slip_or_stick(
     model: Model, environment: Environment, x: Array, time: float, stages: Stages
 ) -> None:
     """Find which joints slide in which sense and which stand in ``x``, and its derivative.

@@ -16,7 +16,7 @@ from ..faults.schedule import BLOCK_TICKS
 Array = NDArray[np.float64]
 
 
-class Draws:
+class NoiseDraws:
     """Fills the sensors' arrays of standard normal numbers, (256, size) each, a row a tick.
 
     The numbers are a function of seed, sensor and tick alone: a flight repeats exactly, in any

@@ -30,7 +30,7 @@ MOST_OWN = 1_000
 """Of its own messages so many are known again; to spoil them once more would wear them down."""
 
 
-def spoil(data: bytes, kind: str, count: int) -> bytes:
+def corrupt(data: bytes, kind: str, count: int) -> bytes:
     """A message as heard, with something wrong with it."""
     seconds, nanoseconds = struct.unpack("<iI", data[STAMP])
     if kind == "future":
@@ -62,7 +62,7 @@ def main() -> None:
         while (taken := heard.take()) is not None:
             if taken not in own and len(taken) >= STAMP.stop:
                 data = taken
-        own.append(spoil(data, kind, count))
+        own.append(corrupt(data, kind, count))
         with suppress(RuntimeError):  # longer than any message of its type: Fast DDS refuses it
             out.publish(own[-1])
         count += 1

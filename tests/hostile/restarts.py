@@ -19,7 +19,7 @@ from space_robot.flight.graph.processes import MODULES
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.ros.process_environment import DEFAULTS
 
-PATIENCE_S = 15.0
+TIMEOUT_S = 15.0
 FLOWN_S = 0.2
 """Simulated time after a restart that shows that the loop is closed again."""
 
@@ -44,7 +44,7 @@ def restarted(victim: str) -> Callable[[int], list[Verdict]]:
                 nodes[name].send_signal(signal.SIGINT)
             for name, node in nodes.items():
                 try:
-                    if code := node.wait(PATIENCE_S):
+                    if code := node.wait(TIMEOUT_S):
                         wrong.append(f"{name} ended with {code}")
                 except subprocess.TimeoutExpired:
                     wrong.append(f"{name} does not end")
@@ -69,7 +69,7 @@ def _start(name: str, domain: int, bag: Path) -> subprocess.Popen[bytes]:
 def _until_nominal(monitor: Monitor, when: str) -> list[str]:
     """Wait until all four nodes are well and simulated time goes on."""
     monitor.modes.clear()
-    until, reached = time.monotonic() + PATIENCE_S, 0.0
+    until, reached = time.monotonic() + TIMEOUT_S, 0.0
     while time.monotonic() < until:
         monitor.poll()
         modes = [monitor.modes.get(f"{name}_node", "silent") for name in NODES]

@@ -98,7 +98,7 @@ AREAS = {
     "robot": _room("model/robot", "model/dynamics/test_equations_of_motion.py"),
     "sensors": _room("sim/sensors", "sim/plant/test_*.py"),
     "nodes": Area(
-        (f"{PACKAGES['sim']}/*.py", f"{PACKAGES['control']}/*.py", f"{PACKAGES['laboratory']}/*.py"),
+        tuple(f"{PACKAGES[name]}/*.py" for name in ("sim", "control", "laboratory")),
         ("tests/laboratory/flight/graph/test_graph_nodes.py",), "",
     ),
     "analysis": _room("laboratory/analysis", marks="not ros"),
@@ -114,7 +114,10 @@ AREAS = {
     ),
     "paper": _room("laboratory/paper", "laboratory/cli/test_stability_command.py", marks="not ros"),
     "api": _room("laboratory/api", marks="not ros"),
-    "scenario": _room("laboratory/scenario", "laboratory/api/test_*.py", "laboratory/flight/test_*.py", marks="not ros"),
+    "scenario": _room(
+        "laboratory/scenario", "laboratory/api/test_*.py", "laboratory/flight/test_*.py",
+        marks="not ros",
+    ),
     "console": _room("laboratory/console", "laboratory/cli/test_output.py", marks="not ros"),
     "processes": _room("laboratory/processes", marks="not ros"),
     "navigation": _room("control/navigation"),

@@ -17,7 +17,7 @@ from ..metrics import tracking_error
 from ..momentum import Momentum
 from ..plot_series import tick_times
 from .single_flight import BASE_AXES
-from .style import GREY, Look, house_style, legend_above, page, plot_lines
+from .style import GREY, LineStyle, house_style, legend_above, page, plot_lines
 
 Array = NDArray[np.float64]
 
@@ -130,7 +130,7 @@ def _draw_cycle(axes: Axes, log: FlightLog) -> None:
     angle = 2.0 * tracking_error(log)[::every, :3]
     rate = (log.reference_base[:, 4:7] - log.omega_base)[::every]
     for i in range(3):
-        look = Look.of(i)
+        look = LineStyle.of(i)
         axes.plot(
             angle[:, i], rate[:, i], color=look.colour, linewidth=0.5, marker=look.marker,
             markevery=[len(angle) // 2],

@@ -17,7 +17,7 @@ from ..spectrum import CHATTER_FREQUENCY
 from .single_flight import BASE_AXES, JUNCTION_HALF_WIDTH
 from .style import (
     GREY,
-    Look,
+    LineStyle,
     grid,
     house_style,
     legend_above,
@@ -130,7 +130,7 @@ def _draw_spectra(axes: Axes, spectra: Mapping[str, tuple[Array, Array]]) -> Non
     for index, (frequency, density) in enumerate(spectra.values()):
         if not np.isfinite(density).any():  # too short, or no torque at all
             continue
-        look = Look.of(index)
+        look = LineStyle.of(index)
         even = np.geomspace(frequency[0], frequency[-1], 1000)
         marks = np.searchsorted(frequency, even[scattered(len(even), index, len(spectra))])
         axes.plot(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..metrics import unit_of
 from ..plot_series import PlotSeries
 from ..pointing import ARCSEC
-from .style import Look, house_style, legend_above, mark_events, page, plot_lines
+from .style import LineStyle, house_style, legend_above, mark_events, page, plot_lines
 
 Array = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ def latency_histogram(flights: Mapping[str, PlotSeries]) -> Figure:
     high = max(float(values.max()) for values in known.values())
     edges = np.geomspace(low, max(high, 1.1 * low), BINS + 1)
     for index, values in enumerate(known.values()):
-        look = Look.of(index)
+        look = LineStyle.of(index)
         counts, _ = np.histogram(np.maximum(values, low), edges)
         axes.stairs(counts, edges, color=look.colour, linestyle=look.dashes, linewidth=0.9)
     axes.set(xscale="log", yscale="log", xlabel="from a state's sending to its command's (ms)",

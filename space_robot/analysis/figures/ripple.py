@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..metrics import unit_of
 from ..plot_series import PlotSeries
 from .overlay import words
-from .style import Look, house_style, legend_above, page, scattered
+from .style import LineStyle, house_style, legend_above, page, scattered
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ def ripple(flights: Mapping[str, PlotSeries]) -> Figure:
             density = spectrum.group(column[key]) / (frequency[1] - frequency[0])
             if not density.any():
                 continue
-            look = Look.of(names.index(name))
+            look = LineStyle.of(names.index(name))
             panel.plot(
                 frequency, np.where(density > 0.0, density, np.nan), color=look.colour,
                 linestyle=look.dashes, marker=look.marker, linewidth=0.7,

@@ -56,7 +56,7 @@ house_style = partial(
 """Applies the style sheet on top of matplotlib's defaults, not the user's; undone afterwards."""
 
 
-class Look(NamedTuple):
+class LineStyle(NamedTuple):
     """Colour, marker and dashes that tell one of several lines from the others."""
 
     colour: str
@@ -64,7 +64,7 @@ class Look(NamedTuple):
     dashes: Any
 
     @classmethod
-    def of(cls, index: int) -> Look:
+    def of(cls, index: int) -> LineStyle:
         """Return the look of the line ``index``: no two of 63 share colour and marker."""
         return cls(
             COLOURS[index % len(COLOURS)],
@@ -113,7 +113,7 @@ def plot_lines(
         roughness = np.nansum(np.abs(np.diff(shown, axis=0)), axis=0)
     for depth, column in enumerate(np.argsort(-roughness, kind="stable").tolist()):
         index = looks[column]
-        look = Look.of(index)
+        look = LineStyle.of(index)
         marked = scattered(len(x), index, max(looks) + 1) if marks is None else marks
         drawn = np.union1d(thinned(shown[:, column]), marked)
         axes.plot(
@@ -174,7 +174,7 @@ def legend_above(
         width: mm that there are.
     """
     names = [shortened(name, MOST_LETTERS) for name in names]
-    looks = [Look.of(index) for index in range(len(names))]
+    looks = [LineStyle.of(index) for index in range(len(names))]
     handles = [
         Line2D([], [], color=x.colour, marker=x.marker, linestyle=x.dashes if dashed else "-")
         for x in looks

@@ -20,7 +20,7 @@ _BLOCK = 1024
 """Points of Sobol's sequence that are made at a time."""
 
 
-class Place(NamedTuple):
+class DesignPoint(NamedTuple):
     """Where a run stands in its design."""
 
     draw: int
@@ -51,14 +51,14 @@ class Design(ABC):
     """So many draws are asked of it."""
 
     @abstractmethod
-    def uniform(self, place: Place, name: str, number: int) -> float:
+    def uniform(self, place: DesignPoint, name: str, number: int) -> float:
         """Return the number between 0 and 1 of a variable, the ``number``-th that is drawn."""
 
 
 class Independent(Design):
     """Every number by itself."""
 
-    def uniform(self, place: Place, name: str, number: int) -> float:
+    def uniform(self, place: DesignPoint, name: str, number: int) -> float:
         """See `Design`."""
         return keys.uniform(self.seed, name, place.draw)
 
@@ -68,7 +68,7 @@ class LatinHypercube(Design):
 
     needs_all_runs: ClassVar[bool] = True
 
-    def uniform(self, place: Place, name: str, number: int) -> float:
+    def uniform(self, place: DesignPoint, name: str, number: int) -> float:
         """See `Design`."""
         stratum = keys.permutation(self.seed, name, self.draws)[place.draw]
         inside = keys.uniform(self.seed, name, place.draw)
@@ -78,7 +78,7 @@ class LatinHypercube(Design):
 class Sobol(Design):
     """Sobol's sequence, each variable a dimension, shifted by random bits of its own."""
 
-    def uniform(self, place: Place, name: str, number: int) -> float:
+    def uniform(self, place: DesignPoint, name: str, number: int) -> float:
         """See `Design`."""
         return shifted(self.seed, name, place.draw, number)
 
@@ -90,7 +90,7 @@ class Saltelli(Design):
     needs_all_runs: ClassVar[bool] = True
     variables: int = 0
 
-    def uniform(self, place: Place, name: str, number: int) -> float:
+    def uniform(self, place: DesignPoint, name: str, number: int) -> float:
         """See `Design`."""
         is_b = place.point in (number + 1, self.variables + 1)
         dimension = number + self.variables * is_b

@@ -154,7 +154,7 @@ class LogUniform(Distribution):
         return min(max(low * exp(u * self._span), low), high)
 
 
-class Listed(Distribution):
+class Categorical(Distribution):
     """One of some values: numbers, or texts."""
 
     is_continuous: ClassVar[bool] = False
@@ -178,7 +178,7 @@ class Listed(Distribution):
         return self
 
 
-class Choice(Listed):
+class Choice(Categorical):
     """One of some values at random, each with its weight; all alike if there are none."""
 
     choice: Values
@@ -196,7 +196,7 @@ class Choice(Listed):
 
     @property
     def values(self) -> list[Any]:
-        """See `Listed`."""
+        """See `Categorical`."""
         return self.choice
 
     def quantile(self, u: float) -> Value:
@@ -210,14 +210,14 @@ class Choice(Listed):
         return self.choice[-1]
 
 
-class Grid(Listed):
+class Grid(Categorical):
     """Every one of some values in turn."""
 
     grid: Values
 
     @property
     def values(self) -> list[Any]:
-        """See `Listed`."""
+        """See `Categorical`."""
         return self.grid
 
     def quantile(self, u: float) -> Value:

@@ -13,7 +13,7 @@ from ...api import Scenario
 from ...flight.plan import Flight
 from ..study import Law, Study
 from .changes import Changes, Nominal
-from .designs import DESIGNS, Blocks, Design, Place, Saltelli
+from .designs import DESIGNS, Blocks, Design, DesignPoint, Saltelli
 from .distributions import Grid, Value
 from .keys import noise_seed
 from .setting_variables import OfScenario
@@ -102,10 +102,10 @@ class Draws:
                     changes = self._changes(self.study.laws[0], [(variable, value)])
                     yield f"{variable.name}: {_shown(value)}", changes.scenario().check()
 
-    def _place(self, run: int) -> Place:
+    def _place(self, run: int) -> DesignPoint:
         if not 0 <= run < self.runs:
             raise InputError(f"run {run}: this campaign has runs 0 to {self.runs - 1}")
-        return Place(*divmod(run, self._points))
+        return DesignPoint(*divmod(run, self._points))
 
     def _raw(self, run: int) -> list[Value]:
         place = self._place(run)

@@ -16,7 +16,7 @@ _NAME = re.compile(rf"{_STEP}(?:\.{_STEP})*")
 _PARTS = re.compile(r"([^.\[\]]+)(?:\[([^\[\]]+)\])?")
 
 
-class Part(NamedTuple):
+class NamePart(NamedTuple):
     """A word of a name, and which element of it is meant."""
 
     word: str
@@ -24,7 +24,7 @@ class Part(NamedTuple):
     """Empty: none is named."""
 
 
-def parts_of(name: str) -> list[Part]:
+def parts_of(name: str) -> list[NamePart]:
     """Take a variable's name apart.
 
     Raises:
@@ -32,7 +32,7 @@ def parts_of(name: str) -> list[Part]:
     """
     if not _NAME.fullmatch(name):
         raise InputError(f"{short(name)} is no name of a variable, as robot.links[*].mass is one")
-    return [Part(*found) for found in _PARTS.findall(name)]
+    return [NamePart(*found) for found in _PARTS.findall(name)]
 
 
 def chosen(element: str, names: Sequence[str], what: str) -> list[tuple[int, str]]:

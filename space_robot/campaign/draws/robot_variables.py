@@ -17,7 +17,7 @@ from space_robot_msgs_py.errors import InputError
 
 from .changes import Changes
 from .distributions import Distribution, Normal, Value, read_distribution
-from .names import Part, chosen
+from .names import NamePart, chosen
 from .variable import Variable
 
 LEAST = 0.01
@@ -141,7 +141,7 @@ class SpreadFile(StrictModel):
 
 
 def robot_variables(
-    key: str, parts: list[Part], given: Any, where: str, robot: Robot
+    key: str, parts: list[NamePart], given: Any, where: str, robot: Robot
 ) -> list[OfRobot]:
     """Return the variables of ``robot.*``.
 

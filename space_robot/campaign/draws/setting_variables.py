@@ -12,7 +12,7 @@ from space_robot_msgs_py.errors import InputError
 from ..study import check_option
 from .changes import Changes, Nominal
 from .distributions import Distribution, Value, read_distribution
-from .names import ALL, Part, chosen
+from .names import ALL, NamePart, chosen
 from .variable import Variable
 
 START, START_PARAMETER = "start_deg", "initial_joints_deg"
@@ -94,7 +94,7 @@ class OfGains(Variable):
 
 
 def option_variables(
-    key: str, parts: list[Part], given: Any, where: str, nominal: Nominal
+    key: str, parts: list[NamePart], given: Any, where: str, nominal: Nominal
 ) -> list[Variable]:
     """Return the variable of ``scenario.<option>``.
 
@@ -118,7 +118,7 @@ def option_variables(
 
 
 def node_variables(
-    key: str, parts: list[Part], given: Any, where: str, nominal: Nominal, node: str
+    key: str, parts: list[NamePart], given: Any, where: str, nominal: Nominal, node: str
 ) -> list[Variable]:
     """Return the variables of ``plant.*``, ``controller.*`` or ``mission.*``.
 
@@ -164,7 +164,7 @@ def node_variables(
 
 
 def gain_variables(
-    key: str, parts: list[Part], given: Any, where: str, nominals: Sequence[Nominal]
+    key: str, parts: list[NamePart], given: Any, where: str, nominals: Sequence[Nominal]
 ) -> list[Variable]:
     """Return the variables of ``gains.<gain>``, of all axes together or of each.
 

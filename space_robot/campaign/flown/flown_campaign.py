@@ -23,7 +23,7 @@ from ..store.software import software
 from ..store.table import check_table, read_table
 from ..study import Study
 from ..verdicts.requirements import Verdict, verdicts
-from .again import FlownAgain
+from .rerun import Rerun
 from .trust import check_study
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ class FlownCampaign:
         """What the table says about each requirement, law by law."""
         return verdicts(self.table, self.study, self.runs, list(self.manifest.table.grid))
 
-    def rerun(self, run: int, law: str | None = None, bag: str | Path | None = None) -> FlownAgain:
+    def rerun(self, run: int, law: str | None = None, bag: str | Path | None = None) -> Rerun:
         """Fly a row's flight again, to the same bits, with its whole log.
 
         Args:
@@ -125,7 +125,7 @@ class FlownCampaign:
         flight = flyer.draws.scenario(task.run, task.law).check()
         flown = fly_in_process(flight, None if bag is None else Path(bag))
         row = flyer.row_of_log(task, flight, flown.ending, blocks_of(flown.log))
-        return FlownAgain(
+        return Rerun(
             flown, task, row.digest, rows.iloc[0]["digest"],
             [
                 f"{name} {then or 'none'}, now {software()[name] or 'none'}"

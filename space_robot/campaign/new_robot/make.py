@@ -25,7 +25,7 @@ from ...processes.pool import (
     cores,
     run_all,
 )
-from ...tuning.method import Wishes
+from ...tuning.method import TuningOptions
 from ...tuning.warning import estimate_remark
 from ..gain_set import tuned_set, write_set
 from .folder import whole_folder
@@ -34,7 +34,7 @@ from .motion import mission_text, rest_to_rest
 
 SET, CASE = "tuned", "1"
 """The gain set that is made, and the environment that it is made for and flown in."""
-WISHES = Wishes(margin=0.05, mass_uncertainty=0.2)
+WISHES = TuningOptions(margin=0.05, mass_uncertainty=0.2)
 """Those of ``gains tune``."""
 
 

@@ -14,7 +14,7 @@ from ...analysis.figures.overlay import words
 from ...analysis.figures.style import (
     COLOURS,
     GREY,
-    Look,
+    LineStyle,
     grid,
     house_style,
     page,
@@ -22,7 +22,7 @@ from ...analysis.figures.style import (
 )
 from ...analysis.metrics import unit_of
 from ..study import short_names
-from ..verdicts.values import Part, laws_of, of_law
+from ..verdicts.values import GridPoint, laws_of, of_law
 from .axes import law_legend, number_log_axis
 
 if TYPE_CHECKING:
@@ -67,7 +67,9 @@ def bands(rows: DataFrame, series: str) -> Array:
 
 
 @house_style()
-def band_figure(parts: Sequence[Part], laws: Sequence[str], series: str, time_s: float) -> Figure:
+def band_figure(
+    parts: Sequence[GridPoint], laws: Sequence[str], series: str, time_s: float
+) -> Figure:
     """Draw a series over time: a panel a law, or where there is a grid a panel a point.
 
     Args:
@@ -98,7 +100,7 @@ def band_figure(parts: Sequence[Part], laws: Sequence[str], series: str, time_s:
         if per_law:
             _draw_band(axes, time, drawn, COLOURS[2])
         else:
-            look = Look.of(index)
+            look = LineStyle.of(index)
             axes.plot(time, drawn[1], color=look.colour, linestyle=look.dashes)
             axes.plot(time, drawn[2], color=look.colour, linestyle=look.dashes, linewidth=0.5)
     unit = unit_of(series).strip("-")

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ...analysis.figures.style import GREY, Look, grid, house_style, page, plain
-from ..verdicts.values import Part, laws_of, measured, of_law
+from ...analysis.figures.style import GREY, LineStyle, grid, house_style, page, plain
+from ..verdicts.values import GridPoint, laws_of, measured, of_law
 from .axes import law_legend, number_log_axis
 from .bands import MOST_PANELS, columns_of
 from .quantities import Quantity
@@ -28,7 +28,9 @@ SMALL = 60
 
 
 @house_style()
-def distribution_figure(parts: Sequence[Part], laws: Sequence[str], quantity: Quantity) -> Figure:
+def distribution_figure(
+    parts: Sequence[GridPoint], laws: Sequence[str], quantity: Quantity
+) -> Figure:
     """Draw what share of the runs is at or below each number, and without a grid what share above.
 
     Args:
@@ -86,7 +88,7 @@ def _numbers(table: DataFrame, law: str, quantity: Quantity) -> Array:
 
 def _draw(axes: Axes, values: Array, index: int, above: bool = False, small: bool = False) -> None:
     """Draw one curve; failed flights keep it from 1, or above 0."""
-    runs, look = len(values), Look.of(index)
+    runs, look = len(values), LineStyle.of(index)
     known = values[np.isfinite(values) & (values > 0.0)]
     if not len(known):
         return

@@ -19,7 +19,7 @@ MOST_INFLUENCES = 4
 """Points of a grid of which influences are drawn; the table has all."""
 
 
-class Drawing(NamedTuple):
+class CampaignDrawing(NamedTuple):
     """A figure that can be drawn."""
 
     section: str
@@ -30,7 +30,7 @@ class Drawing(NamedTuple):
     draw: Callable[[], Figure]
 
 
-def drawings(findings: Findings) -> Iterator[Drawing]:
+def drawings(findings: Findings) -> Iterator[CampaignDrawing]:
     """Yield all figures that the rows allow; none is drawn yet."""
     subject, parts, laws = findings.subject, findings.parts, findings.laws
     known = [q for q in findings.metrics if is_known(subject.table, q.column)]
@@ -38,19 +38,19 @@ def drawings(findings: Findings) -> Iterator[Drawing]:
     if several and known:
         caption = "Medians, with bars from 5 % to 95 % of the runs, at every point of the grid"
         draw = partial(grid_figure, parts, laws, known, findings.grid)
-        yield Drawing("league", "grid", caption, draw)
+        yield CampaignDrawing("league", "grid", caption, draw)
     first = f" (the first {MOST_PANELS} points of the grid)" if len(parts) > MOST_PANELS else ""
     lines = "median (thick) and 95 % (thin) of the runs" if several else "percentiles of the runs"
     for name in series_of(subject.table):
         caption = f"{words(name)} over time: {lines} at each time{first}"
         draw = partial(band_figure, parts, laws, name, subject.time_s)
-        yield Drawing("bands", f"band_{name}", caption, draw)
+        yield CampaignDrawing("bands", f"band_{name}", caption, draw)
     required = [q for q in findings.required if is_known(subject.table, q.column)]
     for quantity in [*required, *known]:
         of = f" ({quantity.name})" if quantity.requirement else ""
         caption = f"Distribution of {quantity.heading}{of} over the runs{first}"
         draw = partial(distribution_figure, parts, laws, quantity)
-        yield Drawing("distributions", f"distribution_{quantity.name}", caption, draw)
+        yield CampaignDrawing("distributions", f"distribution_{quantity.name}", caption, draw)
     for quantity in findings.driven:
         for number, part in enumerate(parts[:MOST_INFLUENCES]):
             of = f", {part.point}" if part.point else ""
@@ -58,12 +58,14 @@ def drawings(findings: Findings) -> Iterator[Drawing]:
             if found:
                 caption = f"What drives {quantity.heading}{of}"
                 stem = f"influence_{quantity.name}_{number}"
-                yield Drawing("sensitivity", stem, caption, partial(influence_figure, found))
+                yield CampaignDrawing(
+                    "sensitivity", stem, caption, partial(influence_figure, found)
+                )
     for metric in dict.fromkeys(s.metric for s in findings.sobol):
         found_indices = [s for s in findings.sobol if s.metric == metric]
         caption = f"Sobol indices of {metric}"
         draw = partial(sobol_figure, found_indices)
-        yield Drawing("sensitivity", f"sobol_{metric}", caption, draw)
+        yield CampaignDrawing("sensitivity", f"sobol_{metric}", caption, draw)
 
 
 def summary_figure(findings: Findings) -> Figure | None:

@@ -20,7 +20,7 @@ from ..verdicts.league import League, league
 from ..verdicts.requirements import Verdict, family_error, verdicts
 from ..verdicts.sensitivity import Sensitivity, sensitivity
 from ..verdicts.sobol import SobolIndices, sobol_indices
-from ..verdicts.values import Part, ended, is_known, laws_of, measured, of_law, parts, turned
+from ..verdicts.values import GridPoint, ended, is_known, laws_of, measured, of_law, parts, turned
 from .quantities import Quantity, chosen, of_requirement
 from .subject import Subject
 
@@ -49,7 +49,7 @@ class Findings:
         self.grid = list(subject.grid)
         self.rows = independent_rows(subject.table, subject.study.design)
         """Those that can be taken for independent draws; all, unless the design is for indices."""
-        self.parts: list[Part] = parts(self.rows, self.grid)
+        self.parts: list[GridPoint] = parts(self.rows, self.grid)
         self.laws = laws_of(subject.table)
 
     @cached_property
@@ -58,9 +58,9 @@ class Findings:
         return short_names(self.laws)
 
     @property
-    def whole(self) -> Part:
+    def whole(self) -> GridPoint:
         """Return all rows, of whatever point of the grid."""
-        return Part((), "", self.rows)
+        return GridPoint((), "", self.rows)
 
     @cached_property
     def verdicts(self) -> list[Verdict]:
@@ -73,7 +73,7 @@ class Findings:
         return family_error(self.subject.study, self.verdicts)
 
     @cached_property
-    def leagues(self) -> list[tuple[Part, Quantity, League]]:
+    def leagues(self) -> list[tuple[GridPoint, Quantity, League]]:
         """Return the league of every metric at every point of the grid."""
         return [
             (part, metric, league(part.table, metric.column, CONFIDENCE))
@@ -89,7 +89,7 @@ class Findings:
         return known or self.metrics[:1]
 
     @cached_property
-    def sensitivities(self) -> list[tuple[Part, Quantity, Sensitivity]]:
+    def sensitivities(self) -> list[tuple[GridPoint, Quantity, Sensitivity]]:
         """Return what drives each quantity under each law at each point of the grid."""
         found = []
         for quantity in self.driven:
@@ -100,7 +100,9 @@ class Findings:
                         found.append((part, quantity, result))
         return found
 
-    def worst(self, part: Part, quantity: Quantity, count: int = 10, law: str = "") -> DataFrame:
+    def worst(
+        self, part: GridPoint, quantity: Quantity, count: int = 10, law: str = ""
+    ) -> DataFrame:
         """Return the worst rows: flights that failed, the earliest first, then by their numbers.
 
         Args:

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...analysis.figures.style import COLOURS, Look, house_style, legend_above, page, plain
+from ...analysis.figures.style import COLOURS, LineStyle, house_style, legend_above, page, plain
 from ..study import short_names
 from ..verdicts.sensitivity import Sensitivity
 from ..verdicts.sobol import SobolIndices
-from ..verdicts.values import Part, laws_of, measured, of_law
+from ..verdicts.values import GridPoint, laws_of, measured, of_law
 from .axes import law_legend, number_log_axis
 from .quantities import Quantity
 
@@ -80,7 +80,7 @@ def sobol_figure(found: Sequence[SobolIndices]) -> Figure:
     for axes, each in zip(panels, shown, strict=True):
         by_name = {i.variable: i for i in each.indices}
         for kind, shift in (("first", -0.2), ("total", 0.2)):
-            look = Look.of(("first", "total").index(kind))
+            look = LineStyle.of(("first", "total").index(kind))
             for place, name in enumerate(names):
                 value, low, high = getattr(by_name[name], kind)
                 error = [[max(0.0, value - low)], [max(0.0, high - value)]]
@@ -106,7 +106,10 @@ def _short(name: str) -> str:
 
 @house_style()
 def grid_figure(
-    parts: Sequence[Part], laws: Sequence[str], metrics: Sequence[Quantity], names: Sequence[str]
+    parts: Sequence[GridPoint],
+    laws: Sequence[str],
+    metrics: Sequence[Quantity],
+    names: Sequence[str],
 ) -> Figure:
     """Draw every metric at every point of a grid: medians, with bars from 5 % to 95 % of the runs.
 
@@ -120,7 +123,7 @@ def grid_figure(
     panels = figure.subplots(len(metrics), 1, sharex=True, squeeze=False)[:, 0]
     for axes, metric in zip(panels, metrics, strict=True):
         for index, law in enumerate(laws):
-            look, shift = Look.of(index), 0.7 / len(laws) * (index - 0.5 * (len(laws) - 1))
+            look, shift = LineStyle.of(index), 0.7 / len(laws) * (index - 0.5 * (len(laws) - 1))
             for place, part in enumerate(parts):
                 if law not in laws_of(part.table):
                     continue

@@ -9,11 +9,11 @@ from dataclasses import replace
 from ...console.tables import (
     Column,
     Group,
+    JudgedCell,
     Table,
-    Verdict,
 )
-from ..verdicts.league import League, Standing
-from ..verdicts.paired import Comparison
+from ..verdicts.league import League, Ranking
+from ..verdicts.paired import PairedComparison
 from ..verdicts.quantiles import Estimate
 from .findings import CONFIDENCE, Findings
 from .quantities import Quantity
@@ -58,7 +58,7 @@ def league_table(findings: Findings) -> Table:
     return Table("Laws, by metrics of which less is better", columns, groups, [RANKS])
 
 
-def _standing(s: Standing, name: str) -> list[str]:
+def _standing(s: Ranking, name: str) -> list[str]:
     return [
         name, str(s.rank), number(s.median.value), span(s.median), number(s.tail.value),
         span(s.tail), f"{s.failures} of {s.runs}",
@@ -84,12 +84,12 @@ def pair_table(findings: Findings) -> Table:
     return Table("Laws by pairs, over the same draws", columns, groups, [note])
 
 
-def _pair(c: Comparison, names: Mapping[str, str]) -> list[str | Verdict]:
+def _pair(c: PairedComparison, names: Mapping[str, str]) -> list[str | JudgedCell]:
     return [
         names[c.law], names[c.other],
         f"{c.better} of {c.runs}", number(c.ratio.value), span(c.ratio),
         f"{c.p_better:.2g}", f"{c.failed}, other {c.other_failed}", f"{c.p_failed:.2g}",
-        Verdict("", WORDS[c.finding], TONES[c.finding]),
+        JudgedCell("", WORDS[c.finding], TONES[c.finding]),
     ]  # fmt: skip
 
 
@@ -108,7 +108,11 @@ def choice_tables(findings: Findings) -> list[Table]:
 
 def _choices(findings: Findings, metric: Quantity) -> Table:
     rows = [
-        [*part.values, *_medians(findings, found), Verdict("", best(found, findings.names), "good")]
+        [
+            *part.values,
+            *_medians(findings, found),
+            JudgedCell("", best(found, findings.names), "good"),
+        ]
         for part, quantity, found in findings.leagues
         if quantity is metric
     ]

@@ -8,11 +8,11 @@ from pathlib import Path
 from ...console.tables import (
     Column,
     Group,
+    JudgedCell,
     Table,
-    Verdict,
 )
 from ..verdicts import requirements
-from ..verdicts.values import Part
+from ..verdicts.values import GridPoint
 from .findings import Findings
 from .league_tables import number
 from .quantities import Quantity
@@ -104,10 +104,10 @@ def _how_often_false(findings: Findings) -> str:
     )
 
 
-def _row(v: requirements.Verdict, name: str) -> list[str | Verdict]:
+def _row(v: requirements.Verdict, name: str) -> list[str | JudgedCell]:
     missed = f"{v.failures} of {v.runs}"
     return [
-        name, Verdict("", v.word, TONES[v.word]),
+        name, JudgedCell("", v.word, TONES[v.word]),
         f"{missed}, {v.not_measured} not measured" if v.not_measured else missed,
         f"{100.0 * v.limits.low:.4g} %", f"{100.0 * v.limits.high:.4g} %",
         "-" if v.bound is None else number(v.bound), _more(v),
@@ -133,7 +133,9 @@ def verdict_grid(findings: Findings, quantity: Quantity) -> Table:
     for part in findings.parts:
         found = [by_place.get((part.point, law)) for law in findings.laws]
         cells = [
-            Verdict("" if v.not_measured else f"{v.failures}", v.word, TONES[v.word]) if v else None
+            JudgedCell("" if v.not_measured else f"{v.failures}", v.word, TONES[v.word])
+            if v
+            else None
             for v in found
         ]
         rows.append([*part.values, *cells])
@@ -146,7 +148,7 @@ def verdict_grid(findings: Findings, quantity: Quantity) -> Table:
 
 
 def worst_table(
-    findings: Findings, part: Part, quantity: Quantity, count: int = 10, law: str = ""
+    findings: Findings, part: GridPoint, quantity: Quantity, count: int = 10, law: str = ""
 ) -> Table:
     """Tabulate the worst runs with the commands that fly them again."""
     columns = [

@@ -35,7 +35,7 @@ WARM_UP = 3
 
 
 @dataclass
-class Flown:
+class SoakedFlight:
     """A flight of a soak."""
 
     number: int
@@ -80,7 +80,7 @@ class Soak:
     """The flights of a soak, and what they left behind."""
 
     seed: int
-    flights: list[Flown] = field(default_factory=list)
+    flights: list[SoakedFlight] = field(default_factory=list)
     interrupted_by: int = 0
     """Signal that ended it; 0: its time was over."""
     shared_memory_files: tuple[int, int] = (0, 0)
@@ -143,7 +143,7 @@ def soak(
         compile_kernels(with_allocation=True)
         numbers = _numbers(time.monotonic() + seconds)
 
-        def fly_one(number: int) -> Flown:
+        def fly_one(number: int) -> SoakedFlight:
             plan = sample_flight(seed, number, duration_s)
             return _fly(number, plan, folder / f"flight_{number:04d}", bool(bags))
 
@@ -167,7 +167,7 @@ def _numbers(until: float) -> Iterator[int]:
     return itertools.takewhile(lambda _: time.monotonic() < until, itertools.count(1))
 
 
-def _fly(number: int, plan: FlightPlan, bag: Path, keep: bool) -> Flown:
+def _fly(number: int, plan: FlightPlan, bag: Path, keep: bool) -> SoakedFlight:
     begin = time.monotonic()
     flight = Flight(plan)
     report, wrong = None, []
@@ -188,13 +188,13 @@ def _fly(number: int, plan: FlightPlan, bag: Path, keep: bool) -> Flown:
     verdict.wrong += [f"left behind: {process}" for process in process_monitor.left_behind]
     if verdict.survived and not keep:
         shutil.rmtree(bag)
-    return Flown(
+    return SoakedFlight(
         number, plan, time.monotonic() - begin, verdict, process_monitor.peak_mb,
         psutil.Process().memory_info().rss / 1e6, bag if bag.exists() else None,
     )  # fmt: skip
 
 
-def _largest(flights: Sequence[Flown]) -> dict[str, dict[str, float] | None]:
+def _largest(flights: Sequence[SoakedFlight]) -> dict[str, dict[str, float] | None]:
     """Return the largest attitude and joint error, each with the number of its flight.
 
     None stands for an error that no bag tells.

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from ...analysis.figures.style import Look, grid, house_style, legend_above, page, plain
+from ...analysis.figures.style import LineStyle, grid, house_style, legend_above, page, plain
 from ...console.tables import (
     Column,
     Group,
@@ -22,7 +22,7 @@ from .study import ACTUATORS, SENSORS
 FAST_OF_BASE = f"{FAST}base_torque"
 
 
-class Cell(NamedTuple):
+class SweepCell(NamedTuple):
     """All flights of a law with some sensors and actuators."""
 
     law: Law
@@ -34,7 +34,7 @@ class Cell(NamedTuple):
     """5 %, 50 % and 95 % of those that did not fail, by name; none if all did."""
 
 
-def shown(found: Sequence[Cell]) -> list[str]:
+def shown(found: Sequence[SweepCell]) -> list[str]:
     """Return the metrics that tables show: RMS errors, then ripple."""
     names = list(dict.fromkeys(name for cell in found for name in cell.metrics))
     ripples = [name for name in names if name.startswith(RIPPLE)]
@@ -43,7 +43,7 @@ def shown(found: Sequence[Cell]) -> list[str]:
     return _errors(names) + ripples
 
 
-def drawn(found: Sequence[Cell]) -> list[str]:
+def drawn(found: Sequence[SweepCell]) -> list[str]:
     """Return the metrics that a figure shows: of the base, then of the outermost joints."""
     names = shown(found)
     errors, ripples = _errors(names), [name for name in names if name.startswith(RIPPLE)]
@@ -54,7 +54,7 @@ def _errors(names: Sequence[str]) -> list[str]:
     return [name for name in names if name.startswith(ERRORS) and name.endswith("_rms")]
 
 
-def cells(rows: Sequence[Row]) -> list[Cell]:
+def cells(rows: Sequence[Row]) -> list[SweepCell]:
     """Sum up the rows by hardware and law, in their order."""
     found: dict[tuple[Law, str, str], list[Row]] = {}
     for row in rows:
@@ -77,16 +77,16 @@ def row_record(row: Row) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _cell(law: Law, sensors: str, actuators: str, rows: Sequence[Row]) -> Cell:
+def _cell(law: Law, sensors: str, actuators: str, rows: Sequence[Row]) -> SweepCell:
     flown = [row.metrics for row in rows if row.is_complete]
     metrics = {}
     for name in flown[0] if flown else ():
         low, middle, high = np.quantile([m[name] for m in flown], (0.05, 0.5, 0.95)).tolist()
         metrics[name] = low, middle, high
-    return Cell(law, sensors, actuators, len(rows), len(rows) - len(flown), metrics)
+    return SweepCell(law, sensors, actuators, len(rows), len(rows) - len(flown), metrics)
 
 
-def hardware(found: Sequence[Cell]) -> dict[str, list[str]]:
+def hardware(found: Sequence[SweepCell]) -> dict[str, list[str]]:
     """Return what the cells fly with, a value a cell: sensors, actuators, or both, unless ideal."""
     named = {
         "sensors": [cell.sensors for cell in found],
@@ -96,7 +96,7 @@ def hardware(found: Sequence[Cell]) -> dict[str, list[str]]:
     return told or {"sensors": named["sensors"]}
 
 
-def summary_table(found: Sequence[Cell]) -> Table:
+def summary_table(found: Sequence[SweepCell]) -> Table:
     """Tabulate the medians, a group for every hardware."""
     flown_with, told = hardware(found), [of_metric(name) for name in shown(found)]
     columns = (
@@ -124,7 +124,7 @@ def _short(metric: Quantity) -> str:
     return kind if column == "RMS" else f"{kind} {column.replace('torque', '').strip()}"
 
 
-def as_records(found: Sequence[Cell]) -> list[dict[str, Any]]:
+def as_records(found: Sequence[SweepCell]) -> list[dict[str, Any]]:
     """Return a dictionary a cell, ready for JSON."""
     return [
         {
@@ -140,7 +140,7 @@ def as_records(found: Sequence[Cell]) -> list[dict[str, Any]]:
 
 
 @house_style()
-def figure(found: Sequence[Cell]) -> Figure:
+def figure(found: Sequence[SweepCell]) -> Figure:
     """Draw errors (left) and ripple (right) of every law by hardware; bars from 5 % to 95 %."""
     titles = [", ".join(map(plain, names)) for names in zip(*hardware(found).values(), strict=True)]
     kinds = list(dict.fromkeys(titles))
@@ -151,7 +151,7 @@ def figure(found: Sequence[Cell]) -> Figure:
     legend_above(sheet, [law.title for law in laws], dashed=False)
     for axes, name in zip(grid(sheet, len(names), 2, shared=False), names, strict=True):
         for number, law in enumerate(laws):
-            look, shift = Look.of(number), 0.09 * (number - 0.5 * (len(laws) - 1))
+            look, shift = LineStyle.of(number), 0.09 * (number - 0.5 * (len(laws) - 1))
             own = [
                 (kinds.index(title) + shift, c.metrics[name])
                 for title, c in zip(titles, found, strict=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .paired import Comparison, compare_all
+from .paired import PairedComparison, compare_all
 from .quantiles import Estimate, quantile
 from .values import laws_of, measured, of_law
 
@@ -19,7 +19,7 @@ TAIL = 0.99
 
 
 @dataclass(frozen=True)
-class Standing:
+class Ranking:
     """A law in the league of a metric."""
 
     law: str
@@ -38,9 +38,9 @@ class League:
     """All laws by one metric at one point of the grid."""
 
     metric: str
-    standings: list[Standing]
+    standings: list[Ranking]
     """By rank, then by median, then by the tail."""
-    comparisons: list[Comparison]
+    comparisons: list[PairedComparison]
     """Of all pairs, on which the ranks rest."""
 
 
@@ -62,7 +62,7 @@ def league(table: DataFrame, column: str, confidence: float = 0.95) -> League:
             if law in (c.law, c.other)
         )
         standings.append(
-            Standing(
+            Ranking(
                 law,
                 1 + beaten_by,
                 len(values),

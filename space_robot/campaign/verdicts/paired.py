@@ -31,7 +31,7 @@ Finding = Literal["better", "worse", "alike", "contradictory"]
 
 
 @dataclass(frozen=True)
-class Comparison:
+class PairedComparison:
     """A law beside another, by a metric of which less is better."""
 
     law: str
@@ -81,7 +81,7 @@ class Comparison:
         return 1 if self.failed < self.other_failed else -1
 
 
-def compare_all(table: DataFrame, column: str, confidence: float = 0.95) -> list[Comparison]:
+def compare_all(table: DataFrame, column: str, confidence: float = 0.95) -> list[PairedComparison]:
     """Compare every law with every one after it, over the runs that both flew.
 
     Args:
@@ -106,7 +106,7 @@ def compare_all(table: DataFrame, column: str, confidence: float = 0.95) -> list
 
 def compare(
     a: Array, b: Array, confidence: float = 0.95, law: str = "A", other: str = "B"
-) -> Comparison:
+) -> PairedComparison:
     """Compare two laws' numbers of the same runs, without correction for other comparisons.
 
     Args:
@@ -122,7 +122,7 @@ def compare(
     )
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = np.where(a == b, 1.0, a / b)
-    return Comparison(
+    return PairedComparison(
         law, other, runs, better, worse, share_interval(better, runs, confidence),
         quantile(ratios, 0.5, confidence) if runs else Estimate(np.nan, 0.0, np.inf),
         failed, other_failed, _sign_test(better, worse), _sign_test(failed, other_failed),

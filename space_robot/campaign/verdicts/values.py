@@ -20,7 +20,7 @@ NOT_OF_THE_LAW = ("killed", "out_of_time", "refused")
 """Outcomes for which a law may be without blame; they count as failures all the same."""
 
 
-class Part(NamedTuple):
+class GridPoint(NamedTuple):
     """The rows of one point of a campaign's grid."""
 
     values: tuple[str, ...]
@@ -30,7 +30,7 @@ class Part(NamedTuple):
     table: DataFrame
 
 
-def parts(table: DataFrame, grid: Sequence[str]) -> list[Part]:
+def parts(table: DataFrame, grid: Sequence[str]) -> list[GridPoint]:
     """Divide a table by its points of the grid, in the order in which they come.
 
     Args:
@@ -38,14 +38,14 @@ def parts(table: DataFrame, grid: Sequence[str]) -> list[Part]:
         grid: names of the variables that are grids.
     """
     if not grid:
-        return [Part((), "", table)]
+        return [GridPoint((), "", table)]
     columns = [f"vary.{name}" for name in grid]
     found = []
     for key, rows in table.groupby(columns, sort=False, dropna=False):
         values = tuple(_word(value) for value in key)
         names = (name.removeprefix("scenario.") for name in grid)
         point = ", ".join(f"{name} = {v}" for name, v in zip(names, values, strict=True))
-        found.append(Part(values, point, rows))
+        found.append(GridPoint(values, point, rows))
     return found
 
 

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.ros.lifeline import PATIENCE_S
+from space_robot_msgs_py.ros.lifeline import TIMEOUT_S
 from space_robot_msgs_py.ros.locks import (
     FileLock,
     HeldError,
@@ -91,7 +91,7 @@ def _take(domain: int, namespace: str) -> FileLock | None:
 
 def _see_that_nobody_is_there(domain: int, namespace: str) -> None:
     """Refuse nodes, but wait for those that are ending because their starter has been killed."""
-    until = time.monotonic() + PATIENCE_S
+    until = time.monotonic() + TIMEOUT_S
     while nodes := nodes_in(domain, namespace):
         for node in nodes:
             if not node.starter or _is_alive(node.starter) or time.monotonic() > until:

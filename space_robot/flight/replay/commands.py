@@ -13,7 +13,7 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
-from space_robot_msgs_py.wire.command import Commands as CommandMessages
+from space_robot_msgs_py.wire.command import Commands
 from space_robot_msgs_py.wire.compiled_codec import FOREIGN, CompiledCodec
 from space_robot_msgs_py.wire.definitions import decode
 from space_robot_msgs_py.wire.message import name_order
@@ -33,7 +33,7 @@ class Form(NamedTuple):
     """Only where the torques do not fit the robot's axes."""
 
 
-class Commands(NamedTuple):
+class ReplayedCommands(NamedTuple):
     """One command a tick, by rising tick."""
 
     ticks: Ticks
@@ -46,7 +46,7 @@ class Commands(NamedTuple):
     unreadable: int
     """Messages that were no command at all, or not of a whole tick."""
 
-    def within(self, start: int, stop: float) -> Commands:
+    def within(self, start: int, stop: float) -> ReplayedCommands:
         """Those of the ticks from ``start`` to before ``stop``."""
         inside = (self.ticks >= start) & (self.ticks < stop)
         return self._replace(
@@ -59,7 +59,7 @@ class CommandList:
 
     def __init__(self, axis_names: tuple[str, ...], timebase: Timebase) -> None:
         self._names, self._timebase = axis_names, timebase
-        own, former = (CommandMessages(axis_names, timebase) for _ in range(2))
+        own, former = (Commands(axis_names, timebase) for _ in range(2))
         former.frame_id = topics.FORMER_BASE_FRAME
         self._usual = (CompiledCodec(own), CompiledCodec(former))
         self._torque = np.zeros(len(axis_names))
@@ -101,12 +101,14 @@ class CommandList:
             form = form._replace(effort=_text(efforts))
         return header_stamp_ns(data), self._forms.setdefault(form, len(self._forms))
 
-    def commands(self) -> Commands:
+    def commands(self) -> ReplayedCommands:
         """Return what has come; of several commands of one tick the first."""
         ticks, first = np.unique(np.frombuffer(self._ticks, np.int64), return_index=True)
         torques = np.frombuffer(self._torques, np.float64).reshape(-1, len(self._names))
         form = np.frombuffer(self._form, np.uint32).astype(np.intp)
-        return Commands(ticks, torques[first], form[first], list(self._forms), self._unreadable)
+        return ReplayedCommands(
+            ticks, torques[first], form[first], list(self._forms), self._unreadable
+        )
 
 
 def number(value: float) -> float | str:

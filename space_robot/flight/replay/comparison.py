@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .commands import Array, Commands, Form, Ticks, number
+from .commands import Array, Form, ReplayedCommands, Ticks, number
 
 
 class Difference(NamedTuple):
@@ -44,8 +44,8 @@ class Comparison:
     """Commands of the ticks that were played."""
 
     def __init__(
-        self, axis_names: tuple[str, ...], played: Ticks, recorded: Commands, replayed: Commands,
-        forces: Collection[str] = (),
+        self, axis_names: tuple[str, ...], played: Ticks, recorded: ReplayedCommands,
+        replayed: ReplayedCommands, forces: Collection[str] = (),
     ) -> None:  # fmt: skip
         """Compare them.
 

@@ -18,7 +18,7 @@ from .recording import Recording
 
 
 @dataclass(frozen=True)
-class Options:
+class ReplayOptions:
     """A choice of what to replay, and how."""
 
     bag: Path
@@ -47,7 +47,7 @@ class Options:
 class Replay:
     """The outcome of a replay."""
 
-    options: Options
+    options: ReplayOptions
     choice: ControllerChoice
     recording: Recording
     comparison: Comparison

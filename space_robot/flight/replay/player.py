@@ -60,14 +60,14 @@ class Player:
             RawPublisher,
             RawSubscription,
         )
-        from space_robot_msgs_py.ros.exclusive import Claim
+        from space_robot_msgs_py.ros.exclusive import TopicClaim
         from space_robot_msgs_py.ros.waiting import Waiter, take_or_wait
 
         self._take_or_wait = take_or_wait
         self._visitor = TemporaryNode("replay_node", domain)
         self.node = self._visitor.node
         try:
-            self._claim = Claim(self.node, [topic.name for topic in (*parts, *REFERENCES)])
+            self._claim = TopicClaim(self.node, [topic.name for topic in (*parts, *REFERENCES)])
         except InputError:
             self._visitor.leave()
             raise
@@ -117,7 +117,7 @@ class Player:
                 f"{topic} is also published by {', '.join(names)}: take another domain"
             )
 
-    def greet(self) -> None:
+    def resend_pending(self) -> None:
         """Send again what is still needed of the reference, as a mission does for who joins."""
         self.wait_for_controller()
         for stream in self._references:

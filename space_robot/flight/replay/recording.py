@@ -27,7 +27,7 @@ from space_robot_msgs_py.samples import LawInForce, in_order
 from space_robot_msgs_py.topics import Topic
 from space_robot_msgs_py.wire.controller_law import LawCodec
 
-from .commands import CommandList, Commands
+from .commands import CommandList, ReplayedCommands
 
 COMPARED = (
     *topics.STATES, topics.REFERENCE_JOINTS, topics.REFERENCE_BASE, topics.COMMAND, topics.LAW,
@@ -119,7 +119,7 @@ class Recording:
             if "period" in flight and not excused:
                 self._whole = log.as_measured().whole
 
-    def commands(self, names: tuple[str, ...]) -> Commands:
+    def commands(self, names: tuple[str, ...]) -> ReplayedCommands:
         """The recorded answers; ``names``: see `RobotNames.commanded`."""
         found = CommandList(names, self.timebase)
         for _, data in self._messages(topics.COMMAND) if self.has_commands else ():

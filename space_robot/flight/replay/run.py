@@ -30,17 +30,17 @@ from ..graph.node_services import change_state, set_parameters
 from ..graph.orchestrator import require_ros, stop_signals
 from ..graph.processes import Graph, NodeProcess, node_command, node_environment
 from .choice import ControllerChoice
-from .commands import CommandList, Commands, Ticks
+from .commands import CommandList, ReplayedCommands, Ticks
 from .comparison import Comparison
 from .laws import RecordedLaws
-from .outcome import Options, Replay
+from .outcome import Replay, ReplayOptions
 from .player import CONTROLLER, REFERENCES, Player
 from .recording import Recording, StateMessages
 
 SHOW_S = 0.2
 
 
-def replay(options: Options) -> Replay:
+def replay(options: ReplayOptions) -> Replay:
     """Play the bag to a controller of its own and compare its commands with the recorded.
 
     Raises:
@@ -58,7 +58,9 @@ def replay(options: Options) -> Replay:
 
 
 class _Run:
-    def __init__(self, options: Options, recording: Recording, choice: ControllerChoice) -> None:
+    def __init__(
+        self, options: ReplayOptions, recording: Recording, choice: ControllerChoice
+    ) -> None:
         self._options, self._recording, self._choice = options, recording, choice
         period = recording.timebase.period
         check_time(options.start_s, "start")
@@ -84,7 +86,7 @@ class _Run:
             )
         return parts
 
-    def _read_commands(self) -> Commands:
+    def _read_commands(self) -> ReplayedCommands:
         """Those to compare with; nobody knows what came after an unfinished bag's last one."""
         recording = self._recording
         commands = recording.commands(self._choice.names.commanded)
@@ -130,7 +132,7 @@ class _Run:
             options, choice, recording, comparison, self._laws, self._skipped, elapsed, error
         )  # fmt: skip
 
-    def _recorded_until(self, played: Ticks, error: FlightError | None) -> Commands:
+    def _recorded_until(self, played: Ticks, error: FlightError | None) -> ReplayedCommands:
         """Take of a replay, or a bag, that ended early only what came until then."""
         if error is None and self._recording.is_finished:
             return self._recorded
@@ -192,7 +194,7 @@ def _start_again(player: Player) -> None:
     """Let the controller forget everything, as the one that was started again in flight."""
     if refused := _change_state(player, "deactivate", "cleanup", "configure", "activate"):
         raise FlightError(f"{CONTROLLER} refused to {refused}")
-    player.greet()
+    player.resend_pending()
 
 
 def _change_state(player: Player, *transitions: str) -> str:

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 from ...console.tables import (
     Column,
+    JudgedCell,
     Table,
-    Verdict,
 )
 from .flights import Result
 from .table import Cell
@@ -45,7 +45,7 @@ def claims_table(records: Iterable[dict[str, Any]]) -> Table:
     rows = [
         [
             claim["text"], claim["value"], f"{claim['relation']} {claim['limit']:g}",
-            Verdict("", "holds", "good") if claim["holds"] else Verdict("", "fails", "bad"),
+            JudgedCell("", "holds", "good") if claim["holds"] else JudgedCell("", "fails", "bad"),
         ]
         for claim in records
     ]  # fmt: skip

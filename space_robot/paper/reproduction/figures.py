@@ -11,8 +11,8 @@ from ...analysis.figures import chatter, desired_joints, junctions
 from ...analysis.figures.figure_set import FigureFolder, SavedFigure
 from ...analysis.plot_series import BaseTorque
 from ...flight.plan import Flight, FlightPlan
-from ...flight.simulate import unflown
-from .flights import ROBOT, Result, Row
+from ...flight.simulate import empty_log
+from .flights import ROBOT, Result, TableRow
 
 FIGURE_OF_CASE = {"1": "6", "2": "7", "3": "8", "4-1": "9a", "4-2": "9b"}
 MISSION = "figure5_desired_joints"
@@ -42,7 +42,7 @@ def comparisons(
 
 
 def _draw_mission(duration: float | None, folder: FigureFolder) -> None:
-    log = unflown(Flight(FlightPlan(robot=ROBOT, duration=duration)))
+    log = empty_log(Flight(FlightPlan(robot=ROBOT, duration=duration)))
     folder.save(desired_joints(log), MISSION)
 
 
@@ -51,7 +51,7 @@ def _draw_comparison(stem: str, flights: Mapping[str, BaseTorque], folder: Figur
     folder.save(draw(flights), stem)
 
 
-def figure_groups(rows: Sequence[Row], folder: FigureFolder) -> dict[str, list[SavedFigure]]:
+def figure_groups(rows: Sequence[TableRow], folder: FigureFolder) -> dict[str, list[SavedFigure]]:
     """Return the figures that were drawn by their heading, the mission's first, then by case."""
     groups = {
         "The mission, and the laws beside one another": [

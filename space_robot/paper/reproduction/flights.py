@@ -43,14 +43,14 @@ AS_PRINTED = VARIANTS[0]
 
 
 @dataclass(frozen=True)
-class Row:
+class TableRow:
     """A row of Table V."""
 
     controller: str
     case: str
 
     @classmethod
-    def parse(cls, text: str) -> Row:
+    def parse(cls, text: str) -> TableRow:
         """From ``CONTROLLER/CASE``.
 
         Raises:
@@ -74,7 +74,7 @@ class Row:
         return Variant(sets[self.controller], True)
 
 
-ROWS = tuple(Row(controller, case) for controller, case in PRINTED)
+ROWS = tuple(TableRow(controller, case) for controller, case in PRINTED)
 
 
 class Equipment(NamedTuple):
@@ -93,7 +93,7 @@ PERFECT = Equipment()
 class Planned(NamedTuple):
     """A row in one variant."""
 
-    row: Row
+    row: TableRow
     variant: Variant
     shown: bool
     """True if it is drawn: the default gains, the printed friction."""
@@ -104,7 +104,7 @@ class Planned(NamedTuple):
         return self.shown and self.row.case == COMPARED_CASE
 
 
-def plan(rows: Iterable[Row], brief: bool = False) -> Iterator[Planned]:
+def plan(rows: Iterable[TableRow], brief: bool = False) -> Iterator[Planned]:
     """Yield the flights of ``rows``: all four variants, or (``brief``) what Table V asks for.
 
     That is the default gains with friction and without and, where the default ones are others,
@@ -121,7 +121,7 @@ def plan(rows: Iterable[Row], brief: bool = False) -> Iterator[Planned]:
 class Result:
     """A finished flight."""
 
-    row: Row
+    row: TableRow
     variant: Variant
     parameters: dict[str, Any]
     """All that plant, controller and mission were told."""

@@ -28,7 +28,7 @@ from ...processes.software import (
 )
 from .claims import claims, claims_table
 from .figures import comparisons, figure_groups
-from .flights import PERFECT, Equipment, Planned, Result, Row, fly, plan
+from .flights import PERFECT, Equipment, Planned, Result, TableRow, fly, plan
 from .table import cells, cells_table, chatter, chatter_table, variant_tables
 
 TABLE = "table_v"
@@ -53,7 +53,7 @@ def check_folder(folder: Path) -> None:
 
 
 def reproduce(
-    rows: Sequence[Row],
+    rows: Sequence[TableRow],
     folder: Path,
     *,
     duration: float | None = None,
@@ -122,7 +122,7 @@ def _call(draw: Callable[[], None]) -> None:
 
 
 def _write(
-    rows: Sequence[Row],
+    rows: Sequence[TableRow],
     results: Sequence[Result],
     duration: float,
     brief: bool,

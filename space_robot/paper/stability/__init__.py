@@ -13,6 +13,6 @@
 """
 
 from .report import report
-from .study import Study, study
+from .study import StabilityStudy, study
 
-__all__ = ["Study", "report", "study"]
+__all__ = ["StabilityStudy", "report", "study"]

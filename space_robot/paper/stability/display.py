@@ -9,21 +9,21 @@ from rich.console import Console
 
 from ...console.tables import (
     Column,
+    JudgedCell,
     Table,
     Value,
-    Verdict,
 )
 from ...console.terminal import say
 from ...console.terminal_tables import print_table
 from .check import Check
 from .lyapunov import Certificate
-from .study import Study
+from .study import StabilityStudy
 from .super_twisting import SuperTwisting
 
 TONES = {"holds": "good", "fails": "bad", "open": "open", "not applicable": "open"}
 
 
-def print_study(study: Study, console: Console) -> None:
+def print_study(study: StabilityStudy, console: Console) -> None:
     """Print all tables and a closing sentence."""
     flight = study.flight
     what = flight.description
@@ -71,19 +71,19 @@ def _of_each(
     return ["none" if certificate is None else text(certificate) for certificate in certificates]
 
 
-def _verdict(text: str, check: Check) -> Verdict:
-    return Verdict(text, check.verdict, TONES[check.verdict])
+def _verdict(text: str, check: Check) -> JudgedCell:
+    return JudgedCell(text, check.verdict, TONES[check.verdict])
 
 
-def _below(check: Check) -> Verdict:
+def _below(check: Check) -> JudgedCell:
     return _verdict(f"{_number(check.value)} < {_number(check.limit)}", check)
 
 
-def _above(check: Check) -> Verdict:
+def _above(check: Check) -> JudgedCell:
     return _verdict(f"{_number(check.limit)} > {_number(check.value)}", check)
 
 
-def _lemma_1(study: Study) -> Table:
+def _lemma_1(study: StabilityStudy) -> Table:
     rows = [
         [
             name, f"{extremes.min:.4f}", f"{extremes.max:.4f}", f"{extremes.max_at_s:.2f}",
@@ -99,7 +99,7 @@ def _lemma_1(study: Study) -> Table:
     return Table.of("Lemma 1: W = E - H_S^-1 H̄ (69)", columns, rows)
 
 
-def _time_delay_error(study: Study) -> Table:
+def _time_delay_error(study: StabilityStudy) -> Table:
     flown, smooth = study.error, study.frictionless_error
     columns = [
         ("max |eps|", map(_number, flown.max_error)),
@@ -175,7 +175,7 @@ def _reaching(names: Sequence[str], twisting: SuperTwisting) -> Table:
     return _by_axis(title, names, columns)
 
 
-def _closing(study: Study, twisting: SuperTwisting) -> str:
+def _closing(study: StabilityStudy, twisting: SuperTwisting) -> str:
     axes = len(twisting.gains)
     bounded = sum(check.holds is True for check in twisting.k_2_above_beta)
     kept = sum(check.applies for check in twisting.reaching_time)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ...analysis.figures.style import COLOURS, GREY, grid, house_style, page, plain, save_figure
 from .circle_criterion import transfer_function
-from .study import Study
+from .study import StabilityStudy
 from .super_twisting import SuperTwisting
 
 BLACK, BLUE, ORANGE = COLOURS[0], COLOURS[2], COLOURS[6]
@@ -19,7 +19,7 @@ POINTS = 1500
 """Points of a line; more would only make the SVG larger."""
 
 
-def draw(study: Study, folder: Path) -> list[Path]:
+def draw(study: StabilityStudy, folder: Path) -> list[Path]:
     """Write ``nyquist`` and ``lyapunov`` as PNG and SVG; nothing for a law without K_1 and K_2."""
     if study.super_twisting is None:
         return []

@@ -12,12 +12,12 @@ import numpy as np
 from .check import Check
 from .lemma_1 import SAMPLING
 from .lyapunov import Certificate
-from .study import Study
+from .study import StabilityStudy
 from .super_twisting import SuperTwisting
 from .time_delay_error import ErrorDerivative
 
 
-def report(study: Study) -> dict[str, Any]:
+def report(study: StabilityStudy) -> dict[str, Any]:
     """Everything found; lists hold one entry an axis, in the order of ``axes``."""
     flight, lemma_1 = study.flight, study.lemma_1
     found = {

@@ -23,7 +23,7 @@ SHORTEST = 10
 
 
 @dataclass(frozen=True)
-class Study:
+class StabilityStudy:
     """The findings; `super_twisting` for laws with K_1 and K_2 only."""
 
     flight: Flight
@@ -59,7 +59,7 @@ def check_law(flight: Flight) -> None:
         )
 
 
-def study(plan: FlightPlan, initial_error: float, fly: Fly) -> Study:
+def study(plan: FlightPlan, initial_error: float, fly: Fly) -> StabilityStudy:
     """Fly what is needed and check every condition of the paper.
 
     Args:
@@ -96,4 +96,4 @@ def study(plan: FlightPlan, initial_error: float, fly: Fly) -> Study:
             reaching_beta=derivative(off).beta,
         )
     walked = contraction(flight.plant.robot, h_bar, log)
-    return Study(flight, walked, error, frictionless, twisting)
+    return StabilityStudy(flight, walked, error, frictionless, twisting)

@@ -26,7 +26,7 @@ from space_robot_msgs_py.errors import SpaceRobotError
 from ..interruption import SIGNALS
 from .worker import work
 
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 """For an answer of the server, which takes milliseconds: then something is very wrong."""
 CHECK_S = 5.0
 """Time between two looks of the server whether the process that it serves is still there."""
@@ -40,7 +40,7 @@ class ForkServer:
     def __init__(self, function: Callable[[Any], Any]) -> None:
         """Fork the server; its workers call ``function``, which is not pickled."""
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._socket.settimeout(PATIENCE_S)
+        self._socket.settimeout(TIMEOUT_S)
         self._pid = _fork(partial(_serve, theirs, self._socket, function, os.getpid()))
         theirs.close()
 

@@ -7,7 +7,7 @@ then, or when a worker ends by ``os._exit(0)``). What is waited for, and how lon
 * for results: until a pipe has one, or is closed, as the kernel does when the worker ends; and
   with ``timeout_s`` no longer than until an item's time is up;
 * for the rest of a result, for room to send an item: `MESSAGE_S`, then the worker is killed;
-* for the server that forks: `fork_server.PATIENCE_S`.
+* for the server that forks: `fork_server.TIMEOUT_S`.
 
 Without ``timeout_s`` a function that never returns is waited for.
 """
@@ -38,7 +38,7 @@ Dones = Iterator[Done[Any, Any]]
 
 
 @dataclass
-class Task:
+class PoolTask:
     """An item on its way."""
 
     item: Any
@@ -53,7 +53,7 @@ class Worker:
 
     pid: int
     connection: Connection
-    tasks: deque[Task] = field(default_factory=deque)
+    tasks: deque[PoolTask] = field(default_factory=deque)
     began: float = 0.0
     """When it got to the first of its tasks."""
 
@@ -84,7 +84,7 @@ class Pool:
         self._timeout_s, self._attempts = timeout_s, attempts
         self._server = ForkServer(function)
         self._workers: dict[Connection, Worker] = {}
-        self._again: deque[Task] = deque()
+        self._again: deque[PoolTask] = deque()
         """Tasks to be given out before any new item."""
 
     def run(self, items: Iterable[Any]) -> Dones:
@@ -110,7 +110,7 @@ class Pool:
                     except StopIteration:
                         return
                     try:
-                        self._again.append(Task(item, pickle.dumps(item)))
+                        self._again.append(PoolTask(item, pickle.dumps(item)))
                     except Exception as error:  # one that cannot be pickled
                         yield Done(item, None, error)
                         continue
@@ -135,7 +135,7 @@ class Pool:
         worker = self._workers[connection] = Worker(pid, connection)
         return worker
 
-    def _send(self, worker: Worker, task: Task) -> None:
+    def _send(self, worker: Worker, task: PoolTask) -> None:
         if not worker.tasks:
             worker.began = time.monotonic()
         worker.tasks.append(task)
@@ -170,13 +170,13 @@ class Pool:
         try:
             packed = worker.connection.recv_bytes()
         except (EOFError, OSError):
-            yield from self._bury(worker)
+            yield from self._remove_dead_worker(worker)
             return
         task = worker.tasks.popleft()
         worker.began = time.monotonic()
         yield Done(task.item, *unpacked(packed))
 
-    def _bury(self, worker: Worker) -> Dones:
+    def _remove_dead_worker(self, worker: Worker) -> Dones:
         """Remove a worker that has died; its item is tried again, unless it was the last time."""
         code = self._remove(worker)
         if not worker.tasks:

@@ -16,7 +16,7 @@ MOST_NAMES = 5
 """Of nodes that are named."""
 
 
-class Place(NamedTuple):
+class FlightPlace(NamedTuple):
     """A namespace of a ROS domain."""
 
     domain: int
@@ -49,13 +49,13 @@ class Finder:
         self._node = None if domain is None else TemporaryNode("viewer_looks", domain)
         self._domain = domain
 
-    def find(self) -> Place | None:
+    def find(self) -> FlightPlace | None:
         """Return where a plant is, of several on this machine the one that began last."""
         if self._domain is not None:
             found = sorted(self._publishing())
-            return Place(self._domain, found[0]) if found else None
+            return FlightPlace(self._domain, found[0]) if found else None
         newest = newest_node(PLANT, self._namespace)
-        return Place(*newest) if newest else None
+        return FlightPlace(*newest) if newest else None
 
     def describe(self) -> str:
         """Say where is looked, and what is there."""
@@ -68,7 +68,7 @@ class Finder:
         seen = f"nodes {nodes}, but nobody sends base/state" if names else "no other node"
         return f"ROS domain {self._domain} has {seen}"
 
-    def is_there(self, place: Place) -> bool:
+    def is_there(self, place: FlightPlace) -> bool:
         """Tell whether a plant that was found still is."""
         if self._domain is not None:
             return place.namespace in self._publishing()

@@ -23,7 +23,7 @@ from space_robot_msgs_py.wire.truth_joints import TruthJoints
 from ...flight.graph.monitor import Event, Monitor
 from ...flight.graph.node_names import PLANT
 from ...flight.graph.node_services import get_parameters
-from .finder import Place
+from .finder import FlightPlace
 from .state_topic import StateTopic
 
 Array = NDArray[np.float64]
@@ -52,7 +52,7 @@ class Sample(NamedTuple):
 class Listener:
     """Listens to the newest state only: the truth where it is sent, else what the sensors tell."""
 
-    def __init__(self, place: Place, robot: str, check: Callable[[], None]) -> None:
+    def __init__(self, place: FlightPlace, robot: str, check: Callable[[], None]) -> None:
         """Join the graph; ask the plant which robot it is, and for its period.
 
         Args:

@@ -12,7 +12,7 @@ from space_robot_msgs_py.errors import FlightError
 
 from ...flight.graph.monitor import Event
 from ..local_server import local_server
-from .finder import Finder, Place
+from .finder import Finder, FlightPlace
 from .listener import Listener, Sample
 from .view import LiveView
 
@@ -87,7 +87,7 @@ def serve(options: LiveOptions, say: Callable[[str], None], ready: Callable[[str
                 say(str(error))
 
 
-def _wait(finder: Finder, say: Callable[[str], None]) -> Place:
+def _wait(finder: Finder, say: Callable[[str], None]) -> FlightPlace:
     """Wait for a flight, and say from time to time what is there instead."""
     say(WAITING)
     say_at = time.monotonic() + SAY_S
@@ -109,7 +109,7 @@ class Follower:
         self._began = 0.0
         """When the flight was first shown, by the monotonic clock."""
 
-    def follow(self, place: Place, say: Callable[[str], None]) -> None:
+    def follow(self, place: FlightPlace, say: Callable[[str], None]) -> None:
         """Show the flight in a place to its end.
 
         Args:
@@ -145,7 +145,7 @@ class Follower:
                 self._view.tell(listener, 0.0, str(over))
                 raise
 
-    def _join(self, place: Place, check: Callable[[], None]) -> Listener:
+    def _join(self, place: FlightPlace, check: Callable[[], None]) -> Listener:
         try:
             return Listener(place, self._options.robot, check)
         except OverError:

@@ -16,7 +16,7 @@ from space_robot_msgs_py.config.choices import choices
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from ...elementary.matrices import norm, product, turned_tensor
+from ...elementary.matrices import norm, product, rotate_tensor
 from .bodies import Body
 
 Array = NDArray[np.float64]
@@ -144,7 +144,7 @@ def _moved_to(body: Body, rotation: Array, position: Array) -> Body:
 
     return replace(
         body,
-        inertia=turned_tensor(rotation, body.inertia),
+        inertia=rotate_tensor(rotation, body.inertia),
         com=at(body.com),
         tools=tuple(
             replace(tool, rotation=product(rotation, tool.rotation), position=at(tool.position))

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.validation import short
 
-from ...elementary.matrices import product, turned_tensor
+from ...elementary.matrices import product, rotate_tensor
 from ..tree import Body, Joint, JointKind, Tool
-from .fields import HERE, Frame
+from .fields import HERE, UrdfFrame
 from .findings import Report
 from .graph import Edge, Tree
 from .inertia import inertia_defect, nearest_inertia, solid_inertia
-from .links import NOTHING, Link
+from .links import NOTHING, UrdfLink
 
 Array = NDArray[np.float64]
 
 
-def mend_massless(links: Mapping[str, Link], tree: Tree, report: Report) -> None:
+def mend_massless(links: Mapping[str, UrdfLink], tree: Tree, report: Report) -> None:
     """Lock the joints of bodies without mass that may be locked: those of tips, and the root's.
 
     Raises:
@@ -54,7 +54,7 @@ def mend_massless(links: Mapping[str, Link], tree: Tree, report: Report) -> None
             )  # fmt: skip
 
 
-def _lock_tip(link: Link, tree: Tree, carriers: Mapping[str, str], report: Report) -> None:
+def _lock_tip(link: UrdfLink, tree: Tree, carriers: Mapping[str, str], report: Report) -> None:
     edge = tree.edges[link.name]
     report.repaired(
         link.mass_line, link.part, "a link that moves must have a mass", f"{link.mass:g}",
@@ -63,7 +63,7 @@ def _lock_tip(link: Link, tree: Tree, carriers: Mapping[str, str], report: Repor
     edge.joint = replace(edge.joint, kind="fixed")
 
 
-def _lock_root(root: Link, child: str, tree: Tree, report: Report) -> None:
+def _lock_root(root: UrdfLink, child: str, tree: Tree, report: Report) -> None:
     """Lock the one joint of a root without mass: what it carries floats freely anyway."""
     edge = tree.edges[child]
     report.repaired(
@@ -88,7 +88,7 @@ def check_kinds(tree: Tree, report: Report) -> None:
             )  # fmt: skip
 
 
-def mend_inertias(links: Mapping[str, Link], tree: Tree, report: Report) -> None:
+def mend_inertias(links: Mapping[str, UrdfLink], tree: Tree, report: Report) -> None:
     """See that every link that has a mass can be made of matter.
 
     A point's inertia, zero, will do for a link that is fixed to one with an inertia.
@@ -116,7 +116,7 @@ def mend_inertias(links: Mapping[str, Link], tree: Tree, report: Report) -> None
         link.inertia = nearest
 
 
-def make_bodies(links: Mapping[str, Link], tree: Tree, tools: Sequence[str]) -> list[Body]:
+def make_bodies(links: Mapping[str, UrdfLink], tree: Tree, tools: Sequence[str]) -> list[Body]:
     """Return a body for each link, the base first, the others in the order of their joints.
 
     Args:
@@ -138,7 +138,7 @@ def make_bodies(links: Mapping[str, Link], tree: Tree, tools: Sequence[str]) -> 
     return bodies
 
 
-def end_frames(links: Mapping[str, Link], tree: Tree) -> list[str]:
+def end_frames(links: Mapping[str, UrdfLink], tree: Tree) -> list[str]:
     """Return the links whose frames are the tools', those behind the most joints first.
 
     They are fixed links without mass that carry nothing, and the last moving link of a branch that
@@ -158,7 +158,7 @@ def end_frames(links: Mapping[str, Link], tree: Tree) -> list[str]:
     return sorted(ends, key=lambda name: (-depth[name], place[name]))
 
 
-def _joint(edge: Edge, parent: Frame) -> Joint:
+def _joint(edge: Edge, parent: UrdfFrame) -> Joint:
     """Return the joint between two bodies; ``parent``: the frame of the one nearer to the base."""
     joint = edge.joint
     rotation = parent.rotation.T
@@ -174,7 +174,9 @@ def _joint(edge: Edge, parent: Frame) -> Joint:
     )  # fmt: skip
 
 
-def _body(link: Link, frame: Frame, joint: Joint | None, parent: str, rank: int | None) -> Body:
+def _body(
+    link: UrdfLink, frame: UrdfFrame, joint: Joint | None, parent: str, rank: int | None
+) -> Body:
     """Return a link as a body whose frame is ``frame``, seen from the link's; a tool if ranked."""
     turn, at = frame.rotation.T, frame.position
     visuals = tuple(
@@ -187,6 +189,6 @@ def _body(link: Link, frame: Frame, joint: Joint | None, parent: str, rank: int 
     )
     tools = () if rank is None else (Tool(link.name, turn, -product(turn, at), rank=rank),)
     return Body(
-        link.name, link.mass, turned_tensor(turn, link.inertia), product(turn, link.com - at),
+        link.name, link.mass, rotate_tensor(turn, link.inertia), product(turn, link.com - at),
         parent, joint, tools, visuals,
     )  # fmt: skip

@@ -23,7 +23,7 @@ _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _INFINITE = re.compile(r"([-+]?)inf(?:inity)?", re.IGNORECASE)
 
 
-class Frame(NamedTuple):
+class UrdfFrame(NamedTuple):
     """A frame, seen from another."""
 
     rotation: Array
@@ -32,7 +32,7 @@ class Frame(NamedTuple):
     """(3,) m, on the axes of the other."""
 
 
-HERE = Frame(np.eye(3), np.zeros(3))
+HERE = UrdfFrame(np.eye(3), np.zeros(3))
 
 
 class Fields:
@@ -78,14 +78,14 @@ class Fields:
             )
         return np.array([self._number(element, name, word) for word in words])
 
-    def frame(self, origin: Element | None) -> Frame:
+    def frame(self, origin: Element | None) -> UrdfFrame:
         """Return the frame that an ``<origin>`` describes, on the axes of the one it stands in."""
         if origin is None:
             return HERE
         self.report.check_content(origin, self.part, (), ("xyz", "rpy"))
         zero = (0.0, 0.0, 0.0)
         rotation = rotation_of_rpy(self.vector(origin, "rpy", zero))
-        return Frame(rotation, self.vector(origin, "xyz", zero))
+        return UrdfFrame(rotation, self.vector(origin, "xyz", zero))
 
     def _number(self, element: Element, name: str, text: str) -> float:
         value = float(text) if _NUMBER.fullmatch(text.strip()) else math.nan

@@ -9,7 +9,7 @@ from space_robot_msgs_py.config.validation import one_of, short
 
 from .findings import Report
 from .joints import UrdfJoint
-from .links import Link
+from .links import UrdfLink
 
 
 @dataclass
@@ -52,7 +52,7 @@ class Tree:
 
 
 def build_tree(
-    links: Mapping[str, Link], joints: Mapping[str, UrdfJoint], base: str | None, report: Report
+    links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], base: str | None, report: Report
 ) -> Tree:
     """Join the links to one tree and look at it from ``base``, or from its root.
 
@@ -83,7 +83,7 @@ def build_tree(
     return tree
 
 
-def _root(links: Mapping[str, Link], joints: Mapping[str, UrdfJoint], report: Report) -> str:
+def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], report: Report) -> str:
     """Return the link that no other carries, having seen that all others hang on it."""
     above: dict[str, UrdfJoint] = {}
     for joint in joints.values():

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ...elementary.matrices import principal_axes, turned_tensor
+from ...elementary.matrices import principal_axes, rotate_tensor
 from ..tree import Visual
 
 Array = NDArray[np.float64]
@@ -59,7 +59,7 @@ def nearest_inertia(inertia: Array) -> Array | None:
     if largest <= 0.0:
         return None
     second = np.maximum(second, SLENDER * largest)
-    nearest = turned_tensor(axes, np.diag(np.sum(second) - second))
+    nearest = rotate_tensor(axes, np.diag(np.sum(second) - second))
     return 0.5 * (nearest + nearest.T)
 
 
@@ -75,7 +75,7 @@ def solid_inertia(mass: float, visuals: tuple[Visual, ...]) -> tuple[Array, str]
     for visual in visuals:
         if visual.shape != "mesh":
             turn = visual.rotation
-            inertia: Array = turned_tensor(turn, np.diag(_solid(mass, visual.shape, visual.size)))
+            inertia: Array = rotate_tensor(turn, np.diag(_solid(mass, visual.shape, visual.size)))
             return inertia, f"the solid {visual.shape} that it looks like"
     from ...elementary.exponential import exp, log  # slow to import
 

@@ -14,9 +14,9 @@ from space_robot_msgs_py.config.validation import short
 from ...elementary.matrices import norm
 from ..tree import JointFriction, JointLimits
 from .elements import Element
-from .fields import Fields, Frame
+from .fields import Fields, UrdfFrame
 from .findings import Report
-from .links import Link, read_name
+from .links import UrdfLink, read_name
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class UrdfJoint:
     """A value of `KINDS`."""
     parent: str
     child: str
-    frame: Frame
+    frame: UrdfFrame
     """The child's frame at joint position zero, on the parent's axes."""
     axis: Array
     """(3,) unit vector on the child's axes."""
@@ -59,7 +59,9 @@ class UrdfJoint:
         return f"joint {short(self.name)}"
 
 
-def read_joints(robot: Element, links: Mapping[str, Link], report: Report) -> dict[str, UrdfJoint]:
+def read_joints(
+    robot: Element, links: Mapping[str, UrdfLink], report: Report
+) -> dict[str, UrdfJoint]:
     """Return all joints by their names, in the order of the file."""
     found: dict[str, UrdfJoint] = {}
     for element in robot.all("joint"):
@@ -73,7 +75,7 @@ def read_joints(robot: Element, links: Mapping[str, Link], report: Report) -> di
     return found
 
 
-def _joint(element: Element, name: str, links: Mapping[str, Link], fields: Fields) -> UrdfJoint:
+def _joint(element: Element, name: str, links: Mapping[str, UrdfLink], fields: Fields) -> UrdfJoint:
     report, part = fields.report, fields.part
     report.check_content(element, part, ELEMENTS + EXTENSIONS, ("name", "type"))
     written = element.attributes.get("type", "")
@@ -101,7 +103,7 @@ def _joint(element: Element, name: str, links: Mapping[str, Link], fields: Field
     return joint
 
 
-def _end(element: Element, tag: str, links: Mapping[str, Link], fields: Fields) -> str:
+def _end(element: Element, tag: str, links: Mapping[str, UrdfLink], fields: Fields) -> str:
     """Return the name of the link at one end of a joint."""
     end = fields.report.only(element, tag, fields.part)
     name = end.attributes.get("link", "") if end is not None else ""

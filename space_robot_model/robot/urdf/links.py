@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.config.validation import short
 
-from ...elementary.matrices import turned_tensor
+from ...elementary.matrices import rotate_tensor
 from ..tree import Visual
 from .elements import Element
 from .fields import Fields
@@ -27,7 +27,7 @@ MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
 @dataclass
-class Link:
+class UrdfLink:
     """A link as its file tells it; vectors on its own axes."""
 
     name: str
@@ -48,9 +48,11 @@ class Link:
         return f"link {short(self.name)}"
 
 
-def read_links(robot: Element, colours: Colours, folder: Path, report: Report) -> dict[str, Link]:
+def read_links(
+    robot: Element, colours: Colours, folder: Path, report: Report
+) -> dict[str, UrdfLink]:
     """Return all links by their names, in the order of the file."""
-    found: dict[str, Link] = {}
+    found: dict[str, UrdfLink] = {}
     for element in robot.all("link"):
         name = read_name(element, report)
         if name in found:
@@ -72,8 +74,8 @@ def read_name(element: Element, report: Report) -> str:
     return name
 
 
-def _link(element: Element, name: str, colours: Colours, folder: Path, report: Report) -> Link:
-    link = Link(
+def _link(element: Element, name: str, colours: Colours, folder: Path, report: Report) -> UrdfLink:
+    link = UrdfLink(
         name, element.line, element.line, 0.0, np.zeros((3, 3)), np.zeros(3),
         read_visuals(element, f"link {short(name)}", colours, folder, report),
     )  # fmt: skip
@@ -84,7 +86,7 @@ def _link(element: Element, name: str, colours: Colours, folder: Path, report: R
     return link
 
 
-def _read_inertial(inertial: Element, link: Link, fields: Fields) -> None:
+def _read_inertial(inertial: Element, link: UrdfLink, fields: Fields) -> None:
     report, part = fields.report, link.part
     report.check_content(inertial, part, ("origin", "mass", "inertia"), ())
     frame = fields.frame(report.only(inertial, "origin", part))
@@ -107,7 +109,7 @@ def _read_inertial(inertial: Element, link: Link, fields: Fields) -> None:
     values += [fields.number(inertia, product, 0.0) for product in MOMENTS[3:]]
     xx, yy, zz, xy, xz, yz = values
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    link.inertia = turned_tensor(frame.rotation, tensor)
+    link.inertia = rotate_tensor(frame.rotation, tensor)
     if link.mass < NOTHING and link.inertia.any():
         report.repaired(
             inertia.line, part, "inertia without mass", f"{np.trace(link.inertia):g} kg m2 (trace)",

@@ -9,7 +9,7 @@ from space_robot_msgs_py.errors import InputError
 
 from ..tree import Visual
 from .elements import Element
-from .fields import Fields, Frame
+from .fields import Fields, UrdfFrame
 from .findings import Report, short_tag
 from .meshes import mesh_path
 
@@ -67,7 +67,7 @@ def _visual(element: Element, fields: Fields, colours: Colours, folder: Path) ->
 
 
 def _shape(
-    shape: Element, frame: Frame, colour: Colour | None, fields: Fields, folder: Path
+    shape: Element, frame: UrdfFrame, colour: Colour | None, fields: Fields, folder: Path
 ) -> Visual:
     if shape.tag == "mesh":
         scale = tuple(map(float, fields.vector(shape, "scale", (1.0, 1.0, 1.0))))

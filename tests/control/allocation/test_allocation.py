@@ -123,7 +123,7 @@ def test_thrusters_unload_the_wheels_which_hold_the_base() -> None:
     given = bench.fly(np.zeros(3), 60000)
     np.testing.assert_allclose(given, 0.0, atol=1e-12)
     assert np.abs(bench.momenta).max() < 6.1
-    assert bench.allocation.unloading.is_under_way == 0.0
+    assert bench.allocation.unloading.is_active == 0.0
     pulses = bench.allocation.modulation.pulses.sum()
     bench.fly(np.zeros(3), 2000)
     assert bench.allocation.modulation.pulses.sum() == pulses
@@ -138,12 +138,12 @@ def test_unloading_lasts_from_one_threshold_to_the_other(k: int, side: float) ->
         thrusters=THRUSTERS, wheels={"max_momentum": limits.tolist()}, null_gain=0.0,
         unload_above=0.7, unload_to=0.3,
     )  # fmt: skip
-    for share, is_under_way in ((0.69, 0.0), (0.71, 1.0), (0.31, 1.0), (0.29, 0.0), (0.69, 0.0)):
+    for share, is_active in ((0.69, 0.0), (0.71, 1.0), (0.31, 1.0), (0.29, 0.0), (0.69, 0.0)):
         bench.momenta[:] = 0.2 * limits
         bench.momenta[k] = side * share * limits[k]
         bench.step(np.zeros(3))
-        assert bench.allocation.unloading.is_under_way == is_under_way
-        assert np.any(bench.allocation.of_thrusters) == bool(is_under_way)
+        assert bench.allocation.unloading.is_active == is_active
+        assert np.any(bench.allocation.of_thrusters) == bool(is_active)
 
 
 @pytest.mark.parametrize("count", [3, 4, 6])

@@ -15,7 +15,7 @@ from space_robot_control.allocation.modulation import (
 )
 from space_robot_control.allocation.settings import AllocationSettings
 from space_robot_control.allocation.thrusters import (
-    Thrusters,
+    AssumedThrusters,
     expect_torque,
     find_times,
     within_reach,
@@ -57,7 +57,7 @@ class Bench:
         self.count = believed.count
         self.torques = believed.torques
         self.forces = believed.unit_directions * 10.0
-        self.thrusters = Thrusters.build(1, believed, settings, PERIOD)
+        self.thrusters = AssumedThrusters.build(1, believed, settings, PERIOD)
         self.modulation = Modulation.build(1, self.thrusters, settings, PERIOD)
 
     def fly(self, demands: Array, first: int = 0) -> Array:

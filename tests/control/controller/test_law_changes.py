@@ -13,7 +13,7 @@ from flights import COMMAND, ros_environment, space_robot_here
 
 from space_robot.flight.graph.domain import ros_domain
 from space_robot.flight.graph.temporary_node import TemporaryNode
-from space_robot.flight.replay.outcome import Options
+from space_robot.flight.replay.outcome import ReplayOptions
 from space_robot.flight.replay.run import replay
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
@@ -141,7 +141,7 @@ def test_the_parameter_tells_the_law_after_a_planned_swap(flown: Flown) -> None:
 
 
 def test_it_replays_to_the_last_bit(flown: Flown, domain: int) -> None:
-    done = replay(Options(flown.bag, domain=domain))
+    done = replay(ReplayOptions(flown.bag, domain=domain))
     assert done.is_judged
     assert done.comparison.is_identical, done.report()["first_difference"]
     assert len(done.comparison.ticks) == flown.log.ticks
@@ -153,7 +153,7 @@ def test_a_part_begins_under_the_law_in_force_there(flown: Flown, domain: int) -
     until = flown.log.laws[4].tick
     period = flown.log.timebase.period
     done = replay(
-        Options(
+        ReplayOptions(
             flown.bag, domain=domain, start_s=(ctc.tick + 1) * period, end_s=until * period
         )
     )  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from flights import space_robot_here
 
-from space_robot.flight.replay.outcome import Options
+from space_robot.flight.replay.outcome import ReplayOptions
 from space_robot.flight.replay.run import replay
 from space_robot_msgs_py.bag.reader import read_flight
 
@@ -94,7 +94,7 @@ def test_the_restart_is_recorded_and_replayed(deaths: Story, domain: int) -> Non
     answered = np.flatnonzero(np.isfinite(deaths.log.commanded_torque).all(axis=1))
     assert again.tick in answered, "the recorder has missed what the controller answered first"
     last = int(answered[answered > again.tick][200])
-    done = replay(Options(deaths.bag, domain=domain, end_s=(last + 1) * PERIOD))
+    done = replay(ReplayOptions(deaths.bag, domain=domain, end_s=(last + 1) * PERIOD))
     assert done.comparison.is_identical, done.report()["first_difference"]
     assert done.comparison.ticks[-1] == last
 

@@ -103,7 +103,7 @@ def test_a_state_that_was_sent_without_a_part_is_passed_over(
 ) -> None:
     bench = Bench(ROBOT, wheels=4)
     parts = [queue.topic for queue in bench.input.inputs]
-    monkeypatch.setattr(state_input, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(state_input, "TIMEOUT_S", 0.0)
     found = []
     for tick in range(10):
         others = [topic for k, topic in enumerate(parts) if k != part]

@@ -115,7 +115,7 @@ def test_a_bad_state_is_answered_with_the_last_torque_for_a_while(
 
 
 @pytest.mark.parametrize(
-    ("spoil", "kind"),
+    ("corrupt", "kind"),
     [
         (lambda s: s.omega_base.fill(np.nan), "state not finite"),
         (lambda s: s.applied_torque.fill(-np.inf), "state not finite"),
@@ -126,13 +126,13 @@ def test_a_bad_state_is_answered_with_the_last_torque_for_a_while(
     ],
 )  # fmt: skip
 def test_what_was_wrong_is_counted_and_held_over(
-    paper_robot: Robot, spoil: Callable[[RobotState], None], kind: str
+    paper_robot: Robot, corrupt: Callable[[RobotState], None], kind: str
 ) -> None:
     """An attitude of zeros is a broken sensor, not half a turn."""
     supervisor = supervisor_of(paper_robot)
     torque = supervisor.answer(state_at(0), REST).torque.copy()
     state = state_at(1)
-    spoil(state)
+    corrupt(state)
     np.testing.assert_array_equal(supervisor.answer(state, REST).torque, torque)
     assert supervisor.rejected == {kind: 1}
     assert supervisor.mode is Mode.HOLDING
@@ -201,7 +201,7 @@ def test_standing_down_commands_nothing_and_forgets(paper_robot: Robot) -> None:
     supervisor = supervisor_of(paper_robot)
     for tick in range(40):
         supervisor.answer(state_at(tick), REST)
-    command = supervisor.stand_down(40)
+    command = supervisor.deactivate(40)
     assert command.tick == 40
     assert not command.torque.any()
     assert not supervisor.answer(with_nan(state_at(41)), REST).torque.any()

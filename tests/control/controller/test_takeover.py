@@ -12,7 +12,7 @@ from space_robot.flight.plan import (
     Flight,
     FlightPlan,
 )
-from space_robot.flight.simulate import unflown
+from space_robot.flight.simulate import empty_log
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import build_law
 from space_robot_control.laws import ControlLaw, laws
@@ -35,7 +35,7 @@ class CommonBeginning:
         self.flight = Flight(
             FlightPlan.model_validate({"controller": law, "gains": "tuned", "duration": 6, **plan})
         )
-        self.log = unflown(self.flight)
+        self.log = empty_log(self.flight)
         self._fly(self.flight.controller, 0, TAKEOVER)
         plant = self.flight.plant
         self._memories = [plant.block, plant.command_delay_buffer, self.flight.controller.block]

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from space_robot.campaign.store.software import file_digests
-from space_robot.scenario.objects import law_setting
+from space_robot.scenario.objects import law_parameter
 from space_robot_control.laws import find_law, importable_name
 from space_robot_msgs_py.errors import InputError
 
@@ -47,7 +47,7 @@ def test_files_of_one_name_in_two_folders_are_two_laws(folder: Path) -> None:
     assert importable_name(two) == "other/my_law.py:Mine"
     for law in (one, two):
         assert find_law(importable_name(law)) is law, "what nodes and bags say finds it again"
-        assert law_setting(law) == importable_name(law)
+        assert law_parameter(law) == importable_name(law)
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ from space_robot.analysis.figures.base_torque import (
     power_spectral_density,
 )
 from space_robot.analysis.figures.style import (
-    Look,
+    LineStyle,
     house_style,
     thinned,
 )
@@ -102,7 +102,7 @@ def curves(axes: Axes) -> list[Line2D]:
 
 
 def by_look(axes: Axes, index: int) -> Line2D:
-    look = Look.of(index)
+    look = LineStyle.of(index)
     found = [x for x in curves(axes) if (x.get_color(), x.get_marker()) == look[:2]]
     assert len(found) == 1
     return found[0]
@@ -379,7 +379,7 @@ class TestComparisons:
 
 class TestPrint:
     def test_looks_differ_in_colour_and_marker(self) -> None:
-        assert len({Look.of(index)[:2] for index in range(63)}) == 63
+        assert len({LineStyle.of(index)[:2] for index in range(63)}) == 63
 
     @pytest.mark.parametrize("n", [1, 7])
     def test_nothing_overlaps_or_leaves_the_page(self, n: int) -> None:

@@ -18,7 +18,7 @@ from space_robot.analysis import (
 )
 from space_robot.analysis.described import robot_of
 from space_robot.analysis.figures import ripple
-from space_robot.analysis.figures.style import Look
+from space_robot.analysis.figures.style import LineStyle
 from space_robot.analysis.plot_series import PlotSeries
 from space_robot.analysis.ripple import (
     desired_torque,
@@ -185,7 +185,7 @@ def test_the_figure_has_a_panel_a_group_and_a_line_a_law() -> None:
     assert len(figure.axes) == 3
     for axes in figure.axes:
         (line,) = axes.get_lines()
-        assert line.get_color() == Look.of(1).colour
+        assert line.get_color() == LineStyle.of(1).colour
         frequency, density = np.asarray(line.get_data())
         assert frequency[0] == 2.0
         assert np.nansum(density) * (frequency[1] - frequency[0]) == pytest.approx(0.125, rel=1e-3)

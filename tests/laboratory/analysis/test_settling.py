@@ -20,7 +20,7 @@ from space_robot.flight.plan import (
     Flight,
     FlightPlan,
 )
-from space_robot.flight.simulate import unflown
+from space_robot.flight.simulate import empty_log
 from space_robot_msgs_py.bag.blocks import blocks_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
@@ -97,7 +97,7 @@ def test_a_flight_that_never_rests_settles_nowhere() -> None:
     ("duration", "expected"), [(30.0, 30_000), (31.0, 60_000), (14.0, 0), (0.5, 0), (0.05, None)]
 )
 def test_the_last_waypoint_has_flight_after_it(duration: float, expected: int | None) -> None:
-    assert last_waypoint(unflown(Flight(FlightPlan(duration=duration)))) == expected
+    assert last_waypoint(empty_log(Flight(FlightPlan(duration=duration)))) == expected
 
 
 def test_the_shortest_watch() -> None:
@@ -108,7 +108,7 @@ def test_the_shortest_watch() -> None:
 
 
 def test_an_excerpt_without_rest_has_none() -> None:
-    log = unflown(Flight(FlightPlan(duration=30.0)))
+    log = empty_log(Flight(FlightPlan(duration=30.0)))
     assert last_waypoint(excerpt(log, 5.0, 10.0)) is None
     assert last_waypoint(excerpt(log, 12.0, 20.0)) == 6000
 

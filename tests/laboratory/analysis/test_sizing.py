@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 from space_robot.analysis import analyze
 from space_robot.analysis.base_demand import BaseDemand
 from space_robot.analysis.loads import (
+    LoadRequirement,
     OtherWheelLoad,
-    Requirement,
     ThrusterLoad,
     WheelLoad,
 )
@@ -249,7 +249,7 @@ class TestThrusters:
 
 def test_at_its_limit_a_part_lacks_it() -> None:
     def of(asked: float, has: float) -> tuple[bool, float | None]:
-        found = Requirement("a", "b", "c", asked, has)
+        found = LoadRequirement("a", "b", "c", asked, has)
         return found.is_met, found.margin
 
     assert of(1.0, 4.0) == (True, 0.75)

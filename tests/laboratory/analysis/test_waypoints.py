@@ -13,13 +13,13 @@ from space_robot.flight.plan import (
     Flight,
     FlightPlan,
 )
-from space_robot.flight.simulate import unflown
+from space_robot.flight.simulate import empty_log
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 
 def log_with_speed(speed: np.ndarray) -> FlightLog:
     """One joint moves with the given speeds, the others rest."""
-    log = unflown(Flight(FlightPlan(duration=len(speed) * 0.0005)))
+    log = empty_log(Flight(FlightPlan(duration=len(speed) * 0.0005)))
     log.reference_joints[:] = 0.0
     log.reference_joints[:, 1, 2] = speed
     return log

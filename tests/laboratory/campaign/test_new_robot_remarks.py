@@ -20,7 +20,7 @@ from space_robot.campaign.new_robot.hinges import (
 )
 from space_robot.tuning.method import (
     Tuned,
-    Wishes,
+    TuningOptions,
 )
 from space_robot.tuning.warning import estimate_remark
 from space_robot_model.robot import Robot
@@ -99,7 +99,9 @@ def test_joints_are_grouped_by_branch(branches: list[int]) -> None:
 
 @pytest.mark.parametrize(("slower", "is_told"), [(1.01, False), (9.9, False), (10.1, True)])
 def test_weak_gains_are_told_with_their_reason(slower: float, is_told: bool) -> None:
-    tuned = Tuned(Wishes(0.05, 0.2), 1.0, 0.0123, 5.0, 5.0 * slower, 0.06, 120.0, np.ones(9), {})
+    tuned = Tuned(
+        TuningOptions(0.05, 0.2), 1.0, 0.0123, 5.0, 5.0 * slower, 0.06, 120.0, np.ones(9), {}
+    )
     remark = estimate_remark(tuned)
     assert bool(remark) == is_told
     if is_told:

@@ -19,7 +19,7 @@ from space_robot.flight.plan import (
 )
 from space_robot.flight.simulate import simulate
 from space_robot.paper.stability import (
-    Study,
+    StabilityStudy,
     report,
     study,
 )
@@ -35,7 +35,7 @@ def run(*arguments: str) -> str:
     return result.stdout
 
 
-def studied(**options: Any) -> Study:
+def studied(**options: Any) -> StabilityStudy:
     plan = FlightPlan.model_validate({"duration": 0.5, **options})
     return study(plan, 1e-3, lambda flight, which: simulate(flight))
 

@@ -12,8 +12,8 @@ from space_robot.analysis.template import template
 from space_robot.console.tables import (
     Column,
     Group,
+    JudgedCell,
     Table,
-    Verdict,
     as_csv,
     as_markdown,
     as_records,
@@ -23,8 +23,8 @@ from space_robot.console.terminal_tables import print_table
 
 COLUMNS = Column("law", is_label=True), Column("error", "rad", ".2e"), Column("verdict")
 ROWS = [
-    ["tde_stc", 0.000123456, Verdict("1 < 2", "holds", "good")],
-    ["<ctc>", None, Verdict("", "fails", "bad")],
+    ["tde_stc", 0.000123456, JudgedCell("1 < 2", "holds", "good")],
+    ["<ctc>", None, JudgedCell("", "fails", "bad")],
 ]
 
 

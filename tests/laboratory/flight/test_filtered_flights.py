@@ -19,8 +19,8 @@ from space_robot.flight.plan import (
     FlightPlan,
 )
 from space_robot.flight.simulate import (
+    empty_log,
     simulate,
-    unflown,
 )
 from space_robot_control.laws import laws
 from space_robot_msgs_py.errors import InputError
@@ -33,7 +33,7 @@ LOOK_TICKS = 100
 def flown(**plan: Any) -> tuple[Flight, Array, Array]:
     """A flight; true errors of attitude and joints now and then, (K, 9); commands (ticks, 9)."""
     flight = Flight(FlightPlan(**plan))
-    log, errors = unflown(flight), []
+    log, errors = empty_log(flight), []
     assert log.reference_base is not None
     assert log.reference_joints is not None
     for start in range(0, log.ticks - LOOK_TICKS, LOOK_TICKS):
@@ -85,7 +85,7 @@ def test_a_delay_that_is_known_costs_nothing_and_one_that_is_not_does() -> None:
                 sensors="fine", navigation="filtered", duration=1.5, parameters=parameters
             )
         )  # fmt: skip
-        log = unflown(flight)
+        log = empty_log(flight)
         close_loop(flight.plant, flight.controller, log, 0, 2000)
         truth = flight.plant.truth.copy()
         assert np.abs(truth.omega_base).max() > 0.005

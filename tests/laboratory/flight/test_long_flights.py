@@ -95,11 +95,11 @@ def test_a_bag_without_room_is_told_before(monkeypatch: pytest.MonkeyPatch, tmp_
     flight, usage = Flight(FlightPlan(duration=20.0)), namedtuple("usage", "free")
     bag = tmp_path / "not there yet" / "bag"
     monkeypatch.setattr(room.shutil, "disk_usage", lambda path: usage(10_000_000))
-    said = room.room_remark(flight, bag)
+    said = room.disk_space_warning(flight, bag)
     assert "20 s make about" in said
     assert "0.01 GB are free" in said
     monkeypatch.setattr(room.shutil, "disk_usage", lambda path: usage(100_000_000))
-    assert room.room_remark(flight, bag) == ""
+    assert room.disk_space_warning(flight, bag) == ""
     assert not bag.parent.exists()
 
 

@@ -22,8 +22,8 @@ from space_robot.flight.plan import (
     FlightPlan,
 )
 from space_robot.flight.simulate import (
+    empty_log,
     simulate,
-    unflown,
 )
 from space_robot.scenario.node_settings import (
     NODES,
@@ -317,7 +317,7 @@ def test_all_that_is_made_of_a_plan_agrees(parameters: Parameters) -> None:
     assert plant == flight.plant_settings
     assert controller == flight.controller_settings
     assert mission == flight.mission_settings
-    said = unflown(flight).flight
+    said = empty_log(flight).flight
     assert said == flight.description
     assert said["parameters"] == sent
     assert (said["case"], said["realtime"]) == (plant.case, plant.realtime)

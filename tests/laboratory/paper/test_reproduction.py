@@ -20,7 +20,7 @@ from space_robot.paper.reproduction.flights import (
     Equipment,
     Planned,
     Result,
-    Row,
+    TableRow,
     Variant,
     fly,
     plan,
@@ -55,7 +55,7 @@ def test_verdicts_on_the_claims(time_delay_flights: list[Result]) -> None:
 
     Tuned TDE-TSMC is the smoother one, and payload and disturbance more than double an error.
     """
-    tuned = fly(Planned(Row("tde_tsmc", "1"), Variant("tuned", True), shown=False), None, None)
+    tuned = fly(Planned(TableRow("tde_tsmc", "1"), Variant("tuned", True), shown=False), None, None)
     judged = claims([*time_delay_flights, tuned], cells(time_delay_flights))
     assert [claim.holds for claim in judged] == [True] * 4 + [False, True, False, False, False]
     smoothest, *growth = judged[4:]
@@ -96,7 +96,7 @@ def test_tde_smc_chatters_as_the_prototype_did(time_delay_flights: list[Result])
 
 def test_rows_fly_with_sensors_that_are_not_ideal() -> None:
     """And with the ideal ones if none are named."""
-    planned = Planned(Row("tde_stc", "1"), Variant("printed", True), shown=False)
+    planned = Planned(TableRow("tde_stc", "1"), Variant("printed", True), shown=False)
     ideal, noisy = (
         fly(planned, 0.05, None),
         fly(planned, 0.05, None, Equipment("white_l1", "filtered")),
@@ -115,7 +115,7 @@ def test_rows_fly_with_sensors_that_are_not_ideal() -> None:
 
 
 def test_printed_computed_torque_gains_diverge_within_ticks() -> None:
-    result = fly(Planned(Row("ctc", "1"), Variant("printed", True), shown=False), None, None)
+    result = fly(Planned(TableRow("ctc", "1"), Variant("printed", True), shown=False), None, None)
     assert result.rms is None
     assert result.diverged_tick is not None
     assert result.diverged_tick < 20
@@ -129,7 +129,7 @@ def test_table_v_has_seventeen_rows() -> None:
     assert len(ROWS) == 17
     cases = [row.case for row in ROWS if row.controller == "tde_stc"]
     assert cases == ["1", "2", "3", "4-1", "4-2"]
-    assert Row.parse("tde_stc/4-2") in ROWS
+    assert TableRow.parse("tde_stc/4-2") in ROWS
 
 
 def test_what_is_flown_in_brief() -> None:
@@ -154,7 +154,7 @@ def test_every_variant_is_flown() -> None:
 @pytest.mark.parametrize("text", ["", "tde_stc", "tde_stc/5", "ctc/4-1", "pid/1", "tde_stc/1/1"])
 def test_unknown_rows_are_named(text: str) -> None:
     with pytest.raises(InputError, match="choose from ctc/1") as caught:
-        Row.parse(text)
+        TableRow.parse(text)
     assert repr(text) in str(caught.value)
 
 
@@ -176,7 +176,7 @@ class References(HTMLParser):
 def twice(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, dict[str, Any]]:
     """Two reproductions of two rows, one after the other."""
     folder = tmp_path_factory.mktemp("reproduction")
-    rows = [Row("ctc", "1"), Row("tde_stc", "4-2")]
+    rows = [TableRow("ctc", "1"), TableRow("tde_stc", "4-2")]
     first, second = folder / "first", folder / "below" / "second"
     record = reproduce(rows, first, duration=SHORT, jobs=2)
     reproduce(rows, second, duration=SHORT, jobs=1)
@@ -247,7 +247,7 @@ def test_parameters_of_every_flight_are_told(twice: tuple[Path, Path, dict[str, 
 def test_an_older_reproduction_is_replaced(twice: tuple[Path, Path, dict[str, Any]]) -> None:
     _, folder, _ = twice
     (folder / "figures" / "old.svg").write_text("of an older run")
-    reproduce([Row("tde_stc", "1")], folder, duration=SHORT, brief=True)
+    reproduce([TableRow("tde_stc", "1")], folder, duration=SHORT, brief=True)
     assert not (folder / "figures" / "old.svg").exists()
     assert not (folder / "figures" / "case1_ctc.svg").exists()
     assert (folder / "figures" / "case1_tde_stc.svg").is_file()

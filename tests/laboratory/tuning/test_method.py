@@ -14,13 +14,13 @@ from space_robot.flight.plan import (
     FlightPlan,
 )
 from space_robot.tuning.demand import (
-    Demand,
+    ForceDemand,
     demand,
 )
 from space_robot.tuning.inertia import inertia_along
 from space_robot.tuning.method import (
     Tuned,
-    Wishes,
+    TuningOptions,
     axis_inertia,
     tune,
 )
@@ -34,7 +34,7 @@ PERIOD = 5e-4
 
 
 @functools.cache
-def scene(robot: str = "paper") -> tuple[Array, Demand]:
+def scene(robot: str = "paper") -> tuple[Array, ForceDemand]:
     """H_S along the mission with the least and the largest payload, and what is asked for."""
     flights = [Flight(FlightPlan(robot=robot, case=case)) for case in ("1", "4-2")]
     first = flights[0]
@@ -43,7 +43,7 @@ def scene(robot: str = "paper") -> tuple[Array, Demand]:
     return np.concatenate(inertias), demand(first.robot, first.mission_settings, cases)
 
 
-def tuned(wishes: Wishes, robot: str = "paper", lag: float = 0.0) -> Tuned:
+def tuned(wishes: TuningOptions, robot: str = "paper", lag: float = 0.0) -> Tuned:
     still = np.zeros((100, scene(robot)[0].shape[-1]))
     return tune(*scene(robot), wishes, PERIOD, Noise(still, still, lag, PERIOD))
 
@@ -52,7 +52,7 @@ def tuned(wishes: Wishes, robot: str = "paper", lag: float = 0.0) -> Tuned:
 @pytest.mark.parametrize("margin", [0.01, 0.05])
 @pytest.mark.parametrize("share", [0.0, 0.2])
 def test_the_margin_is_left_with_the_worst_masses(robot: str, margin: float, share: float) -> None:
-    found, (inertia, _) = tuned(Wishes(margin, share), robot), scene(robot)
+    found, (inertia, _) = tuned(TuningOptions(margin, share), robot), scene(robot)
     h_bar = np.asarray(found.gains["tde_stc"]["h_bar"])
     heavy, light = (eigenvalues(factor * inertia, h_bar) for factor in (1.0 + share, 1.0 - share))
     assert heavy.min() == pytest.approx(margin, rel=0.01)  # gains are rounded
@@ -63,13 +63,13 @@ def test_the_margin_is_left_with_the_worst_masses(robot: str, margin: float, sha
 
 
 def test_poles_are_those_of_the_bandwidth() -> None:
-    found = tuned(Wishes(0.05, 0.2))
+    found = tuned(TuningOptions(0.05, 0.2))
     assert found.bandwidth == pytest.approx(0.05 / found.delay / 4.0)
     for law, bandwidth in (("tde_tsmc", found.bandwidth), ("ctc", found.model_bandwidth)):
         roots = np.roots([1.0, *(float(found.gains[law][name][0]) for name in ("k_d", "k_p"))])
         assert np.abs(roots) == pytest.approx([bandwidth] * 2, rel=0.02)
     assert found.model_bandwidth == pytest.approx(0.05 / PERIOD)
-    assert tuned(Wishes(0.05, 0.2), lag=0.02).model_bandwidth == pytest.approx(12.5)
+    assert tuned(TuningOptions(0.05, 0.2), lag=0.02).model_bandwidth == pytest.approx(12.5)
     # with the lag of the estimate, a pole at margin / T
     pole = 0.05 / found.delay
     slow = np.roots([1.0 / pole, 1.0, 2.0 * found.bandwidth, found.bandwidth**2])
@@ -78,7 +78,7 @@ def test_poles_are_those_of_the_bandwidth() -> None:
 
 
 def test_conditions_of_the_laws_hold() -> None:
-    found = tuned(Wishes(0.05, 0.2))
+    found = tuned(TuningOptions(0.05, 0.2))
     stc, smc, layer = (found.gains[law] for law in ("tde_stc", "tde_smc", "ctc_smc"))
     rate = found.bandwidth * found.error
     assert np.all(stc["k_2"] > rate)
@@ -90,7 +90,7 @@ def test_conditions_of_the_laws_hold() -> None:
 
 
 def test_a_lag_of_the_navigation_makes_it_slower_not_weaker() -> None:
-    quick, slow = (tuned(Wishes(0.05, 0.2), lag=lag) for lag in (0.0, 0.02))
+    quick, slow = (tuned(TuningOptions(0.05, 0.2), lag=lag) for lag in (0.0, 0.02))
     assert slow.delay == pytest.approx(quick.delay + 0.02)
     assert slow.bandwidth < quick.bandwidth / 5.0
     np.testing.assert_array_equal(
@@ -99,13 +99,13 @@ def test_a_lag_of_the_navigation_makes_it_slower_not_weaker() -> None:
 
 
 def test_a_bandwidth_beyond_the_estimates_is_refused() -> None:
-    assert tuned(Wishes(0.05, 0.2, bandwidth=3.0)).gains["ctc"]["k_p"][0] == 9.0
+    assert tuned(TuningOptions(0.05, 0.2, bandwidth=3.0)).gains["ctc"]["k_p"][0] == 9.0
     with pytest.raises(InputError, match=r"at most 13\.\d rad/s.*got 20"):
-        tuned(Wishes(0.05, 0.2, bandwidth=20.0))
+        tuned(TuningOptions(0.05, 0.2, bandwidth=20.0))
 
 
 def test_all_laws_of_the_house_get_all_their_gains() -> None:
-    found = tuned(Wishes(0.05, 0.2))
+    found = tuned(TuningOptions(0.05, 0.2))
     assert found.gains.keys() == laws().keys()
     for name, law in laws().items():
         assert found.gains[name].keys() == law.gain_descriptions().keys()
@@ -152,7 +152,7 @@ def white(rate: float, angle: float = 0.0) -> Noise:
 
 def test_noise_is_kept_within_the_ripple_allowed() -> None:
     inertia, asked = scene()
-    wishes = Wishes(0.05, 0.2, ripple=0.1)
+    wishes = TuningOptions(0.05, 0.2, ripple=0.1)
     quiet, loud = (tune(inertia, asked, wishes, PERIOD, noise=white(x)) for x in (1e-9, 1e-5))
     assert quiet.corner_hz == tuned(wishes).corner_hz
     weight = 1.0 - np.exp(-2.0 * np.pi * loud.corner_hz * PERIOD)
@@ -164,7 +164,7 @@ def test_noise_is_kept_within_the_ripple_allowed() -> None:
 def test_bandwidth_is_also_what_computed_torque_allows() -> None:
     inertia, asked = scene()
     noise = white(1e-9, angle=1e-3)
-    found = tune(inertia, asked, Wishes(0.05, 0.2), PERIOD, noise)
+    found = tune(inertia, asked, TuningOptions(0.05, 0.2), PERIOD, noise)
     own = np.diagonal(inertia, axis1=1, axis2=2).max(axis=0)
     gains = found.gains["ctc"]
     command = gains["k_d"] * noise.rates + gains["k_p"] * noise.errors
@@ -173,7 +173,7 @@ def test_bandwidth_is_also_what_computed_torque_allows() -> None:
 
 def test_noise_beyond_any_low_pass_is_refused() -> None:
     with pytest.raises(InputError, match="allow more ripple"):
-        tune(*scene(), Wishes(0.05, 0.2), PERIOD, white(10.0))
+        tune(*scene(), TuningOptions(0.05, 0.2), PERIOD, white(10.0))
 
 
 def test_axes_that_nothing_is_asked_of_have_gains_as_well() -> None:
@@ -182,10 +182,10 @@ def test_axes_that_nothing_is_asked_of_have_gains_as_well() -> None:
     idle = [0, 2]
     factor = np.ones(len(asked.peak))
     factor[idle] = 0.0, 1e-17
-    planar = Demand(asked.peak * factor, asked.slope * factor, asked.unknown * factor,
+    planar = ForceDemand(asked.peak * factor, asked.slope * factor, asked.unknown * factor,
                     asked.nominal * factor)  # fmt: skip
-    found = tune(inertia, planar, Wishes(0.05, 0.2), PERIOD)
-    usual = tuned(Wishes(0.05, 0.2))
+    found = tune(inertia, planar, TuningOptions(0.05, 0.2), PERIOD)
+    usual = tuned(TuningOptions(0.05, 0.2))
     for law, gains in found.gains.items():
         for name, values in gains.items():
             assert np.all(values > 0.0), (law, name)

@@ -19,11 +19,11 @@ from space_robot.flight.plan import (
 )
 from space_robot.flight.simulate import simulate
 from space_robot.view.film import (
-    Flown,
+    FilmedFlight,
     film,
 )
 from space_robot.view.flights import (
-    Options,
+    ViewOptions,
     flights_page,
     shown_robot,
 )
@@ -93,7 +93,7 @@ def test_the_poses_on_the_page_are_the_bags(flown, robot_name: str) -> None:  # 
     robot = shown_robot(log)
     times = shown_times([log], 30.0)
     assert len(times) == 31
-    page = flights_page({"one": log}, {"one": robot}, Options(), quiet)
+    page = flights_page({"one": log}, {"one": robot}, ViewOptions(), quiet)
     scene = Scene(page)
     assert scene.duration == pytest.approx(times[-1] - times[0])
     assert_shown(scene, log, robot, times)
@@ -112,7 +112,7 @@ def test_the_poses_of_a_tree_with_all_kinds_of_joints() -> None:
     log.joint_positions[:] = rng.uniform(-3.0, 3.0, log.joint_positions.shape)
     log.passive_positions[:] = rng.uniform(-0.2, 0.2, log.passive_positions.shape)
     times = shown_times([log], 100.0)
-    page = film([Flown("tree", log, robot, "", "#112233")], times, False, True, quiet)
+    page = film([FilmedFlight("tree", log, robot, "", "#112233")], times, False, True, quiet)
     assert_shown(Scene(page), log, robot, times)
 
 
@@ -120,8 +120,8 @@ def test_side_by_side_nobody_is_in_anothers_place(flown) -> None:  # type: ignor
     log = flown("paper", robot="paper")
     robot = shown_robot(log)
     logs, robots = {"a": log, "b/c": log, "d": log}, dict.fromkeys(("a", "b/c", "d"), robot)
-    apart = Scene(flights_page(logs, robots, Options(side_by_side=True), quiet)).poses(0.5)
-    together = Scene(flights_page(logs, robots, Options(), quiet)).poses(0.5)
+    apart = Scene(flights_page(logs, robots, ViewOptions(side_by_side=True), quiet)).poses(0.5)
+    together = Scene(flights_page(logs, robots, ViewOptions(), quiet)).poses(0.5)
     roots = ("/a/base_link", "/b_c/base_link", "/d/base_link")
     reach = [
         [poses.position for path, poses in apart.items() if path.startswith(root)] for root in roots
@@ -140,7 +140,7 @@ def test_side_by_side_nobody_is_in_anothers_place(flown) -> None:  # type: ignor
 def test_different_robots_stand_side_by_side_of_themselves(flown) -> None:  # type: ignore[no-untyped-def]
     logs = {name: flown(name, robot=name) for name in ("paper", "boom")}
     robots = {name: shown_robot(log) for name, log in logs.items()}
-    poses = Scene(flights_page(logs, robots, Options(), quiet)).poses(0.0)
+    poses = Scene(flights_page(logs, robots, ViewOptions(), quiet)).poses(0.0)
     assert poses["/paper"].position[0] == 0.0
     assert poses["/boom"].position[0] > 1.0
 
@@ -148,7 +148,7 @@ def test_different_robots_stand_side_by_side_of_themselves(flown) -> None:  # ty
 def test_a_target_waits_where_it_is_grasped_and_is_seen_while_it_is_held(flown) -> None:  # type: ignore[no-untyped-def]
     log = flown("held", events=["capture@0.2:small_satellite", "release@0.6"])
     robot = shown_robot(log)
-    scene = Scene(flights_page({"one": log}, {"one": robot}, Options(rate=100.0), quiet))
+    scene = Scene(flights_page({"one": log}, {"one": robot}, ViewOptions(rate=100.0), quiet))
     free, held = "/one/free_target_0", next(n for n in scene.names() if n.endswith("/target_0"))
     times = shown_times([log], 100.0)
     for time in times:
@@ -165,7 +165,7 @@ def test_a_target_waits_where_it_is_grasped_and_is_seen_while_it_is_held(flown) 
 
 def test_the_trail_grows_and_is_the_tools_way(flown) -> None:  # type: ignore[no-untyped-def]
     log = flown("paper", robot="paper")
-    scene = Scene(flights_page({"one": log}, {"one": shown_robot(log)}, Options(), quiet))
+    scene = Scene(flights_page({"one": log}, {"one": shown_robot(log)}, ViewOptions(), quiet))
     pieces = [name for name in scene.names() if name.startswith("/one/trail_tool/")]
     assert len(pieces) == 30
     counts = [sum(scene.visible(time)[name] for name in pieces) for time in (0.0, 0.5, 1.0)]
@@ -178,7 +178,7 @@ def test_a_row_without_a_state_shows_the_one_before(flown, tmp_path: Path) -> No
     log = flown("paper", robot="paper")
     robot = shown_robot(log)
     log.quaternion[900:1100] = np.nan
-    scene = Scene(flights_page({"one": log}, {"one": robot}, Options(rate=100.0), quiet))
+    scene = Scene(flights_page({"one": log}, {"one": robot}, ViewOptions(rate=100.0), quiet))
     held, before = scene.poses(0.5)["/one/base_link/link1"], expected(robot, log, 899)["link1"]
     np.testing.assert_allclose(held.position, before.translation, atol=TOLERANCE)
     np.testing.assert_allclose(held.rotation, before.rotation, atol=TOLERANCE)
@@ -187,6 +187,6 @@ def test_a_row_without_a_state_shows_the_one_before(flown, tmp_path: Path) -> No
 def test_many_flights_all_have_curves(flown) -> None:  # type: ignore[no-untyped-def]
     log = flown("paper", robot="paper")
     logs = {f"flight_{k}": log for k in range(8)}
-    page = flights_page(logs, dict.fromkeys(logs, shown_robot(log)), Options(rate=2.0), quiet)
+    page = flights_page(logs, dict.fromkeys(logs, shown_robot(log)), ViewOptions(rate=2.0), quiet)
     for plot in plot_data(page)["plots"]:
         assert [series["label"] for series in plot["series"]] == list(logs)

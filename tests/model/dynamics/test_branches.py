@@ -16,12 +16,12 @@ from tree_oracle import TreeOracle, assert_same_dynamics, pinocchio_tree
 
 from space_robot_model.dynamics.aba import aba
 from space_robot_model.dynamics.branches import (
-    hand_in,
+    accumulate,
+    collect_children,
     keep_frame,
     keep_motion,
     kept_frame,
     kept_motion,
-    taken_in,
 )
 from space_robot_model.dynamics.kinematics import (
     forward_kinematics,
@@ -40,14 +40,14 @@ def sum_of_branches(parts: Array, row: Array, out: Array) -> None:
     """Hand in all but the first of ``parts`` (B, 27), then take them in with the first."""
     for b in range(1, parts.shape[0]):
         p = parts[b]
-        hand_in(
+        accumulate(
             row, (p[0], p[1], p[2], p[3], p[4], p[5]),
             (p[6], p[7], p[8], p[9], p[10], p[11], p[12], p[13], p[14]),
             (p[15], p[16], p[17], p[18], p[19], p[20]), (p[21], p[22], p[23]),
             (p[24], p[25], p[26]),
         )  # fmt: skip
     p = parts[0]
-    j, g, m, moment, force = taken_in(
+    j, g, m, moment, force = collect_children(
         row, (p[0], p[1], p[2], p[3], p[4], p[5]),
         (p[6], p[7], p[8], p[9], p[10], p[11], p[12], p[13], p[14]),
         (p[15], p[16], p[17], p[18], p[19], p[20]), (p[21], p[22], p[23]), (p[24], p[25], p[26]),

@@ -22,8 +22,8 @@ from space_robot_model.elementary.matrices import (
     norm,
     principal_axes,
     product,
+    rotate_tensor,
     solve,
-    turned_tensor,
 )
 from space_robot_model.elementary.rotations import (
     exact_sines_cosines,
@@ -44,7 +44,7 @@ def test_products_are_numpys(rng: np.random.Generator, size: int, columns: int) 
     assert norm(a[0]) == pytest.approx(np.linalg.norm(a[0]), rel=1e-14)
     tensor = rng.normal(size=(size, size))
     expected = a[0] @ tensor @ a[0].T
-    np.testing.assert_allclose(turned_tensor(a[0], tensor), expected, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(rotate_tensor(a[0], tensor), expected, rtol=0.0, atol=1e-12)
 
 
 def exact_solution(matrix: Array, right: Array) -> Array:

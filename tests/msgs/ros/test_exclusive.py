@@ -18,7 +18,7 @@ from space_robot_msgs_py.ros.process_environment import DEFAULTS, set_defaults
 set_defaults()
 rclpy = pytest.importorskip("rclpy")
 
-from space_robot_msgs_py.ros.exclusive import Claim, claim_name, foreign_publishers  # noqa: E402
+from space_robot_msgs_py.ros.exclusive import TopicClaim, claim_name, foreign_publishers  # noqa: E402
 
 PUBLISHER = """
 import sys, time
@@ -26,10 +26,10 @@ from space_robot_msgs_py.ros.process_environment import set_defaults
 set_defaults()
 import rclpy
 from std_msgs.msg import String
-from space_robot_msgs_py.ros.exclusive import Claim
+from space_robot_msgs_py.ros.exclusive import TopicClaim
 rclpy.init()
 node = rclpy.create_node("controller")
-claim = Claim(node, ["/command"])
+claim = TopicClaim(node, ["/command"])
 publisher = node.create_publisher(String, "/command", 1)
 print("ready", flush=True)
 time.sleep(60)
@@ -78,9 +78,9 @@ def test_second_publisher_is_refused_by_name(
     node = make_node("controller")
     said = f"/command of ROS domain {domain} is already published by controller"
     with pytest.raises(InputError, match=re.escape(f"{said} (pid {controller.pid})")):
-        Claim(node, ["/controller/telemetry", "/command"])
+        TopicClaim(node, ["/controller/telemetry", "/command"])
     # what it had got before the refusal is free again
-    Claim(make_node("other"), ["/controller/telemetry"]).release()
+    TopicClaim(make_node("other"), ["/controller/telemetry"]).release()
 
 
 def test_killed_publisher_leaves_its_place_at_once(
@@ -97,7 +97,7 @@ def test_killed_publisher_leaves_its_place_at_once(
     controller.wait()
     assert seen() == ["controller"]
     assert foreign_publishers(node, ["/command"]) == {}
-    Claim(node, ["/command"]).release()
+    TopicClaim(node, ["/command"]).release()
 
 
 def test_remapped_topics_and_other_topics_do_not_meet(
@@ -105,9 +105,9 @@ def test_remapped_topics_and_other_topics_do_not_meet(
 ) -> None:
     node = make_node("controller")
     moved = make_node("controller", cli_args=["--ros-args", "-r", "/command:=/spare/command"])
-    claims = [Claim(node, ["/command"]), Claim(moved, ["/command"])]
+    claims = [TopicClaim(node, ["/command"]), TopicClaim(moved, ["/command"])]
     with pytest.raises(InputError, match="/spare/command of ROS domain"):
-        Claim(node, ["/spare/command"])
+        TopicClaim(node, ["/spare/command"])
     for claim in claims:
         claim.release()
 

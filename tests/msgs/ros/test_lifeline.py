@@ -68,7 +68,7 @@ def test_stopped_process_ends_when_it_goes_on() -> None:
 
 
 def test_deaf_process_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lifeline, "PATIENCE_S", 0.1)
+    monkeypatch.setattr(lifeline, "TIMEOUT_S", 0.1)
     pid = os.fork()
     if not pid:
         signal.signal(signal.SIGTERM, signal.SIG_IGN)

@@ -28,19 +28,19 @@ set_defaults()
 pytest.importorskip("rclpy")
 
 from space_robot_msgs_py.ros.endpoints import RawPublisher  # noqa: E402
-from space_robot_msgs_py.ros.exclusive import Claim  # noqa: E402
+from space_robot_msgs_py.ros.exclusive import TopicClaim  # noqa: E402
 
 if TYPE_CHECKING:
     from ground import Ground
 
 FLOOD = TESTS / "flood.py"
-PATIENCE_S = 30.0
+TIMEOUT_S = 30.0
 RATE_HZ = 2000
 """Of the flight's messages."""
 
 
 def wait(done: Callable[[], bool], what: str) -> None:
-    until = time.monotonic() + PATIENCE_S
+    until = time.monotonic() + TIMEOUT_S
     while not done():
         assert time.monotonic() < until, what
         time.sleep(0.01)
@@ -67,7 +67,7 @@ class Player:
 
     def __init__(self, ground: Ground) -> None:
         self._outs = {topic: RawPublisher(ground.node, topic) for topic in topics.RECORDED}
-        self._claim = Claim(ground.node, [topic.full_name for topic in topics.RECORDED])
+        self._claim = TopicClaim(ground.node, [topic.full_name for topic in topics.RECORDED])
 
     def is_heard(self) -> bool:
         """Whether the recorder is connected, beside all others that listen."""
@@ -111,7 +111,7 @@ def test_the_bag_is_the_flight_and_nothing_else(
     time.sleep(0.5)
     assert flood.poll() is None
     recorder.terminate()  # and the flood goes on
-    output, _ = recorder.communicate(timeout=PATIENCE_S)
+    output, _ = recorder.communicate(timeout=TIMEOUT_S)
     assert recorder.returncode == 0, output
     log, counts = read_flight(bag), read_accounts(bag)
     assert not log.unfinished

@@ -18,7 +18,7 @@ rclpy = pytest.importorskip("rclpy")
 
 from space_robot_msgs_py.bag.sources import Claimed  # noqa: E402
 from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription  # noqa: E402
-from space_robot_msgs_py.ros.exclusive import Claim, GraphPublishers  # noqa: E402
+from space_robot_msgs_py.ros.exclusive import GraphPublishers, TopicClaim  # noqa: E402
 from space_robot_msgs_py.ros.locks import MOST_NOTES  # noqa: E402
 from space_robot_msgs_py.ros.serialized_take import (  # noqa: E402
     ROOM,
@@ -29,7 +29,7 @@ from space_robot_msgs_py.ros.serialized_take import (  # noqa: E402
 )
 
 TOPIC = topics.COMMAND
-PATIENCE_S = 30.0
+TIMEOUT_S = 30.0
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def node(domain: int) -> Iterator[rclpy.node.Node]:
 
 
 def _next(entry: RawSubscription) -> Received:
-    until = time.monotonic() + PATIENCE_S
+    until = time.monotonic() + TIMEOUT_S
     while (taken := entry.take_with_source()) is None:
         assert time.monotonic() < until
         time.sleep(0.001)
@@ -53,7 +53,7 @@ def _next(entry: RawSubscription) -> Received:
 def test_publisher_number_and_time_of_every_message(node: rclpy.node.Node) -> None:
     entry = RawSubscription(node, TOPIC, PolledCallbackGroup())
     first, second = RawPublisher(node, TOPIC), RawPublisher(node, TOPIC)
-    until = time.monotonic() + PATIENCE_S
+    until = time.monotonic() + TIMEOUT_S
     while not all(out._publisher.get_subscription_count() for out in (first, second)):
         assert time.monotonic() < until
     sizes = (16, 3 * ROOM, 40)  # more than there is room for, then less
@@ -82,7 +82,7 @@ def test_a_claim_tells_the_publishers_that_messages_are_from(node: rclpy.node.No
     )
     before = publishers.claimed(TOPIC.name)
     assert not before.is_held
-    claim = Claim(node, [TOPIC.name])
+    claim = TopicClaim(node, [TOPIC.name])
     while not out._publisher.get_subscription_count():
         time.sleep(0.001)
     out.publish(bytes(16))
@@ -130,7 +130,7 @@ def test_where_rcl_is_not_as_expected_rclpy_takes(
         patch.setattr(where, what, instead)
         assert serialized_take() is take_by_rclpy
     entry, out = RawSubscription(node, TOPIC, PolledCallbackGroup()), RawPublisher(node, TOPIC)
-    until = time.monotonic() + PATIENCE_S
+    until = time.monotonic() + TIMEOUT_S
     while not out.listener_count:
         assert time.monotonic() < until
     begin_ns = time.time_ns()

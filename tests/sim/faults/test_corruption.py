@@ -45,7 +45,7 @@ def spoilt(*texts: str, ticks: int = 400, seed: int = 0) -> list[RobotState]:
     corruption = Corruption(schedule(*texts, seed=seed))
     states = [a_state(tick) for tick in range(ticks)]
     for state in states:
-        corruption.spoil_state(state, state.tick)
+        corruption.corrupt_state(state, state.tick)
     return states
 
 
@@ -61,7 +61,7 @@ def test_one_measured_number_is_not_finite(
     ticks, numbers = 1500, 3 + 4 + 3 + 3 + 2 * N + 2 * passive
     for tick in range(ticks):
         state = a_state(0)
-        corruption.spoil_state(state, tick)
+        corruption.corrupt_state(state, tick)
         places = np.flatnonzero(~np.isfinite(state.numbers))
         assert test(state.numbers[places]).all()
         assert (state.numbers == a_state(0).numbers).sum() == state.numbers.size - places.size
@@ -102,7 +102,7 @@ def test_one_commanded_torque_is_not_finite(kind: str, test: Any) -> None:
     corruption, seen = Corruption(schedule(f"{kind}@0.1")), set()
     for tick in range(400):
         command = Command(tick, np.ones(N + 3))
-        corruption.spoil_command(command, tick)
+        corruption.corrupt_command(command, tick)
         assert test(command.torque).sum() == (tick >= 200)
         assert (command.torque == 1.0).sum() == N + 3 - (tick >= 200)
         seen |= set(np.flatnonzero(test(command.torque)).tolist())

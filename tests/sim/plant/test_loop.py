@@ -194,7 +194,7 @@ def test_without_an_answer_it_asks_again_then_flies_by_the_clock_and_comes_back(
     bench = Bench(paper_robot, monkeypatch, lambda tick: not 20 <= tick < 80)
     bench.run(lambda: bench.tick == 21)
     asked = [when - 1000.0 for tick, when in bench.states if tick == 20]
-    assert len(asked) == 1 + int(SILENCE_S / (ASK_AGAIN_S + loop.PATIENCE_S))
+    assert len(asked) == 1 + int(SILENCE_S / (ASK_AGAIN_S + loop.TIMEOUT_S))
     assert np.diff(asked).min() > ASK_AGAIN_S
     assert bench.now - 1000.0 == pytest.approx(SILENCE_S, abs=0.05)
     assert bench.logged == ["no command for 1 s: the controller is silent"]
@@ -298,7 +298,7 @@ def test_at_the_end_the_actuators_are_left_at_zero(
 ) -> None:
     bench = Bench(paper_robot, monkeypatch, lambda tick: tick < 40)
     bench.run(lambda: bench.tick == 40)
-    bench.loop.stand_down()
+    bench.loop.deactivate()
     assert bench.logged == ["flew 0.0200 s in 0.00 s"]
     bench.run(lambda: bench.tick == 42)
     assert not bench.loop._plant.state.applied_torque.any()

@@ -146,7 +146,7 @@ def flight(robot: Robot, *texts: str, seed: int = 0, ticks: int = 400) -> list[l
         if awaited is not None:
             (pull,) = [state.item for state in states if state.stamp == awaited][-1:]
             command, answered = Command(awaited, pull), awaited
-            faults.corruption.spoil_command(command, tick)
+            faults.corruption.corrupt_command(command, tick)
             faults.commands.send(tick, command, awaited)
         for parcel in faults.commands.arrivals(tick):
             if parcel.stamp > held.tick and np.isfinite(parcel.item.torque).all():

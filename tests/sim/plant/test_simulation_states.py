@@ -13,7 +13,7 @@ pytest.importorskip("rclpy")
 from space_robot_sim.plant import simulation as module
 from space_robot_sim.plant.loop import PlantLoop
 from space_robot_sim.plant.run_control import RunControl
-from space_robot_sim.plant.simulation import Simulation, State
+from space_robot_sim.plant.simulation import Simulation, SimulationState
 
 
 class Loop(PlantLoop):
@@ -48,17 +48,19 @@ def test_a_reset_keeps_a_pause_and_stops_only_if_it_is_to(
     """One that is to stop is stopped until it is told anything else; else it is as before."""
     loop = cast(Any, simulation)._node.loop
     loop.control.begin(7)
-    before = State.PAUSED if paused else State.PLAYING
+    before = SimulationState.PAUSED if paused else SimulationState.PLAYING
     if paused:
         simulation.pause()
     assert simulation.state is before
     asyncio.run(simulation.reset(stop))
     control = cast(Any, simulation)._node.loop.control
-    assert simulation.state is (State.STOPPED if stop else before)
+    assert simulation.state is (SimulationState.STOPPED if stop else before)
     assert (control.tick, control.is_paused) == (0, paused or stop)
     simulation.pause()
-    assert simulation.state is State.PAUSED
+    assert simulation.state is SimulationState.PAUSED
     asyncio.run(simulation.reset())
-    assert simulation.state is State.PAUSED, "a reset without stop is none, whatever was before"
+    assert simulation.state is SimulationState.PAUSED, (
+        "a reset without stop is none, whatever was before"
+    )
     simulation.resume()
-    assert simulation.state is State.PLAYING
+    assert simulation.state is SimulationState.PLAYING

@@ -30,7 +30,7 @@ from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.plant.conservation import kinetic_energy, momentum
 from space_robot_sim.plant.integrator import Stages
 from space_robot_sim.plant.plant import Plant, PlantSettings
-from space_robot_sim.plant.stick_slip import MOST_CUTS, integrate, slide_or_stand
+from space_robot_sim.plant.stick_slip import MOST_CUTS, integrate, slip_or_stick
 
 Array = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ def stand(plant: Plant, torque: Array) -> Stages:
     """Find under a torque (n+3,) on base and joints which joints stand; the plant's scratch."""
     memory = plant.memory
     memory.stages.actuation[3 : 3 + torque.size] = torque
-    slide_or_stand(memory.model, memory.environment, memory.x, 0.0, memory.stages)
+    slip_or_stick(memory.model, memory.environment, memory.x, 0.0, memory.stages)
     return memory.stages
 
 

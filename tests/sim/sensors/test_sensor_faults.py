@@ -13,7 +13,7 @@ from sensor_bench import Bench, a_state
 
 from space_robot_msgs_py.samples import ACTUATOR_FIELDS, ALL_FIELDS, PASSIVE_FIELDS, RobotState
 from space_robot_sim.faults.schedule import BLOCK_TICKS
-from space_robot_sim.sensors.noise import Draws
+from space_robot_sim.sensors.noise import NoiseDraws
 
 Array = NDArray[np.float64]
 
@@ -147,7 +147,7 @@ def test_each_sensor_and_each_block_of_ticks_has_numbers_of_its_own() -> None:
     arrays = {name: np.empty((BLOCK_TICKS, 6)) for name in ("star_tracker", "gyro", "encoders")}
     rows = []
     for seed in (0, 1):
-        draws = Draws(seed, arrays)
+        draws = NoiseDraws(seed, arrays)
         for block in range(3):
             assert draws.refill(BLOCK_TICKS * block + 7) == BLOCK_TICKS * (block + 1)
             rows += [array.ravel().copy() for array in arrays.values()]

@@ -29,7 +29,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks  # noqa: E402
 from space_robot.flight.graph.monitor import Monitor  # noqa: E402
 from space_robot_msgs_py.ros.endpoints import RawPublisher, message_type, qos  # noqa: E402
 
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 TIMEBASE = Timebase(500_000)
 
 
@@ -42,7 +42,7 @@ def monitor(domain: int) -> Iterator[Monitor]:
 
 def until(monitor: Monitor, done: Callable[[], bool], meanwhile: Callable[[], None]) -> None:
     """Poll until ``done``, doing something in between."""
-    deadline = time.monotonic() + PATIENCE_S
+    deadline = time.monotonic() + TIMEOUT_S
     while not done():
         assert time.monotonic() < deadline, (monitor.modes, monitor.values)
         monitor.poll()
@@ -115,7 +115,7 @@ def test_a_flood_of_junk_on_every_topic_changes_nothing(
 
     until(monitor, lambda: k > 200 and monitor.simulated_s > begun_s + 0.5, flood)
     plant.send_signal(signal.SIGINT)
-    output, _ = plant.communicate(timeout=PATIENCE_S)
+    output, _ = plant.communicate(timeout=TIMEOUT_S)
     assert plant.returncode == 0, output
     until(monitor, lambda: "silence_s" in monitor.values.get("controller_node", {}), pause)
     told = monitor.values["controller_node"]
@@ -129,7 +129,7 @@ def test_a_restarted_plant_is_flown_without_ado(start: Start) -> None:
     start("controller")
     for realtime in (False, False, True, True):
         plant = start("plant", ticks=400, realtime=str(realtime).lower())
-        output, _ = plant.communicate(timeout=PATIENCE_S)
+        output, _ = plant.communicate(timeout=TIMEOUT_S)
         assert plant.returncode == 0, output
         assert "flew 0.2000 s" in output
 
@@ -138,7 +138,7 @@ def test_a_missing_mission_is_told_and_a_restarted_one_followed(
     start: Start, monitor: Monitor
 ) -> None:
     """Before the first state and in flight: nothing is held where there is time to wait."""
-    start("controller", reference_timeout=PATIENCE_S)
+    start("controller", reference_timeout=TIMEOUT_S)
     start("plant", silence_timeout=0.0)
     waiting = "waiting for the reference: no mission sends it"
     until(monitor, lambda: monitor.modes.get("controller_node") == waiting, pause)

@@ -16,7 +16,7 @@ from space_robot.flight.plan import (
     Flight,
     FlightPlan,
 )
-from space_robot.flight.replay.outcome import Options
+from space_robot.flight.replay.outcome import ReplayOptions
 from space_robot.flight.replay.run import replay
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight
@@ -72,7 +72,7 @@ def test_a_flight_with_actuators_is_replayed_to_the_bit(
 ) -> None:
     """The controller has all of its actuators' numbers from the bag."""
     names = Flight(flown[1]).plant.names
-    done = replay(Options(flown[0].bag, domain=domain))
+    done = replay(ReplayOptions(flown[0].bag, domain=domain))
     report = done.report()
     assert done.has_passed, report["first_difference"]
     assert report["equal"] == report["compared"] > 0

@@ -13,7 +13,7 @@ from space_robot.flight.plan import (
     Flight,
     FlightPlan,
 )
-from space_robot.flight.replay.outcome import Options
+from space_robot.flight.replay.outcome import ReplayOptions
 from space_robot.flight.replay.run import replay
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight
@@ -38,7 +38,7 @@ def test_passive_joints_swing_in_the_graph_as_in_one_process(
         np.testing.assert_array_equal(getattr(recorded, column), getattr(log, column), column)
     assert np.abs(recorded.passive_velocities).max() > 0.0
     assert set(flown.report["rms"]["mean_axis"]) >= {"joints_revolute", "joints_prismatic"}
-    again = replay(Options(flown.bag, domain=domain, trust=True))
+    again = replay(ReplayOptions(flown.bag, domain=domain, trust=True))
     assert again.comparison.is_identical
     assert [axis["unit"] for axis in again.report()["axes"].values()] == [
         *["N m"] * 4,

@@ -20,7 +20,7 @@ from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscripti
 
 ROUNDS = 4
 OUTPUTS = {"plant": topics.JOINT_STATES, "controller": topics.COMMAND}
-PATIENCE_S = 30.0
+TIMEOUT_S = 30.0
 
 
 class Listener:
@@ -42,7 +42,7 @@ class Listener:
 
     def hears(self, name: str) -> bool:
         """Whether the node says something in time."""
-        until = time.monotonic() + PATIENCE_S
+        until = time.monotonic() + TIMEOUT_S
         while time.monotonic() < until:
             if self._inputs[name].take() is not None:
                 return True

@@ -16,7 +16,7 @@ from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")
 
-PATIENCE_S = 90.0
+TIMEOUT_S = 90.0
 
 
 def _start(bag: Path, domain: int, *options: str) -> subprocess.Popen[bytes]:
@@ -48,7 +48,7 @@ def _has_ended(process: psutil.Process) -> bool:
 
 
 def _wait_until(condition: Callable[[], bool], flight: subprocess.Popen[bytes]) -> None:
-    until = time.monotonic() + PATIENCE_S
+    until = time.monotonic() + TIMEOUT_S
     while not condition():
         assert flight.poll() is None
         assert time.monotonic() < until
@@ -89,7 +89,7 @@ def test_nodes_that_do_not_fly_yet_end_too(moment: str, tmp_path: Path, free_dom
     nodes = _nodes(flight)
     flight.kill()
     flight.wait()
-    _, alive = psutil.wait_procs(nodes, timeout=PATIENCE_S)
+    _, alive = psutil.wait_procs(nodes, timeout=TIMEOUT_S)
     assert not alive
 
 
@@ -101,10 +101,10 @@ def test_stopped_node_ends_when_it_goes_on(tmp_path: Path, free_domain: int) -> 
     stopped.send_signal(signal.SIGSTOP)
     flight.kill()
     flight.wait()
-    assert not psutil.wait_procs(others, timeout=PATIENCE_S)[1]
+    assert not psutil.wait_procs(others, timeout=TIMEOUT_S)[1]
     assert stopped.is_running()
     stopped.send_signal(signal.SIGCONT)
-    stopped.wait(timeout=PATIENCE_S)
+    stopped.wait(timeout=TIMEOUT_S)
 
 
 def test_killed_while_landing(tmp_path: Path, free_domain: int) -> None:
@@ -117,7 +117,7 @@ def test_killed_while_landing(tmp_path: Path, free_domain: int) -> None:
     _wait_until(lambda: _has_ended(plant), flight)
     flight.kill()
     flight.wait()
-    assert not psutil.wait_procs(nodes, timeout=PATIENCE_S)[1]
+    assert not psutil.wait_procs(nodes, timeout=TIMEOUT_S)[1]
     log = read_flight(bag)
     assert (log.unfinished, log.damage, log.ticks) == ("", (), 600)
     assert not any(log.lost.values())

@@ -40,7 +40,7 @@ IMPATIENT = (
 )  # fmt: skip
 LONGER_THAN_ANY_WATCHDOG_S = 3.0
 """Also than the one of a controller that is started again when it seems to hang."""
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 SAME = (
     topics.JOINT_STATES, topics.BASE_STATE, topics.COMMAND, topics.CLOCK, topics.TELEMETRY,
     topics.LAW,
@@ -66,12 +66,12 @@ def flying(domain: int, *options: str) -> Iterator[subprocess.Popen[str]]:
     finally:
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
-        process.communicate(timeout=PATIENCE_S)
+        process.communicate(timeout=TIMEOUT_S)
 
 
 def sim(domain: int, *words: str) -> str:
     """``space-robot sim``, as soon as the plant is active; what it says."""
-    until = time.monotonic() + PATIENCE_S
+    until = time.monotonic() + TIMEOUT_S
     while True:
         result = space_robot_here("sim", *words, "--domain", str(domain))
         if result.returncode == 0:
@@ -93,7 +93,7 @@ def test_pauses_and_steps_leave_no_trace(
         assert sim(free_domain, "pause") == "already paused at tick 100 (0.0500 s)"
         time.sleep(LONGER_THAN_ANY_WATCHDOG_S)
         assert sim(free_domain, "resume") == "goes on at tick 100 (0.0500 s)"
-        output, errors = process.communicate(timeout=PATIENCE_S)
+        output, errors = process.communicate(timeout=TIMEOUT_S)
     assert process.returncode == 0, errors
     report = json.loads(output)
     assert report["graph"]["events"] == [], "a pause is no silence"
@@ -111,7 +111,7 @@ def test_after_a_reset_the_flight_is_a_fresh_one(
         sim(free_domain, "step", "--ticks", "150")
         assert sim(free_domain, "reset") == "reset, paused at tick 0 (0.0000 s)"
         assert sim(free_domain, "resume") == "goes on at tick 0 (0.0000 s)"
-        output, errors = process.communicate(timeout=PATIENCE_S)
+        output, errors = process.communicate(timeout=TIMEOUT_S)
     assert process.returncode == 0, errors
     report = json.loads(output)
     assert (report["ticks"], report["graph"]["failures"]) == (400, [])
@@ -144,7 +144,7 @@ def test_a_signal_ends_a_paused_flight_that_who_joins_late_sees(
         viewer.until(hears_all, "messages while the plant is paused")
         viewer.close()
         process.send_signal(number)
-        _, errors = process.communicate(timeout=PATIENCE_S)
+        _, errors = process.communicate(timeout=TIMEOUT_S)
     assert process.returncode == 128 + number, errors
     log = read_flight(bag)
     assert log.ticks == 46, "ticks 0 to 45 have been measured and answered"
@@ -170,7 +170,7 @@ def test_by_the_wall_clock_a_pause_is_no_lost_time(start: Start, ground: Ground)
     assert call("step") == "stepped to tick 1 (0.0005 s)"
     time.sleep(LONGER_THAN_ANY_WATCHDOG_S)
     assert call("resume") == "goes on at tick 1 (0.0005 s)"
-    output, _ = plant.communicate(timeout=PATIENCE_S)
+    output, _ = plant.communicate(timeout=TIMEOUT_S)
     assert plant.returncode == 0, output
     assert "flew 0.5000 s" in output
     lost = re.search(r"([0-9.]+) s behind the wall clock$", output, re.MULTILINE)
@@ -184,7 +184,7 @@ def test_a_step_that_the_end_of_the_flight_cuts_short_is_told(
     with flying(free_domain, *options) as process:
         sim(free_domain, "step")
         result = space_robot_here("sim", "step", "--ticks", "500", "--domain", str(free_domain))
-        output, errors = process.communicate(timeout=PATIENCE_S)
+        output, errors = process.communicate(timeout=TIMEOUT_S)
     assert process.returncode == 0, errors
     assert json.loads(output)["ticks"] == 100
     assert result.returncode == 1
@@ -212,7 +212,7 @@ def test_what_cannot_be_is_refused_in_one_line(
 
 def test_a_plant_that_runs_cannot_be_stepped(start: Start, domain: int) -> None:
     start("plant")
-    until = time.monotonic() + PATIENCE_S
+    until = time.monotonic() + TIMEOUT_S
     while time.monotonic() < until:
         result = space_robot_here("sim", "step", "--domain", str(domain))
         if "is a graph flying" not in result.stderr and "is not active" not in result.stderr:

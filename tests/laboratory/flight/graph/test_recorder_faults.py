@@ -27,7 +27,7 @@ pytest.importorskip("rclpy")
 RECORDER = "recorder_node"
 REPORTS_IN_FLIGHT = 4
 PERIOD_S = 0.002
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 REFERENCE, IN_FLIGHT = 20_000, 1_000_000
 """Bytes of a bag with some of the reference, and with more than what is sent in advance."""
 
@@ -49,7 +49,7 @@ def _start_graph(
 
 
 def _wait_for_size(file: Path, size: int) -> None:
-    until = time.monotonic() + PATIENCE_S
+    until = time.monotonic() + TIMEOUT_S
     while not (file.exists() and file.stat().st_size > size):
         assert time.monotonic() < until
         time.sleep(0.02)
@@ -78,7 +78,7 @@ def test_killed_recorder_has_kept_all_but_the_last_moment(
     nodes = _start_graph(start, bag, ticks=200_000, realtime=True, period=PERIOD_S)
     monitor = Monitor(domain)
     received: list[int] = []
-    heard_at, until = 0.0, time.monotonic() + PATIENCE_S
+    heard_at, until = 0.0, time.monotonic() + TIMEOUT_S
     try:
         while len(received) < REPORTS_IN_FLIGHT:
             monitor.poll()

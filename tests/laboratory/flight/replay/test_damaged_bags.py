@@ -19,8 +19,8 @@ from space_robot.flight.plan import (
     FlightPlan,
 )
 from space_robot.flight.replay.commands import (
-    Commands,
     Form,
+    ReplayedCommands,
 )
 from space_robot.flight.replay.comparison import Comparison
 from space_robot.flight.replay.recording import (
@@ -108,9 +108,9 @@ def test_stretches_are_runs_of_ticks(
 ) -> None:
     """Together they are all that was compared; none touches another."""
 
-    def commands(ticks: set[int], are_other: bool) -> Commands:
+    def commands(ticks: set[int], are_other: bool) -> ReplayedCommands:
         torque = np.array([[float(are_other and tick in other)] for tick in sorted(ticks)])
-        return Commands(
+        return ReplayedCommands(
             np.array(sorted(ticks), dtype=np.int64), torque.reshape(-1, 1),
             np.zeros(len(ticks), dtype=np.intp), [Form("", "")], 0,
         )  # fmt: skip

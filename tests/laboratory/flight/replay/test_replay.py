@@ -22,8 +22,8 @@ from space_robot.flight.plan import (
     FlightPlan,
 )
 from space_robot.flight.replay.outcome import (
-    Options,
     Replay,
+    ReplayOptions,
 )
 from space_robot.flight.replay.run import replay
 from space_robot.flight.simulate import simulate
@@ -60,7 +60,7 @@ def play(domain: int) -> Callable[..., Replay]:
     """Replay in a ROS domain of the test's own."""
 
     def run(bag: Path, **options: object) -> Replay:
-        return replay(Options(bag, domain=domain, **options))  # type: ignore[arg-type]
+        return replay(ReplayOptions(bag, domain=domain, **options))  # type: ignore[arg-type]
 
     return run
 

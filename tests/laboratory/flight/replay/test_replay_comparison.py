@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from space_robot.flight.replay.commands import (
     CommandList,
-    Commands,
     Form,
+    ReplayedCommands,
 )
 from space_robot.flight.replay.comparison import Comparison
 from space_robot_msgs_py.samples import Command, Timebase
@@ -34,7 +34,7 @@ def messages(ticks: Iterable[int]) -> dict[int, bytes]:
     return {tick: codec.encode(Command(tick, torque_of(tick))) for tick in ticks}
 
 
-def commands(data: Iterable[bytes]) -> Commands:
+def commands(data: Iterable[bytes]) -> ReplayedCommands:
     taken = CommandList(AXES, TIMEBASE)
     for message in data:
         taken.add(message)
@@ -170,10 +170,10 @@ def test_a_command_for_other_axes_differs_and_does_not_stop_the_rest() -> None:
     json.dumps(compared.report(TIMEBASE.period)["axes"], allow_nan=False)
 
 
-@pytest.mark.parametrize("spoil", [lambda m: b"", lambda m: m[:40], lambda m: m[:8] + b"?" * 9])
-def test_what_is_no_command_is_counted(spoil: Callable[[bytes], bytes]) -> None:
+@pytest.mark.parametrize("corrupt", [lambda m: b"", lambda m: m[:40], lambda m: m[:8] + b"?" * 9])
+def test_what_is_no_command_is_counted(corrupt: Callable[[bytes], bytes]) -> None:
     sent = messages(range(4))
-    compared = compare({**sent, 3: spoil(sent[3])}.values(), messages(range(3)).values(), 4)
+    compared = compare({**sent, 3: corrupt(sent[3])}.values(), messages(range(3)).values(), 4)
     assert not compared.is_identical
     assert compared.equal.tolist() == [True, True, True]
     report = compared.report(TIMEBASE.period)

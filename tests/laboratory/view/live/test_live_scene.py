@@ -32,7 +32,7 @@ websockets = pytest.importorskip("websockets.sync.client")
 
 Array = NDArray[np.float64]
 Poses = dict[str, tuple[float, ...]]
-PATIENCE_S = 120.0
+TIMEOUT_S = 120.0
 CLOSE = 3e-5
 """viser sends no pose again that has changed by less than a hundred-thousandth."""
 ORIGIN, UNTURNED = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
@@ -127,11 +127,11 @@ def fly(domain: int, bag: Path, shown: list[Poses], *options: str) -> FlightLog:
         ],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
     ) as process:  # fmt: skip
-        until = time.monotonic() + PATIENCE_S
+        until = time.monotonic() + TIMEOUT_S
         while not (sim("step", "--ticks", "50") and any(is_robot_in(poses) for poses in shown)):
             assert time.monotonic() < until
         assert sim("resume")
-        _, errors = process.communicate(timeout=PATIENCE_S)
+        _, errors = process.communicate(timeout=TIMEOUT_S)
     assert process.returncode == 0, errors
     return read_flight(bag)
 
@@ -166,7 +166,7 @@ def test_two_flights_one_after_the_other(tmp_path: Path, free_domain: int) -> No
     given = ((), ("--sensors", "tactical"))
     server = Server(free_domain, len(given))
     server.start()
-    assert server.waits.wait(PATIENCE_S)
+    assert server.waits.wait(TIMEOUT_S)
     shown: list[list[Poses]] = []
     done = threading.Event()
 
@@ -183,9 +183,9 @@ def test_two_flights_one_after_the_other(tmp_path: Path, free_domain: int) -> No
         rows = shown_rows(log, seen)
         assert len(set(rows)) > 3
         assert rows == sorted(rows)
-    server.join(PATIENCE_S)
+    server.join(TIMEOUT_S)
     assert isinstance(server.error, EndedError)
-    assert done.wait(PATIENCE_S)
+    assert done.wait(TIMEOUT_S)
     following = f"following the flight in ROS domain {free_domain}"
     robot, showing = "its robot is paper; waiting for its first state", "showing it from "
     once = [serving.WAITING, following, robot, showing, serving.OVER]
@@ -207,4 +207,4 @@ def test_ctrl_c_ends_it(free_domain: int) -> None:
         assert waiting.strip() == serving.WAITING
         process.send_signal(signal.SIGINT)
         assert process.stderr.read().strip() == "ended"
-        assert process.wait(PATIENCE_S) == 0
+        assert process.wait(TIMEOUT_S) == 0

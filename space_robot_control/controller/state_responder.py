@@ -22,7 +22,7 @@ from .settings import ControllerNodeSettings
 from .supervisor import Supervisor
 
 
-class Standing(Enum):
+class StampStatus(Enum):
     """How a state stands by its stamp."""
 
     ANSWERED = "answered"
@@ -33,7 +33,7 @@ class Standing(Enum):
     """Its stamp is not believed."""
 
 
-class Answering:
+class StateResponder:
     """Answers states, never a tick anew, with the messages of the controller. Knows no ROS."""
 
     def __init__(
@@ -60,23 +60,23 @@ class Answering:
         self.change: LawChange | None = None
         """The change of law or gains that came with it, if any."""
 
-    def judge(self, tick: int) -> Standing:
+    def judge(self, tick: int) -> StampStatus:
         """Tell how a state of ``tick`` that has come stands."""
         if tick == self.answered:
-            return Standing.ANSWERED
+            return StampStatus.ANSWERED
         if tick == self.stamps.last:
-            return Standing.NEW
+            return StampStatus.NEW
         if not self.stamps.passes(tick):
-            return Standing.REFUSED
+            return StampStatus.REFUSED
         if self.stamps.is_new_time:
             self._references.begin(tick)
         self._references.now = tick
-        return Standing.NEW
+        return StampStatus.NEW
 
     def messages(
         self, tick: int, state: RobotState, reference: Block
     ) -> Iterator[tuple[topics.Topic, bytes]]:
-        """Answer a state that is `Standing.NEW`; the messages to send, each to be sent at once.
+        """Answer a state that is `StampStatus.NEW`; the messages to send, each to be sent at once.
 
         The command goes out before the telemetry is written.
         """

@@ -9,8 +9,14 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.codecs import StateCodec
 from space_robot_sim.plant.command_guard import CommandGuard
-from space_robot_sim.plant.exchange import NONE, Exchange, FaultyExchange, SentState, exchange_of
 from space_robot_sim.plant.faults import FaultSettings
+from space_robot_sim.plant.messages import (
+    NONE,
+    FaultyExchange,
+    PlantMessages,
+    SentState,
+    exchange_of,
+)
 
 PERIOD = 5e-4
 
@@ -60,7 +66,7 @@ def test_in_order_every_state_is_answered_and_every_command_acts(
     way = Way(paper_robot, *texts)
     assert way.fly(12) == (EACH, EACH, TICKS)
     is_faulty = any("state" in text for text in texts)
-    assert type(way.exchange) is (FaultyExchange if is_faulty else Exchange)
+    assert type(way.exchange) is (FaultyExchange if is_faulty else PlantMessages)
 
 
 def test_a_lost_state_is_not_waited_for(paper_robot: Robot) -> None:

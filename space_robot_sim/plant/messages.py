@@ -1,7 +1,7 @@
 """What passes between a plant and its controller in a tick, in order or with faults. Knows no ROS.
 
-In the order of a tick: `Exchange.send` the state, `Exchange.take` the commands that come for it,
-`Exchange.end`; then `CommandGuard.act` says which command acts.
+In the order of a tick: `PlantMessages.send` the state, `PlantMessages.take` the commands that come
+for it, `PlantMessages.end`; then `CommandGuard.act` says which command acts.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class SentState(NamedTuple):
     """Tick of the command that will come for it; `NONE`: no command will."""
 
 
-class Exchange:
+class PlantMessages:
     """Hands every state out, and every command in."""
 
     def __init__(self, codec: StateCodec, guard: CommandGuard) -> None:
@@ -47,7 +47,7 @@ class Exchange:
         """End the exchange of ``tick``: all that has come for it is there."""
 
 
-class FaultyExchange(Exchange):
+class FaultyExchange(PlantMessages):
     """Messages are lost, late, repeated and spoilt, as a flight's faults say.
 
     A state that is lost, late or wrongly stamped has no answer to wait for: that is known here,
@@ -61,7 +61,7 @@ class FaultyExchange(Exchange):
         """Tick of the newest state that a controller can have answered."""
 
     def send(self, state: RobotState) -> Iterator[SentState]:
-        """See `Exchange.send`."""
+        """See `PlantMessages.send`."""
         tick, faults = state.tick, self._faults
         measured = faults.measure(state)
         messages = self._codec.encode(measured)
@@ -72,13 +72,13 @@ class FaultyExchange(Exchange):
             yield SentState(arriving.item, NONE if stamp is None else stamp)
 
     def take(self, tick: int) -> None:
-        """See `Exchange.take`; the command may act in a later tick, or never."""
+        """See `PlantMessages.take`; the command may act in a later tick, or never."""
         faults, offered = self._faults, self._guard.offered
-        faults.corruption.spoil_command(offered, tick)
+        faults.corruption.corrupt_command(offered, tick)
         faults.commands.send(tick, offered.torque.copy(), offered.tick)
 
     def end(self, tick: int) -> None:
-        """See `Exchange.end`."""
+        """See `PlantMessages.end`."""
         guard = self._guard
         for command in self._faults.commands.arrivals(tick):
             guard.offered.tick, guard.offered.torque[:] = command.stamp, command.item
@@ -88,9 +88,9 @@ class FaultyExchange(Exchange):
 def exchange_of(
     settings: FaultSettings, names: RobotNames, period: float, codec: StateCodec,
     guard: CommandGuard,
-) -> Exchange:  # fmt: skip
+) -> PlantMessages:  # fmt: skip
     """Return the exchange of a robot's flight: a faulty one if any of its messages are to fail."""
     if not settings.has_message_faults:
-        return Exchange(codec, guard)
+        return PlantMessages(codec, guard)
     faults = MessageFaults(settings.schedule(names, period), len(names.joints), len(names.passive))
     return FaultyExchange(codec, guard, faults)

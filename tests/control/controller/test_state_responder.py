@@ -10,11 +10,14 @@ from closed_loop import GAINS, PERIOD, law_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from space_robot_control.controller.answering import Answering, Standing
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
 from space_robot_control.controller.settings import ControllerNodeSettings
+from space_robot_control.controller.state_responder import (
+    StampStatus,
+    StateResponder,
+)
 from space_robot_control.laws import ControlLaw
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
@@ -83,7 +86,7 @@ class Bench:
         self.choice = LawChoice(
             self.controller.law, [(tick, law_of(name)) for name, tick in swaps.items()]
         )
-        self.answering = Answering(self.controller, self.choice, self.references, settings)
+        self.answering = StateResponder(self.controller, self.choice, self.references, settings)
         self._codec = CommandCodec(self.controller.names.commanded, settings.timebase)
         self._state = RobotState.allocate(robot.n)
         self._state.quaternion[:] = [0.9, 0.3, -0.1, 0.3]
@@ -103,18 +106,18 @@ def test_a_state_is_answered_once_and_a_new_time_believed_late(paper_robot: Robo
     bench = Bench(paper_robot)
     judge = bench.answering.judge
     for tick in (3, 4, 53):
-        assert judge(tick) is Standing.NEW
-        assert judge(tick) is Standing.NEW, "it waits for its reference"
+        assert judge(tick) is StampStatus.NEW
+        assert judge(tick) is StampStatus.NEW, "it waits for its reference"
         bench.answer(tick)
-        assert judge(tick) is Standing.ANSWERED
+        assert judge(tick) is StampStatus.ANSWERED
         assert bench.references.now == tick
     for other in (1000, 2, 104):
-        assert judge(other) is Standing.REFUSED
+        assert judge(other) is StampStatus.REFUSED
     assert bench.references.now == 53
     begun: list[int] = []
     bench.references.begin = begun.append  # type: ignore[method-assign]
     verdicts = [judge(tick) for tick in range(7, 7 + AGREEING)]
-    assert verdicts == [Standing.REFUSED] * (AGREEING - 1) + [Standing.NEW]
+    assert verdicts == [StampStatus.REFUSED] * (AGREEING - 1) + [StampStatus.NEW]
     assert begun == [6 + AGREEING]
 
 

@@ -26,13 +26,13 @@ GLANCE_S = 1e-3
 NO_WAIT = Wait(0.0)
 
 
-class Turns:
+class NodeScheduler:
     """Gives each node its turn, and lets the process sleep between two rounds if it can."""
 
     def __init__(self, nodes: Sequence[ManagedNode[Any]]) -> None:
         """Take the nodes in the order of their turns."""
         self._nodes = nodes
-        self._seats = [Seat(node, is_alone=len(nodes) == 1) for node in nodes]
+        self._seats = [ScheduledNode(node, is_alone=len(nodes) == 1) for node in nodes]
         self._upkeeps = [Upkeep(node) for node in nodes]
         self._due = [0.0] * len(nodes)
         """When each node's upkeep is due, by the monotonic clock."""
@@ -96,14 +96,14 @@ class Turns:
             time.sleep(left)
         return True
 
-    def _step_others(self, seat: Seat) -> None:
+    def _step_others(self, seat: ScheduledNode) -> None:
         now = time.monotonic()
         for other in self._seats:
             if other is not seat:
                 other.step(now)
 
 
-class Seat:
+class ScheduledNode:
     """A node among those that take turns, and how far its loop is."""
 
     def __init__(self, node: ManagedNode[Any], is_alone: bool) -> None:

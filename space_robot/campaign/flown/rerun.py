@@ -8,7 +8,7 @@ from ...api import FlownFlight
 from ..row.row import Task
 
 
-class FlownAgain(FlownFlight):
+class Rerun(FlownFlight):
     """A `FlownFlight` that knows whether it is the one of the campaign's table."""
 
     def __init__(
