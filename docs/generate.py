@@ -35,11 +35,20 @@ NODES: dict[str, type[NodeSettings]] = {
 }
 ROS_TYPES = {bool: "bool", int: "integer", float: "double", str: "string"}
 EXAMPLES = {
-    "P": "0.1", "TICKS": "2", "SIGMA": "1e-5", "STEP": "1e-5", "TORQUE": "0.5",
-    "JOINT": "3", "BASE_AXIS=RATE": "base_x=1e-5", "JOINT=TORQUE": "3=20", "SECONDS": "1.5",
+    "P": "0.1",
+    "TICKS": "2",
+    "SIGMA": "1e-5",
+    "STEP": "1e-5",
+    "TORQUE": "0.5",
+    "JOINT": "3",
+    "BASE_AXIS=RATE": "base_x=1e-5",
+    "JOINT=TORQUE": "3=20",
+    "SECONDS": "1.5",
     "AXIS=FACTOR": "all=0.99",
-    "AXIS=TORQUE": "base_x=0.01", "WHEEL": "2", "THRUSTER": "3",
-}  # fmt: skip
+    "AXIS=TORQUE": "base_x=0.01",
+    "WHEEL": "2",
+    "THRUSTER": "3",
+}
 """An argument as it may be given, by the form of the kind."""
 
 
@@ -59,12 +68,13 @@ def parameters() -> str:
     shared = dict(leaves(NodeSettings))
     defaults = dict(flatten(PlantNodeSettings.resolve({}).model_dump()))
     parts = [
-        "# Parameters", MADE,
+        "# Parameters",
+        MADE,
         "Defaults are those of a flight without options: the schema, `config/space_robot.yaml`,"
         " the mission `paper`, case 1. [Configuration](../manual/configuration.md): setting them.",
         "## All nodes",
         table(HEAD, iter([*_rows(shared, defaults), AUTOSTART])),
-    ]  # fmt: skip
+    ]
     for node, schema in NODES.items():
         own = {name: field for name, field in leaves(schema) if name not in shared}
         defaults = dict(flatten(schema.resolve({}).model_dump()))
@@ -75,27 +85,37 @@ def parameters() -> str:
                 "A list for each gain `<law>.<gain>`, one value an axis or one for all; the set"
                 " has the defaults. Gains change in flight, as `controller` does.",
                 table(("parameter", "description"), _gains()),
-            ]  # fmt: skip
+            ]
     return "\n\n".join(parts) + "\n"
 
 
 HEAD = ("parameter", "type", "default", "range", "description")
 AUTOSTART = (
-    "`autostart`", "bool", "true", "", "configure and activate by itself; false: wait to be told",
-)  # fmt: skip
+    "`autostart`",
+    "bool",
+    "true",
+    "",
+    "configure and activate by itself; false: wait to be told",
+)
 STEP_TICKS = (
-    "`step_ticks`", "integer", "1", f"from 1 to {MOST_TICKS:g}",
+    "`step_ticks`",
+    "integer",
+    "1",
+    f"from 1 to {MOST_TICKS:g}",
     "ticks of a step of the paused plant (service ~/step); changes in flight",
-)  # fmt: skip
+)
 
 
 def _rows(fields: Mapping[str, Any], defaults: Mapping[str, Any]) -> Iterator[Sequence[str]]:
     for name, field in fields.items():
         default = defaults[name]
         yield (
-            f"`{name}`", _ros_type(field.annotation), _text(default),
-            _range(field), (field.description or "").replace("|", "\\|"),
-        )  # fmt: skip
+            f"`{name}`",
+            _ros_type(field.annotation),
+            _text(default),
+            _range(field),
+            (field.description or "").replace("|", "\\|"),
+        )
 
 
 def _ros_type(annotation: Any) -> str:
@@ -133,10 +153,11 @@ def _gains() -> Iterator[Sequence[str]]:
 def faults() -> str:
     """All kinds of faults."""
     parts = [
-        "# Kinds of faults", MADE,
+        "# Kinds of faults",
+        MADE,
         "`KIND@T[-END][:ARGUMENT]`, times in simulated seconds;"
         " [faults](../manual/faults.md) says how to use them.",
-    ]  # fmt: skip
+    ]
     for title, kinds in (("Of the plant", PLANT_KINDS), ("Of the processes", PROCESS_KINDS)):
         head = ("fault", "unit", "default", "what is done", "example")
         parts += [f"## {title}", table(head, map(_kind, kinds.values()))]
@@ -158,25 +179,40 @@ def topic_page() -> str:
     """All topics of the graph."""
     rows = (
         (
-            f"`{topic.full_name}`", _type(topic), str(topic.depth),
+            f"`{topic.full_name}`",
+            _type(topic),
+            str(topic.depth),
             "transient local" if topic.transient_local else "volatile",
             _occasion(topic),
         )
         for topic in (
-            *topics.RECORDED, topics.MARKERS, topics.DIAGNOSTICS, topics.SIMULATION_PAUSED,
+            *topics.RECORDED,
+            topics.MARKERS,
+            topics.DIAGNOSTICS,
+            topics.SIMULATION_PAUSED,
             topics.PLANT_DESCRIPTION,
         )
-    )  # fmt: skip
-    return "\n\n".join([
-        "# Topics", MADE,
-        "All are reliable and keep the last messages. Fields, units, frames and rates are in"
-        " [bags](../manual/bags.md#topics). Every topic but the last four is recorded; what the"
-        " plant flies is noted with the bag. These are"
-        " the names of nodes without a namespace; in one, as `/sat1`, all but `/diagnostics` begin"
-        " with it: `/sat1/joint_states`; so do the frames in `/tf`, but for `inertial`. `/tf` and"
-        " `/tf_static` themselves are sent by a plant that finds tf2_msgs installed.",
-        table(("topic", "type", "history", "durability", "a message"), rows),
-    ]) + "\n"  # fmt: skip
+    )
+    return (
+        "\n\n".join(
+            [
+                "# Topics",
+                MADE,
+                "All are reliable and keep the last messages. Fields, units, frames and rates "
+                "are in"
+                " [bags](../manual/bags.md#topics). Every topic but the last four is recorded; "
+                "what the"
+                " plant flies is noted with the bag. These are"
+                " the names of nodes without a namespace; in one, as `/sat1`, all but "
+                "`/diagnostics` begin"
+                " with it: `/sat1/joint_states`; so do the frames in `/tf`, but for "
+                "`inertial`. `/tf` and"
+                " `/tf_static` themselves are sent by a plant that finds tf2_msgs installed.",
+                table(("topic", "type", "history", "durability", "a message"), rows),
+            ]
+        )
+        + "\n"
+    )
 
 
 def _type(topic: topics.Topic) -> str:

@@ -18,12 +18,7 @@ from space_robot.campaign.report.figures import summary_figure
 from space_robot.campaign.report.findings import Findings
 from space_robot.campaign.report.league_tables import choice_tables
 from space_robot.campaign.report.subject import subject_of
-from space_robot.console.tables import (
-    Column,
-    Group,
-    Table,
-    as_markdown,
-)
+from space_robot.console.tables import Column, Group, Table, as_markdown
 
 PAGE = Path(__file__).with_name("law_league.md")
 BLOCK = re.compile(r"(<!-- begin (\S+)( medians)? -->\n).*?(<!-- end -->)", re.DOTALL)

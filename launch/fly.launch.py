@@ -24,11 +24,7 @@ from launch.event_handlers import OnProcessExit, OnShutdown
 from launch.substitutions import EnvironmentVariable, LaunchConfiguration
 from launch_ros.actions import LifecycleNode
 
-from space_robot.cli.launch_arguments import (
-    launch_arguments,
-    launched_flight,
-    refuse_unknown,
-)
+from space_robot.cli.launch_arguments import launch_arguments, launched_flight, refuse_unknown
 from space_robot.flight.graph.launched import launched_parameters
 from space_robot.flight.graph.node_names import NODE_NAMES
 from space_robot_msgs_py.ros.process_environment import defaults
@@ -52,9 +48,11 @@ def generate_launch_description() -> LaunchDescription:
         for name, description, choices in launch_arguments()
     ]
     autostart = DeclareLaunchArgument(
-        AUTOSTART, default_value="true", choices=("true", "false"),
+        AUTOSTART,
+        default_value="true",
+        choices=("true", "false"),
         description="Nodes configure and activate themselves; false: they wait for transitions.",
-    )  # fmt: skip
+    )
     return LaunchDescription([*environment, *arguments, autostart, OpaqueFunction(function=fly)])
 
 
@@ -71,11 +69,16 @@ def fly(context: LaunchContext) -> list:
     file = launched_parameters(flight, bag, value(AUTOSTART) == "true", folder)
     nodes = [
         LifecycleNode(
-            package=PACKAGE, executable=name, name=name, namespace=flight.plan.namespace,
-            parameters=[str(file)], output="screen", sigterm_timeout=RECORDER_S,
+            package=PACKAGE,
+            executable=name,
+            name=name,
+            namespace=flight.plan.namespace,
+            parameters=[str(file)],
+            output="screen",
+            sigterm_timeout=RECORDER_S,
         )
         for name in NODE_NAMES
-    ]  # fmt: skip
+    ]
     return [
         RegisterEventHandler(OnShutdown(on_shutdown=lambda *_: file.unlink() or folder.rmdir())),
         LogInfo(msg=f"recording to {bag}"),

@@ -25,10 +25,7 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from space_robot.cli.launch_arguments import (
-    launch_arguments,
-    refuse_unknown,
-)
+from space_robot.cli.launch_arguments import launch_arguments, refuse_unknown
 
 RVIZ, PAGE = "rviz", "page"
 VIEW = [sys.executable, "-m", "space_robot.cli.main", "view"]
@@ -36,33 +33,41 @@ VIEW = [sys.executable, "-m", "space_robot.cli.main", "view"]
 
 def generate_launch_description() -> LaunchDescription:
     """Declare the arguments; what is started follows from their values."""
-    return LaunchDescription([
-        DeclareLaunchArgument(
-            "play", default_value="", description="A bag to be shown, in place of a flight."
-        ),
-        DeclareLaunchArgument(
-            "viewer", default_value="", choices=("", RVIZ, PAGE),
-            description="rviz, or the page of `space-robot view` [default: rviz if it is there].",
-        ),
-        OpaqueFunction(function=view),
-    ])  # fmt: skip
+    return LaunchDescription(
+        [
+            DeclareLaunchArgument(
+                "play", default_value="", description="A bag to be shown, in place of a flight."
+            ),
+            DeclareLaunchArgument(
+                "viewer",
+                default_value="",
+                choices=("", RVIZ, PAGE),
+                description="rviz, or the page of `space-robot view` [default: rviz if it is "
+                "there].",
+            ),
+            OpaqueFunction(function=view),
+        ]
+    )
 
 
 def view(context: LaunchContext) -> list:
     """Start what shows, and what is shown."""
     refuse_unknown(
-        sys.argv, __file__,
+        sys.argv,
+        __file__,
         [*(name for name, *_ in launch_arguments()), "autostart", "play", "viewer"],
-    )  # fmt: skip
+    )
     bag = LaunchConfiguration("play").perform(context)
     viewer = LaunchConfiguration("viewer").perform(context) or (RVIZ if has_rviz() else PAGE)
     share = Path(get_package_share_directory("space_robot"))
     if viewer == PAGE and bag:
         return [ExecuteProcess(cmd=[*VIEW, bag], output="screen")]
     rviz = Node(
-        package="rviz2", executable="rviz2", arguments=["-d", str(share / "config/views/fly.rviz")],
+        package="rviz2",
+        executable="rviz2",
+        arguments=["-d", str(share / "config/views/fly.rviz")],
         parameters=[{"use_sim_time": True}],
-    )  # fmt: skip
+    )
     if bag:  # its own /clock is played: no --clock, which would send a second one
         play = ExecuteProcess(cmd=["ros2", "bag", "play", bag], output="screen")
         return [rviz, play]

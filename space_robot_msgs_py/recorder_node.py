@@ -53,9 +53,11 @@ class RecorderLoop:
     is_complete = False
 
     def __init__(
-        self, node: ManagedNode[RecorderNodeSettings], settings: RecorderNodeSettings,
+        self,
+        node: ManagedNode[RecorderNodeSettings],
+        settings: RecorderNodeSettings,
         gives_way: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Open the bag and listen to the topics that every flight has.
 
         Args:
@@ -84,10 +86,15 @@ class RecorderLoop:
         self._look_at = 0.0
         """When to look for their publishers, by the monotonic clock."""
         self._recorder = BagRecorder(
-            path, {"period": settings.period, **flight}, settings.timebase,
-            settings.compression, settings.split_size, GraphPublishers(node),
-            {topic.name: name for topic, name in self._names.items()}, namespace,
-        )  # fmt: skip
+            path,
+            {"period": settings.period, **flight},
+            settings.timebase,
+            settings.compression,
+            settings.split_size,
+            GraphPublishers(node),
+            {topic.name: name for topic, name in self._names.items()},
+            namespace,
+        )
         self.outputs: tuple[RawPublisher, ...] = ()
         self._ours = {name: topic.full_name for topic, name in self._names.items()}
         """Names in the root namespace by those that are heard."""

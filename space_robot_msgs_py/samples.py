@@ -37,9 +37,12 @@ class RobotNames(NamedTuple):
 
     @classmethod
     def of(
-        cls, joints: Sequence[str], actuators: Sequence[str] = (), wheel_count: int = 0,
+        cls,
+        joints: Sequence[str],
+        actuators: Sequence[str] = (),
+        wheel_count: int = 0,
         passive: Sequence[str] = (),
-    ) -> RobotNames:  # fmt: skip
+    ) -> RobotNames:
         """Take the joints' names and those of the base's ``actuators``: wheels come first."""
         wheels, thrusters = actuators[:wheel_count], actuators[wheel_count:]
         return cls(tuple(joints), tuple(wheels), tuple(thrusters), tuple(passive))

@@ -86,9 +86,8 @@ TELEMETRY = Topic("controller/telemetry", "std_msgs/msg/Float64MultiArray", 1_00
 # The telemetry once more, by name: what viewers plot; nobody here reads it.
 SIGNALS = Topic("controller/signals", "sensor_msgs/msg/JointState", 1_000, is_optional=True)
 LAW = Topic(
-    "controller/law", "rcl_interfaces/msg/ParameterEvent", 100,
-    transient_local=True, is_event=True,
-)  # fmt: skip
+    "controller/law", "rcl_interfaces/msg/ParameterEvent", 100, transient_local=True, is_event=True
+)
 CLOCK = Topic("clock", "rosgraph_msgs/msg/Clock", 1_000)
 # The truth is sent where what the sensors tell may differ from it; no flight software listens.
 TRUTH_JOINTS = Topic("truth/joints", "trajectory_msgs/msg/JointTrajectory", 1_000, is_optional=True)
@@ -103,18 +102,38 @@ CARRIER = "std_msgs/msg/UInt8MultiArray"
 # Hidden, as names with an underscore are in ROS: nobody but the recorder can read them.
 TRANSFORMS = Topic("_transforms", CARRIER, 1_000, is_optional=True, carries=TF)
 TRANSFORMS_STATIC = Topic(
-    "_transforms/static", CARRIER, 1,
-    transient_local=True, is_event=True, is_optional=True, carries=TF_STATIC,
-)  # fmt: skip
+    "_transforms/static",
+    CARRIER,
+    1,
+    transient_local=True,
+    is_event=True,
+    is_optional=True,
+    carries=TF_STATIC,
+)
 ROBOT_DESCRIPTION = Topic(
-    "robot_description", "std_msgs/msg/String", 1,
-    transient_local=True, is_event=True, has_stamp=False, is_optional=True,
-)  # fmt: skip
+    "robot_description",
+    "std_msgs/msg/String",
+    1,
+    transient_local=True,
+    is_event=True,
+    has_stamp=False,
+    is_optional=True,
+)
 
 ALL = (
-    JOINT_STATES, BASE_STATE, COMMAND, REFERENCE_JOINTS, REFERENCE_BASE, TELEMETRY, LAW, CLOCK,
-    TRUTH_JOINTS, TRUTH_BASE, WHEELS_STATE, THRUSTERS_STATE,
-)  # fmt: skip
+    JOINT_STATES,
+    BASE_STATE,
+    COMMAND,
+    REFERENCE_JOINTS,
+    REFERENCE_BASE,
+    TELEMETRY,
+    LAW,
+    CLOCK,
+    TRUTH_JOINTS,
+    TRUTH_BASE,
+    WHEELS_STATE,
+    THRUSTERS_STATE,
+)
 """All that tell of a flight: who reads a bag reads these."""
 SCENE = (TRANSFORMS, TRANSFORMS_STATIC, ROBOT_DESCRIPTION)
 """What viewers show of it; nobody here reads them again."""
@@ -130,12 +149,20 @@ MARKERS = Topic("markers", "visualization_msgs/msg/MarkerArray", 10, is_optional
 # One for all robots of a domain, as ROS has it: each status tells its node's name.
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", 100)
 SIMULATION_PAUSED = Topic(
-    "simulation/paused", "std_msgs/msg/Bool", 1,
-    transient_local=True, is_event=True, has_stamp=False,
-)  # fmt: skip
+    "simulation/paused",
+    "std_msgs/msg/Bool",
+    1,
+    transient_local=True,
+    is_event=True,
+    has_stamp=False,
+)
 """True while the plant is held: not recorded, for a bag tells nothing of the wall clock's time."""
 PLANT_DESCRIPTION = Topic(
-    "_plant_description", "std_msgs/msg/String", 1,
-    transient_local=True, is_event=True, has_stamp=False,
-)  # fmt: skip
+    "_plant_description",
+    "std_msgs/msg/String",
+    1,
+    transient_local=True,
+    is_event=True,
+    has_stamp=False,
+)
 """What the plant flies, as JSON: the recorder notes it with the bag, beside what it was told."""

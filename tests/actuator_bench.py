@@ -30,9 +30,14 @@ NAMES = RobotNames(tuple(f"joint{k}" for k in range(1, N + 1)))
 
 @kernel
 def actuate_blocks(
-    actuators: Block, ring: Array, command: Array, tick: int, period: float, truth: Block,
+    actuators: Block,
+    ring: Array,
+    command: Array,
+    tick: int,
+    period: float,
+    truth: Block,
     measured: Block,
-) -> None:  # fmt: skip
+) -> None:
     """`actuate`, five times faster from Python."""
     actuate(actuators[0], ring, command, tick, period, truth[0], measured[0])
 
@@ -60,9 +65,14 @@ class Bench:
         for part, fault in self.faults:
             fault.apply(self.tick, getattr(self.record, part))
         actuate_blocks(
-            self.block, self.ring, command, self.tick, self.period, self.truth.block,
+            self.block,
+            self.ring,
+            command,
+            self.tick,
+            self.period,
+            self.truth.block,
             self.measured.block,
-        )  # fmt: skip
+        )
         self.tick += 1
         return self.measured.applied_torque.copy(), self.truth.applied_torque.copy()
 

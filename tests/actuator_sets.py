@@ -32,11 +32,14 @@ def hardware(**parts: dict[str, Any]) -> BaseActuatorSettings:
 def random_thrusters(rng: np.random.Generator, count: int) -> BaseActuatorSettings:
     """Thrusters anywhere, in pairs that turn the base either way."""
     places, directions = rng.uniform(-2.0, 2.0, (count, 3)), rng.normal(size=(count, 3))
-    return hardware(thrusters={
-        "positions": flat([places, places]), "directions": flat([directions, -directions]),
-        "force": flat(rng.uniform(1.0, 10.0, 2 * count)),
-        "specific_impulse": flat(rng.uniform(100.0, 300.0, 2 * count)),
-    })  # fmt: skip
+    return hardware(
+        thrusters={
+            "positions": flat([places, places]),
+            "directions": flat([directions, -directions]),
+            "force": flat(rng.uniform(1.0, 10.0, 2 * count)),
+            "specific_impulse": flat(rng.uniform(100.0, 300.0, 2 * count)),
+        }
+    )
 
 
 def still_log(
@@ -44,9 +47,12 @@ def still_log(
 ) -> FlightLog:
     """A flight in which nothing moves and nothing is asked, described as a bag has it."""
     log = FlightLog.allocate(
-        ticks, robot.joint_names, Timebase(round(1e9 * period)), actuators.wheel_count,
+        ticks,
+        robot.joint_names,
+        Timebase(round(1e9 * period)),
+        actuators.wheel_count,
         actuators.thruster_count,
-    )  # fmt: skip
+    )
     for column in log.columns.values():
         column[:] = 0.0
     log.quaternion[:, 0] = log.reference_base[:, 0] = 1.0

@@ -8,10 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from wheel_layouts import PYRAMID
 
-from space_robot_control.allocation.allocation import (
-    Allocation,
-    allocate,
-)
+from space_robot_control.allocation.allocation import Allocation, allocate
 from space_robot_control.allocation.settings import AllocationSettings
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_msgs_py.samples import State
@@ -26,15 +23,24 @@ class AllocationBench:
     """A base that does not turn, whose wheels do: momentum is inertia times speed."""
 
     def __init__(
-        self, axes: Any = PYRAMID, thrusters: Any = None, momenta: Any = 0.0, latency: int = 0,
-        wheels: Any = None, sharing: str = "pseudo_inverse", **settings: Any,
-    ) -> None:  # fmt: skip
+        self,
+        axes: Any = PYRAMID,
+        thrusters: Any = None,
+        momenta: Any = 0.0,
+        latency: int = 0,
+        wheels: Any = None,
+        sharing: str = "pseudo_inverse",
+        **settings: Any,
+    ) -> None:
         hardware: dict[str, Any] = {"base_actuation": "hardware"}
         if axes is not None:
             hardware["wheels"] = {
-                "axes": np.ravel(axes).tolist(), "rotor_inertia": [INERTIA], "max_torque": [1.0],
-                "max_momentum": [20.0], **(wheels or {}),
-            }  # fmt: skip
+                "axes": np.ravel(axes).tolist(),
+                "rotor_inertia": [INERTIA],
+                "max_torque": [1.0],
+                "max_momentum": [20.0],
+                **(wheels or {}),
+            }
         if thrusters:
             hardware["thrusters"] = thrusters
         believed = BaseActuatorSettings(**hardware)

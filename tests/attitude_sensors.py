@@ -40,12 +40,18 @@ class Case(NamedTuple):
     @property
     def settings(self) -> NavigationFilterSettings:
         return NavigationFilterSettings(
-            tracker_across=self.across, tracker_about=self.about,
-            tracker_boresight=[0.0, 0.0, 1.0], joint_angle_noise=1e-7, joint_rate_noise=0.0,
+            tracker_across=self.across,
+            tracker_about=self.about,
+            tracker_boresight=[0.0, 0.0, 1.0],
+            joint_angle_noise=1e-7,
+            joint_rate_noise=0.0,
             gyro_angle_walk=self.arw,
-            gyro_rate_walk=self.rrw, gyro_bias=self.bias, tracker_delay=self.delay * self.period,
-            rate_filter_hz=0.0, joint_bandwidth_hz=0.0,
-        )  # fmt: skip
+            gyro_rate_walk=self.rrw,
+            gyro_bias=self.bias,
+            tracker_delay=self.delay * self.period,
+            rate_filter_hz=0.0,
+            joint_bandwidth_hz=0.0,
+        )
 
     def filter(self) -> AttitudeFilter:
         return Navigation.build(1, self.settings, self.period).attitude
@@ -143,9 +149,15 @@ def filtered(case: Case, measured: Measured, filter: AttitudeFilter | None = Non
 
 @kernel
 def run(
-    filter: AttitudeFilter, quaternions: Array, gyro: Array, period: float, delayed: Array,
-    present: Array, bias: Array, covariance: Array,
-) -> None:  # fmt: skip
+    filter: AttitudeFilter,
+    quaternions: Array,
+    gyro: Array,
+    period: float,
+    delayed: Array,
+    present: Array,
+    bias: Array,
+    covariance: Array,
+) -> None:
     for tick in range(gyro.shape[0]):
         if tick == 0:
             start(filter, 0, quaternions[0], gyro[0], period)

@@ -40,17 +40,23 @@ def made_table(
         for number, law in enumerate(laws):
             bad, value = bool(failed[run, number]), float(error[run, number])
             row = {
-                "run": run, "law": law, "outcome": "diverged" if bad else "complete",
+                "run": run,
+                "law": law,
+                "outcome": "diverged" if bad else "complete",
                 "reason": "the flight diverged at tick 812" if bad else "",
                 "ended_at_s": 0.4 if bad else 5.0,
                 "vary.robot.base.mass": mass[run],
                 "vary.faults.torque_scale@0:all": scale[run],
                 "vary.unused": moon[run],
-            }  # fmt: skip
+            }
             if places is not None:
                 row["vary.scenario.sensors"] = places[run]
-            for name, factor in (("attitude_rms", 1.0), ("attitude_max", 5.0),
-                                 ("joints_1_3_rms", 2.0), ("ripple_base_torque", 3e3)):  # fmt: skip
+            for name, factor in (
+                ("attitude_rms", 1.0),
+                ("attitude_max", 5.0),
+                ("joints_1_3_rms", 2.0),
+                ("ripple_base_torque", 3e3),
+            ):
                 row[f"metric.{name}"] = None if bad else factor * value
             row["require.pointing"] = None if bad else 2.0 * value
             if bands:

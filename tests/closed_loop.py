@@ -9,10 +9,7 @@ from numpy.typing import NDArray
 
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
-from space_robot_control.guidance.mission import (
-    Mission,
-    MissionSettings,
-)
+from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.laws import ControlLaw, find_law
 from space_robot_control.navigation.settings import NavigationFilterSettings
 from space_robot_model.robot import Robot
@@ -29,14 +26,18 @@ GAINS: dict[str, dict[str, list[float]]] = {
     # Table IV
     "tde_smc": {"h_bar": H_BAR, "lambda": [1.0] * 9, "g": [0.1] * 6 + [0.01] * 3},
     "tde_tsmc": {
-        "h_bar": H_BAR, "k_p": [10.0] * 3 + [8.0] * 3 + [2.0] * 3, "k_d": [2.0] * 6 + [0.5] * 3,
+        "h_bar": H_BAR,
+        "k_p": [10.0] * 3 + [8.0] * 3 + [2.0] * 3,
+        "k_d": [2.0] * 6 + [0.5] * 3,
         "k_1": [2.0] * 9,
     },
     "tde_stc": {
-        "h_bar": H_BAR, "lambda": [1.0] * 9, "k_1": [0.02] * 3 + [0.2] * 3 + [0.4, 0.2, 0.2],
+        "h_bar": H_BAR,
+        "lambda": [1.0] * 9,
+        "k_1": [0.02] * 3 + [0.2] * 3 + [0.4, 0.2, 0.2],
         "k_2": [8e-5] * 3 + [3e-3] * 3 + [4e-3, 2e-3, 2e-3],
     },
-}  # fmt: skip
+}
 
 
 def law_of(name: str) -> ControlLaw:
@@ -44,10 +45,16 @@ def law_of(name: str) -> ControlLaw:
 
 
 NAVIGATION = NavigationFilterSettings(
-    tracker_across=1e-5, tracker_about=8e-5, tracker_boresight=[0.0, 0.0, 1.0], tracker_delay=0.1,
-    gyro_angle_walk=3e-7, gyro_rate_walk=1e-9, gyro_bias=1e-6, joint_angle_noise=1e-7,
+    tracker_across=1e-5,
+    tracker_about=8e-5,
+    tracker_boresight=[0.0, 0.0, 1.0],
+    tracker_delay=0.1,
+    gyro_angle_walk=3e-7,
+    gyro_rate_walk=1e-9,
+    gyro_bias=1e-6,
+    joint_angle_noise=1e-7,
     joint_rate_noise=0.0,
-)  # fmt: skip
+)
 """A filter for good sensors, with a number for everything."""
 
 
@@ -55,9 +62,13 @@ class Loop:
     """Plant, controller and mission in one process; a test may bend what passes between them."""
 
     def __init__(
-        self, robot: Robot, law: ControlLaw, degrees: Any = None,
-        navigation: NavigationFilterSettings | None = None, **plant: Any,
-    ) -> None:  # fmt: skip
+        self,
+        robot: Robot,
+        law: ControlLaw,
+        degrees: Any = None,
+        navigation: NavigationFilterSettings | None = None,
+        **plant: Any,
+    ) -> None:
         waypoints = PAPER_DEG if degrees is None else degrees
         flat = np.asarray(waypoints, dtype=float).ravel().tolist()
         plant = {"initial_joints_deg": flat[: robot.n], **plant}

@@ -36,9 +36,20 @@ if TYPE_CHECKING:
 ROBOTS = CONFIG / "robots"
 
 TOOLS = (
-    "cvxpy", "gymnasium", "hypothesis", "msgspec", "mujoco", "nbclient", "nbformat", "pandas",
-    "pinocchio", "psutil", "pyarrow", "trimesh", "viser",
-)  # fmt: skip
+    "cvxpy",
+    "gymnasium",
+    "hypothesis",
+    "msgspec",
+    "mujoco",
+    "nbclient",
+    "nbformat",
+    "pandas",
+    "pinocchio",
+    "psutil",
+    "pyarrow",
+    "trimesh",
+    "viser",
+)
 """Of the tests only. Where `colcon test` finds one missing, the modules that use it are skipped,
 whichever of their helpers imports it."""
 
@@ -57,19 +68,32 @@ sys.meta_path.append(_MissingTool())
 OF_ROS = {"domain", "free_domain", "fly", "start", "ground"}
 """Fixtures of tests that start ROS processes, or are a node of their own."""
 WITH_ROS = (
-    "laboratory/flight/graph/", "laboratory/flight/replay/", "test_examples.py",
+    "laboratory/flight/graph/",
+    "laboratory/flight/replay/",
+    "test_examples.py",
     "test_pages_with_graphs.py",
-)  # fmt: skip
+)
 SLOW = (
-    "benchmarks/", "laboratory/campaign/", "laboratory/paper/", "laboratory/cli/test_output.py",
-    "laboratory/cli/test_view_command.py", "laboratory/view/test_in_browser.py",
-    "laboratory/cli/test_stability_command.py", "laboratory/processes/test_interruption.py",
-    "laboratory/flight/test_long_flights.py", "laboratory/flight/test_shipped_robots.py",
-    "msgs/bag/test_bag_fuzz.py", "test_notebooks.py", "test_examples.py", "test_tutorial.py",
-    "msgs/bag/test_description_fuzz.py", "test_packaging.py", "test_pages.py",
+    "benchmarks/",
+    "laboratory/campaign/",
+    "laboratory/paper/",
+    "laboratory/cli/test_output.py",
+    "laboratory/cli/test_view_command.py",
+    "laboratory/view/test_in_browser.py",
+    "laboratory/cli/test_stability_command.py",
+    "laboratory/processes/test_interruption.py",
+    "laboratory/flight/test_long_flights.py",
+    "laboratory/flight/test_shipped_robots.py",
+    "msgs/bag/test_bag_fuzz.py",
+    "test_notebooks.py",
+    "test_examples.py",
+    "test_tutorial.py",
+    "msgs/bag/test_description_fuzz.py",
+    "test_packaging.py",
+    "test_pages.py",
     "test_shown_outputs.py",
     "test_site.py",
-)  # fmt: skip
+)
 """Folders and files whose tests take seconds each."""
 FLYING_UNTIL = 0.7
 """Part of the files after which none of the marked ones is left to begin."""
@@ -188,9 +212,12 @@ def start(domain: int) -> Iterator[Start]:
         for name, value in parameters.items():
             command += ["-p", f"{name.replace('__', '.')}:={value}"]
         process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
             env={**ros_environment(), "ROS_DOMAIN_ID": str(domain)},
-        )  # fmt: skip
+        )
         running.append(process)
         return process
 

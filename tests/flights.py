@@ -37,9 +37,13 @@ def space_robot(
         paths = [str(python_path), environment.get("PYTHONPATH", "")]
         environment["PYTHONPATH"] = os.pathsep.join(path for path in paths if path)
     return subprocess.run(
-        [*COMMAND, *arguments], capture_output=True, text=True, timeout=timeout, check=False,
+        [*COMMAND, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        check=False,
         env=environment,
-    )  # fmt: skip
+    )
 
 
 def space_robot_here(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -45,9 +45,18 @@ OF_GRAPHS = re.compile(
 """Commands that need a graph. All other options of `fly` are those of `simulate`, which flies the
 same bits (tests/laboratory/flight/graph holds it to that) and is asked in its place."""
 PLACEHOLDERS = {
-    "CASE": "3", "COMMAND": "fly", "D": "2", "F": "100", "FOLDER": "flights/one", "LAW": "ctc",
-    "LINK": "upper_arm", "MODE": "filtered", "NAME": "ets_vii", "S": "tactical", "SIGMA": "1e-4",
-}  # fmt: skip
+    "CASE": "3",
+    "COMMAND": "fly",
+    "D": "2",
+    "F": "100",
+    "FOLDER": "flights/one",
+    "LAW": "ctc",
+    "LINK": "upper_arm",
+    "MODE": "filtered",
+    "NAME": "ets_vii",
+    "S": "tactical",
+    "SIGMA": "1e-4",
+}
 """What stands for a word in capitals."""
 EXIT_CODES = {
     r"gains check(?! --(gains|actuators))": 1,
@@ -173,10 +182,14 @@ class PageShell:
         for pipe in ("ask", "answer"):
             os.mkfifo(pipes / pipe)
         bash = subprocess.Popen(
-            ["bash", "-c", "\n".join([CLIENT, *self._script(page)])], cwd=folder, text=True,
-            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+            ["bash", "-c", "\n".join([CLIENT, *self._script(page)])],
+            cwd=folder,
+            text=True,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
             env={**os.environ, "PIPES": str(pipes)},
-        )  # fmt: skip
+        )
         failures: list[str] = []
         names: dict[str, Any] = {}
         while (asked := (pipes / "ask").read_bytes().decode().split("\0")[:-1]) != ["end"]:

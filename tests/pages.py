@@ -19,9 +19,27 @@ SHELL = {"", "bash", "console", "sh"}
 BEGINNING = re.compile(r"(?:\$ )?((?:[A-Z_]+=\S* )*([\w./-]+).*)")
 """Of a line: the command without its prompt, and the command's first word."""
 COMMANDS = {
-    ".", "cp", "dask", "export", "for", "git", "make", "mkdir", "nft", "pip", "python",
-    "plotjuggler", "python3", "rerun", "ros2", "rviz2", "sed", "source", "space-robot", "sudo",
-}  # fmt: skip
+    ".",
+    "cp",
+    "dask",
+    "export",
+    "for",
+    "git",
+    "make",
+    "mkdir",
+    "nft",
+    "pip",
+    "python",
+    "plotjuggler",
+    "python3",
+    "rerun",
+    "ros2",
+    "rviz2",
+    "sed",
+    "source",
+    "space-robot",
+    "sudo",
+}
 """First words of commands; all other indented lines are what one prints."""
 INLINE = re.compile(r"`(space-robot [^`]*\s(?:-|\S*[./@=])[^`]*)`")
 """A whole command within a sentence: one with an option or a file. Others are names."""

@@ -117,5 +117,5 @@ def branched_cases(draw: st.DrawFn, joints: Sequence[int] = JOINTS) -> Case:
         path.append(joint + 1)
     robot = replace(
         random_robot(rng, n), parent=np.array(parents), is_prismatic=rng.random(n) < 0.3
-    )  # fmt: skip
+    )
     return Case(robot, random_state(rng, n), rng)

@@ -10,13 +10,7 @@ from random_robots import random_inertia
 from scipy.spatial.transform import Rotation
 
 from space_robot_model.robot.inertia import inertia_tensor
-from space_robot_model.robot.tree import (
-    Body,
-    Joint,
-    JointFriction,
-    Spring,
-    Tool,
-)
+from space_robot_model.robot.tree import Body, Joint, JointFriction, Spring, Tool
 
 Array = NDArray[np.float64]
 
@@ -48,9 +42,14 @@ def random_joint(rng: np.random.Generator, name: str, kind: str) -> Joint:
     elif kind != "fixed" and rng.random() < 0.5:
         friction = JointFriction(0.0, float(rng.uniform(0.0, 0.5)))
     return Joint(
-        name, kind.removeprefix("passive "), random_rotation(rng), rng.uniform(-1.0, 1.0, 3),  # type: ignore[arg-type]
-        random_axis(rng), friction=friction, spring=spring,
-    )  # fmt: skip
+        name,
+        kind.removeprefix("passive "),
+        random_rotation(rng),
+        rng.uniform(-1.0, 1.0, 3),  # type: ignore[arg-type]
+        random_axis(rng),
+        friction=friction,
+        spring=spring,
+    )
 
 
 def random_bodies(rng: np.random.Generator, kinds: Sequence[str]) -> list[Body]:
@@ -74,6 +73,11 @@ def _body(
     inertia = inertia_tensor(random_inertia(rng, size * rng.uniform(0.3, 3.0)))
     tool = Tool(f"tool of {name}", random_rotation(rng), rng.uniform(-1.0, 1.0, 3))
     return Body(
-        name, size * float(rng.uniform(2.0, 40.0)), inertia, size * rng.uniform(-0.5, 0.5, 3),
-        parent, joint, (tool,),
-    )  # fmt: skip
+        name,
+        size * float(rng.uniform(2.0, 40.0)),
+        inertia,
+        size * rng.uniform(-0.5, 0.5, 3),
+        parent,
+        joint,
+        (tool,),
+    )

@@ -69,17 +69,16 @@ class Scene:
         for name in sorted(self.names(), key=lambda name: name.count("/")):
             parent = found.get(name.rpartition("/")[0], found[""])
             turn, place = rotation.get(name, np.eye(3)), position.get(name, np.zeros(3))
-            found[name] = Pose(
-                parent.rotation @ turn, parent.position + parent.rotation @ place
-            )  # fmt: skip
+            found[name] = Pose(parent.rotation @ turn, parent.position + parent.rotation @ place)
         return found
 
     def mesh(self, name: str) -> tuple[Array, NDArray[np.uint32]]:
         """Vertices and faces of a node that is a mesh."""
         props = next(
-            message["props"] for _, message in self.messages
+            message["props"]
+            for _, message in self.messages
             if message["type"] == "MeshMessage" and message["name"] == name
-        )  # fmt: skip
+        )
         vertices, faces = (
             np.frombuffer(self._buffers[held["__binary_index"]], held["dtype"]).reshape(-1, 3)
             for held in (props["vertices"], props["faces"])

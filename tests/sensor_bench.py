@@ -17,12 +17,7 @@ from space_robot_sim.faults.grammar import parse_faults
 from space_robot_sim.faults.schedule import Schedule
 from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.sensors.noise import NoiseDraws
-from space_robot_sim.sensors.sensors import (
-    FAULTS,
-    Sensors,
-    arrays_of_draws,
-    sense,
-)
+from space_robot_sim.sensors.sensors import FAULTS, Sensors, arrays_of_draws, sense
 
 Array = NDArray[np.float64]
 
@@ -48,9 +43,13 @@ class Bench:
     """Sensors as a plant has them."""
 
     def __init__(
-        self, *faults: str, seed: int = 0, period: float = PERIOD, truth: RobotState | None = None,
+        self,
+        *faults: str,
+        seed: int = 0,
+        period: float = PERIOD,
+        truth: RobotState | None = None,
         **settings: Any,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """``truth``: at rest before tick 0."""
         start = a_state() if truth is None else truth
         schedule = Schedule(parse_faults(faults, PLANT_KINDS), seed, period, NAMES)

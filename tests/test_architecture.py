@@ -10,22 +10,44 @@ from import_graph import PACKAGES, cycles, edges, folders, imports, modules, str
 
 ROOMS = {
     "space_robot_msgs_py": (
-        "errors", "deprecation", "simulated_time", "topics", "compiled", "samples", "config",
-        "wire", "bag", "ros", "recorder_node",
+        "errors",
+        "deprecation",
+        "simulated_time",
+        "topics",
+        "compiled",
+        "samples",
+        "config",
+        "wire",
+        "bag",
+        "ros",
+        "recorder_node",
     ),
     "space_robot_model": ("elementary", "dynamics", "robot", "hardware"),
-    "space_robot_sim": (
-        "faults", "environment", "actuators", "sensors", "plant", "plant_node",
-    ),
+    "space_robot_sim": ("faults", "environment", "actuators", "sensors", "plant", "plant_node"),
     "space_robot_control": (
-        "laws", "navigation", "allocation", "controller", "controller_node", "guidance",
+        "laws",
+        "navigation",
+        "allocation",
+        "controller",
+        "controller_node",
+        "guidance",
         "mission_node",
     ),
     "space_robot": (
-        "console", "processes", "scenario", "tuning", "flight", "analysis", "api", "campaign",
-        "paper", "view", "cli", "__main__",
+        "console",
+        "processes",
+        "scenario",
+        "tuning",
+        "flight",
+        "analysis",
+        "api",
+        "campaign",
+        "paper",
+        "view",
+        "cli",
+        "__main__",
     ),
-}  # fmt: skip
+}
 """Of each package, from the ground up: a room imports only from rooms that stand before it."""
 LOOSE = {
     "space_robot_msgs_py": {

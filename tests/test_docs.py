@@ -18,10 +18,14 @@ from space_robot_msgs_py import topics
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 PREFIXES = (
-    "", "space_robot.", "space_robot_control.", "space_robot_model.", "space_robot_msgs_py.",
+    "",
+    "space_robot.",
+    "space_robot_control.",
+    "space_robot_model.",
+    "space_robot_msgs_py.",
     "space_robot_sim.",
     "space_robot_model.dynamics.",
-)  # fmt: skip
+)
 DOTTED = re.compile(r"`([A-Za-z_]\w*(?:\.\w+)+)`")
 COMMAND = re.compile(r"space-robot ((?:[a-z]+)\b[^`;|#\n]*)")
 

@@ -42,9 +42,14 @@ def test_an_example_prints_what_it_shows(program: Path, tmp_path: Path) -> None:
         "PYTHONPATH": os.pathsep.join((str(ROOT), os.environ.get("PYTHONPATH", ""))),
     }
     done = subprocess.run(
-        [sys.executable, str(program), *arguments], cwd=tmp_path, env=environment,
-        capture_output=True, text=True, timeout=200, check=False,
-    )  # fmt: skip
+        [sys.executable, str(program), *arguments],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     found = list(differences([line.strip() for line in shown], done.stdout.splitlines()))
     assert not found, "\n".join(found)

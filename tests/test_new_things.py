@@ -16,14 +16,8 @@ import space_robot.cli as room_of_commands
 import space_robot_control.laws as room_of_laws
 import space_robot_msgs_py.wire as room_of_messages
 from space_robot import load_bag
-from space_robot.cli.main import (
-    cli,
-    commands,
-)
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.cli.main import cli, commands
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
@@ -134,7 +128,9 @@ def test_a_robot_is_one_file(tmp_path: Path) -> None:
     text = (CONFIG / "robots/paper.yaml").read_text("utf-8")
     (tmp_path / "newest.yaml").write_text(text)
     plan = FlightPlan(
-        robot=str(tmp_path / "newest.yaml"), mission=str(CONFIG / "missions/paper.yaml"),
-        gains=str(CONFIG / "gains/paper/tuned"), duration=0.001,
-    )  # fmt: skip
+        robot=str(tmp_path / "newest.yaml"),
+        mission=str(CONFIG / "missions/paper.yaml"),
+        gains=str(CONFIG / "gains/paper/tuned"),
+        duration=0.001,
+    )
     assert simulate(Flight(plan)).ticks == 2

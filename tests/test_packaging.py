@@ -24,9 +24,17 @@ from space_robot_msgs_py import topics
 ROOT = Path(__file__).resolve().parents[1]
 EXECUTABLES = sorted((ROOT / "resource/executables").iterdir())
 TOOLS = (
-    "mujoco", "cvxpy", "distributed", "gymnasium", "hypothesis", "pandas", "pinocchio", "psutil",
-    "pyarrow", "xacro",
-)  # fmt: skip
+    "mujoco",
+    "cvxpy",
+    "distributed",
+    "gymnasium",
+    "hypothesis",
+    "pandas",
+    "pinocchio",
+    "psutil",
+    "pyarrow",
+    "xacro",
+)
 PYPI = {
     "PIL": "pillow",
     "yaml": "pyyaml",
@@ -35,10 +43,16 @@ PYPI = {
 }
 """Names on PyPI of modules that are not called as their package."""
 OF_EXTRAS = {
-    "distributed": "dask", "gymnasium": "gym", "pandas": "campaign", "psutil": "soak",
-    "pyarrow": "parquet", "trimesh": "view", "viser": "view",
-    "websockets": "view", "xacro": "xacro",
-}  # fmt: skip
+    "distributed": "dask",
+    "gymnasium": "gym",
+    "pandas": "campaign",
+    "psutil": "soak",
+    "pyarrow": "parquet",
+    "trimesh": "view",
+    "viser": "view",
+    "websockets": "view",
+    "xacro": "xacro",
+}
 """Packages that one command needs, and their extra."""
 ROSDEP = {"pillow": "pil", "pyyaml": "yaml", "rosbags": "rosbags-pip"}
 """Names of rosdep's keys, behind python3-, where they are not the package's."""
@@ -47,8 +61,14 @@ ROSDEP = {"pillow": "pil", "pyyaml": "yaml", "rosbags": "rosbags-pip"}
 def setup_keyword(name: str) -> Any:
     """A literal that setup.py hands to setuptools."""
     tree = ast.parse((ROOT / "setup.py").read_text("utf-8"))
-    (call,) = (n for n in ast.walk(tree) if isinstance(n, ast.Call) and n.keywords and
-               isinstance(n.func, ast.Name) and n.func.id == "setup")  # fmt: skip
+    (call,) = (
+        n
+        for n in ast.walk(tree)
+        if isinstance(n, ast.Call)
+        and n.keywords
+        and isinstance(n.func, ast.Name)
+        and n.func.id == "setup"
+    )
     return ast.literal_eval(next(k.value for k in call.keywords if k.arg == name))
 
 
@@ -131,8 +151,11 @@ def test_the_docs_name_every_extra_that_a_command_needs() -> None:
     text = "\n".join(page.read_text("utf-8") for page in pages)
     for extra in OF_EXTRAS.values():
         assert f"pip install 'space_robot[{extra}]'" in text, extra
-    named = {name for group in re.findall(r"install [^\n]*\[([\w,]+)\]", text)
-             for name in group.split(",")}  # fmt: skip
+    named = {
+        name
+        for group in re.findall(r"install [^\n]*\[([\w,]+)\]", text)
+        for name in group.split(",")
+    }
     assert named <= set(extras)
 
 
@@ -242,12 +265,27 @@ def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     build, prefix = tmp_path_factory.mktemp("build"), tmp_path_factory.mktemp("prefix")
     subprocess.run(
         [
-            sys.executable, "setup.py", "-q", "egg_info", "--egg-base", str(build),
-            "build", "--build-base", str(build), "install", "--prefix", str(prefix),
-            "--record", str(build / "log"), "--single-version-externally-managed",
+            sys.executable,
+            "setup.py",
+            "-q",
+            "egg_info",
+            "--egg-base",
+            str(build),
+            "build",
+            "--build-base",
+            str(build),
+            "install",
+            "--prefix",
+            str(prefix),
+            "--record",
+            str(build / "log"),
+            "--single-version-externally-managed",
         ],
-        cwd=ROOT, check=True, capture_output=True, env={**os.environ, "PYTHONPATH": ""},
-    )  # fmt: skip
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+        env={**os.environ, "PYTHONPATH": ""},
+    )
     return prefix
 
 
@@ -255,10 +293,13 @@ def start(prefix: Path, name: str, *arguments: str) -> subprocess.CompletedProce
     """An installed executable, where the first Python of the PATH is another one."""
     (library,) = prefix.glob("lib/python*/site-packages")
     return subprocess.run(
-        [prefix / "lib/space_robot" / name, *arguments], text=True, capture_output=True,
-        cwd=prefix, timeout=60,
+        [prefix / "lib/space_robot" / name, *arguments],
+        text=True,
+        capture_output=True,
+        cwd=prefix,
+        timeout=60,
         env={**os.environ, "PYTHONPATH": str(library), "PATH": os.defpath},
-    )  # fmt: skip
+    )
 
 
 def test_an_installed_command_runs_with_the_python_that_installed_it(prefix: Path) -> None:
@@ -305,12 +346,27 @@ def test_all_modules_are_collected_without_ros_and_the_tools_of_tests(tmp_path: 
     ros = ("rclpy", *sorted({topic.type.split("/")[0] for topic in topics.ALL}))
     (tmp_path / "hide.py").write_text(HIDE.format(names=(*TOOLS, *ros)))
     run = subprocess.run(
-        [sys.executable, "-m", "pytest", "-p", "hide",
-         "-p", "no:cacheprovider", "--collect-only", "-rs"],
-        cwd=ROOT, text=True, capture_output=True, timeout=120,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)]),
-             "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-p",
+            "hide",
+            "-p",
+            "no:cacheprovider",
+            "--collect-only",
+            "-rs",
+        ],
+        cwd=ROOT,
+        text=True,
+        capture_output=True,
+        timeout=120,
+        env={
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)]),
+            "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
+        },
+    )
     assert run.returncode == 0, run.stdout[-2000:]
     skipped = run.stdout.partition("short test summary")[2]
     assert "hypothesis is not installed" in skipped

@@ -67,23 +67,36 @@ def test_the_page_on_stability_has_the_numbers_of_its_command() -> None:
     shown = block(
         "docs/explanation/stability.md", "| Lemma 1, spectral norm", "| reaching time below (56)"
     )
-    assert not [*differences(shown, [
-        f"| Lemma 1, spectral norm of $W$ below 1 | fails: {lemma['spectral_norm']['max']:.3f} |",
-        f"| the same with the spectral radius | holds: {lemma['spectral_radius']['max']:.3f} |",
-        r"| $K_2 > \beta$, also circle criterion (73) | fails on every axis, by factors of "
-        f"{min(excess):.0f} to {max(excess):.0f}; without friction by "
-        f"{min(without_friction):.0f} to {max(without_friction):.0f} |",
-        "| $K_1^2 > 4K_2$ | holds on every axis |",
-        f"| LMI (51) with the $M$ of (48) | fails: largest eigenvalue {min(eigenvalues):.2f} to "
-        rf"{max(eigenvalues):.2f}, with $\beta = \gamma = 0$ |",
-        r"| LMI (51) with $M$ free, $\beta$ measured | no $\gamma$ |",
-        rf"| the same, $\beta = K_2/2$ | $\gamma$ {min(gammas):.4f} (base) to {max(gammas):.3f} |",
-        r"| reaching time below (56) for $\beta = K_2/2$ | not applicable: the flight exceeds that "
-        rf"$\beta$ on every axis. It arrives within {max(t for t, _ in base):.1f} s (base) and "
-        f"{min(t for t, _ in joints):.2f} to {max(t for t, _ in joints):.2f} s (joints), the "
-        f"bounds would be {min(limit for _, limit in base):.0f} and "
-        f"{min(limit for _, limit in joints):.0f} to {max(limit for _, limit in joints):.0f} s |",
-    ])]  # fmt: skip
+    assert not [
+        *differences(
+            shown,
+            [
+                f"| Lemma 1, spectral norm of $W$ below 1 | fails: "
+                f"{lemma['spectral_norm']['max']:.3f} |",
+                f"| the same with the spectral radius | holds: "
+                f"{lemma['spectral_radius']['max']:.3f} |",
+                r"| $K_2 > \beta$, also circle criterion (73) | fails on every axis, by factors of "
+                f"{min(excess):.0f} to {max(excess):.0f}; without friction by "
+                f"{min(without_friction):.0f} to {max(without_friction):.0f} |",
+                "| $K_1^2 > 4K_2$ | holds on every axis |",
+                f"| LMI (51) with the $M$ of (48) | fails: largest eigenvalue "
+                f"{min(eigenvalues):.2f} to "
+                rf"{max(eigenvalues):.2f}, with $\beta = \gamma = 0$ |",
+                r"| LMI (51) with $M$ free, $\beta$ measured | no $\gamma$ |",
+                rf"| the same, $\beta = K_2/2$ | $\gamma$ {min(gammas):.4f} (base) to "
+                rf"{max(gammas):.3f} |",
+                r"| reaching time below (56) for $\beta = K_2/2$ | not applicable: the flight "
+                r"exceeds that "
+                rf"$\beta$ on every axis. It arrives within {max(t for t, _ in base):.1f} s "
+                rf"(base) and "
+                f"{min(t for t, _ in joints):.2f} to {max(t for t, _ in joints):.2f} s "
+                f"(joints), the "
+                f"bounds would be {min(limit for _, limit in base):.0f} and "
+                f"{min(limit for _, limit in joints):.0f} to "
+                f"{max(limit for _, limit in joints):.0f} s |",
+            ],
+        )
+    ]
     verdicts = [axis["holds"] for axis in twisting["4_k_2_below_k_1_squared"]]
     assert all(verdicts)
     assert not any(axis["applies"] for axis in bounds)
@@ -102,9 +115,7 @@ def test_the_first_difference_of_the_page_on_replay_is_that_of_the_two_gains(
         re.sub(r"k_1: \[.*?\]", f"k_1: {[0.2] * 9}", gains, flags=re.DOTALL)
     )
     run(*options, str(tmp_path / "other"), "--gains", str(tmp_path / "tde_stc.yaml"))
-    recorded, replayed = (
-        load_bag(tmp_path / name).commanded_torque for name in ("mine", "other")
-    )  # fmt: skip
+    recorded, replayed = (load_bag(tmp_path / name).commanded_torque for name in ("mine", "other"))
     assert np.array_equal(recorded[0], replayed[0])
     (first,) = np.flatnonzero(recorded[1] != replayed[1])[:1]
     difference = replayed[1, first] - recorded[1, first]
@@ -119,8 +130,12 @@ def test_the_first_difference_of_the_page_on_replay_is_that_of_the_two_gains(
 
 
 SWEPT = (
-    "attitude_rms", "joints_1_3_rms", "joints_4_6_rms", "ripple_base_torque", "ripple_torque_4_6",
-)  # fmt: skip
+    "attitude_rms",
+    "joints_1_3_rms",
+    "joints_4_6_rms",
+    "ripple_base_torque",
+    "ripple_torque_4_6",
+)
 """Metrics of the pages' tables of sweeps."""
 
 

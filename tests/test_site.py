@@ -50,8 +50,11 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("site")
     made = subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)],
-        cwd=ROOT, text=True, capture_output=True, env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
-    )  # fmt: skip
+        cwd=ROOT,
+        text=True,
+        capture_output=True,
+        env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+    )
     said = made.stdout + made.stderr
     assert made.returncode == 0, said
     assert not re.findall(r"WARN.*|ERROR.*", said), said
@@ -129,11 +132,23 @@ def test_a_browser_without_network_reads_and_searches_it(site: Path, tmp_path: P
     """As files, without a server: what could not be loaded would be told on the console."""
     address = f"{(site / 'index.html').as_uri()}?q=bounded+real+lemma"
     shown = subprocess.run(
-        [str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom",
-         f"--user-data-dir={tmp_path}", "--host-resolver-rules=MAP * ~NOTFOUND",
-         "--enable-logging=stderr", "--virtual-time-budget=20000", address],
-        text=True, capture_output=True, timeout=120, check=True,
-    )  # fmt: skip
+        [
+            str(CHROMIUM),
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--dump-dom",
+            f"--user-data-dir={tmp_path}",
+            "--host-resolver-rules=MAP * ~NOTFOUND",
+            "--enable-logging=stderr",
+            "--virtual-time-budget=20000",
+            address,
+        ],
+        text=True,
+        capture_output=True,
+        timeout=120,
+        check=True,
+    )
     assert not re.findall(r".*:CONSOLE.*", shown.stderr)
     (results,) = re.findall(r'<ol class="md-search-result__list".*?</ol>', shown.stdout, re.DOTALL)
     assert "explanation/theory.html" in results

@@ -13,10 +13,7 @@ import yaml
 from paths import CONFIG
 from rosbags.highlevel import AnyReader
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
@@ -27,15 +24,30 @@ SHOWN = {topic.full_name: topic for topic in (topics.ROBOT_DESCRIPTION, topics.M
 PANEL_TITLES = {"foxglovePanelTitle", "lichtblickPanelTitle"}
 PANELS = {
     "3D": {
-        "cameraState", "followMode", "followTf", "scene", "transforms", "topics", "layers",
+        "cameraState",
+        "followMode",
+        "followTf",
+        "scene",
+        "transforms",
+        "topics",
+        "layers",
         "publish",
     },
     "Plot": {
-        "paths", "showLegend", "legendDisplay", "showPlotValuesInLegend", "showXAxisLabels",
-        "showYAxisLabels", "isSynced", "xAxisVal", "sidebarDimension", "yAxisLabel",
-        "minYValue", "maxYValue",
+        "paths",
+        "showLegend",
+        "legendDisplay",
+        "showPlotValuesInLegend",
+        "showXAxisLabels",
+        "showYAxisLabels",
+        "isSynced",
+        "xAxisVal",
+        "sidebarDimension",
+        "yAxisLabel",
+        "minYValue",
+        "maxYValue",
     },
-}  # fmt: skip
+}
 """Keys of a panel's settings, from the sources of Lichtblick, which Foxglove's are named as."""
 PATH = {"value", "label", "enabled", "timestampMethod", "color"}
 

@@ -13,10 +13,7 @@ from random_trees import BASE, random_bodies
 from tree_oracle import TreeOracle, pinocchio_tree
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.tree import (
-    Body,
-    JointFriction,
-)
+from space_robot_model.robot.tree import Body, JointFriction
 from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.plant.plant import Plant, PlantSettings
@@ -24,9 +21,15 @@ from space_robot_sim.plant.plant import Plant, PlantSettings
 Array = NDArray[np.float64]
 PERIOD = 5e-4
 KINDS = (
-    "revolute", "prismatic", "revolute", "fixed", "passive revolute", "passive prismatic",
-    "passive revolute", "fixed",
-)  # fmt: skip
+    "revolute",
+    "prismatic",
+    "revolute",
+    "fixed",
+    "passive revolute",
+    "passive prismatic",
+    "passive revolute",
+    "fixed",
+)
 TORQUE = np.array([60.0, -40.0, 50.0, 4.0, 9.0, -6.0])
 SEEDS = (0, 1, 2)
 
@@ -40,13 +43,15 @@ def tree(seed: int, lossless: bool = False) -> list[Body]:
         replace(
             body,
             joint=replace(
-                body.joint, friction=JointFriction(),
+                body.joint,
+                friction=JointFriction(),
                 spring=body.joint.spring and body.joint.spring._replace(damping=0.0),
             ),
         )
-        if body.joint else body
+        if body.joint
+        else body
         for body in bodies
-    ]  # fmt: skip
+    ]
 
 
 class TreeFlight:

@@ -11,11 +11,7 @@ from oracles import quaternion_of
 from scipy.spatial.transform import Rotation
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.dynamics import (
-    bias_force,
-    forward_dynamics,
-    mass_matrix,
-)
+from space_robot_model.robot.dynamics import bias_force, forward_dynamics, mass_matrix
 from space_robot_model.robot.tree import Body
 
 Array = NDArray[np.float64]

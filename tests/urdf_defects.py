@@ -68,7 +68,10 @@ DEFECTS = {
         '<child link="fore"/>', '<child link="upper"/>', "joint 'slide'", 45, "must be two links"
     ),
     "two parents": Defect(
-        '<child link="hand"/>', '<child link="upper"/>', "joint 'wrist'", 52,
+        '<child link="hand"/>',
+        '<child link="upper"/>',
+        "joint 'wrist'",
+        52,
         "already: loops cannot be closed",
     ),
     "two roots": Defect(
@@ -87,7 +90,11 @@ DEFECTS = {
         '"prismatic"', '"floating"', "joint 'slide'", 45, "it moves in more than one way"
     ),
     "mimic": Defect(
-        LIMIT, f'{LIMIT}<mimic joint="slide"/>', "joint 'shoulder'", 42, "cannot be coupled",
+        LIMIT,
+        f'{LIMIT}<mimic joint="slide"/>',
+        "joint 'shoulder'",
+        42,
+        "cannot be coupled",
         "freed",
     ),
     "zero axis": Defect('"0 1 0"', '"0 0 0"', "joint 'shoulder'", 41, "the axis has no direction"),
@@ -122,16 +129,22 @@ DEFECTS = {
     "too large": Defect('"300"', '"1e13"', "link 'hull'", 7, "must be at most 1e+12"),
     "infinite": Defect('"300"', '"1e400"', "link 'hull'", 7, "must be at most 1e+12"),
     "no mass value": Defect(FORE, "<mass/>", "link 'fore'", 26, "needs the attribute 'value'"),
-    "no moment": Defect(
-        ' iyy="50"', "", "link 'hull'", 8, "<inertia> needs the attribute 'iyy'"
-    ),
+    "no moment": Defect(' iyy="50"', "", "link 'hull'", 8, "<inertia> needs the attribute 'iyy'"),
     "no product": Defect(' iyz="0" izz="60"', ' izz="60"', "link 'hull'", 8, "needs 'iyz'", "read"),
     "misspelt element": Defect(
-        '<dynamics damping="0.4" friction="0.3"/>', "<dynamcis/>", "joint 'shoulder'", 43,
-        "unknown element <dynamcis>", "left out",
+        '<dynamics damping="0.4" friction="0.3"/>',
+        "<dynamcis/>",
+        "joint 'shoulder'",
+        43,
+        "unknown element <dynamcis>",
+        "left out",
     ),
     "misspelt attribute": Defect(
-        'damping="0.4"', 'damp="0.4"', "joint 'shoulder'", 43, "unknown attribute 'damp'",
+        'damping="0.4"',
+        'damp="0.4"',
+        "joint 'shoulder'",
+        43,
+        "unknown attribute 'damp'",
         "left out",
     ),
     "given twice": Defect(
@@ -140,37 +153,61 @@ DEFECTS = {
     # masses and inertias
     "negative mass": Defect('"300"', '"-300"', "link 'hull'", 7, "mass must be at least 0"),
     "root without inertia": Defect(
-        HULL, "", "link 'hull'", 4, "the base must have a mass",
+        HULL,
+        "",
+        "link 'hull'",
+        4,
+        "the base must have a mass",
         "joint 'shoulder' locked at 0, merged into link 'upper'",
     ),
     "massless tip": Defect(
-        FORE, '<mass value="0"/>', "link 'fore'", 26, "a link that moves must have a mass",
+        FORE,
+        '<mass value="0"/>',
+        "link 'fore'",
+        26,
+        "a link that moves must have a mass",
         "joint 'slide' locked at 0, merged into link 'upper'",
     ),
     "massless between": Defect(
         UPPER, "<inertial>", "link 'upper'", 16, "a link that moves and carries others must"
     ),
     "inertia without mass": Defect(
-        "</link>\n  <joint", f"<inertial>{FLAT}</inertial></link>\n  <joint", "link 'hand'", 36,
-        "inertia without mass", "the inertia is left out",
+        "</link>\n  <joint",
+        f"<inertial>{FLAT}</inertial></link>\n  <joint",
+        "link 'hand'",
+        36,
+        "inertia without mass",
+        "the inertia is left out",
     ),
     "zero inertia": Defect(
         FLAT, "", "link 'fore'", 26, "the inertia is zero", "that of a solid sphere of 0.134 m"
     ),
     "zero inertia, a shape": Defect(
-        '<inertia ixx="2" ixy="0.1" ixz="0" iyy="2" iyz="0" izz="0.5"/>', "", "link 'upper'", 19,
-        "the inertia is zero", "that of the solid cylinder that it looks like",
+        '<inertia ixx="2" ixy="0.1" ixz="0" iyy="2" iyz="0" izz="0.5"/>',
+        "",
+        "link 'upper'",
+        19,
+        "the inertia is zero",
+        "that of the solid cylinder that it looks like",
     ),
     "not positive definite": Defect(
         'iyy="50"', 'iyy="-5"', "link 'hull'", 7, "not positive definite", "raised to the nearest"
     ),
     "triangle inequality": Defect(
-        'izz="60"', 'izz="95"', "link 'hull'", 7, "breaks the triangle inequality",
+        'izz="60"',
+        'izz="95"',
+        "link 'hull'",
+        7,
+        "breaks the triangle inequality",
         "raised to the nearest physical one, principal moments 42.55, 52.55, 95",
     ),
     # shapes
     "shape without size": Defect(
-        '<sphere radius="0.1"/>', "<sphere/>", "link 'hand'", 32, "needs the attribute 'radius'",
+        '<sphere radius="0.1"/>',
+        "<sphere/>",
+        "link 'hand'",
+        32,
+        "needs the attribute 'radius'",
         "the shape is left out",
     ),
     "negative shape": Defect(
@@ -183,13 +220,17 @@ DEFECTS = {
         '<geometry><box size="1 1 2"/></geometry>', "", "link 'hull'", 10, "one <geometry>", "the"
     ),
     "mesh without file": Defect(
-        'filename="package://arm/fore.stl" ', "", "link 'fore'", 29, "a mesh needs a filename",
+        'filename="package://arm/fore.stl" ',
+        "",
+        "link 'fore'",
+        29,
+        "a mesh needs a filename",
         "the shape is left out",
     ),
     "colour": Defect(
         '"0.2 0.2 0.2 1"', '"grey"', "material 'grey'", 3, "must be 4 numbers", "the colour"
     ),
-}  # fmt: skip
+}
 
 
 def with_defect(name: str) -> str:

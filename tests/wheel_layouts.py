@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.allocation.wheel_set import (
-    WheelSet,
-    tabulate,
-)
+from space_robot_control.allocation.wheel_set import WheelSet, tabulate
 from space_robot_msgs_py.samples import MOST_WHEELS
 
 Array = NDArray[np.float64]

@@ -58,11 +58,13 @@ def random_rotors(rng: np.random.Generator, robot: Robot, count: int) -> list[Ro
         spin = rng.uniform(0.05, 0.3) * room
         rotors.append(
             Rotor(
-                axis / np.linalg.norm(axis), spin, rng.uniform(0.5, 1.0) * spin,
+                axis / np.linalg.norm(axis),
+                spin,
+                rng.uniform(0.5, 1.0) * spin,
                 rng.uniform(0.01, 0.05) * robot.mass[0] / count,
                 rng.uniform(-0.5, 0.5, 3) * radius,
             )
-        )  # fmt: skip
+        )
     return rotors
 
 

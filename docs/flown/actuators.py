@@ -20,14 +20,23 @@ from flown_tables import Number, Options, Page, Sentence, Table, Text
 
 MODULATIONS = ("schmitt", "sigma_delta", "pwm")
 SETS = (
-    ("tde_stc", "robust"), ("tde_smc", "robust"), ("tde_tsmc", "robust"), ("ctc", "robust"),
-    ("ctc_smc", "tuned"), ("tde_stc", "printed"), ("tde_smc", "printed"), ("tde_tsmc", "printed"),
+    ("tde_stc", "robust"),
+    ("tde_smc", "robust"),
+    ("tde_tsmc", "robust"),
+    ("ctc", "robust"),
+    ("ctc_smc", "tuned"),
+    ("tde_stc", "printed"),
+    ("tde_smc", "printed"),
+    ("tde_tsmc", "printed"),
     ("ctc", "tuned"),
-)  # fmt: skip
+)
 TITLES = {
-    "ctc": "CTC", "ctc_smc": "CTC-SMC", "tde_smc": "TDE-SMC", "tde_tsmc": "TDE-TSMC",
+    "ctc": "CTC",
+    "ctc_smc": "CTC-SMC",
+    "tde_smc": "TDE-SMC",
+    "tde_tsmc": "TDE-TSMC",
     "tde_stc": "TDE-STC",
-}  # fmt: skip
+}
 ON_THRUSTERS: Options = {"actuators": "thrusters", "gains": "robust", "navigation": "filtered"}
 
 
@@ -45,11 +54,16 @@ def _modulated(law: str, gains: str) -> list[str | Text]:
     cells: list[str | Text] = [f"{law}, `{gains}`"]
     for modulation in MODULATIONS:
         options = {
-            "actuators": "thrusters", "controller": law, "gains": gains,
+            "actuators": "thrusters",
+            "controller": law,
+            "gains": gains,
             "parameters": {"controller": {"allocation.modulation": modulation}},
-        }  # fmt: skip
-        shown = (Number(options, ATTITUDE, ".1e"), Number(options, impulse, ".0f"),
-                 Number(options, pulses, ".0f"))  # fmt: skip
+        }
+        shown = (
+            Number(options, ATTITUDE, ".1e"),
+            Number(options, impulse, ".0f"),
+            Number(options, pulses, ".0f"),
+        )
         cells.append(Text("{}; {}; {}", shown))
     return cells
 
@@ -58,10 +72,13 @@ def _free(law: str) -> list[str | Number | Text]:
     free, ideal = {"actuators": "none", "controller": law}, {"controller": law}
     return [
         TITLES[law],
-        *(Number(options, quantity, ".2e")
-          for quantity in (JOINTS_1_3, JOINTS_4_6) for options in (ideal, free)),
+        *(
+            Number(options, quantity, ".2e")
+            for quantity in (JOINTS_1_3, JOINTS_4_6)
+            for options in (ideal, free)
+        ),
         Text("{}°", (Number(free, DRIFT, ".4f"),)),
-    ]  # fmt: skip
+    ]
 
 
 def _on_wheels(law: str, **controller: object) -> Options:
@@ -70,16 +87,20 @@ def _on_wheels(law: str, **controller: object) -> Options:
 
 
 PAGE = Page(
-    "actuators", "manual/actuators.md",
+    "actuators",
+    "manual/actuators.md",
     (
         Table(
             "asked",
             ("", "base x, y, z, N m", "stored, N m s", "a wheel, N m", "N m s"),
-            [*(_asked(f"`paper`: {TITLES[law]}", {"controller": law}) for law in LAWS),
-             _asked("`seven_joint`: TDE-STC", {"controller": "tde_stc", "robot": "seven_joint"})],
+            [
+                *(_asked(f"`paper`: {TITLES[law]}", {"controller": law}) for law in LAWS),
+                _asked("`seven_joint`: TDE-STC", {"controller": "tde_stc", "robot": "seven_joint"}),
+            ],
         ),
         Table(
-            "modulations", ("", *(f"`{name}`" for name in MODULATIONS)),
+            "modulations",
+            ("", *(f"`{name}`" for name in MODULATIONS)),
             [_modulated(law, gains) for law, gains in SETS],
         ),
         Table(
@@ -90,35 +111,57 @@ PAGE = Page(
         Sentence(
             "the wheel that has most to do gives {} N m with the one, {} with the other, {} with "
             "the null motion",
-            tuple(Number(options, largest_wheel_torque, ".2f") for options in (
-                _on_wheels("tde_stc"),
-                _on_wheels("tde_stc", **{"allocation.wheels": "least_largest",
-                                         "allocation.null_gain": 0.0}),
-                _on_wheels("tde_stc", **{"allocation.wheels": "least_largest"}),
-            )),
+            tuple(
+                Number(options, largest_wheel_torque, ".2f")
+                for options in (
+                    _on_wheels("tde_stc"),
+                    _on_wheels(
+                        "tde_stc",
+                        **{"allocation.wheels": "least_largest", "allocation.null_gain": 0.0},
+                    ),
+                    _on_wheels("tde_stc", **{"allocation.wheels": "least_largest"}),
+                )
+            ),
         ),
         Sentence(
             "costs CTC-SMC: {} attitude error in case 1 without, {} with it",
-            tuple(Number(options, ATTITUDE) for options in (
-                _on_wheels("ctc_smc"), _on_wheels("ctc_smc", **{"allocation.least_speed": 50.0}),
-            )),
+            tuple(
+                Number(options, ATTITUDE)
+                for options in (
+                    _on_wheels("ctc_smc"),
+                    _on_wheels("ctc_smc", **{"allocation.least_speed": 50.0}),
+                )
+            ),
         ),
         Sentence(
             "Case 1 with `wheel_fail@10:2`: the error (tde_stc) peaks at {} and",
-            (Number({**_on_wheels("tde_stc"), "faults": ["wheel_fail@10:2"]},
-                    largest_attitude_error),),
+            (
+                Number(
+                    {**_on_wheels("tde_stc"), "faults": ["wheel_fail@10:2"]}, largest_attitude_error
+                ),
+            ),
         ),
         Sentence(
             "With `fine` sensors and navigation filtered the numbers are the same (tde_stc {}), "
             "with `tactical` {}.",
-            (Number({**ON_THRUSTERS, "sensors": "fine"}, ATTITUDE),
-             Number({**ON_THRUSTERS, "sensors": "tactical"}, ATTITUDE)),
+            (
+                Number({**ON_THRUSTERS, "sensors": "fine"}, ATTITUDE),
+                Number({**ON_THRUSTERS, "sensors": "tactical"}, ATTITUDE),
+            ),
         ),
         Sentence(
             "a low-pass of 10 Hz (`acceleration_filter_hz`) makes it {}, one of 2 Hz {}",
-            tuple(Number({"actuators": "thrusters", "gains": "robust",
-                          "parameters": {"controller": {"acceleration_filter_hz": corner}}},
-                         ATTITUDE) for corner in (10.0, 2.0)),
+            tuple(
+                Number(
+                    {
+                        "actuators": "thrusters",
+                        "gains": "robust",
+                        "parameters": {"controller": {"acceleration_filter_hz": corner}},
+                    },
+                    ATTITUDE,
+                )
+                for corner in (10.0, 2.0)
+            ),
         ),
         Sentence(
             "with the errors of ideal torque (tde_stc {}, ideal {})",
@@ -127,18 +170,22 @@ PAGE = Page(
         Sentence(
             "tde_stc {}, the joints as before; ctc and ctc_smc lose the joints, too ({} and {} "
             "rad)",
-            (Number({"actuators": "small_wheels", "controller": "tde_stc"}, ATTITUDE),
-             Number({"actuators": "small_wheels", "controller": "ctc"}, JOINTS_1_3),
-             Number({"actuators": "small_wheels", "controller": "ctc_smc"}, JOINTS_1_3)),
+            (
+                Number({"actuators": "small_wheels", "controller": "tde_stc"}, ATTITUDE),
+                Number({"actuators": "small_wheels", "controller": "ctc"}, JOINTS_1_3),
+                Number({"actuators": "small_wheels", "controller": "ctc_smc"}, JOINTS_1_3),
+            ),
         ),
         Sentence(
             "Joints 1 to 3 need {} N m instead of {} (RMS)",
-            (Number({"actuators": "none", "controller": "tde_stc"}, "rms.mean_axis.torque_1_3"),
-             Number({"controller": "tde_stc"}, "rms.mean_axis.torque_1_3")),
+            (
+                Number({"actuators": "none", "controller": "tde_stc"}, "rms.mean_axis.torque_1_3"),
+                Number({"controller": "tde_stc"}, "rms.mean_axis.torque_1_3"),
+            ),
         ),
         Sentence(
             "With the payload of case 4-2 the drift is {}°",
             (Number({"actuators": "none", "controller": "tde_stc", "case": "4-2"}, DRIFT, ".1f"),),
         ),
     ),
-)  # fmt: skip
+)

@@ -20,22 +20,31 @@ from flown_tables import Number, Options, Page, Sentence, Table, Text
 
 ACTUATORS = ("ideal", "wheels", "small_wheels", "wheels_and_thrusters", "thrusters", "none")
 SWEEP_HEAD = (
-    "actuators", "law", "attitude", "joints 1-3 (rad)", "joints 4-6 (rad)", "base ripple (N m)",
+    "actuators",
+    "law",
+    "attitude",
+    "joints 1-3 (rad)",
+    "joints 4-6 (rad)",
+    "base ripple (N m)",
     "ripple 4-6 (N m)",
-)  # fmt: skip
+)
 IDEAL: Options = {}
 STC_ON_SMALL_WHEELS: Options = {"actuators": "small_wheels", "controller": "tde_stc"}
 SLOW: Options = {
-    "actuators": "small_wheels", "parameters": {"mission": {"waypoint_times": [0.0, 50.0, 100.0]}},
-}  # fmt: skip
+    "actuators": "small_wheels",
+    "parameters": {"mission": {"waypoint_times": [0.0, 50.0, 100.0]}},
+}
 COMES_BACK: Options = {
-    "actuators": "small_wheels", "duration": 180.0,
-    "parameters": {"controller": {
-        "tde_stc.lambda": [*[0.1] * 3, *[1.0] * 6],
-        "tde_stc.k_1": [*[5e-3] * 3, 0.2, 0.2, 0.2, 0.4, 0.2, 0.2],
-        "tde_stc.k_2": [*[1e-5] * 3, 3e-3, 3e-3, 3e-3, 4e-3, 2e-3, 2e-3],
-    }},
-}  # fmt: skip
+    "actuators": "small_wheels",
+    "duration": 180.0,
+    "parameters": {
+        "controller": {
+            "tde_stc.lambda": [*[0.1] * 3, *[1.0] * 6],
+            "tde_stc.k_1": [*[5e-3] * 3, 0.2, 0.2, 0.2, 0.4, 0.2, 0.2],
+            "tde_stc.k_2": [*[1e-5] * 3, 3e-3, 3e-3, 3e-3, 4e-3, 2e-3, 2e-3],
+        }
+    },
+}
 ROBUST_THRUSTERS: Options = {"actuators": "thrusters", "gains": "robust", "controller": "tde_stc"}
 
 
@@ -60,31 +69,45 @@ def _after(law: str) -> list[str | Number]:
 
 
 PAGE = Page(
-    "base_actuators", "explanation/base_actuators.md",
+    "base_actuators",
+    "explanation/base_actuators.md",
     (
         Table(
             "asked",
-            ("case, robot", "peak torque x, y, z (N m)", "stored momentum x, y, z (N m s)",
-             "largest sum (N m s)"),
+            (
+                "case, robot",
+                "peak torque x, y, z (N m)",
+                "stored momentum x, y, z (N m s)",
+                "largest sum (N m s)",
+            ),
             [
-                _asked("1, `paper`", IDEAL), _asked("3, `paper`", {"case": "3"}),
+                _asked("1, `paper`", IDEAL),
+                _asked("3, `paper`", {"case": "3"}),
                 _asked("4-2, `paper`", {"case": "4-2"}),
                 _asked("1, `seven_joint`", {"robot": "seven_joint"}),
             ],
         ),
         Table(
-            "bases", SWEEP_HEAD,
-            [_swept(name, {"actuators": name, "controller": law})
-             for name in ACTUATORS for law in LAWS],
+            "bases",
+            SWEEP_HEAD,
+            [
+                _swept(name, {"actuators": name, "controller": law})
+                for name in ACTUATORS
+                for law in LAWS
+            ],
         ),
         Table(
-            "after", ("law, gains `default`", "30 s", "60 s", "90 s", "120 s"),
+            "after",
+            ("law, gains `default`", "30 s", "60 s", "90 s", "120 s"),
             [_after(law) for law in LAWS],
         ),
         Table(
-            "robust", SWEEP_HEAD,
-            [_swept("thrusters, `robust`", {**ROBUST_THRUSTERS, "controller": law})
-             for law in LAWS],
+            "robust",
+            SWEEP_HEAD,
+            [
+                _swept("thrusters, `robust`", {**ROBUST_THRUSTERS, "controller": law})
+                for law in LAWS
+            ],
         ),
         Sentence(
             "The mission asks {} N m of a base axis and {} N m s of momentum.",
@@ -97,13 +120,23 @@ PAGE = Page(
         ),
         Sentence(
             "`--set controller.allocation.least_speed=50` keeps them from it: {})",
-            (Number({"actuators": "wheels", "controller": "ctc_smc",
-                     "parameters": {"controller": {"allocation.least_speed": 50.0}}}, ATTITUDE),),
+            (
+                Number(
+                    {
+                        "actuators": "wheels",
+                        "controller": "ctc_smc",
+                        "parameters": {"controller": {"allocation.least_speed": 50.0}},
+                    },
+                    ATTITUDE,
+                ),
+            ),
         ),
         Sentence(
             "Under TDE-STC they are at their limit in {} % of the ticks, first after {} s.",
-            (Number(STC_ON_SMALL_WHEELS, "wheel_saturation.share", ".0f", 100.0),
-             Number(STC_ON_SMALL_WHEELS, first_at_limit, ".1f")),
+            (
+                Number(STC_ON_SMALL_WHEELS, "wheel_saturation.share", ".0f", 100.0),
+                Number(STC_ON_SMALL_WHEELS, first_at_limit, ".1f"),
+            ),
         ),
         Sentence(
             "the base turns by {}°, whichever law flies",
@@ -111,19 +144,26 @@ PAGE = Page(
         ),
         Sentence(
             "`--fault wheel_fail@10:3` on `wheels` costs TDE-STC {} at most",
-            (Number({"actuators": "wheels", "faults": ["wheel_fail@10:3"]},
-                    largest_attitude_error),),
+            (
+                Number(
+                    {"actuators": "wheels", "faults": ["wheel_fail@10:3"]}, largest_attitude_error
+                ),
+            ),
         ),
         Sentence(
             "comes back: {} at 30 s, {} at 60 s, {} at 90 s, {} at the end.",
-            tuple(Number(COMES_BACK, attitude_error_at(t), ".2g", 1e3)
-                  for t in (30.0, 60.0, 90.0, 180.0)),
+            tuple(
+                Number(COMES_BACK, attitude_error_at(t), ".2g", 1e3)
+                for t in (30.0, 60.0, 90.0, 180.0)
+            ),
         ),
         Sentence(
             "{} g of propellant, {} pulses, the robot is pushed by {} mm.",
-            (Number(ROBUST_THRUSTERS, propellant, ".0f", 1e3),
-             Number(ROBUST_THRUSTERS, pulses, ".0f"),
-             Number(ROBUST_THRUSTERS, "momentum.pushed_m.max", ".0f", 1e3)),
+            (
+                Number(ROBUST_THRUSTERS, propellant, ".0f", 1e3),
+                Number(ROBUST_THRUSTERS, pulses, ".0f"),
+                Number(ROBUST_THRUSTERS, "momentum.pushed_m.max", ".0f", 1e3),
+            ),
         ),
     ),
-)  # fmt: skip
+)

@@ -11,7 +11,7 @@ from space_robot.analysis.described import robot_of
 from space_robot.analysis.metrics import tracking_error
 from space_robot.analysis.sizing import ActuatorSet
 from space_robot.api.flown_flight import FlownFlight
-from space_robot_control.allocation.assumed_actuators import believed_actuators
+from space_robot_control.allocation.assumed_actuators import assumed_actuators
 
 ATTITUDE = "rms.mean_axis.attitude"
 JOINTS_1_3 = "rms.mean_axis.joints_1_3"
@@ -71,7 +71,7 @@ def asked_of_a_wheel(quantity: str) -> Callable[[FlownFlight], float]:
     """Return the most that the flight asks of one of the wheels of `wheels`."""
 
     def asked(flown: FlownFlight) -> float:
-        wheels = ActuatorSet("wheels", believed_actuators("wheels", robot_of(flown.log)))
+        wheels = ActuatorSet("wheels", assumed_actuators("wheels", robot_of(flown.log)))
         requirements = analyze(flown.log, wheels)["sizing"]["requirements"]
         of_wheels = [r for r in requirements if r["part"].startswith("wheel_")]
         return float(max(r["asked"] for r in of_wheels if r["quantity"] == quantity))

@@ -9,9 +9,12 @@ GRADES = ("fine", "tactical", "coarse")
 BASE, JOINTS = "ripple.rms.base_torque", "ripple.rms.torque_1_3"
 SMOOTH = {"controller": {"acceleration_filter_hz": 100.0}}
 DIVERGE = {
-    ("fine", "ctc"), ("tactical", "ctc"), ("coarse", "tde_smc"), ("coarse", "tde_tsmc"),
+    ("fine", "ctc"),
+    ("tactical", "ctc"),
+    ("coarse", "tde_smc"),
+    ("coarse", "tde_tsmc"),
     ("coarse", "tde_stc"),
-}  # fmt: skip
+}
 """Without the filter."""
 CORNERS_HZ = ((200.0, 300.0), (50.0, 75.0), (20.0, 30.0), (10.0, 15.0))
 
@@ -43,13 +46,13 @@ def _corners(rate_hz: float, joints_hz: float) -> list[str | Text]:
         "navigation_filter.joint_bandwidth_hz": joints_hz,
     }
     options: Options = {
-        "sensors": "fine", "navigation": "filtered", "duration": 10.0,
+        "sensors": "fine",
+        "navigation": "filtered",
+        "duration": 10.0,
         "parameters": {"controller": corners},
-    }  # fmt: skip
+    }
     laws = ("tde_stc", "tde_smc")
-    return [
-        f"{rate_hz:g}, {joints_hz:g}", *(_cell({**options, "controller": law}) for law in laws)
-    ]  # fmt: skip
+    return [f"{rate_hz:g}, {joints_hz:g}", *(_cell({**options, "controller": law}) for law in laws)]
 
 
 PAGE = Page(
@@ -57,12 +60,14 @@ PAGE = Page(
     "manual/navigation.md",
     (
         Table(
-            "grades", ("", "direct", "filtered", "filtered + 100 Hz"),
+            "grades",
+            ("", "direct", "filtered", "filtered + 100 Hz"),
             [_row(sensors, law) for sensors in GRADES for law in LAWS],
         ),
         Table(
-            "corners", ("rate, joints, Hz", "`fine`, tde_stc", "`fine`, tde_smc"),
+            "corners",
+            ("rate, joints, Hz", "`fine`, tde_stc", "`fine`, tde_smc"),
             [_corners(*corners) for corners in CORNERS_HZ],
         ),
     ),
-)  # fmt: skip
+)

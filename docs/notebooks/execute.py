@@ -24,9 +24,12 @@ def executed(path: Path) -> nbformat.NotebookNode:
         # The kernel is spoken to by sockets in the file system, not by the network.
         local = Config({"KernelManager": {"transport": "ipc", "ip": f"{sockets}/kernel"}})
         NotebookClient(
-            notebook, timeout=600, record_timing=False, config=local,
+            notebook,
+            timeout=600,
+            record_timing=False,
+            config=local,
             resources={"metadata": {"path": folder}},
-        ).execute()  # fmt: skip
+        ).execute()
     del notebook.metadata.language_info["version"]  # whatever it is, the output is the same
     return notebook
 

@@ -7,10 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from space_robot_model.elementary.matrices import (
-    norm,
-    product,
-)
+from space_robot_model.elementary.matrices import norm, product
 from space_robot_model.hardware.wheels import WheelSettings
 from space_robot_model.robot.base_axes import base_axes
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -30,15 +27,21 @@ def state_before(exchange: CaptureEvent, row: FlightLog, wheels: WheelSettings) 
     axes = base_axes(quaternion[:, np.newaxis])[:, :, 0]
     impact = exchange.impact(
         quaternion, row.all_positions[0], wheels.unit_axes, wheels.values("rotor_inertia")
-    )  # fmt: skip
-    after = np.concatenate([
-        row.base_velocity[0], product(row.omega_base[0], axes), row.all_velocities[0],
-        row.wheel_velocities[0],
-    ])  # fmt: skip
+    )
+    after = np.concatenate(
+        [
+            row.base_velocity[0],
+            product(row.omega_base[0], axes),
+            row.all_velocities[0],
+            row.wheel_velocities[0],
+        ]
+    )
     before = exchange.velocity_before(impact, after)
     columns: dict[str, Any] = {
-        "base_velocity": before[:3], "omega_base": product(axes, before[3:6]),
-        "joint_velocities": before[6 : 6 + n], "passive_velocities": before[6 + n : 6 + n + p],
+        "base_velocity": before[:3],
+        "omega_base": product(axes, before[3:6]),
+        "joint_velocities": before[6 : 6 + n],
+        "passive_velocities": before[6 + n : 6 + n + p],
         "wheel_velocities": before[6 + n + p :],
-    }  # fmt: skip
+    }
     return replace(row, **{name: values[np.newaxis] for name, values in columns.items()})

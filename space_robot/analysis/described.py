@@ -15,11 +15,7 @@ from numpy.typing import NDArray
 
 from space_robot_control.controller.gains import build_law
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.laws.trust import (
-    check_file,
-    check_law,
-    is_plain,
-)
+from space_robot_control.laws.trust import check_file, check_law, is_plain
 from space_robot_control.navigation.low_pass import low_pass_weight
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot

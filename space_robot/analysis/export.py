@@ -12,11 +12,7 @@ import numpy as np
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
-from ..console.files import (
-    csv_rows,
-    csv_writer,
-    whole_file,
-)
+from ..console.files import csv_rows, csv_writer, whole_file
 from .columns import batches, column_names, metadata
 
 if TYPE_CHECKING:

@@ -24,16 +24,19 @@ Table = dict[str, dict[str, float]]
 AxisIndex = slice | list[int]
 """Some of the n+3 axes, as an index."""
 UNITS = {
-    "attitude": "-", "joints_prismatic": "m", "joints": "rad", "base_torque": "N m",
-    "torque": "N m", "force": "N",
-}  # fmt: skip
+    "attitude": "-",
+    "joints_prismatic": "m",
+    "joints": "rad",
+    "base_torque": "N m",
+    "torque": "N m",
+    "force": "N",
+}
 """By the beginning of a column's name; the first that fits holds."""
 
 
 def axis_groups(
-    n: int, controls_base: bool = True, prismatic: Sequence[bool] = (),
-    branches: Sequence[int] = (),
-) -> dict[str, AxisIndex]:  # fmt: skip
+    n: int, controls_base: bool = True, prismatic: Sequence[bool] = (), branches: Sequence[int] = ()
+) -> dict[str, AxisIndex]:
     """Divide the n+3 axes into the base and groups of joints, by their keys' suffix.
 
     Those of one arm are inner (1 to 3) and outer joints; where there are several ``branches`` on
@@ -61,18 +64,22 @@ def axis_groups(
 
 
 def error_columns(
-    axes: int, controls_base: bool = True, prismatic: Sequence[bool] = (),
+    axes: int,
+    controls_base: bool = True,
+    prismatic: Sequence[bool] = (),
     branches: Sequence[int] = (),
-) -> dict[str, AxisIndex]:  # fmt: skip
+) -> dict[str, AxisIndex]:
     """Return which of the m = n+3 axes each error column of Table V is of."""
     groups = axis_groups(axes - 3, controls_base, prismatic, branches)
     return {"attitude" if k == "base" else f"joints_{k}": found for k, found in groups.items()}
 
 
 def torque_columns(
-    axes: int, controls_base: bool = True, prismatic: Sequence[bool] = (),
+    axes: int,
+    controls_base: bool = True,
+    prismatic: Sequence[bool] = (),
     branches: Sequence[int] = (),
-) -> dict[str, AxisIndex]:  # fmt: skip
+) -> dict[str, AxisIndex]:
     """Return which of the m = n+3 axes each torque column of Table V is of."""
     groups = axis_groups(axes - 3, controls_base, prismatic, branches)
     names = {"base": "base_torque", "prismatic": "force_prismatic"}
@@ -172,9 +179,12 @@ class Rms(Metric):
     """The RMS of errors and torques, by definition and column of Table V."""
 
     def __init__(
-        self, axes: int, controls_base: bool = True, prismatic: Sequence[bool] = (),
+        self,
+        axes: int,
+        controls_base: bool = True,
+        prismatic: Sequence[bool] = (),
         branches: Sequence[int] = (),
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._error, self._torque = AxisRms(axes), AxisRms(axes)
         self._kinds = controls_base, prismatic, branches
 
@@ -196,9 +206,12 @@ class Maxima(Metric):
     """Largest |error| and |torque| on any axis, by column of Table V."""
 
     def __init__(
-        self, axes: int, controls_base: bool = True, prismatic: Sequence[bool] = (),
+        self,
+        axes: int,
+        controls_base: bool = True,
+        prismatic: Sequence[bool] = (),
         branches: Sequence[int] = (),
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._error, self._torque = AxisMaximum(axes), AxisMaximum(axes)
         self._kinds = controls_base, prismatic, branches
 
@@ -216,9 +229,13 @@ class Chatter(Metric):
     """Measures how rough the applied torques are, by measure and column of Table V."""
 
     def __init__(
-        self, axes: int, period: float, controls_base: bool = True,
-        prismatic: Sequence[bool] = (), branches: Sequence[int] = (),
-    ) -> None:  # fmt: skip
+        self,
+        axes: int,
+        period: float,
+        controls_base: bool = True,
+        prismatic: Sequence[bool] = (),
+        branches: Sequence[int] = (),
+    ) -> None:
         self._period = period
         self._columns = torque_columns(axes, controls_base, prismatic, branches)
         self._variation, self._power = TotalVariation(axes), PowerAbove(axes, period)

@@ -18,14 +18,8 @@ from space_robot_model.elementary.matrices import product
 from space_robot_model.elementary.sine import sines_cosines
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
-from space_robot_model.robot.base_axes import (
-    cross,
-    to_inertial,
-)
-from space_robot_model.robot.momentum import (
-    Motion,
-    robot_momentum,
-)
+from space_robot_model.robot.base_axes import cross, to_inertial
+from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_msgs_py.bag.blocks import Metric, joined, last_rows
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_sim.environment.captures import Captures
@@ -109,9 +103,12 @@ class _OfOneRobot:
     """Follows the momentum of a robot that holds the same all the time."""
 
     def __init__(
-        self, robot: Robot, flown: BaseActuatorSettings, disturbance: DisturbanceSettings,
+        self,
+        robot: Robot,
+        flown: BaseActuatorSettings,
+        disturbance: DisturbanceSettings,
         outside: Array,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """``outside``: (3,) N m s that have come from outside at the first row."""
         self._robot, self._flown, self._disturbance = robot, flown, disturbance
         self._before: FlightLog | None = None
@@ -123,17 +120,22 @@ class _OfOneRobot:
         axes, skipped = axes_of(rows), rows.ticks - log.ticks
         motion = Motion(
             rows.quaternion / np.linalg.norm(rows.quaternion, axis=1, keepdims=True),
-            rows.omega_base, rows.all_positions, rows.all_velocities,
-        )  # fmt: skip
+            rows.omega_base,
+            rows.all_positions,
+            rows.all_velocities,
+        )
         found = robot_momentum(self._robot, motion)
         wheels = self._flown.wheels
         spin = product(wheels.spin_momenta(rows.wheel_velocities), wheels.unit_axes)
         outside = self._from_outside(rows, axes, found.centre_of_mass)
         self._before, self._outside = last_rows(log, 1), outside[-1].copy()
         whole = Momentum(
-            found.angular, found.base, to_inertial(axes, spin.T).T, outside,
+            found.angular,
+            found.base,
+            to_inertial(axes, spin.T).T,
+            outside,
             rows.base_position + found.centre_of_mass,
-        )  # fmt: skip
+        )
         return Momentum(*(values[skipped:] for values in whole))
 
     def _from_outside(self, rows: FlightLog, axes: Array, centre_of_mass: Array) -> Array:
@@ -148,9 +150,10 @@ class _OfOneRobot:
             each = [  # turned as the base is before and after the interval
                 _torque(side, centre, force[1:], torque[1:])
                 for side, centre in (
-                    (axes[:, :, :-1], centre_of_mass[:-1]), (axes[:, :, 1:], centre_of_mass[1:])
+                    (axes[:, :, :-1], centre_of_mass[:-1]),
+                    (axes[:, :, 1:], centre_of_mass[1:]),
                 )
-            ]  # fmt: skip
+            ]
             impulse[1:] = 0.5 * period * np.cumsum(each[0] + each[1], axis=0)
         wave = disturbance_impulse(self._disturbance, time)
         outside: Array = self._outside + impulse + (wave - wave[0])[:, np.newaxis]

@@ -6,11 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..console.tables import (
-    Column,
-    JudgedCell,
-    Table,
-)
+from ..console.tables import Column, JudgedCell, Table
 from .report_tables import comparison_table
 from .sizing_table import sizing_table
 from .template import template
@@ -44,13 +40,15 @@ def _recorded(reports: Mapping[str, Report]) -> Table:
     names = ("bag", "law", "case", "gains", "robot", "time analysed", "ticks", "recording")
     rows = [
         [
-            name, law_of(report) or "not said",
+            name,
+            law_of(report) or "not said",
             *(report[key] or "not said" for key in ("case", "gains", "robot")),
-            f"{report['from_s']:g} to {report['to_s']:g} s", report["ticks"],
+            f"{report['from_s']:g} to {report['to_s']:g} s",
+            report["ticks"],
             JudgedCell("", *(("whole", "good") if _whole(report) else ("not whole", "bad"))),
         ]
         for name, report in reports.items()
-    ]  # fmt: skip
+    ]
     return Table.of("", [Column(name) for name in names], rows)
 
 

@@ -7,12 +7,7 @@ from functools import partial
 from itertools import groupby
 from typing import Any, NamedTuple
 
-from ..console.tables import (
-    NONE,
-    Column,
-    Group,
-    Table,
-)
+from ..console.tables import NONE, Column, Group, Table
 from .described import IDEAL
 from .metrics import unit_of
 from .pointing import ARCSEC
@@ -84,11 +79,14 @@ def rms_table(report: Report) -> Table:
         title += f"\n{seen_through(report)}"
     navigation = report["navigation_error"]
     columns = (
-        Column(is_label=True), Column("unit"), Column("RMS, mean\nof axes"),
+        Column(is_label=True),
+        Column("unit"),
+        Column("RMS, mean\nof axes"),
         Column("naviga-\ntion RMS" if navigation else "RMS, eq.\n(64)"),
-        Column("variation\nper s", spec=".3g"), Column("power >\n100 Hz", spec=".2e"),
+        Column("variation\nper s", spec=".3g"),
+        Column("power >\n100 Hz", spec=".2e"),
         Column("ripple", spec=".2e"),
-    )  # fmt: skip
+    )
     beside = report["rms"]["eq64"]
     if navigation:
         beside = dict.fromkeys(beside, "") | navigation["rms"]
@@ -172,18 +170,25 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
         found += each(group, ("pointing", key), "m", label=_upper)
     found += each("momentum", ("momentum", "peak_n_m_s"), "N m s", label="{} at most".format)
     found += each(
-        "momentum", ("momentum", "drift"), lambda key: "N m s" if key == "n_m_s" else "",
-        text=_drift, label=lambda key: "drift" if key == "n_m_s" else "drift, relative",
-    )  # fmt: skip
+        "momentum",
+        ("momentum", "drift"),
+        lambda key: "N m s" if key == "n_m_s" else "",
+        text=_drift,
+        label=lambda key: "drift" if key == "n_m_s" else "drift, relative",
+    )
     found += each("pushed by thrusters", ("momentum", "pushed_m"), "m")
     if not brief:
         for key, name, unit in (
-            ("peak_torque_n_m", "torque", "N m"), ("peak_momentum_n_m_s", "momentum", "N m s"),
-        ):  # fmt: skip
+            ("peak_torque_n_m", "torque", "N m"),
+            ("peak_momentum_n_m_s", "momentum", "N m s"),
+        ):
             found += each(
-                "asked of the base", ("sizing", "axes"), unit, text=partial(_of_axis, key=key),
+                "asked of the base",
+                ("sizing", "axes"),
+                unit,
+                text=partial(_of_axis, key=key),
                 label=partial(_named, name=name),
-            )  # fmt: skip
+            )
     return [
         *found,
         one("recording", "messages lost", "", lambda r: str(sum(r["lost"].values()))),
@@ -219,12 +224,14 @@ def _each_key(
     below = [_at(report, path) for report in reports]
     return [
         Line(
-            group, label(key), unit if isinstance(unit, str) else unit(key),
+            group,
+            label(key),
+            unit if isinstance(unit, str) else unit(key),
             [write(values[key]) if key in values else NONE for values in below],
         )
         for key in dict.fromkeys(key for values in below for key in values)
         for write in [text_of(key) if text_of else text]
-    ]  # fmt: skip
+    ]
 
 
 def _at(report: Report, path: tuple[str, ...]) -> dict[str, Any]:

@@ -6,13 +6,7 @@ from collections.abc import Iterator
 from itertools import groupby
 from typing import Any
 
-from ..console.tables import (
-    Column,
-    Group,
-    JudgedCell,
-    Row,
-    Table,
-)
+from ..console.tables import Column, Group, JudgedCell, Row, Table
 from .words import Report
 
 BY_AXIS = (
@@ -34,17 +28,20 @@ def sizing_table(report: Report) -> Table | None:
     requirements = found["requirements"]
     parts = groupby(requirements, key=lambda requirement: requirement["part"])
     judged = {(r["part"], r["quantity"]): r for r in requirements}
-    groups = [Group(list(_of_axis(name, axis, judged)), name)
-              for name, axis in found["axes"].items()]  # fmt: skip
+    groups = [
+        Group(list(_of_axis(name, axis, judged)), name) for name, axis in found["axes"].items()
+    ]
     groups += [
         Group([_row(r["quantity"], r["unit"], r["asked"], r) for r in each], part)
         for part, each in parts
         if part not in found["axes"]
     ]
     columns = (
-        Column(is_label=True), Column("unit", is_label=True), Column("asked", spec=".4g"),
+        Column(is_label=True),
+        Column("unit", is_label=True),
+        Column("asked", spec=".4g"),
         *((Column("has"), Column("margin")) if requirements else ()),
-    )  # fmt: skip
+    )
     rows = [Group([row[: len(columns)] for row in g.rows], g.name) for g in groups]
     return Table(_title(found), columns, rows, _notes(report))
 

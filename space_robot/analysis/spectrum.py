@@ -73,9 +73,12 @@ class PowerAbove:
     """
 
     def __init__(
-        self, axes: int, period: float, frequency: float = CHATTER_FREQUENCY,
+        self,
+        axes: int,
+        period: float,
+        frequency: float = CHATTER_FREQUENCY,
         segment: int = BLOCK_TICKS,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Begin without rows.
 
         Args:

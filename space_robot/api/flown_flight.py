@@ -32,9 +32,13 @@ class FlownFlight:
     """What came of a `Scenario.fly`, to its end or not."""
 
     def __init__(
-        self, flight: Flight, ending: Ending, bag: Path | None, log: FlightLog | None,
+        self,
+        flight: Flight,
+        ending: Ending,
+        bag: Path | None,
+        log: FlightLog | None,
         metrics: dict[str, Any] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Take what was to be flown, how that ended, where it was recorded, and what was flown.
 
         Args:

@@ -141,19 +141,23 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
         eps = side * reference.quaternion[1:] - state.quaternion[1:]
         return (
             np.concatenate((eps, reference.joint_positions - state.joint_positions)),
-            np.concatenate((
-                reference.omega_base - state.omega_base,
-                reference.joint_velocities - state.joint_velocities,
-            )),
-        )  # fmt: skip
+            np.concatenate(
+                (
+                    reference.omega_base - state.omega_base,
+                    reference.joint_velocities - state.joint_velocities,
+                )
+            ),
+        )
 
     def _cost(self, action: Array) -> float:
         """Return the cost a second of the true state; NaN if that is none."""
         error, rate = self._errors(self.bench.truth)
         return float(
-            4.0 * error[:3] @ error[:3] + error[3:] @ error[3:] + RATE_WEIGHT * rate @ rate
+            4.0 * error[:3] @ error[:3]
+            + error[3:] @ error[3:]
+            + RATE_WEIGHT * rate @ rate
             + ACTION_WEIGHT * action @ action
-        )  # fmt: skip
+        )
 
     def _info(self) -> dict[str, Any]:
         bench = self.bench

@@ -9,9 +9,17 @@ from ..flight.ending import DIVERGED, Ending
 from ..flight.plan import Flight
 
 FLOWN = (
-    "controller", "case", "gains", "robot", "mission", "sensors", "period", "swaps", "faults",
+    "controller",
+    "case",
+    "gains",
+    "robot",
+    "mission",
+    "sensors",
+    "period",
+    "swaps",
+    "faults",
     "events",
-)  # fmt: skip
+)
 
 
 def flight_report(

@@ -14,10 +14,7 @@ from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.payload import with_payload
 
-from ..console.files import (
-    make_folder,
-    whole_file,
-)
+from ..console.files import make_folder, whole_file
 from ..flight.plan import FlightPlan
 from ..scenario.node_settings import FlightSettings
 from ..scenario.robots import Robots

@@ -79,15 +79,12 @@ def analyze(
       space-robot analyze flights/one --parquet one.parquet
       space-robot analyze theirs --remap /arm/joint_states:=/joint_states
       space-robot analyze both --namespace /sat1
-    """  # fmt: skip
+    """
     from space_robot_msgs_py.bag.reader import read_flight
 
     from ..analysis import analyze, excerpt
     from ..analysis.export import check_parquet, write_csv, write_parquet
-    from ..console.files import (
-        check_free,
-        write_text,
-    )
+    from ..console.files import check_free, write_text
 
     if parquet:
         check_parquet()
@@ -142,19 +139,16 @@ def _set(log: FlightLog, name: str | None) -> ActuatorSet | None:
     """
     if name is None:
         return None
-    from space_robot_control.allocation.assumed_actuators import believed_actuators
+    from space_robot_control.allocation.assumed_actuators import assumed_actuators
 
     from ..analysis.described import robot_of
     from ..analysis.sizing import ActuatorSet
 
-    return ActuatorSet(name, believed_actuators(name, robot_of(log)))
+    return ActuatorSet(name, assumed_actuators(name, robot_of(log)))
 
 
 def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
-    from ..console.terminal import (
-        echo_json,
-        terminal,
-    )
+    from ..console.terminal import echo_json, terminal
 
     if as_json:
         found = list(reports.values())

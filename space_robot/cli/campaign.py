@@ -33,25 +33,32 @@ campaign.add_command(report)
 @campaign.command()
 @click.argument("file")
 @click.option(
-    "--runs", type=click.IntRange(1), metavar="N",
+    "--runs",
+    type=click.IntRange(1),
+    metavar="N",
     help="Draws of all that is varied, each flown by every law [default: the file's].",
-)  # fmt: skip
+)
 @click.option(
     "--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of all draws."
 )
 @folder_option("--out", help="Folder of the campaign; one that was begun is gone on with.")
 @click.option(
-    "--workers", type=click.IntRange(0, 1024),
+    "--workers",
+    type=click.IntRange(0, 1024),
     help="Processes that fly; 0: this one alone [default: one a core].",
-)  # fmt: skip
+)
 @click.option(
-    "--scheduler", metavar="ADDRESS",
+    "--scheduler",
+    metavar="ADDRESS",
     help="Hand the flights to a Dask cluster, as tcp://host:8786, instead of processes here.",
-)  # fmt: skip
+)
 @click.option(
-    "--timeout", "timeout_s", type=FiniteRange(0.0, min_open=True), metavar="S",
+    "--timeout",
+    "timeout_s",
+    type=FiniteRange(0.0, min_open=True),
+    metavar="S",
     help="Longest wall-clock time of a flight; its row says out_of_time then [default: any].",
-)  # fmt: skip
+)
 @click.option("--json", "as_json", is_flag=True, help="Print outcomes and verdicts as JSON.")
 def run(
     file: str,
@@ -79,10 +86,7 @@ def run(
 
     from ..campaign.flown import Campaign
     from ..console.progress import rated_progress
-    from ..console.terminal import (
-        echo_json,
-        terminal,
-    )
+    from ..console.terminal import echo_json, terminal
     from .campaign_display import as_record, print_summary
 
     if out is None:
@@ -100,9 +104,15 @@ def run(
                 show(progress.done, progress.total, failed)
 
             flown = Campaign.load(file).run(
-                runs, seed, out, workers, scheduler, timeout_s, progress=told,
+                runs,
+                seed,
+                out,
+                workers,
+                scheduler,
+                timeout_s,
+                progress=told,
                 warn=lambda text: click.echo(text, err=True),
-            )  # fmt: skip
+            )
     except KeyboardInterrupt:
         if latest:
             done = f"{latest[0].done} of {latest[0].total} flights are kept in {out}"
@@ -122,9 +132,10 @@ def run(
 @click.option("--law", metavar="LAW", help="As the campaign's file has it [default: its first].")
 @click.option("--bag", type=click.Path(path_type=Path), help="Folder of the bag to write.")
 @click.option(
-    "--trust", is_flag=True,
+    "--trust",
+    is_flag=True,
     help="Import the module:Class and read the files that the campaign names: runs its code.",
-)  # fmt: skip
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
 def rerun(
     folder: Path, run: int, law: str | None, bag: Path | None, trust: bool, as_json: bool

@@ -15,10 +15,7 @@ from ..campaign.report.subject import subject_of
 from ..campaign.report.verdict_tables import TONES, command
 from ..campaign.verdicts.quantiles import quantile
 from ..campaign.verdicts.values import ended, is_known, laws_of, measured, of_law
-from ..console.tables import (
-    Column,
-    Table,
-)
+from ..console.tables import Column, Table
 from ..console.tables import JudgedCell as Judged
 from ..console.terminal import say
 from ..console.terminal_tables import print_table
@@ -34,13 +31,17 @@ def as_record(flown: FlownCampaign) -> dict[str, Any]:
     """Return what there is to say of a campaign, ready for JSON."""
     table = flown.table
     return {
-        "folder": str(flown.folder), "seed": flown.seed, "flights": len(table),
-        "runs": int(table["run"].nunique()), "runs_asked": flown.runs, "kept": flown.kept,
+        "folder": str(flown.folder),
+        "seed": flown.seed,
+        "flights": len(table),
+        "runs": int(table["run"].nunique()),
+        "runs_asked": flown.runs,
+        "kept": flown.kept,
         "outcomes": {
             law: of_law(table, law)["outcome"].value_counts().to_dict() for law in laws_of(table)
         },
         "verdicts": [asdict(verdict) for verdict in flown.verdicts],
-    }  # fmt: skip
+    }
 
 
 def print_summary(flown: FlownCampaign, console: Console) -> None:
@@ -53,20 +54,25 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
             Table.of(
                 "Requirements",
                 (
-                    Column("requirement", is_label=True), Column("law", is_label=True),
-                    Column("met in"), Column("at least", spec=".4f"), Column("verdict"),
+                    Column("requirement", is_label=True),
+                    Column("law", is_label=True),
+                    Column("met in"),
+                    Column("at least", spec=".4f"),
+                    Column("verdict"),
                 ),
                 [
                     [
                         f"{v.requirement}, {v.point}" if v.point else v.requirement,
-                        names[v.law], f"{v.met} of {v.runs}", v.limits.low,
+                        names[v.law],
+                        f"{v.met} of {v.runs}",
+                        v.limits.low,
                         Judged("", v.word, TONES[v.word]),
                     ]
                     for v in found
                 ],
             ),
             console,
-        )  # fmt: skip
+        )
     say(console, shlex.join(["space-robot", "campaign", "report", str(flown.folder)]))
     # where no flight has a number all failed, and the first is as bad as any
     driven = findings.driven

@@ -14,14 +14,19 @@ from .options import file_option
 @file_option("--html", help="One page with all tables and figures, to send to a colleague.")
 @file_option("--markdown", help="The tables as Markdown, and beside it a figure, as PNG and SVG.")
 @click.option(
-    "--metric", "metrics", multiple=True, metavar="NAME",
+    "--metric",
+    "metrics",
+    multiple=True,
+    metavar="NAME",
     help="Compare the laws by this metric, as attitude_max; repeatable [default: RMS errors, "
     "the base's ripple, and what is required].",
-)  # fmt: skip
+)
 @click.option(
-    "--study", type=click.Path(path_type=Path), metavar="FILE",
+    "--study",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
     help="Judge by the requirements of this campaign's file [default: those that were flown].",
-)  # fmt: skip
+)
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
 def report(
     folder: Path,
@@ -42,21 +47,15 @@ def report(
       space-robot campaign report campaigns/a --html a.html
       space-robot campaign report campaigns/a --metric attitude_max --json
       space-robot campaign report campaigns/a --study stricter.yaml
-    """  # fmt: skip
+    """
     from ..analysis.figures.style import save_figure
     from ..campaign.flown import FlownCampaign
     from ..campaign.report import console, page, record, subject
     from ..campaign.report.figures import summary_figure
     from ..campaign.report.findings import Findings
     from ..campaign.study import read_study
-    from ..console.files import (
-        check_free,
-        write_text,
-    )
-    from ..console.terminal import (
-        echo_json,
-        terminal,
-    )
+    from ..console.files import check_free, write_text
+    from ..console.terminal import echo_json, terminal
 
     for path in (html, markdown):
         if path:

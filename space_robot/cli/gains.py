@@ -21,9 +21,11 @@ def gains() -> None:
 
 @gains.command()
 @click.option(
-    "--controller", default="all", show_default=True,
+    "--controller",
+    default="all",
+    show_default=True,
     help="A law's name, or file.py:Class of your own; all: every law that the gain set has.",
-)  # fmt: skip
+)
 @flight_options(
     "case", "gains", "robot", "mission", "sensors", "actuators", "navigation", "seed", "set", "json"
 )
@@ -47,10 +49,7 @@ def check(as_json: bool, **options: Any) -> None:
     """
     from space_robot_msgs_py.errors import SpaceRobotError
 
-    from ..console.terminal import (
-        echo_json,
-        terminal,
-    )
+    from ..console.terminal import echo_json, terminal
     from .gains_checked import checked, report_of
     from .gains_display import print_checks
 
@@ -67,29 +66,49 @@ def check(as_json: bool, **options: Any) -> None:
 @gains.command()
 @flight_options("robot", "mission", "sensors", "navigation", "set")
 @click.option(
-    "--case", "cases", multiple=True, default=["1"], show_default=True, metavar="CASE",
+    "--case",
+    "cases",
+    multiple=True,
+    default=["1"],
+    show_default=True,
+    metavar="CASE",
     help="A case that is to be flown, with its payload; may be repeated.",
-)  # fmt: skip
+)
 @click.option(
-    "--margin", type=FiniteRange(0.0, 0.5, min_open=True), default=0.05, show_default=True,
+    "--margin",
+    type=FiniteRange(0.0, 0.5, min_open=True),
+    default=0.05,
+    show_default=True,
     help="Share by which the torque reported may exceed the one commanded.",
-)  # fmt: skip
+)
 @click.option(
-    "--mass-uncertainty", type=FiniteRange(0.0, 0.9), default=0.2, show_default=True,
+    "--mass-uncertainty",
+    type=FiniteRange(0.0, 0.9),
+    default=0.2,
+    show_default=True,
     help="Share by which each mass and inertia may be wrong.",
-)  # fmt: skip
+)
 @click.option(
-    "--bandwidth", type=FiniteRange(0.0, 1e4, min_open=True), metavar="W",
+    "--bandwidth",
+    type=FiniteRange(0.0, 1e4, min_open=True),
+    metavar="W",
     help="Poles of all laws, rad/s [default: what lag and ripple allow].",
-)  # fmt: skip
+)
 @click.option(
-    "--ripple", type=FiniteRange(0.0, 10.0, min_open=True), default=0.1, show_default=True,
+    "--ripple",
+    type=FiniteRange(0.0, 10.0, min_open=True),
+    default=0.1,
+    show_default=True,
     help="Noise allowed on a torque, RMS, as a share of the largest that the mission asks.",
-)  # fmt: skip
+)
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path, file_okay=False), required=True,
-    metavar="DIR", help="Folder of the set, for --gains.",
-)  # fmt: skip
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path, file_okay=False),
+    required=True,
+    metavar="DIR",
+    help="Folder of the set, for --gains.",
+)
 @click.pass_context
 def tune(context: click.Context, /, output: Path, **options: Any) -> None:
     """Make a gain set for all five laws, by a method without search or luck.

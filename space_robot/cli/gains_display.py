@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from rich.console import Console
 
-from ..console.tables import (
-    Column,
-    JudgedCell,
-    Table,
-)
+from ..console.tables import Column, JudgedCell, Table
 from ..console.terminal import say
 from ..console.terminal_tables import print_table
 from ..tuning.spectrum import LEAST_MARGIN
@@ -32,19 +28,28 @@ def print_checks(found: Checked, console: Console) -> None:
 
 def _margins(found: Checked) -> Table:
     columns = [
-        Column("", is_label=True), Column("smallest", spec=".4f"), Column("largest", spec=".4f"),
-        Column("radius"), Column("margin"),
-    ]  # fmt: skip
+        Column("", is_label=True),
+        Column("smallest", spec=".4f"),
+        Column("largest", spec=".4f"),
+        Column("radius"),
+        Column("margin"),
+    ]
     rows = []
     for check in found.checks:
         if spectrum := check.spectrum:
             small = "good" if spectrum.is_sound else "bad"
             word = "sound" if spectrum.margin >= LEAST_MARGIN else "small"
-            rows.append([
-                check.law, spectrum.smallest, spectrum.largest,
-                JudgedCell(f"{spectrum.radius:.4f} < 1", *_holds(spectrum.contracts)),
-                JudgedCell(f"{spectrum.margin:.2%}", word if spectrum.contracts else "none", small),
-            ])  # fmt: skip
+            rows.append(
+                [
+                    check.law,
+                    spectrum.smallest,
+                    spectrum.largest,
+                    JudgedCell(f"{spectrum.radius:.4f} < 1", *_holds(spectrum.contracts)),
+                    JudgedCell(
+                        f"{spectrum.margin:.2%}", word if spectrum.contracts else "none", small
+                    ),
+                ]
+            )
     inertia = "H_S" if found.flight.controls_base else "H_f"
     table = Table.of(f"Eigenvalues of {inertia}^-1 h_bar along the mission", columns, rows)
     note = (
@@ -60,8 +65,9 @@ def _holds(value: bool) -> tuple[str, str]:
 
 def _noise_gains(found: Checked) -> Table:
     columns = [
-        Column("", is_label=True), *(Column(check.law, spec=".3g") for check in found.checks)
-    ]  # fmt: skip
+        Column("", is_label=True),
+        *(Column(check.law, spec=".3g") for check in found.checks),
+    ]
     names = _axes(found, "N s/m")
     rows = [
         [name, *(float(check.noise_gain[axis]) for check in found.checks)]

@@ -14,18 +14,9 @@ from space_robot_msgs_py.config.text import printable
 from space_robot_msgs_py.errors import SpaceRobotError
 from space_robot_msgs_py.ros.lifeline import hold_to_standard_input
 
-from ..console.streams import (
-    is_of_output,
-    standard_streams,
-)
-from ..processes.interruption import (
-    Interrupted,
-    raising_signals,
-)
-from ..processes.node_modules import (
-    MODULES,
-    SUFFIX,
-)
+from ..console.streams import is_of_output, standard_streams
+from ..processes.interruption import Interrupted, raising_signals
+from ..processes.node_modules import MODULES, SUFFIX
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})

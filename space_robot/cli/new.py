@@ -13,9 +13,11 @@ from .options import BASE, REPAIR, flight_options
 @click.command()
 @click.argument("robot")
 @click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
+    "--out",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
     help="Folder to make [default: the file's name, here].",
-)  # fmt: skip
+)
 @BASE
 @REPAIR
 @click.option("--force", is_flag=True, help="Replace an older folder of this command.")
@@ -35,18 +37,12 @@ def new(
       space-robot new my.urdf --base satellite --repair --out my_robot
       space-robot fly --robot my_robot --controller ctc
     """
-    from space_robot_model.robot.find import (
-        robot_as_path,
-        robot_files,
-    )
+    from space_robot_model.robot.find import robot_as_path, robot_files
     from space_robot_msgs_py.errors import SpaceRobotError
 
     from ..campaign.new_robot import check_replaceable, make_robot, robot_texts
     from ..campaign.new_robot.display import rms_table
-    from ..console.terminal import (
-        echo_json,
-        terminal,
-    )
+    from ..console.terminal import echo_json, terminal
     from ..console.terminal_tables import print_table
     from ..flight.compilation import compile_kernels
 

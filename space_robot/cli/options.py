@@ -146,19 +146,24 @@ def file_option(*names: str, help: str) -> Decorator:
 
 
 REMAP = click.option(
-    "--remap", multiple=True, callback=_remap, metavar="THEIRS:=OURS",
+    "--remap",
+    multiple=True,
+    callback=_remap,
+    metavar="THEIRS:=OURS",
     help="Take their topic for ours, as /arm/states:=/joint_states; may be repeated.",
-)  # fmt: skip
+)
 
 NAMESPACE = click.option(
-    "--namespace", metavar="NS",
+    "--namespace",
+    metavar="NS",
     help="Of the robot, as /sat1, where a bag has several [default: the only one].",
-)  # fmt: skip
+)
 
 TRUST = click.option(
-    "--trust", is_flag=True,
+    "--trust",
+    is_flag=True,
     help="Import the law and read the files that the bag names: runs the bag's code.",
-)  # fmt: skip
+)
 
 
 def _list_faults(
@@ -191,10 +196,12 @@ def _robot_options(function: Any) -> Any:
 
 
 ROBOT = click.option(
-    "--robot", default="paper", show_default=True,
+    "--robot",
+    default="paper",
+    show_default=True,
     help="paper, seven_joint, dual_arm, flexible_panels, boom, ets_vii, or a path to a robot's "
     "YAML, URDF or folder.",
-)  # fmt: skip
+)
 BASE = click.option("--base", metavar="LINK", help="The satellite, of a URDF [default: its root].")
 REPAIR = click.option(
     "--repair", is_flag=True, help="Repair the defects of a URDF that can be; each is told."
@@ -202,89 +209,153 @@ REPAIR = click.option(
 
 OPTIONS: dict[str, Decorator] = {
     "controller": click.option(
-        "--controller", default="tde_stc", show_default=True,
-        help="ctc, ctc_smc, tde_smc, tde_tsmc, tde_stc, or file.py:Class of your own."),
+        "--controller",
+        default="tde_stc",
+        show_default=True,
+        help="ctc, ctc_smc, tde_smc, tde_tsmc, tde_stc, or file.py:Class of your own.",
+    ),
     "case": click.option(
-        "--case", default="1", show_default=True,
-        help="1, 2, 3, 4-1, 4-2, or a path to a case's YAML."),
+        "--case",
+        default="1",
+        show_default=True,
+        help="1, 2, 3, 4-1, 4-2, or a path to a case's YAML.",
+    ),
     "sensors": click.option(
-        "--sensors", default="ideal", show_default=True,
-        help="ideal, fine, tactical, coarse, white_l1, white_l2, or a path to a YAML file."),
+        "--sensors",
+        default="ideal",
+        show_default=True,
+        help="ideal, fine, tactical, coarse, white_l1, white_l2, or a path to a YAML file.",
+    ),
     "actuators": click.option(
-        "--actuators", default="ideal", show_default=True,
+        "--actuators",
+        default="ideal",
+        show_default=True,
         help="Of the base: ideal, none (it floats freely), wheels, small_wheels, thrusters, "
-        "wheels_and_thrusters, or a path to a YAML file."),
+        "wheels_and_thrusters, or a path to a YAML file.",
+    ),
     "gains": click.option(
-        "--gains", default="default", show_default=True,
-        help="printed, tuned, robust, default (printed where it flies), or a path."),
+        "--gains",
+        default="default",
+        show_default=True,
+        help="printed, tuned, robust, default (printed where it flies), or a path.",
+    ),
     "robot": _robot_options,
     "mission": click.option(
-        "--mission", default="", help="Mission by name or path [default: the robot's]."),
+        "--mission", default="", help="Mission by name or path [default: the robot's]."
+    ),
     "duration": click.option(
-        "--duration", type=float, help="Seconds to fly [default: the mission's]."),
+        "--duration", type=float, help="Seconds to fly [default: the mission's]."
+    ),
     "period": click.option(
-        "--period", type=float,
-        help="Length of a tick, s, of the plant's and all other nodes [default: 0.0005]."),
+        "--period",
+        type=float,
+        help="Length of a tick, s, of the plant's and all other nodes [default: 0.0005].",
+    ),
     "substeps": click.option(
-        "--substeps", type=int,
-        help="Integration steps of the plant in a tick [default: 1]."),
+        "--substeps", type=int, help="Integration steps of the plant in a tick [default: 1]."
+    ),
     "bag": click.option(
-        "--bag", type=click.Path(path_type=Path), help="Folder of the bag to write."),
+        "--bag", type=click.Path(path_type=Path), help="Folder of the bag to write."
+    ),
     "compression": click.option(
-        "--compression", type=click.Choice(["none", "lz4", "zstd"]),
-        help="Of the bag [default: lz4]."),
+        "--compression",
+        type=click.Choice(["none", "lz4", "zstd"]),
+        help="Of the bag [default: lz4].",
+    ),
     "split_size": click.option(
-        "--split-size", metavar="SIZE",
+        "--split-size",
+        metavar="SIZE",
         help="Go on in another file of the bag after so many bytes, as 500K, 100M, 2G "
-        "[default: one file]."),
+        "[default: one file].",
+    ),
     "navigation": click.option(
-        "--navigation", type=click.Choice(["direct", "filtered"]),
+        "--navigation",
+        type=click.Choice(["direct", "filtered"]),
         help="What the laws see: measurements, or what the navigation filter makes of them "
-        "[default: direct]."),
+        "[default: direct].",
+    ),
     "latency": click.option(
-        "--command-latency-ticks", type=int, default=0, show_default=True,
-        help="Ticks by which the plant applies commands late."),
+        "--command-latency-ticks",
+        type=int,
+        default=0,
+        show_default=True,
+        help="Ticks by which the plant applies commands late.",
+    ),
     "friction": click.option(
-        "--friction/--no-friction", default=True, show_default=True,
-        help="Joint friction of the case, or none."),
+        "--friction/--no-friction",
+        default=True,
+        show_default=True,
+        help="Joint friction of the case, or none.",
+    ),
     "swap": click.option(
-        "--swap", "swaps", multiple=True, metavar="T:LAW",
-        help="Swap to LAW at T simulated seconds; may be repeated."),
+        "--swap",
+        "swaps",
+        multiple=True,
+        metavar="T:LAW",
+        help="Swap to LAW at T simulated seconds; may be repeated.",
+    ),
     "fault": click.option(
-        "--fault", "faults", multiple=True, metavar="KIND@T[-END][:ARG]", callback=_list_faults,
+        "--fault",
+        "faults",
+        multiple=True,
+        metavar="KIND@T[-END][:ARG]",
+        callback=_list_faults,
         help="Inject a fault at T simulated seconds; may be repeated; --fault list lists all "
-        "kinds."),
+        "kinds.",
+    ),
     "event": click.option(
-        "--event", "events", multiple=True, metavar="capture@T:TARGET|release@T[:SPEED]",
+        "--event",
+        "events",
+        multiple=True,
+        metavar="capture@T:TARGET|release@T[:SPEED]",
         help="Capture a target (of config/targets, or a path to its YAML) or let it go at T "
-        "simulated seconds; may be repeated [default: the mission's events]."),
+        "simulated seconds; may be repeated [default: the mission's events].",
+    ),
     "seed": click.option(
-        "--seed", type=int, default=0, help="Seed of the random numbers of faults and sensors."),
+        "--seed", type=int, default=0, help="Seed of the random numbers of faults and sensors."
+    ),
     "set": click.option(
-        "--set", "parameters", multiple=True, metavar="NODE.PARAM=VALUE", callback=_parameters,
-        help="Any parameter of a node, as plant.hold_ticks=40; may be repeated."),
+        "--set",
+        "parameters",
+        multiple=True,
+        metavar="NODE.PARAM=VALUE",
+        callback=_parameters,
+        help="Any parameter of a node, as plant.hold_ticks=40; may be repeated.",
+    ),
     "scenario": click.option(
-        "--scenario", type=click.Path(path_type=Path), is_eager=True, callback=_scenario,
+        "--scenario",
+        type=click.Path(path_type=Path),
+        is_eager=True,
+        callback=_scenario,
         expose_value=False,
-        help="YAML file with any of these options; those given here come first."),
-    "json": click.option(
-        "--json", "as_json", is_flag=True, help="Print the report as JSON."),
-}  # fmt: skip
+        help="YAML file with any of these options; those given here come first.",
+    ),
+    "json": click.option("--json", "as_json", is_flag=True, help="Print the report as JSON."),
+}
 
 GRAPH_OPTIONS: dict[str, Decorator] = {
     "realtime": click.option(
-        "--realtime", is_flag=True, help="Pace by the wall clock instead of lockstep."),
+        "--realtime", is_flag=True, help="Pace by the wall clock instead of lockstep."
+    ),
     "paused": click.option(
-        "--paused", is_flag=True,
-        help="Begin paused: `space-robot sim` lets the plant go on, or step."),
+        "--paused",
+        is_flag=True,
+        help="Begin paused: `space-robot sim` lets the plant go on, or step.",
+    ),
     "fifo_priority": click.option(
-        "--fifo-priority", type=click.IntRange(0, 98), default=0,
-        help="Ask for SCHED_FIFO for plant and controller; for machines with cores to spare."),
+        "--fifo-priority",
+        type=click.IntRange(0, 98),
+        default=0,
+        help="Ask for SCHED_FIFO for plant and controller; for machines with cores to spare.",
+    ),
     "namespace": click.option(
-        "--namespace", default="", metavar="NS",
+        "--namespace",
+        default="",
+        metavar="NS",
         help="ROS namespace of the nodes and their topics, as /sat1: one for each robot of a "
-        "domain."),
-}  # fmt: skip
+        "domain.",
+    ),
+}
 """What only a graph of nodes has; its nodes may be started by `fly` or by a launch file."""
 
 
@@ -329,9 +400,14 @@ def remarks_on(flight: Flight) -> list[str]:
     # the default gains of an ideal plant are the project's own choice: nobody is warned of them
     tries_margin = flight.has_chosen_gains or bool(flight.faults) or bool(names.actuators)
     on_gains = margin_remarks(
-        flown, flight.plant.robot, flight.mission_settings, corner, flight.controls_base,
-        on_thrusters=bool(names.thrusters and not names.wheels), on_thin_margin=tries_margin,
-    )  # fmt: skip
+        flown,
+        flight.plant.robot,
+        flight.mission_settings,
+        corner,
+        flight.controls_base,
+        on_thrusters=bool(names.thrusters and not names.wheels),
+        on_thin_margin=tries_margin,
+    )
     on_limits = limit_remarks(flight.plant.robot, flight.mission_settings)
     step = flight.start_step
     on_start = [f"warning: {sentence(step)}"] if step else []

@@ -25,13 +25,18 @@ from .options import NAMESPACE, OPTIONS, REMAP, TRUST, file_option
     help="By the wall clock, R times real time [default: lockstep].",
 )
 @click.option(
-    "--start", type=FiniteRange(0.0), default=0.0, metavar="T",
+    "--start",
+    type=FiniteRange(0.0),
+    default=0.0,
+    metavar="T",
     help="Simulated time to begin at, s.",
-)  # fmt: skip
+)
 @click.option(
-    "--end", type=FiniteRange(0.0, min_open=True), metavar="T",
+    "--end",
+    type=FiniteRange(0.0, min_open=True),
+    metavar="T",
     help="Simulated time to end before, s.",
-)  # fmt: skip
+)
 @file_option("--csv", "table", help="File for both torques of every tick.")
 @file_option("--plot", help="Picture of both torques by axis, as PNG and SVG.")
 @REMAP
@@ -77,10 +82,7 @@ def replay(
     from space_robot_msgs_py.errors import FlightError, InputError
 
     from ..console.files import check_writable
-    from ..console.terminal import (
-        echo_json,
-        terminal,
-    )
+    from ..console.terminal import echo_json, terminal
     from ..flight.replay.outcome import ReplayOptions
     from ..flight.replay.run import replay as run
 
@@ -92,10 +94,13 @@ def replay(
         check_writable(file)
     done = run(
         ReplayOptions(
-            bag, parameters=parameters.get("controller", {}), start_s=start,
-            end_s=math.inf if end is None else end, **options,
+            bag,
+            parameters=parameters.get("controller", {}),
+            start_s=start,
+            end_s=math.inf if end is None else end,
+            **options,
         )
-    )  # fmt: skip
+    )
     report, period = done.report(), done.recording.timebase.period
     if table:
         from .replay_files import write_csv

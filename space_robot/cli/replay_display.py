@@ -9,10 +9,7 @@ from rich.console import Console
 from space_robot_msgs_py.bag.law_history import in_words
 
 from ..analysis.words import flown as words_of
-from ..console.tables import (
-    Column,
-    Table,
-)
+from ..console.tables import Column, Table
 from ..console.terminal import say
 from ..console.terminal_tables import print_table
 
@@ -104,9 +101,11 @@ def verdict(report: dict[str, Any]) -> str:
 
 def _print_stretches(stretches: list[dict[str, Any]], console: Console) -> None:
     columns = (
-        Column("from, s", spec=".4f"), Column("to, s", spec=".4f"), Column("compared"),
+        Column("from, s", spec=".4f"),
+        Column("to, s", spec=".4f"),
+        Column("compared"),
         Column("equal"),
-    )  # fmt: skip
+    )
     shown = stretches[:MOST_STRETCHES]
     rows = [[s["from_s"], s["to_s"], str(s["compared"]), str(s["equal"])] for s in shown]
     more = "" if len(stretches) == len(shown) else f" (the first {len(shown)} of {len(stretches)})"
@@ -116,16 +115,20 @@ def _print_stretches(stretches: list[dict[str, Any]], console: Console) -> None:
 def _print_first(first: dict[str, Any], console: Console) -> None:
     title = f"first difference: tick {first['tick']}, t = {first['time_s']:.4f} s"
     columns = (
-        Column("field", is_label=True), Column("recorded"), Column("replayed"),
+        Column("field", is_label=True),
+        Column("recorded"),
+        Column("replayed"),
         Column("by", spec=".3g"),
-    )  # fmt: skip
+    )
     rows = [
         [
-            field["field"], str(field["recorded"]), str(field["replayed"]),
+            field["field"],
+            str(field["recorded"]),
+            str(field["replayed"]),
             "" if field["difference"] is None else field["difference"],
         ]
         for field in first["fields"]
-    ]  # fmt: skip
+    ]
     print_table(Table.of(title, columns, rows), console, dense=True)  # all digits in 80 columns
 
 

@@ -17,10 +17,7 @@ from ..analysis.figures.style import (
     plot_lines,
     save_figure,
 )
-from ..console.files import (
-    csv_rows,
-    csv_writer,
-)
+from ..console.files import csv_rows, csv_writer
 from ..flight.replay.comparison import Comparison
 
 COLUMNS = 3

@@ -45,9 +45,16 @@ if TYPE_CHECKING:
 @click.option("--jobs", type=click.IntRange(1, 256), help="Processes [default: one a core].")
 @click.option("--json", "as_json", is_flag=True, help="Print table_v.json.")
 def reproduce(
-    out: Path, only: tuple[str, ...], duration: float | None, brief: bool, sensors: str,
-    navigation: Mode | None, actuators: str, jobs: int | None, as_json: bool,
-) -> None:  # fmt: skip
+    out: Path,
+    only: tuple[str, ...],
+    duration: float | None,
+    brief: bool,
+    sensors: str,
+    navigation: Mode | None,
+    actuators: str,
+    jobs: int | None,
+    as_json: bool,
+) -> None:
     """Fly Table V of the paper and compare: tables, Figures 5 to 9, one page with it all.
 
     Every row is flown with the printed gains and the tuned ones, with the printed friction and
@@ -75,10 +82,14 @@ def reproduce(
     compile_kernels(actuators not in ("ideal", "none"))
     with counting_progress("flights") as progress:
         record = run(
-            rows, out, duration=duration, brief=brief,
-            equipment=Equipment(sensors, navigation or "direct", actuators), jobs=jobs or cores(),
+            rows,
+            out,
+            duration=duration,
+            brief=brief,
+            equipment=Equipment(sensors, navigation or "direct", actuators),
+            jobs=jobs or cores(),
             progress=progress,
-        )  # fmt: skip
+        )
     if as_json:
         click.echo(json.dumps(record, indent=1))
     else:
@@ -86,10 +97,7 @@ def reproduce(
 
 
 def _summary(record: dict[str, Any], out: Path) -> None:
-    from ..console.terminal import (
-        say,
-        terminal,
-    )
+    from ..console.terminal import say, terminal
     from ..console.terminal_tables import print_table
     from ..paper.reproduction.claims import claims_table
 
@@ -103,7 +111,4 @@ def _summary(record: dict[str, Any], out: Path) -> None:
     }
     for controller, gains, tick in sorted(diverged):
         say(console, f"{controller} with {gains} gains diverges at tick {tick}")
-    say(
-        console,
-        f"written to {out}/: report.html, table_v.md, table_v.csv, table_v.json, figures/",
-    )
+    say(console, f"written to {out}/: report.html, table_v.md, table_v.csv, table_v.json, figures/")

@@ -30,22 +30,13 @@ def robot(robot: str, base: str | None, repair: bool, out: Path | None, as_json:
     """
     from space_robot_model.robot import Robot
     from space_robot_model.robot.described import describe
-    from space_robot_model.robot.find import (
-        robot_as_path,
-        robot_files,
-    )
-    from space_robot_model.robot.source import (
-        URDF,
-        read_robot_file,
-    )
+    from space_robot_model.robot.find import robot_as_path, robot_files
+    from space_robot_model.robot.source import URDF, read_robot_file
     from space_robot_model.robot.urdf import read_urdf
     from space_robot_msgs_py.errors import InputError
 
     from ..console.files import whole_file
-    from ..console.terminal import (
-        echo_json,
-        terminal,
-    )
+    from ..console.terminal import echo_json, terminal
     from .robot_display import print_defects, print_robot
 
     file = robot_files(robot_as_path(robot)).file

@@ -10,11 +10,7 @@ from rich.console import Console
 
 from space_robot_model.robot.urdf import Finding
 
-from ..console.tables import (
-    Column,
-    Group,
-    Table,
-)
+from ..console.tables import Column, Group, Table
 from ..console.terminal import say
 from ..console.terminal_tables import print_table
 
@@ -51,16 +47,22 @@ def print_defects(
 
 def _bodies(told: dict[str, Any]) -> Table:
     columns = [
-        Column("body", is_label=True), Column("moved by", is_label=True),
-        Column("mass", "kg", ".6g"), Column("CoM", "m"), Column("principal moments", "kg m2"),
-    ]  # fmt: skip
+        Column("body", is_label=True),
+        Column("moved by", is_label=True),
+        Column("mass", "kg", ".6g"),
+        Column("CoM", "m"),
+        Column("principal moments", "kg m2"),
+    ]
     rows = [
         [
-            body["name"], body["joint"] or "-", body["mass"], _vector(body["com"]),
+            body["name"],
+            body["joint"] or "-",
+            body["mass"],
+            _vector(body["com"]),
             _vector(body["principal_moments"]),
         ]
         for body in told["bodies"]
-    ]  # fmt: skip
+    ]
     note = "With all that is fixed to it; its frame is its joint's, whose axis is z."
     return Table("Bodies", columns, [Group(rows)], [note])
 
@@ -119,9 +121,11 @@ def _tools(told: dict[str, Any]) -> Table:
 
 def _shapes(told: dict[str, Any]) -> Table:
     columns = [
-        Column("body", is_label=True), Column("shape", is_label=True), Column("size", "m"),
+        Column("body", is_label=True),
+        Column("shape", is_label=True),
+        Column("size", "m"),
         Column("mesh", is_label=True),
-    ]  # fmt: skip
+    ]
     rows = [
         [
             seen["body"],

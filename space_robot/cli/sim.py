@@ -28,11 +28,12 @@ def where(function: Any) -> Any:
     """Give a command the options that say which graph is meant."""
     options: list[Decorator] = [
         click.option(
-            "--domain", type=click.IntRange(0, 232),
+            "--domain",
+            type=click.IntRange(0, 232),
             help="ROS domain [default: ROS_DOMAIN_ID, or that of the only plant here].",
         ),
         click.option("--namespace", default="", metavar="NS", help="Of the robot, as /sat1."),
-    ]  # fmt: skip
+    ]
     for option in reversed(options):
         function = option(function)
     return function

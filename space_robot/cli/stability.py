@@ -37,14 +37,11 @@ def stability(initial_error: float, as_json: bool, plot: Path | None, **options:
       space-robot stability
       space-robot stability --case 4-2 --json
       space-robot stability --gains tuned --plot figures
-    """  # fmt: skip
+    """
     from space_robot_msgs_py.config.validation import validate
 
     from ..console.files import make_folder
-    from ..console.terminal import (
-        echo_json,
-        terminal,
-    )
+    from ..console.terminal import echo_json, terminal
     from ..flight.compilation import compile_kernels
     from ..flight.plan import FlightPlan
     from ..paper.stability import report, study

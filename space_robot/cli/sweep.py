@@ -15,26 +15,39 @@ GRADES = ("ideal", "fine", "tactical", "coarse")
 
 @click.command()
 @click.option(
-    "--law", "laws", multiple=True, metavar="LAW[=GAINS]",
+    "--law",
+    "laws",
+    multiple=True,
+    metavar="LAW[=GAINS]",
     help="Law with its gain set, by name or path; repeatable [default: the five laws].",
-)  # fmt: skip
+)
 @click.option(
-    "--sensors", multiple=True, metavar="NAME",
+    "--sensors",
+    multiple=True,
+    metavar="NAME",
     help="Sensors of config/sensors, or a path; repeatable "
     "[default: ideal, fine, tactical, coarse; with --actuators: ideal].",
-)  # fmt: skip
+)
 @click.option(
-    "--actuators", multiple=True, metavar="NAME",
+    "--actuators",
+    multiple=True,
+    metavar="NAME",
     help="Actuators of config/actuators, or a path; repeatable [default: ideal].",
-)  # fmt: skip
+)
 @click.option(
-    "--draws", type=click.IntRange(1, 100_000), default=1, show_default=True,
+    "--draws",
+    type=click.IntRange(1, 100_000),
+    default=1,
+    show_default=True,
     help="Flights of every law with all hardware.",
-)  # fmt: skip
+)
 @click.option(
-    "--spread", type=FiniteRange(0.0, 1.0, max_open=True), default=0.0, show_default=True,
+    "--spread",
+    type=FiniteRange(0.0, 1.0, max_open=True),
+    default=0.0,
+    show_default=True,
     help="Largest relative error of the plant's masses and inertias; no law is told.",
-)  # fmt: skip
+)
 @click.option("--seed", type=click.IntRange(0, 2**30), default=0, help="Seed of the draws.")
 @click.option("--jobs", type=click.IntRange(1, 256), help="Processes [default: one a core].")
 @folder_option(
@@ -84,18 +97,9 @@ def sweep(
     from ..campaign.sweep import sweep as run
     from ..campaign.sweep import sweep_study
     from ..campaign.sweep.summary import as_records, cells, figure, row_record, summary_table
-    from ..console.files import (
-        check_writable,
-        make_folder,
-        whole_file,
-    )
+    from ..console.files import check_writable, make_folder, whole_file
     from ..console.progress import counting_progress
-    from ..console.tables import (
-        Column,
-        Table,
-        as_csv,
-        as_markdown,
-    )
+    from ..console.tables import Column, Table, as_csv, as_markdown
     from ..console.terminal import terminal
     from ..console.terminal_tables import print_table
     from ..processes.pool import cores
@@ -104,8 +108,10 @@ def sweep(
         list(dict.fromkeys(laws or sorted(all_laws()))),
         list(dict.fromkeys(sensors or (("ideal",) if actuators else GRADES))),
         list(dict.fromkeys(actuators or ("ideal",))),
-        draws, spread, common,
-    )  # fmt: skip
+        draws,
+        spread,
+        common,
+    )
     if out:
         make_folder(out)
         for name in ("table.csv", "summary.md", "sweep.png", "sweep.svg"):

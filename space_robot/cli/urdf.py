@@ -27,10 +27,7 @@ def urdf(robot: str, base: str | None, repair: bool, out: Path | None) -> None:
       space-robot urdf my_robot/ --out my_robot.urdf
       space-robot urdf published.urdf --repair --base satellite --out mended.urdf
     """
-    from space_robot_model.robot.find import (
-        robot_as_path,
-        robot_source,
-    )
+    from space_robot_model.robot.find import robot_as_path, robot_source
     from space_robot_model.robot.urdf_text import urdf_text
 
     from ..console.files import whole_file

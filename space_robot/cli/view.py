@@ -20,19 +20,25 @@ from .options import NAMESPACE, REMAP, TRUST, file_option
 )
 @click.option("--open/--no-open", "opens", default=True, help="Open the page in a browser.")
 @click.option(
-    "--side-by-side", is_flag=True,
+    "--side-by-side",
+    is_flag=True,
     help="A place for each robot [default: of one and the same robot all flights in one place].",
-)  # fmt: skip
+)
 @click.option(
-    "--rate", type=FiniteRange(0.0, 1e3, min_open=True), default=30.0, metavar="HZ",
+    "--rate",
+    type=FiniteRange(0.0, 1e3, min_open=True),
+    default=30.0,
+    metavar="HZ",
     help="Poses a second of flight [default: 30]; fewer where the page grew beyond 3 MB.",
-)  # fmt: skip
+)
 @click.option("--from", "from_s", type=float, metavar="T", help="Begin at T simulated seconds.")
 @click.option("--to", "to_s", type=float, metavar="T", help="End before T simulated seconds.")
 @click.option(
-    "--robot", default="", metavar="NAME-or-FILE",
+    "--robot",
+    default="",
+    metavar="NAME-or-FILE",
     help="The robot that flew, where the bag does not tell; of a URDF its shapes, too.",
-)  # fmt: skip
+)
 @click.option("--title", default="", help="Of the page [default: the bags' names].")
 @click.option("--light", is_flag=True, help="Dark on white, to print.")
 @REMAP
@@ -40,22 +46,38 @@ from .options import NAMESPACE, REMAP, TRUST, file_option
 @TRUST
 @click.option("--live", is_flag=True, help="What flies now: serve the scene until Ctrl-C.")
 @click.option(
-    "--domain", type=int,
+    "--domain",
+    type=int,
     help="ROS domain of the live graph [default: ROS_DOMAIN_ID, or that of this machine's newest "
     "flight].",
-)  # fmt: skip
+)
 @click.option(
-    "--port", type=click.IntRange(0, 65535), default=8080, show_default=True,
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=8080,
+    show_default=True,
     help="Of the live scene, on 127.0.0.1; if it is taken, the next one that is free.",
-)  # fmt: skip
+)
 @click.pass_context
 def view(
-    context: click.Context, bags: tuple[Path, ...], out: Path | None, opens: bool,
-    side_by_side: bool, rate: float, from_s: float | None, to_s: float | None, robot: str,
-    title: str, light: bool,
-    remap: dict[str, str], namespace: str | None, trust: bool, live: bool, domain: int | None,
+    context: click.Context,
+    bags: tuple[Path, ...],
+    out: Path | None,
+    opens: bool,
+    side_by_side: bool,
+    rate: float,
+    from_s: float | None,
+    to_s: float | None,
+    robot: str,
+    title: str,
+    light: bool,
+    remap: dict[str, str],
+    namespace: str | None,
+    trust: bool,
+    live: bool,
+    domain: int | None,
     port: int,
-) -> None:  # fmt: skip
+) -> None:
     """Show recorded flights: the robot in 3-D, with plots that follow it, on one HTML page.
 
     The page needs nothing but a browser, no network: send it to a colleague. Play, scrub, click a
@@ -77,11 +99,7 @@ def view(
     from space_robot_msgs_py.bag.reader import read_flight
 
     from ..analysis import excerpt
-    from ..console.files import (
-        check_writable,
-        make_folder,
-        whole_file,
-    )
+    from ..console.files import check_writable, make_folder, whole_file
     from ..console.progress import counting_progress
     from ..view.animation import FORMATS
     from ..view.flights import ViewOptions, flights_page, picture_of, remarks_on, shown_robot

@@ -69,10 +69,7 @@ def write_text(text: str, path: Path) -> None:
 @contextmanager
 def csv_writer(path: Path, replace: bool = False) -> Iterator[Any]:
     """Open a `whole_file` for the writer of the module `csv`."""
-    with (
-        whole_file(path, replace) as raw,
-        TextIOWrapper(raw, encoding="utf-8", newline="") as file,
-    ):
+    with whole_file(path, replace) as raw, TextIOWrapper(raw, encoding="utf-8", newline="") as file:
         yield csv.writer(file, lineterminator="\n")
 
 

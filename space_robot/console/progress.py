@@ -134,6 +134,11 @@ class _Rate(ProgressColumn):
 def _bar(done: str, *more: ProgressColumn) -> Progress:
     """Make a line with a bar; ``done`` beside it tells how far things are."""
     return Progress(
-        TextColumn("{task.description}", markup=False), BarColumn(bar_width=24), TextColumn(done),
-        TimeElapsedColumn(), *more, console=terminal(stderr=True), refresh_per_second=5,
-    )  # fmt: skip
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=24),
+        TextColumn(done),
+        TimeElapsedColumn(),
+        *more,
+        console=terminal(stderr=True),
+        refresh_per_second=5,
+    )

@@ -9,17 +9,8 @@ from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from .tables import (
-    Column,
-    JudgedCell,
-    Table,
-    Value,
-    text_of,
-)
-from .terminal import (
-    say,
-    show,
-)
+from .tables import Column, JudgedCell, Table, Value, text_of
+from .terminal import say, show
 
 TONES = {"good": "green", "bad": "red", "open": "yellow"}
 
@@ -34,9 +25,11 @@ def print_table(table: Table, console: Console, *, dense: bool = False) -> None:
     """
     style: dict[str, Any] = {"box": SIMPLE_HEAD, "show_edge": False} if dense else {}
     shown = RichTable(
-        title=table.title or None, title_justify="left",
-        show_header=any(column.heading for column in table.columns), **style,
-    )  # fmt: skip
+        title=table.title or None,
+        title_justify="left",
+        show_header=any(column.heading for column in table.columns),
+        **style,
+    )
     is_grouped = table.has_named_groups
     if is_grouped:
         shown.add_column("", no_wrap=True)

@@ -15,10 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from space_robot_control.controller.controller import (
-    Controller,
-    ControllerSnapshot,
-)
+from space_robot_control.controller.controller import Controller, ControllerSnapshot
 from space_robot_control.laws import ControlLaw
 from space_robot_msgs_py.compiled.records import Block, RecordOwner
 from space_robot_msgs_py.config.arguments import as_numbers, as_whole_number
@@ -67,9 +64,7 @@ class Bench(RecordOwner):
             raise InputError("on the bench are no messages that could fail: fly the faults of them")
         self.flight, self.ticks, self.period = flight, flight.ticks, flight.period
         # of its own: a law remembers, and another bench may fly the same flight
-        self._laws, self._law, self._swaps = copy.deepcopy((
-            flight.laws, flight.law, flight.swaps
-        ))  # fmt: skip
+        self._laws, self._law, self._swaps = copy.deepcopy((flight.laws, flight.law, flight.swaps))
         self.names = flight.plant.names
         """Names of joints and actuators; ``names.commanded`` are those of a command's numbers."""
         self.axes = len(self.names.axes)
@@ -158,9 +153,7 @@ class Bench(RecordOwner):
 
     def save(self) -> Snapshot:
         """Copy all that the rest of the flight depends on."""
-        return Snapshot(
-            self._plant.save(), self.controller.save(), self._answered, self._ending
-        )  # fmt: skip
+        return Snapshot(self._plant.save(), self.controller.save(), self._answered, self._ending)
 
     def restore(self, snapshot: Snapshot) -> RobotState:
         """Go back, or on, to a snapshot of this scenario, whatever its seed; the same bits follow.
@@ -174,8 +167,10 @@ class Bench(RecordOwner):
             raise InputError("the snapshot is of another robot")
         delayed, law = snapshot.plant.command_delay_buffer, snapshot.controller.law
         if delayed.shape != self._plant.command_delay_buffer.shape:
-            raise InputError("the snapshot is of another scenario: its delay of commands, or its "
-                             "actuators, are not those of this bench")  # fmt: skip
+            raise InputError(
+                "the snapshot is of another scenario: its delay of commands, or its "
+                "actuators, are not those of this bench"
+            )
         if law not in self._laws:
             raise InputError(
                 f"the snapshot is of another scenario: under {law!r}, the laws of this bench are "

@@ -5,18 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_control.controller.controller import (
-    Controller,
-    unusable,
-)
-from space_robot_control.controller.kernels import (
-    USABLE,
-    controller_tick,
-)
-from space_robot_control.laws.compiled import (
-    CompiledLaw,
-    LawCode,
-)
+from space_robot_control.controller.controller import Controller, unusable
+from space_robot_control.controller.kernels import USABLE, controller_tick
+from space_robot_control.laws.compiled import CompiledLaw, LawCode
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.records import Block
@@ -57,10 +48,21 @@ def _close_loop_compiled(
     torques = np.zeros((rows.ticks, len(controller.names.commanded)))
     truths = np.empty(0 if rows.measured is None else rows.ticks, states.dtype)
     tick, fastest, status = fly_ticks(
-        law.code, controller.allocate, plant.block, plant.command_delay_buffer, controller.block,
-        plant.state.block, plant.truth.block, rows.references(start, stop), states, truths, torques,
-        rows.telemetry, start, plant.period,
-    )  # fmt: skip
+        law.code,
+        controller.allocate,
+        plant.block,
+        plant.command_delay_buffer,
+        controller.block,
+        plant.state.block,
+        plant.truth.block,
+        rows.references(start, stop),
+        states,
+        truths,
+        torques,
+        rows.telemetry,
+        start,
+        plant.period,
+    )
     measured = tick - start + (status != USABLE)
     rows.put(start, states[:measured] if rows.measured is None else truths[:measured])
     rows.put_measured(start, states[:measured])
@@ -96,10 +98,21 @@ def _close_loop_in_python(plant: Plant, controller: Controller, log: FlightLog) 
 
 @kernel
 def fly_ticks(
-    law: LawCode, allocate: RecordFunction, plant_block: Block, command_delay_buffer: Array,
-    controller_block: Block, state: Block, truth: Block, references: Block, states: Block,
-    truths: Block, torques: Array, telemetry: Array, start: int, period: float,
-) -> tuple[int, float, int]:  # fmt: skip
+    law: LawCode,
+    allocate: RecordFunction,
+    plant_block: Block,
+    command_delay_buffer: Array,
+    controller_block: Block,
+    state: Block,
+    truth: Block,
+    references: Block,
+    states: Block,
+    truths: Block,
+    torques: Array,
+    telemetry: Array,
+    start: int,
+    period: float,
+) -> tuple[int, float, int]:
     """Fly from the tick ``start`` on, a tick for each reference; the loop of `close_loop`.
 
     The sensors have measured ``start``, and not yet the tick reached. ``state`` is what they

@@ -9,14 +9,8 @@ from typing import Any
 import click
 import numpy as np
 
-from space_robot_control.allocation.allocation import (
-    allocate,
-    allocation_code,
-)
-from space_robot_control.laws import (
-    CompiledLaw,
-    laws,
-)
+from space_robot_control.allocation.allocation import allocate, allocation_code
+from space_robot_control.laws import CompiledLaw, laws
 from space_robot_msgs_py.compiled.cache import cache_directory
 from space_robot_msgs_py.compiled.call_graph import count_compiled, index_files
 from space_robot_msgs_py.ros.lifeline import hold_to_standard_input

@@ -11,21 +11,14 @@ from collections.abc import Callable
 
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
-from space_robot_control.controller.state_responder import (
-    StampStatus,
-    StateResponder,
-)
+from space_robot_control.controller.state_responder import StampStatus, StateResponder
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
 from space_robot_msgs_py.samples import RobotState
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_msgs_py.wire.stamp_guard import AGREEING
 from space_robot_sim.plant.command_guard import CommandGuard
-from space_robot_sim.plant.messages import (
-    NONE,
-    SentState,
-    exchange_of,
-)
+from space_robot_sim.plant.messages import NONE, SentState, exchange_of
 
 from .plan import Flight
 
@@ -38,7 +31,7 @@ class MessageLoop:
     def __init__(
         self, flight: Flight, record: Record, update_true_state: Callable[[RobotState], None]
     ) -> None:
-        """``update_true_state``: called with every true state that differs from the measured one."""
+        """``update_true_state``: called with each true state that is not the measured one."""
         robot, settings = flight.robot, flight.plant_settings
         names = flight.plant.names
         self._flight, self._plant, self._record = flight, flight.plant, record
@@ -49,9 +42,11 @@ class MessageLoop:
         self._exchange = exchange_of(settings, names, flight.period, self._states, self._guard)
         self._references = ReferenceBuffer(robot.n)
         self._answering = StateResponder(
-            flight.controller, LawChoice(flight.law, flight.swaps), self._references,
+            flight.controller,
+            LawChoice(flight.law, flight.swaps),
+            self._references,
             flight.controller_settings,
-        )  # fmt: skip
+        )
         self._state = RobotState.allocate(robot.n)
         self._streamed = 0
         """The first tick that the mission has not sent yet."""

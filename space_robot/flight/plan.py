@@ -6,7 +6,7 @@ import math
 from functools import cached_property
 from typing import Any
 
-from space_robot_control.allocation.assumed_actuators import believed_actuators
+from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import build_laws
 from space_robot_control.controller.plain_laws import NoLaw
@@ -26,20 +26,11 @@ from space_robot_sim.plant.faults import PLANT_KINDS
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import MOST_TICKS
 
-from ..processes.software import (
-    commit,
-    versions,
-)
-from ..scenario.faults import (
-    KINDS,
-    PROCESS_KINDS,
-)
+from ..processes.software import commit, versions
+from ..scenario.faults import KINDS, PROCESS_KINDS
 from ..scenario.node_settings import FlightSettings
 from ..scenario.objects import resolve_law
-from ..scenario.options import (
-    NO_FRICTION,
-    FlightPlan,
-)
+from ..scenario.options import NO_FRICTION, FlightPlan
 from ..scenario.robots import Robots
 from .start_step import start_step
 
@@ -90,16 +81,16 @@ class Flight:
         """In force at the start."""
         self.plant = Plant(self.robot, settings.plant, self.period)
         self.mission = Mission(self.robot, settings.mission, self.period)
-        self.believed_actuators = self._believed_actuators()
+        self.assumed_actuators = self._assumed_actuators()
         """The base's actuators as the controller knows them."""
         self._check_actuators()
         self.controller = self.build_controller(self.law)
         self.ticks = self._ticks()
 
-    def _believed_actuators(self) -> BaseActuatorSettings:
+    def _assumed_actuators(self) -> BaseActuatorSettings:
         name, robot = self.controller_settings.actuators, self._robots.controller
         if name != GIVEN:
-            return believed_actuators(name, robot)
+            return assumed_actuators(name, robot)
         given = self.plan.actuators if isinstance(self.plan.actuators, dict) else {}
         own = {key: given[key] for key in BaseActuatorSettings.model_fields if key in given}
         found = validate(BaseActuatorSettings, own, "actuators")
@@ -110,9 +101,14 @@ class Flight:
         """Build a controller that remembers nothing, with ``law`` in force."""
         settings = self.controller_settings
         return Controller(
-            self._robots.controller, law, self.period, settings.acceleration_filter_hz,
-            settings.filter_settings, self.believed_actuators, settings.allocation,
-        )  # fmt: skip
+            self._robots.controller,
+            law,
+            self.period,
+            settings.acceleration_filter_hz,
+            settings.filter_settings,
+            self.assumed_actuators,
+            settings.allocation,
+        )
 
     def _ticks(self) -> int:
         duration = self.mission.duration if self.plan.duration is None else self.plan.duration
@@ -143,8 +139,8 @@ class Flight:
         return self.plant_settings.controls_base
 
     def _check_actuators(self) -> None:
-        flown, believed = self.plant_settings, self.believed_actuators
-        both = [(s.base_actuation, s.wheel_count, s.thruster_count) for s in (flown, believed)]
+        flown, assumed = self.plant_settings, self.assumed_actuators
+        both = [(s.base_actuation, s.wheel_count, s.thruster_count) for s in (flown, assumed)]
         if both[0] != both[1]:
             said = "; ".join(
                 f"{node} {actuation}, {wheels} wheels, {thrusters} thrusters"
@@ -201,11 +197,11 @@ class Flight:
     @property
     def _base_actuators(self) -> dict[str, Any]:
         """The numbers of the base's actuators that the controller believes, if they are others."""
-        believed = actuators(self.believed_actuators)
+        assumed = actuators(self.assumed_actuators)
         if self.plant_settings.base_actuation == "ideal":
             return {}
-        is_same = believed == actuators(self.plant_settings)
-        return {} if is_same else {"controller_base_actuators": believed}
+        is_same = assumed == actuators(self.plant_settings)
+        return {} if is_same else {"controller_base_actuators": assumed}
 
     @cached_property
     def start_step(self) -> dict[str, Any] | None:
@@ -214,9 +210,14 @@ class Flight:
         See `space_robot.flight.start_step.StartStep`.
         """
         step = start_step(
-            self.robot, self.plant_settings, self.mission, self.law, self.build_controller,
-            self.period, self.ticks,
-        )  # fmt: skip
+            self.robot,
+            self.plant_settings,
+            self.mission,
+            self.law,
+            self.build_controller,
+            self.period,
+            self.ticks,
+        )
         return step and step._asdict()
 
     @property

@@ -202,9 +202,7 @@ def fly_blocks(
 
 
 def simulate(
-    flight: Flight,
-    bag: Path | None = None,
-    progress: Callable[[int], None] = lambda tick: None,
+    flight: Flight, bag: Path | None = None, progress: Callable[[int], None] = lambda tick: None
 ) -> FlightLog:
     """`fly_blocks` into one log.
 
@@ -263,9 +261,12 @@ def _flown_by_messages(
 
 
 def _fly_block(
-    flight: Flight, block: FlightLog, changes: LawChanges, messages: Messages | None,
+    flight: Flight,
+    block: FlightLog,
+    changes: LawChanges,
+    messages: Messages | None,
     progress: Callable[[int], None],
-) -> None:  # fmt: skip
+) -> None:
     plant, controller, swaps = flight.plant, flight.controller, dict(flight.swaps)
     first, end = block.first_tick, block.first_tick + block.ticks
     cuts = {*range(first, end, STRETCH_TICKS), *(k for k in swaps if first <= k < end), end}

@@ -17,10 +17,7 @@ from space_robot_control.guidance.mission import Mission
 from space_robot_control.laws import ControlLaw
 from space_robot_model.elementary.matrices import norm
 from space_robot_model.robot import Robot
-from space_robot_model.robot.dynamics import (
-    free_inverse_dynamics,
-    inverse_dynamics,
-)
+from space_robot_model.robot.dynamics import free_inverse_dynamics, inverse_dynamics
 from space_robot_msgs_py.errors import FlightError
 from space_robot_sim.environment.friction import coefficients
 from space_robot_sim.plant.plant import Plant, PlantSettings
@@ -63,9 +60,10 @@ class StartStep(NamedTuple):
 def sentence(step: Mapping[str, Any]) -> str:
     """Return a `StartStep`, as a mapping, in words."""
     error, unit = (
-        (math.degrees(step["joint_error"]), "deg") if step["unit"] == "rad"
+        (math.degrees(step["joint_error"]), "deg")
+        if step["unit"] == "rad"
         else (step["joint_error"], "m")
-    )  # fmt: skip
+    )
     places = []
     if step["attitude_deg"]:
         places.append(f"the base's attitude is {step['attitude_deg']:.3g} deg")
@@ -80,9 +78,14 @@ def sentence(step: Mapping[str, Any]) -> str:
 
 
 def start_step(
-    robot: Robot, settings: PlantSettings, mission: Mission, law: ControlLaw,
-    build_controller: Callable[[ControlLaw], Controller], period: float, ticks: int,
-) -> StartStep | None:  # fmt: skip
+    robot: Robot,
+    settings: PlantSettings,
+    mission: Mission,
+    law: ControlLaw,
+    build_controller: Callable[[ControlLaw], Controller],
+    period: float,
+    ticks: int,
+) -> StartStep | None:
     """Return the step that a flight begins with, if the law commands much more than the mission.
 
     Args:
@@ -121,8 +124,11 @@ def start_step(
         robot.joint_names[farthest] if is_elsewhere else "",
         float(errors[farthest]) if is_elsewhere else 0.0,
         "m" if robot.is_prismatic[farthest] else "rad",
-        law.name, robot.axis_names[axis], float(demand[axis]), float(planned[axis]),
-    )  # fmt: skip
+        law.name,
+        robot.axis_names[axis],
+        float(demand[axis]),
+        float(planned[axis]),
+    )
 
 
 def _rehearse(plant: Plant, controller: Controller, mission: Mission, ticks: int) -> Array:

@@ -10,9 +10,7 @@ from pathlib import Path
 
 from space_robot_msgs_py.config.files import config_directory
 
-PACKAGES = (
-    "space_robot", "numpy", "scipy", "numba", "llvmlite", "matplotlib", "mcap", "rosbags",
-)  # fmt: skip
+PACKAGES = ("space_robot", "numpy", "scipy", "numba", "llvmlite", "matplotlib", "mcap", "rosbags")
 
 
 @cache
@@ -24,10 +22,21 @@ def commit() -> str | None:
     try:
         done = subprocess.run(
             # no tag matches, so it prints the hash
-            ["git", "-C", str(root), "describe", "--always", "--abbrev=40", "--exclude=*",
-             "--dirty"],
-            capture_output=True, text=True, timeout=10, check=True,
-        )  # fmt: skip
+            [
+                "git",
+                "-C",
+                str(root),
+                "describe",
+                "--always",
+                "--abbrev=40",
+                "--exclude=*",
+                "--dirty",
+            ],
+            capture_output=True,
+            text=True,
+            timeout=10,
+            check=True,
+        )
     except (OSError, subprocess.SubprocessError):
         return None
     return done.stdout.strip()

@@ -21,10 +21,14 @@ KILLS = {
 """By node."""
 STOPS = {
     node: Kind(
-        f"stop_{node}", _SECONDS, math.inf,
-        f"the {node}'s process stands still, then goes on", lasts=False,
-    ) for node in _NODES
-}  # fmt: skip
+        f"stop_{node}",
+        _SECONDS,
+        math.inf,
+        f"the {node}'s process stands still, then goes on",
+        lasts=False,
+    )
+    for node in _NODES
+}
 """By node."""
 NODE_OF = {kind: node for kinds in (KILLS, STOPS) for node, kind in kinds.items()}
 """The node that a kind of fault is about."""

@@ -5,17 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from space_robot_control.controller.gains import (
-    gains_as_path,
-    split_gains,
-)
-from space_robot_control.controller.settings import (
-    ControllerNodeSettings,
-    set_file,
-)
+from space_robot_control.controller.gains import gains_as_path, split_gains
+from space_robot_control.controller.settings import ControllerNodeSettings, set_file
 from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import ControlLaw
-from space_robot_control.navigation.assumed_sensors import believed_numbers
+from space_robot_control.navigation.assumed_sensors import assumed_numbers
 from space_robot_model.robot.find import mission_layers
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
 from space_robot_msgs_py.config.files import GIVEN, config_directory, named_layers, node_parameters
@@ -26,8 +20,11 @@ from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.settings import PlantNodeSettings
 
 SCHEMAS: tuple[type[NodeSettings], ...] = (
-    PlantNodeSettings, ControllerNodeSettings, MissionNodeSettings, RecorderNodeSettings,
-)  # fmt: skip
+    PlantNodeSettings,
+    ControllerNodeSettings,
+    MissionNodeSettings,
+    RecorderNodeSettings,
+)
 NODES = tuple(schema.node for schema in SCHEMAS)
 
 _WAITING = "a flight's nodes wait for one another as they must"
@@ -99,9 +96,9 @@ class FlightSettings(NamedTuple):
             controller = ControllerNodeSettings.resolve(own)
         if controller.navigation == "filtered" and "navigation_sensors" not in own:
             if plant.sensors == GIVEN:
-                believed = {"navigation_filter": believed_numbers(plant, plant.period)}
-                given["controller"] = {**dict(flatten(believed)), **given["controller"]}
-                own = merge(believed, own)
+                assumed = {"navigation_filter": assumed_numbers(plant, plant.period)}
+                given["controller"] = {**dict(flatten(assumed)), **given["controller"]}
+                own = merge(assumed, own)
             else:
                 own["navigation_sensors"] = plant.sensors
                 given["controller"]["navigation_sensors"] = plant.sensors

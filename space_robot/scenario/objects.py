@@ -16,18 +16,10 @@ from pydantic import BaseModel, BeforeValidator, PlainValidator
 
 from space_robot_control.controller.plain_laws import law_of
 from space_robot_control.guidance.mission import MissionSettings
-from space_robot_control.laws import (
-    ControlLaw,
-    find_law,
-    importable_name,
-    laws,
-)
+from space_robot_control.laws import ControlLaw, find_law, importable_name, laws
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
-from space_robot_model.robot.find import (
-    ROBOTS,
-    robot_as_path,
-)
+from space_robot_model.robot.find import ROBOTS, robot_as_path
 from space_robot_msgs_py.config.files import GIVEN, is_named
 from space_robot_msgs_py.config.trees import Tree, nest
 from space_robot_msgs_py.config.validation import StrictModel, validate
@@ -99,11 +91,13 @@ def _gains(value: Any) -> str | Tree:
 def _listed(gains: Tree) -> Tree:
     """Let a number stand for a list of one, which counts for all axes."""
     return {
-        name: _listed(value) if isinstance(value, dict)
-        else value if isinstance(value, list)
+        name: _listed(value)
+        if isinstance(value, dict)
+        else value
+        if isinstance(value, list)
         else [value]
         for name, value in gains.items()
-    }  # fmt: skip
+    }
 
 
 RobotGiven = Annotated[Any, PlainValidator(_robot)]

@@ -10,10 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_model.dynamics.attitude import rotation_matrix
-from space_robot_model.dynamics.rho_space import (
-    RhoSpaceModel,
-    rho_space_into,
-)
+from space_robot_model.dynamics.rho_space import RhoSpaceModel, rho_space_into
 from space_robot_model.robot import Robot
 from space_robot_sim.environment.disturbance import Disturbance, disturbance_torque
 from space_robot_sim.environment.environment import EnvironmentSettings

@@ -35,13 +35,15 @@ def gain_files(tuned: Tuned, command: str) -> Mapping[str, str]:
         f"{law}.yaml": _file([*head, NOTES[law], *_numbers(tuned, "h_bar" in gains)], law, gains)
         for law, gains in tuned.gains.items()
     }
-    files[OF_THE_SET] = "\n".join([
-        *_comments([*head, "Low-pass of the time-delay estimate, part of the set's margin."]),
-        "controller_node:",
-        "  ros__parameters:",
-        f"    acceleration_filter_hz: {tuned.corner_hz:g}",
-        "",
-    ])  # fmt: skip
+    files[OF_THE_SET] = "\n".join(
+        [
+            *_comments([*head, "Low-pass of the time-delay estimate, part of the set's margin."]),
+            "controller_node:",
+            "  ros__parameters:",
+            f"    acceleration_filter_hz: {tuned.corner_hz:g}",
+            "",
+        ]
+    )
     return files
 
 

@@ -147,24 +147,24 @@ def tune(
     slope, poles = bandwidth * ones, _critical(bandwidth * ones)
     gains = {
         "ctc": _critical(of_model * ones),
-        "ctc_smc": {
-            "lambda": of_model * ones, "g": unknown, "delta": unknown / (of_model * layer)
-        },
+        "ctc_smc": {"lambda": of_model * ones, "g": unknown, "delta": unknown / (of_model * layer)},
         "tde_smc": {"h_bar": h_bar, "lambda": slope, "g": gap},
         "tde_tsmc": {"h_bar": h_bar, **poles, "k_1": np.sqrt(rough)},
         "tde_stc": {
-            "h_bar": h_bar, "lambda": slope, "k_1": 2.2 * np.sqrt(rough), "k_2": 1.1 * rough
+            "h_bar": h_bar,
+            "lambda": slope,
+            "k_1": 2.2 * np.sqrt(rough),
+            "k_2": 1.1 * rough,
         },
-    }  # fmt: skip
+    }
     rounded = {
         law: {name: significant(values) for name, values in own.items()}
         for law, own in gains.items()
     }
     corner = float(significant(low_pass_corner(weight, period)))
     return Tuned(
-        wishes, corner, delay, bandwidth, of_model, size * low, size * high, error,
-        rounded,
-    )  # fmt: skip
+        wishes, corner, delay, bandwidth, of_model, size * low, size * high, error, rounded
+    )
 
 
 def _critical(bandwidth: Array) -> dict[str, Array]:

@@ -15,10 +15,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from space_robot_control.controller.controller import Controller
-from space_robot_control.guidance.mission import (
-    Mission,
-    MissionSettings,
-)
+from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.laws import find_law
 from space_robot_control.navigation.settings import NavigationFilterSettings
 from space_robot_model.robot import Robot
@@ -61,9 +58,12 @@ class Noise:
 
 
 def listen(
-    robot: Robot, settings: PlantSettings, navigation: NavigationFilterSettings | None,
-    mission: MissionSettings, period: float,
-) -> Noise:  # fmt: skip
+    robot: Robot,
+    settings: PlantSettings,
+    navigation: NavigationFilterSettings | None,
+    mission: MissionSettings,
+    period: float,
+) -> Noise:
     """Return the noise of a robot's sensors behind its navigation.
 
     Args:

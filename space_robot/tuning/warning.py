@@ -6,14 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from space_robot_control.guidance.limits import (
-    too_fast,
-    too_strong,
-)
-from space_robot_control.guidance.mission import (
-    Mission,
-    MissionSettings,
-)
+from space_robot_control.guidance.limits import too_fast, too_strong
+from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_control.laws import ControlLaw
 from space_robot_control.navigation.low_pass import low_pass_weight
 from space_robot_model.robot import Robot

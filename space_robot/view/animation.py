@@ -36,9 +36,11 @@ TOP, BOTTOM = (13, 17, 23), (27, 35, 48)
 
 
 def animate(
-    flight: FilmedFlight, plots: Sequence[Plot], caption: str,
+    flight: FilmedFlight,
+    plots: Sequence[Plot],
+    caption: str,
     advance: Callable[[int], Callable[[], None]],
-) -> list[Image]:  # fmt: skip
+) -> list[Image]:
     """Draw the frames of a flight.
 
     Args:
@@ -70,9 +72,14 @@ def animate(
                     for move in moves:
                         move(k)
                 return client.get_render(
-                    height, width, wxyz=pose[0], position=pose[1], fov=fov,
-                    transport_format="png", timeout=FRAME_TIMEOUT_S,
-                )  # fmt: skip
+                    height,
+                    width,
+                    wxyz=pose[0],
+                    position=pose[1],
+                    fov=fov,
+                    transport_format="png",
+                    timeout=FRAME_TIMEOUT_S,
+                )
 
             done = advance(len(times))
             draw(0)  # the first one may lack what the browser has yet to make
@@ -91,9 +98,14 @@ def encoded(frames: Sequence[Image], file: Path) -> bytes:
     options: Any = {".webp": {"quality": 72, "method": 6}, ".gif": {"optimize": True}, ".png": {}}
     written = io.BytesIO()
     first.save(
-        written, file.suffix[1:], save_all=True, append_images=others,
-        duration=round(1000 / RATE_HZ), loop=0, **options[file.suffix],
-    )  # fmt: skip
+        written,
+        file.suffix[1:],
+        save_all=True,
+        append_images=others,
+        duration=round(1000 / RATE_HZ),
+        loop=0,
+        **options[file.suffix],
+    )
     return written.getvalue()
 
 
@@ -141,9 +153,14 @@ class _Overlay:
                 self._lines.append((line, plot.time, series.values))
                 label = series.label.removeprefix(stem) or series.label
                 axes.text(
-                    place, 1.03, label, color=series.colour, size=9, ha="right",
+                    place,
+                    1.03,
+                    label,
+                    color=series.colour,
+                    size=9,
+                    ha="right",
                     transform=axes.transAxes,
-                )  # fmt: skip
+                )
                 place -= 0.03 + 0.03 * len(label)
         axes.set_xlabel("s", color=FAINT, size=8, labelpad=1)
 

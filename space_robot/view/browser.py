@@ -18,10 +18,14 @@ if TYPE_CHECKING:
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 OPTIONS = (
-    "--headless=new", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--headless=new",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
     "--no-first-run",
-)  # fmt: skip
+)
 """It draws without a graphics card, and asks nobody but this process."""
 TIMEOUT_S = 60.0
 LOOK_S = 0.1
@@ -59,9 +63,12 @@ def headless_browser(server: ViserServer) -> Iterator[ClientHandle]:
         options.append("--no-sandbox")
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         command = [
-            find_browser(), *options, f"--user-data-dir={profile}",
-            "--window-size=300,200", f"http://127.0.0.1:{server.get_port()}",
-        ]  # fmt: skip
+            find_browser(),
+            *options,
+            f"--user-data-dir={profile}",
+            "--window-size=300,200",
+            f"http://127.0.0.1:{server.get_port()}",
+        ]
         silent = subprocess.DEVNULL
         with subprocess.Popen(command, stdin=silent, stdout=silent, stderr=silent) as process:
             try:

@@ -44,9 +44,12 @@ class FilmedFlight(NamedTuple):
 
 
 def film(
-    flights: Sequence[FilmedFlight], times: Array, side_by_side: bool, dark: bool,
+    flights: Sequence[FilmedFlight],
+    times: Array,
+    side_by_side: bool,
+    dark: bool,
     advance: Callable[[int], Callable[[], None]],
-) -> str:  # fmt: skip
+) -> str:
     """Return the page of a scene with the flights, from the first time on.
 
     Args:
@@ -72,9 +75,13 @@ def film(
 
 
 def add_flights(
-    server: ViserServer, flights: Sequence[FilmedFlight], times: Array, side_by_side: bool,
-    dark: bool, shadows: bool = True,
-) -> list[Move]:  # fmt: skip
+    server: ViserServer,
+    flights: Sequence[FilmedFlight],
+    times: Array,
+    side_by_side: bool,
+    dark: bool,
+    shadows: bool = True,
+) -> list[Move]:
     """Add robots, trails and targets to a server's empty scene; return what moves them.
 
     Args:

@@ -8,10 +8,7 @@ from pathlib import Path
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.choice import split_choice
-from space_robot_model.robot.find import (
-    find_robot,
-    robot_as_path,
-)
+from space_robot_model.robot.find import find_robot, robot_as_path
 from space_robot_model.robot.source import URDF
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.law_history import as_data, in_words, laws_of
@@ -49,9 +46,11 @@ class ViewOptions:
 
 
 def flights_page(
-    logs: Mapping[str, FlightLog], robots: Mapping[str, Robot], options: ViewOptions,
+    logs: Mapping[str, FlightLog],
+    robots: Mapping[str, Robot],
+    options: ViewOptions,
     advance: Callable[[int], Callable[[], None]],
-) -> str:  # fmt: skip
+) -> str:
     """Return the page of some flights, complete in itself.
 
     Args:
@@ -72,16 +71,23 @@ def flights_page(
     times = shown_times(list(logs.values()), options.rate)
     scene = film(flights, times, options.side_by_side or not of_one, options.dark, advance)
     return render(
-        options.title or ", ".join(logs), scene,
+        options.title or ", ".join(logs),
+        scene,
         [Shown(f.name, f.colour, _told(f), f.log.defects) for f in flights],
-        plots_of(logs, robots, colours), shared_marks(logs), float(times[0]), options.dark,
-    )  # fmt: skip
+        plots_of(logs, robots, colours),
+        shared_marks(logs),
+        float(times[0]),
+        options.dark,
+    )
 
 
 def picture_of(
-    logs: Mapping[str, FlightLog], robots: Mapping[str, Robot], title: str, file: Path,
+    logs: Mapping[str, FlightLog],
+    robots: Mapping[str, Robot],
+    title: str,
+    file: Path,
     advance: Callable[[int], Callable[[], None]],
-) -> bytes:  # fmt: skip
+) -> bytes:
     """Return the animated picture of a flight.
 
     Args:

@@ -10,10 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.tool import tool_pose
-from space_robot_model.robot.transforms import (
-    Transform,
-    joint_transforms,
-)
+from space_robot_model.robot.transforms import Transform, joint_transforms
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
@@ -61,8 +58,9 @@ class Frames:
         Raises:
             InputError: no tick of the flight has a whole state.
         """
-        known = np.flatnonzero(log.finite(("base_position", "quaternion", "joint_positions",
-                                           "passive_positions")))  # fmt: skip
+        known = np.flatnonzero(
+            log.finite(("base_position", "quaternion", "joint_positions", "passive_positions"))
+        )
         if not len(known):
             raise InputError("no tick of the bag has the whole state of the robot: nothing to show")
         # a time is a tick's to half a tick: times are counted from ticks with rounding
@@ -80,9 +78,14 @@ class Frames:
             for t in joint_transforms(robot, angles)
         ]
         return cls(
-            times, _rounded(position), _rounded(quaternion), angles, joints, tools,
+            times,
+            _rounded(position),
+            _rounded(quaternion),
+            angles,
+            joints,
+            tools,
             _desired(log, robot, rows),
-        )  # fmt: skip
+        )
 
     def move_to(self, k: int) -> tuple[Array, Array, list[Transform], int]:
         """Return what `RobotScene.move` takes at the k-th time."""

@@ -67,9 +67,13 @@ class FreeBody(NamedTuple):
             quaternions = np.tile(start.as_quat(), (len(times), 1))
         else:
             solved = solve_ivp(
-                rate, (0.0, farthest), start.as_quat(), dense_output=True, rtol=ACCURACY,
+                rate,
+                (0.0, farthest),
+                start.as_quat(),
+                dense_output=True,
+                rtol=ACCURACY,
                 atol=ACCURACY,
-            )  # fmt: skip
+            )
             assert solved.sol is not None  # it is dense
             quaternions = solved.sol(times).T
         quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)

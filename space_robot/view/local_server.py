@@ -114,9 +114,12 @@ class _Connections:
 
         self.is_serving = True
         return self.original(
-            *arguments, process_request=_own_only(process_request), create_connection=Connection,
-            open_timeout=OPENING_S, **options,
-        )  # fmt: skip
+            *arguments,
+            process_request=_own_only(process_request),
+            create_connection=Connection,
+            open_timeout=OPENING_S,
+            **options,
+        )
 
     def _opened(self, transport: asyncio.Transport, loop: asyncio.AbstractEventLoop) -> None:
         if self._has_ended or len(self._open) >= MOST_CONNECTIONS:

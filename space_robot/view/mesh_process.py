@@ -114,9 +114,11 @@ def main(most: int, folder: Path, files: list[str]) -> None:
             (folder / f"{number}.txt").write_text(str(error) or TOO_MUCH, "utf-8")
             continue
         np.savez(
-            folder / f"{number}.npz", vertices=shown.vertices, faces=shown.faces,
+            folder / f"{number}.npz",
+            vertices=shown.vertices,
+            faces=shown.faces,
             whole=len(whole.faces),
-        )  # fmt: skip
+        )
 
 
 if __name__ == "__main__":

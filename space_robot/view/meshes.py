@@ -12,10 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.shapes import (
-    drawn_shapes,
-    shapes_of,
-)
+from space_robot_model.robot.shapes import drawn_shapes, shapes_of
 from space_robot_model.robot.tree import Visual
 from space_robot_msgs_py.ros.run_module import clean_environment, module_command
 
@@ -90,10 +87,13 @@ def _read_in_process(files: tuple[str, ...], most: int) -> list[ReadMesh]:
     read: list[ReadMesh] = []
     with TemporaryDirectory() as folder:
         subprocess.run(
-            module_command(mesh_process.__name__, str(most), folder), env=environment,
-            input=json.dumps(files).encode(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            module_command(mesh_process.__name__, str(most), folder),
+            env=environment,
+            input=json.dumps(files).encode(),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
             check=False,
-        )  # fmt: skip
+        )
         for number in range(len(files)):
             result = Path(folder) / f"{number}.npz"
             reason = result.with_suffix(".txt")

@@ -51,12 +51,15 @@ def render(
     data = {
         "plots": [
             {
-                "title": plot.title, "unit": plot.unit, "logarithmic": plot.is_logarithmic,
+                "title": plot.title,
+                "unit": plot.unit,
+                "logarithmic": plot.is_logarithmic,
                 "pulses": plot.are_pulses,
                 "time": _short(plot.time, 4),
                 "series": [
                     {
-                        "label": s.label, "colour": s.colour,
+                        "label": s.label,
+                        "colour": s.colour,
                         "values": _digits(s.values, plot.is_logarithmic),
                     }
                     for s in plot.series
@@ -65,20 +68,28 @@ def render(
             for plot in plots
         ],
         "marks": [
-            {"start": m.start, "stop": m.stop if math.isfinite(m.stop) else None, "text": m.text,
-             "kind": m.kind}
+            {
+                "start": m.start,
+                "stop": m.stop if math.isfinite(m.stop) else None,
+                "text": m.text,
+                "kind": m.kind,
+            }
             for m in marks
         ],
-        "start": start, "dark": dark,
-    }  # fmt: skip
+        "start": start,
+        "dark": dark,
+    }
     return template("space_robot.view", "view.html.j2").render(
-        title=title, scene=scene, bags=bags, dark=dark,
+        title=title,
+        scene=scene,
+        bags=bags,
+        dark=dark,
         uplot=folder.joinpath("uPlot.iife.min.js").read_text("utf-8"),
         uplot_css=folder.joinpath("uPlot.min.css").read_text("utf-8"),
         css=folder.joinpath("view.css").read_text("utf-8"),
         script=folder.joinpath("view.js").read_text("utf-8"),
         data=data,
-    )  # fmt: skip
+    )
 
 
 def _short(values: Array, decimals: int) -> list[float]:

@@ -72,15 +72,19 @@ def plots_of(
         for quantity in quantities_of(log, robots[name]):
             is_one = len(flights) == 1
             series = (
-                _of_axes(log, quantity, colours, edges) if is_one
+                _of_axes(log, quantity, colours, edges)
+                if is_one
                 else [_of_size(log, name, colour, quantity, edges)]
-            )  # fmt: skip
+            )
             key = quantity.title, quantity.unit
             before = plots[key].series if key in plots else []
             plots[key] = Plot(
-                *key, time, [*before, *series], quantity.is_error and not is_one,
+                *key,
+                time,
+                [*before, *series],
+                quantity.is_error and not is_one,
                 quantity.are_pulses and is_one,
-            )  # fmt: skip
+            )
     return list(plots.values())
 
 

@@ -43,9 +43,12 @@ def quantities_of(log: FlightLog, robot: Robot) -> list[PlottedQuantity]:
         robot: that flew, with the joints of ``log``.
     """
     return [
-        *_errors(log), *_drift(log), *_passive_joints(log, robot), *_torques(log),
+        *_errors(log),
+        *_drift(log),
+        *_passive_joints(log, robot),
+        *_torques(log),
         *_actuators(log),
-    ]  # fmt: skip
+    ]
 
 
 def _errors(log: FlightLog) -> Iterator[PlottedQuantity]:
@@ -64,7 +67,7 @@ def _torques(log: FlightLog) -> Iterator[PlottedQuantity]:
     for name, axes in columns.items():
         yield PlottedQuantity(
             words(name), unit_of(name), names[axes].tolist(), log.applied_torque[:, axes]
-        )  # fmt: skip
+        )
 
 
 def _drift(log: FlightLog) -> Iterator[PlottedQuantity]:

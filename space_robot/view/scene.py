@@ -10,12 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.frame_names import frame_names
-from space_robot_model.robot.transforms import (
-    Transform,
-    joint_transforms,
-    tool_transforms,
-    wxyz,
-)
+from space_robot_model.robot.transforms import Transform, joint_transforms, tool_transforms, wxyz
 from space_robot_model.robot.tree import Visual
 
 from .mesh import Mesh
@@ -78,9 +73,13 @@ class RobotScene:
             path += "_"
         self._paths.setdefault(link.child, path)
         return self._scene.add_frame(
-            path, show_axes=axes > 0.0, axes_length=axes, axes_radius=0.04 * axes,
-            position=link.position[0], wxyz=link.quaternion[0],
-        )  # fmt: skip
+            path,
+            show_axes=axes > 0.0,
+            axes_length=axes,
+            axes_radius=0.04 * axes,
+            position=link.position[0],
+            wxyz=link.quaternion[0],
+        )
 
     def add_shape(self, name: str, shape: Visual, mesh: Mesh | None = None) -> SceneNodeHandle:
         """Draw a shape on its body.
@@ -144,22 +143,26 @@ def add_shape(
         vertices = mesh.vertices * shape.size
         flips = np.prod(shape.size) < 0.0  # mirrored: what was outside is inside
         return scene.add_mesh_simple(
-            path, vertices, mesh.faces[:, ::-1] if flips else mesh.faces, color=colour,
-            opacity=opacity, flat_shading=True, position=position, wxyz=turn,
-        )  # fmt: skip
+            path,
+            vertices,
+            mesh.faces[:, ::-1] if flips else mesh.faces,
+            color=colour,
+            opacity=opacity,
+            flat_shading=True,
+            position=position,
+            wxyz=turn,
+        )
     if shape.shape == "box":
         x, y, z = (edge + 2.0 * more for edge in shape.size)
-        return scene.add_box(
-            path, colour, (x, y, z), opacity=opacity, position=position, wxyz=turn
-        )  # fmt: skip
+        return scene.add_box(path, colour, (x, y, z), opacity=opacity, position=position, wxyz=turn)
     if shape.shape == "cylinder":
         radius, length = shape.size[0] + more, shape.size[1] + 2.0 * more
         return scene.add_cylinder(
             path, radius, length, colour, opacity=opacity, position=position, wxyz=turn
-        )  # fmt: skip
+        )
     return scene.add_icosphere(
         path, shape.size[0] + more, colour, opacity=opacity, position=position, wxyz=turn
-    )  # fmt: skip
+    )
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

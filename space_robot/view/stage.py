@@ -48,9 +48,7 @@ def check_viser() -> None:
         raise InputError("view needs viser: pip install 'space_robot[view]'")
 
 
-def set_stage(
-    server: ViserServer, points: Array, dark: bool, shadows: bool = True
-) -> None:  # fmt: skip
+def set_stage(server: ViserServer, points: Array, dark: bool, shadows: bool = True) -> None:
     """Put stars, axes, light and camera about some points.
 
     Args:
@@ -76,16 +74,22 @@ def _surround(scene: SceneApi, middle: Array, size: float, low: Array, dark: boo
     """Draw what shows that a robot drifts and turns: inertial axes of a round length, and stars."""
     length = 10.0 ** np.floor(np.log10(0.5 * size))
     scene.add_frame(
-        "/inertial", axes_length=length, axes_radius=0.002 * size, origin_radius=0.004 * size,
+        "/inertial",
+        axes_length=length,
+        axes_radius=0.002 * size,
+        origin_radius=0.004 * size,
         position=low - 0.05 * size,
-    )  # fmt: skip
+    )
     scene.add_label("/inertial/length", f"{length:g} m", position=(length, 0.0, 0.0))
     directions = np.random.default_rng(STAR_SEED).normal(size=(STARS, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     scene.add_point_cloud(
-        "/stars", middle + STARS_AT * size * directions, STAR_DARK if dark else STAR_LIGHT,
-        point_size=STAR * STARS_AT * size, point_shape="circle",
-    )  # fmt: skip
+        "/stars",
+        middle + STARS_AT * size * directions,
+        STAR_DARK if dark else STAR_LIGHT,
+        point_size=STAR * STARS_AT * size,
+        point_shape="circle",
+    )
 
 
 def _light(scene: SceneApi, shadows: bool) -> None:
@@ -96,9 +100,13 @@ def _light(scene: SceneApi, shadows: bool) -> None:
     for number, (direction, strength) in enumerate(LAMPS):
         turn, _ = Rotation.align_vectors([direction], [[0.0, 0.0, 1.0]])
         scene.add_light_directional(
-            f"/lamp_{number}", color=(255, 250, 240), intensity=strength, position=direction,
-            cast_shadow=shadows and number == 0, wxyz=wxyz(turn.as_matrix()),
-        )  # fmt: skip
+            f"/lamp_{number}",
+            color=(255, 250, 240),
+            intensity=strength,
+            position=direction,
+            cast_shadow=shadows and number == 0,
+            wxyz=wxyz(turn.as_matrix()),
+        )
 
 
 def _distance(points: Array, back: Array) -> float:

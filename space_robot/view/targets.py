@@ -9,10 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.shapes import (
-    Colour,
-    even_box,
-)
+from space_robot_model.robot.shapes import Colour, even_box
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.simulated_time import tick_from

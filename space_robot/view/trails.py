@@ -41,11 +41,15 @@ def trails(
     for tool, places in frames.tools.items():
         pieces = {
             int(stop): _line(
-                scene, f"{root}/trail_{tool.replace('/', '_')}/{start}", places[start : stop + 1],
-                colour, width, False,
+                scene,
+                f"{root}/trail_{tool.replace('/', '_')}/{start}",
+                places[start : stop + 1],
+                colour,
+                width,
+                False,
             )
             for start, stop in pairwise(edges)
-        }  # fmt: skip
+        }
         found.append(_appearing(pieces))
     if frames.desired is not None:
         _line(scene, f"{root}/desired", frames.desired, DESIRED, 0.3 * width, True)
@@ -53,9 +57,13 @@ def trails(
 
 
 def _line(
-    scene: SceneApi, path: str, places: Array, colour: tuple[int, int, int], width: float,
+    scene: SceneApi,
+    path: str,
+    places: Array,
+    colour: tuple[int, int, int],
+    width: float,
     visible: bool,
-) -> LineSegmentsHandle:  # fmt: skip
+) -> LineSegmentsHandle:
     points = np.stack([places[:-1], places[1:]], axis=1)
     return scene.add_line_segments(path, points, colour, thickness=width, visible=visible)
 

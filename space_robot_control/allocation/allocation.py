@@ -59,18 +59,21 @@ class Allocation(Record):
 
     @classmethod
     def build(
-        cls, n: int, believed: BaseActuatorSettings, settings: AllocationSettings, period: float
+        cls, n: int, assumed: BaseActuatorSettings, settings: AllocationSettings, period: float
     ) -> Allocation:
         """Read the settings for a robot of ``n`` joints and ticks of ``period``, s."""
         allocation = cls.allocate(n)
-        thrusters = AssumedThrusters.build(n, believed.thrusters, settings, period)
+        thrusters = AssumedThrusters.build(n, assumed.thrusters, settings, period)
         assign(
-            allocation, is_used=bool(believed.names), thrusters=thrusters,
-            wheels=AssumedWheels.build(n, believed.wheels, settings, period),
-            health=WheelHealth.build(n, settings), null_motion=NullMotion.build(n, settings),
+            allocation,
+            is_used=bool(assumed.names),
+            thrusters=thrusters,
+            wheels=AssumedWheels.build(n, assumed.wheels, settings, period),
+            health=WheelHealth.build(n, settings),
+            null_motion=NullMotion.build(n, settings),
             modulation=Modulation.build(n, thrusters, settings, period),
             unloading=Unloading.build(n, settings),
-        )  # fmt: skip
+        )
         return allocation
 
 

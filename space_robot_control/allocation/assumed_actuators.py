@@ -15,7 +15,7 @@ OWNER = "plant"
 """The node whose parameters the hardware in the actuators' files is."""
 
 
-def believed_actuators(name: str, robot: Robot) -> BaseActuatorSettings:
+def assumed_actuators(name: str, robot: Robot) -> BaseActuatorSettings:
     """Read the hardware of a file of config/actuators, or at a path.
 
     Args:

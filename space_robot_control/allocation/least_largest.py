@@ -57,9 +57,15 @@ def _is_along(part: float, whole: float) -> bool:
 
 @subroutine
 def _share_in_plane(
-    wheels: WheelSet, count: int, normal: Array, size: float, x: float, y: float, z: float,
+    wheels: WheelSet,
+    count: int,
+    normal: Array,
+    size: float,
+    x: float,
+    y: float,
+    z: float,
     torque: Array,
-) -> None:  # fmt: skip
+) -> None:
     """Give (x, y, z) N m, in the plane of a facet, to the wheels whose axes lie in it."""
     column, full_load = wheels.column, wheels.full_load
     largest, best, side = 0.0, -1, 1.0

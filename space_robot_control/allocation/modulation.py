@@ -85,10 +85,14 @@ class Modulation(Record):
             "schmitt": 1.0,
         }
         assign(
-            modulation, kind=MODULATIONS.index(settings.modulation), tick=-1.0,
-            slot=ticks[settings.modulation], on=settings.schmitt_on, off=settings.schmitt_off,
+            modulation,
+            kind=MODULATIONS.index(settings.modulation),
+            tick=-1.0,
+            slot=ticks[settings.modulation],
+            on=settings.schmitt_on,
+            off=settings.schmitt_off,
             forget=min(1.0, period / FORCE_TIME),
-        )  # fmt: skip
+        )
         return modulation
 
 
@@ -171,7 +175,7 @@ def owed_ticks(modulation: Modulation, thrusters: AssumedThrusters, j: int) -> f
 @subroutine
 def _open_best(
     modulation: Modulation, thrusters: AssumedThrusters, threshold: float, slot: float
-) -> bool:  # fmt: skip
+) -> bool:
     """Open the thruster of which most is owed, if that is ``threshold`` pulses or more.
 
     A pulse is a ``slot`` of ticks (0: the thruster's shortest). ``impulse`` is then less by it.

@@ -59,9 +59,11 @@ class NullMotion(Record):
         """Read the settings."""
         motion = cls.allocate(n)
         assign(
-            motion, gain=settings.null_gain, share=settings.null_share,
+            motion,
+            gain=settings.null_gain,
+            share=settings.null_share,
             least_speed=settings.least_speed,
-        )  # fmt: skip
+        )
         return motion
 
 

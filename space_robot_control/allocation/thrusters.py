@@ -53,23 +53,28 @@ class AssumedThrusters(Record):
 
     @classmethod
     def build(
-        cls, n: int, believed: ThrusterSettings, settings: AllocationSettings, period: float
+        cls, n: int, assumed: ThrusterSettings, settings: AllocationSettings, period: float
     ) -> AssumedThrusters:
         """Read the numbers of the settings; ``period`` of a tick in s."""
-        thrusters, count = cls.allocate(n), believed.count
+        thrusters, count = cls.allocate(n), assumed.count
         wrench = np.zeros((MOST_THRUSTERS, 6))
         size, shortest, delay = np.zeros((3, MOST_THRUSTERS))
         if count:
-            torque, size[:count] = believed.torques, believed.values("force")
-            shortest[:count] = np.maximum(1.0, believed.ticks("shortest_pulse", period))
-            delay[:count] = np.minimum(believed.ticks("delay", period), LONGEST_DELAY - 1.0)
+            torque, size[:count] = assumed.torques, assumed.values("force")
+            shortest[:count] = np.maximum(1.0, assumed.ticks("shortest_pulse", period))
+            delay[:count] = np.minimum(assumed.ticks("delay", period), LONGEST_DELAY - 1.0)
             arm = float(np.mean(np.linalg.norm(torque, axis=1) / size[:count]))
-            force = believed.unit_directions * size[:count, None]
+            force = assumed.unit_directions * size[:count, None]
             wrench[:count] = np.hstack([torque, settings.force_weight * arm * force])
         assign(
-            thrusters, count=count, period=period, force=size, wrench=wrench, shortest=shortest,
+            thrusters,
+            count=count,
+            period=period,
+            force=size,
+            wrench=wrench,
+            shortest=shortest,
             delay=delay,
-        )  # fmt: skip
+        )
         assign(thrusters.problem, gram=product(wrench, wrench.T))
         for row, side in enumerate((1.0, -1.0) if count else ()):
             for i in range(3):

@@ -38,9 +38,11 @@ class Unloading(Record):
         """Read the settings."""
         unloading = cls.allocate(n)
         assign(
-            unloading, above=settings.unload_above, to=settings.unload_to,
+            unloading,
+            above=settings.unload_above,
+            to=settings.unload_to,
             rate=1.0 / settings.unload_time,
-        )  # fmt: skip
+        )
         return unloading
 
 

@@ -60,20 +60,26 @@ class AssumedWheels(Record):
 
     @classmethod
     def build(
-        cls, n: int, believed: WheelSettings, settings: AllocationSettings, period: float
+        cls, n: int, assumed: WheelSettings, settings: AllocationSettings, period: float
     ) -> AssumedWheels:
         """Read the numbers of the settings; ``period`` of a tick in s."""
-        wheels, count = cls.allocate(n), believed.count
+        wheels, count = cls.allocate(n), assumed.count
         torque, momentum = np.full((2, MOST_WHEELS), np.inf)
-        torque[:count] = believed.limits("max_torque")
-        momentum[:count] = believed.limits("max_momentum")
+        torque[:count] = assumed.limits("max_torque")
+        momentum[:count] = assumed.limits("max_momentum")
         load = torque if np.all(np.isfinite(torque[:count])) else np.ones(MOST_WHEELS)
         axis, inertia = np.zeros((MOST_WHEELS, 3)), np.ones(MOST_WHEELS)
-        axis[:count], inertia[:count] = believed.unit_axes, believed.values("rotor_inertia")
+        axis[:count], inertia[:count] = assumed.unit_axes, assumed.values("rotor_inertia")
         assign(
-            wheels, count=count, period=period, axis=axis, inertia=inertia, max_torque=torque,
-            max_momentum=momentum, is_least_largest=settings.wheels == "least_largest",
-        )  # fmt: skip
+            wheels,
+            count=count,
+            period=period,
+            axis=axis,
+            inertia=inertia,
+            max_torque=torque,
+            max_momentum=momentum,
+            is_least_largest=settings.wheels == "least_largest",
+        )
         for part in (wheels.healthy, wheels.free):
             part.takes_part[:count] = 1.0
             part.full_load[:] = np.where(np.isfinite(load), load, 1.0)

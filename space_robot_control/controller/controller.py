@@ -17,14 +17,8 @@ from space_robot_msgs_py.compiled.records import Block, RecordOwner, assign
 from space_robot_msgs_py.errors import SingularAttitudeError, UnusableStateError
 from space_robot_msgs_py.samples import Command, RobotState
 
-from ..allocation.allocation import (
-    Allocation,
-    allocation_code,
-)
-from ..allocation.diagnosis import (
-    Diagnosis,
-    diagnose,
-)
+from ..allocation.allocation import Allocation, allocation_code
+from ..allocation.diagnosis import Diagnosis, diagnose
 from ..allocation.settings import AllocationSettings
 from ..laws import ControlLaw, Signals
 from ..laws.checked import force_of
@@ -73,10 +67,15 @@ class Controller(RecordOwner):
     _views = ("_memory", "_address", "_actuators", "signals", "allocate")
 
     def __init__(
-        self, robot: Robot, law: ControlLaw, period: float, acceleration_filter_hz: float = 0.0,
+        self,
+        robot: Robot,
+        law: ControlLaw,
+        period: float,
+        acceleration_filter_hz: float = 0.0,
         navigation: NavigationFilterSettings | None = None,
-        actuators: BaseActuatorSettings | None = None, allocation: AllocationSettings | None = None,
-    ) -> None:  # fmt: skip
+        actuators: BaseActuatorSettings | None = None,
+        allocation: AllocationSettings | None = None,
+    ) -> None:
         """Build it for a robot and a law.
 
         Args:
@@ -189,9 +188,11 @@ class Controller(RecordOwner):
         """The command for a torque (m,), N m, that no law asked for; see `update`."""
         allocation = self._memory.allocation
         assign(
-            allocation, reported_speeds=state.wheel_velocities,
-            reported_torques=state.wheel_torques, demand=torque[:3],
-        )  # fmt: skip
+            allocation,
+            reported_speeds=state.wheel_velocities,
+            reported_torques=state.wheel_torques,
+            demand=torque[:3],
+        )
         self.last_command.torque[: len(torque)] = torque
         return self._allocate(state.tick)
 

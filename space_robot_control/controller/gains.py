@@ -11,10 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.robot.find import (
-    new_command,
-    robot_files,
-)
+from space_robot_model.robot.find import new_command, robot_files
 from space_robot_msgs_py.config.files import GIVEN, node_parameters
 from space_robot_msgs_py.config.text import one_line_of
 from space_robot_msgs_py.config.trees import Tree, nest
@@ -158,9 +155,11 @@ def _numbers(value: Any) -> Array | None:
 
 
 def build_law(
-    name: str | type[ControlLaw], settings: ControllerNodeSettings, axes: int,
+    name: str | type[ControlLaw],
+    settings: ControllerNodeSettings,
+    axes: int,
     given: Mapping[str, Any] | None = None,
-) -> ControlLaw:  # fmt: skip
+) -> ControlLaw:
     """A law by name (or as `find_law` takes it) with the gains that the settings choose.
 
     Args:
@@ -197,9 +196,11 @@ def build_law(
 
 
 def build_laws(
-    settings: ControllerNodeSettings, axes: int, given: Mapping[str, Tree] | None = None,
+    settings: ControllerNodeSettings,
+    axes: int,
+    given: Mapping[str, Tree] | None = None,
     own: str | type[ControlLaw] | ControlLaw = "",
-) -> dict[str, ControlLaw]:  # fmt: skip
+) -> dict[str, ControlLaw]:
     """The laws a controller can fly, by name: the one in force first, then those of the gain set.
 
     Args:

@@ -5,16 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.dynamics.attitude import (
-    SINGULAR_ETA,
-    attitude_jacobian_inverse,
-)
+from space_robot_model.dynamics.attitude import SINGULAR_ETA, attitude_jacobian_inverse
 from space_robot_model.dynamics.free_floating import eliminate_rotation
 from space_robot_model.dynamics.model import Model
-from space_robot_model.dynamics.rho_space import (
-    semi_floating_into,
-    to_rho_space,
-)
+from space_robot_model.dynamics.rho_space import semi_floating_into, to_rho_space
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.records import Block, Record, nested, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS, State
@@ -22,10 +16,7 @@ from space_robot_msgs_py.samples import MOST_WHEELS, State
 from ..allocation.allocation import Allocation
 from ..laws import Signals
 from ..laws.compiled import LawCode
-from ..navigation.navigation import (
-    Navigation,
-    navigate,
-)
+from ..navigation.navigation import Navigation, navigate
 from .time_delay_estimation import TimeDelayPair, follows, observe, time_delay_estimate
 from .tracking import (
     force_from_torque,
@@ -83,9 +74,15 @@ class ControllerMemory(Record):
 
 @kernel
 def controller_tick(
-    block: Block, law: LawCode, allocate: RecordFunction, tick: int, state: Block,
-    reference: Block, torque: Array, period: float,
-) -> int:  # fmt: skip
+    block: Block,
+    law: LawCode,
+    allocate: RecordFunction,
+    tick: int,
+    state: Block,
+    reference: Block,
+    torque: Array,
+    period: float,
+) -> int:
     """A whole tick of the controller under a law in compiled code.
 
     Args:
@@ -115,9 +112,14 @@ def controller_tick(
 
 @kernel
 def compute_signals(
-    block: Block, tick: int, state: Block, reference: Block, h_bar: Array, uses_model: bool,
+    block: Block,
+    tick: int,
+    state: Block,
+    reference: Block,
+    h_bar: Array,
+    uses_model: bool,
     period: float,
-) -> int:  # fmt: skip
+) -> int:
     """Turn a measured state, or what navigation makes of it, and its reference into signals.
 
     Without a base to control all of them are zero on its axes, and none asks for J0^-1.
@@ -166,9 +168,13 @@ def compute_signals(
         time_delay_estimate(memory.pair, h_bar, signals.n_hat)
     if uses_model:
         semi_floating_into(
-            memory.model, near, measured.joint_positions, measured.omega_base,
-            measured.joint_velocities, signals.nominal,
-        )  # fmt: skip
+            memory.model,
+            near,
+            measured.joint_positions,
+            measured.omega_base,
+            measured.joint_velocities,
+            signals.nominal,
+        )
         if controls_base:
             to_rho_space(near, signals.nominal)
         else:

@@ -79,13 +79,14 @@ class LawSet:
         law.gain_values = check_gains(tree, type(law), self._axes, PARAMETERS)
         for gain, values in law.gain_values.items():
             node.declare_parameter(
-                f"{law.name}.{gain}", values.tolist(),
+                f"{law.name}.{gain}",
+                values.tolist(),
                 ParameterDescriptor(
                     description=descriptions[gain],
                     additional_constraints=f"{gain_lengths(self._axes)}; {gain_range(gain)}",
                 ),
                 ignore_override=True,
-            )  # fmt: skip
+            )
 
     def _on_set(self, parameters: list[Any]) -> SetParametersResult:
         """Check all changes first, then make them; the loop sees them at its next tick."""

@@ -14,16 +14,13 @@ from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
 from space_robot_msgs_py.ros.paused import PausedInput
 
-from ..allocation.assumed_actuators import believed_actuators
+from ..allocation.assumed_actuators import assumed_actuators
 from .controller import Controller
 from .law_set import LawSet
 from .reference_input import ReferenceInput
 from .settings import ControllerNodeSettings
 from .state_input import StateInput
-from .state_responder import (
-    StampStatus,
-    StateResponder,
-)
+from .state_responder import StampStatus, StateResponder
 from .supervisor import Mode
 
 FLUSH_S = 1.0
@@ -46,19 +43,27 @@ class ControllerLoop:
         self._node, self._settings = node, settings
         robot = find_robot(settings.robot)
         self._laws = LawSet(node, settings, robot.n + 3)
-        actuators = believed_actuators(settings.actuators, robot)
+        actuators = assumed_actuators(settings.actuators, robot)
         self._laws.warm_up(robot, actuators)
         self._controller = Controller(
-            robot, self._laws.choice.chosen, settings.period, settings.acceleration_filter_hz,
-            settings.filter_settings, actuators, settings.allocation,
-        )  # fmt: skip
+            robot,
+            self._laws.choice.chosen,
+            settings.period,
+            settings.acceleration_filter_hz,
+            settings.filter_settings,
+            actuators,
+            settings.allocation,
+        )
         timebase = settings.timebase
         self._states = StateInput(node, self._controller.names, timebase)
         self._references = ReferenceInput(node, robot, timebase, settings.reference_timeout)
         self._answering = StateResponder(
-            self._controller, self._laws.choice, self._references.buffer, settings,
+            self._controller,
+            self._laws.choice,
+            self._references.buffer,
+            settings,
             node.get_fully_qualified_name(),
-        )  # fmt: skip
+        )
         self._command_out = RawPublisher(node, topics.COMMAND)
         self._out = {
             topics.COMMAND: self._command_out,

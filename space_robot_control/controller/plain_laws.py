@@ -57,7 +57,9 @@ def law_of(function: Force) -> type[FunctionLaw]:
     """Make a law of a function, which gives it its name."""
     name = getattr(function, "__name__", type(function).__name__)
     content: dict[str, Any] = {
-        "name": name, "function": staticmethod(function), "__doc__": function.__doc__,
+        "name": name,
+        "function": staticmethod(function),
+        "__doc__": function.__doc__,
         "__module__": getattr(function, "__module__", __name__),
-    }  # fmt: skip
+    }
     return type(name, (FunctionLaw,), content)

@@ -55,13 +55,15 @@ class ReferenceInput:
         self._halves = (
             _Half(
                 FollowedSubscription(node, topics.REFERENCE_JOINTS, group, QUEUE_DEPTH),
-                codec.decode_joints, buffer.add_joints,
+                codec.decode_joints,
+                buffer.add_joints,
             ),
             _Half(
                 FollowedSubscription(node, topics.REFERENCE_BASE, group, QUEUE_DEPTH),
-                codec.decode_base, buffer.add_base,
+                codec.decode_base,
+                buffer.add_base,
             ),
-        )  # fmt: skip
+        )
         self.inputs = tuple(half.input for half in self._halves)
         self.wait = Wait(TIMEOUT_S, self.inputs)
         """The wait while `at` has no row."""
@@ -117,9 +119,11 @@ class _Half:
     """One of the two topics; what another than the mission sends only fills gaps."""
 
     def __init__(
-        self, source: FollowedSubscription, decode: Callable[[bytes], tuple[int, Array]],
+        self,
+        source: FollowedSubscription,
+        decode: Callable[[bytes], tuple[int, Array]],
         add: Callable[[int, Array, bool], bool],
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.input, self._decode, self._add = source, decode, add
         self._stop = -1
         """Where the mission's next message should begin."""

@@ -17,10 +17,7 @@ from space_robot_msgs_py.config.yaml_text import is_folder
 
 from ..allocation.settings import AllocationSettings
 from ..navigation.assumed_sensors import completed
-from ..navigation.settings import (
-    Mode,
-    NavigationFilterSettings,
-)
+from ..navigation.settings import Mode, NavigationFilterSettings
 
 OF_THE_SET = "controller.yaml"
 """A file of a gain set with the controller's parameters that belong to its gains; need not be."""
@@ -56,8 +53,11 @@ class ControllerNodeSettings(NodeSettings):
     node: ClassVar[str] = "controller"
     selectors: ClassVar[tuple[str, ...]] = ("robot", "actuators", "gains")
     sends: ClassVar[tuple[topics.Topic, ...]] = (
-        topics.COMMAND, topics.TELEMETRY, topics.SIGNALS, topics.LAW,
-    )  # fmt: skip
+        topics.COMMAND,
+        topics.TELEMETRY,
+        topics.SIGNALS,
+        topics.LAW,
+    )
 
     controller: str = Field(
         "tde_stc", description="control law in force, or file.py:Class or module:Class of your own"

@@ -114,9 +114,12 @@ class _LaterPart:
     """A part of the state that is looked for once the first one is there."""
 
     def __init__(
-        self, entry: FollowedSubscription, codec: StateCodec, timebase: Timebase,
+        self,
+        entry: FollowedSubscription,
+        codec: StateCodec,
+        timebase: Timebase,
         rejected: Counter[str],
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.input, self._codec, self._timebase = entry, codec, timebase
         self._rejected = rejected
         self._kept: dict[int, tuple[bytes, tuple[int, int]]] = {}

@@ -37,9 +37,13 @@ class StateResponder:
     """Answers states, never a tick anew, with the messages of the controller. Knows no ROS."""
 
     def __init__(
-        self, controller: Controller, laws: LawChoice, references: ReferenceBuffer,
-        settings: ControllerNodeSettings, node: str = NODE,
-    ) -> None:  # fmt: skip
+        self,
+        controller: Controller,
+        laws: LawChoice,
+        references: ReferenceBuffer,
+        settings: ControllerNodeSettings,
+        node: str = NODE,
+    ) -> None:
         """Answer with ``controller`` under the laws chosen, as the node's settings say.
 
         ``references`` are told what is now; ``node`` is the node's full name.

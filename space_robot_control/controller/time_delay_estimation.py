@@ -48,9 +48,13 @@ def follows(pair: TimeDelayPair, tick: int) -> bool:
 
 @kernel
 def observe(
-    pair: TimeDelayPair, tick: int, applied_force: Array, rate: Array,
-    acceleration_desired: Array, period: float,
-) -> None:  # fmt: skip
+    pair: TimeDelayPair,
+    tick: int,
+    applied_force: Array,
+    rate: Array,
+    acceleration_desired: Array,
+    period: float,
+) -> None:
     """Take force and rate (m,) of the interval that ended at ``tick``.
 
     The first tick, and one after a longer gap, has no acceleration: the desired one is taken.

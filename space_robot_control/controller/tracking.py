@@ -5,11 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.dynamics.attitude import (
-    attitude_jacobian,
-    rotate,
-    rotate_back,
-)
+from space_robot_model.dynamics.attitude import attitude_jacobian, rotate, rotate_back
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.samples import Reference, State
 
@@ -31,9 +27,13 @@ def measured_rate(state: State, quaternion: Array, jacobian: Array, rate: Array)
 
 @kernel
 def tracking_errors(
-    state: State, quaternion: Array, rate: Array, reference: Reference, jacobian: Array,
+    state: State,
+    quaternion: Array,
+    rate: Array,
+    reference: Reference,
+    jacobian: Array,
     signals: Signals,
-) -> None:  # fmt: skip
+) -> None:
     """Write e, edot and rhodd_d into ``signals``.
 
     Of the two quaternions of the desired attitude the one on the measured side is taken.
@@ -41,8 +41,10 @@ def tracking_errors(
     """
     error, error_rate = signals.error, signals.error_rate
     acceleration, desired, omega = (
-        signals.acceleration_desired, reference.quaternion, reference.omega_base,
-    )  # fmt: skip
+        signals.acceleration_desired,
+        reference.quaternion,
+        reference.omega_base,
+    )
     dot = 0.0
     for k in range(4):
         dot += quaternion[k] * desired[k]

@@ -62,11 +62,14 @@ def too_fast(robot: Robot, times: Array, waypoints: Array) -> list[Beyond]:
     return [
         Beyond(name, float(fastest), limits.velocity, "m/s" if is_prismatic else "rad/s")
         for name, fastest, limits, is_prismatic in zip(
-            robot.joint_names, HALFWAY * legs.max(axis=0), robot.limits,
-            robot.is_prismatic[: robot.n], strict=True,
+            robot.joint_names,
+            HALFWAY * legs.max(axis=0),
+            robot.limits,
+            robot.is_prismatic[: robot.n],
+            strict=True,
         )
         if fastest > limits.velocity * (1.0 + ROUNDING)
-    ]  # fmt: skip
+    ]
 
 
 def too_strong(robot: Robot, force: Array) -> list[Beyond]:
@@ -74,8 +77,11 @@ def too_strong(robot: Robot, force: Array) -> list[Beyond]:
     return [
         Beyond(name, float(largest), limits.effort, "N" if is_prismatic else "N m")
         for name, largest, limits, is_prismatic in zip(
-            robot.joint_names, np.abs(force).max(axis=0, initial=0.0), robot.limits,
-            robot.is_prismatic[: robot.n], strict=True,
+            robot.joint_names,
+            np.abs(force).max(axis=0, initial=0.0),
+            robot.limits,
+            robot.is_prismatic[: robot.n],
+            strict=True,
         )
         if largest > limits.effort * (1.0 + ROUNDING)
-    ]  # fmt: skip
+    ]

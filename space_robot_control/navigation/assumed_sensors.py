@@ -19,13 +19,17 @@ from .settings import NavigationFilterSettings
 OWNER = "plant"
 """The node whose parameters the sensors' files are."""
 LEAST_ANGLE = 1e-7
-"""rad; no tracker is believed to be better, for nothing else in the filter is that exact."""
+"""rad; no tracker is assumed to be better, for nothing else in the filter is that exact."""
 LEAST = 1e-9
-"""No gyro and no encoder is believed to be better, rad and rad/s."""
+"""No gyro and no encoder is assumed to be better, rad and rad/s."""
 MAY_BE_ZERO = (
-    "tracker_delay", "gyro_rate_walk", "joint_rate_noise", "gate", "rate_filter_hz",
+    "tracker_delay",
+    "gyro_rate_walk",
+    "joint_rate_noise",
+    "gate",
+    "rate_filter_hz",
     "joint_bandwidth_hz",
-)  # fmt: skip
+)
 """Numbers of which 0 says something; where it would say that something is perfect, it counts as
 not given."""
 UNIFORM = 1.0 / math.sqrt(12.0)
@@ -49,7 +53,7 @@ def completed(
     lacking = [name for name, value in given.items() if not _is_given(name, value)]
     if not lacking:
         return settings
-    believed = believed_numbers(read_sensors(sensors), period)
+    assumed = assumed_numbers(read_sensors(sensors), period)
     return settings.model_copy(update={name: believed[name] for name in lacking})
 
 
@@ -65,7 +69,7 @@ def read_sensors(name: str) -> SensorSettings:
     return validate(SensorSettings, own, str(path))
 
 
-def believed_numbers(sensors: SensorSettings, period: float) -> Mapping[str, Any]:
+def assumed_numbers(sensors: SensorSettings, period: float) -> Mapping[str, Any]:
     """Return what the filter is to believe of ``sensors``, by the names of its settings."""
     return {
         **_of_tracker(sensors.star_tracker),

@@ -237,13 +237,22 @@ def update(filter: AttitudeFilter, quaternion: Array) -> bool:
     """
     p, noise, scratch = filter.covariance, filter.noise, filter.scratch
     innovation, gain, weighted, rest = (
-        filter.innovation, scratch.gain, scratch.weighted, scratch.remaining,
-    )  # fmt: skip
+        filter.innovation,
+        scratch.gain,
+        scratch.weighted,
+        scratch.remaining,
+    )
     cosine = small_angle(filter.quaternion, quaternion, innovation)
-    xx, yy, zz, xy, xz, yz = inverse_symmetric((
-        p[0, 0] + noise[0, 0], p[1, 1] + noise[1, 1], p[2, 2] + noise[2, 2],
-        p[0, 1] + noise[0, 1], p[0, 2] + noise[0, 2], p[1, 2] + noise[1, 2],
-    ))  # fmt: skip
+    xx, yy, zz, xy, xz, yz = inverse_symmetric(
+        (
+            p[0, 0] + noise[0, 0],
+            p[1, 1] + noise[1, 1],
+            p[2, 2] + noise[2, 2],
+            p[0, 1] + noise[0, 1],
+            p[0, 2] + noise[0, 2],
+            p[1, 2] + noise[1, 2],
+        )
+    )
     a, b, c = innovation[0], innovation[1], innovation[2]
     distance = xx * a * a + yy * b * b + zz * c * c + 2.0 * (xy * a * b + xz * a * c + yz * b * c)
     if filter.gate > 0.0 and not (cosine > 0.0 and distance <= filter.gate):
@@ -265,9 +274,10 @@ def update(filter: AttitudeFilter, quaternion: Array) -> bool:
     for i in range(6):  # (E - K H) P (E - K H)^T + K R K^T, whose upper triangle is as good
         for j in range(i, 6):
             p[i, j] = rest[i, j] + (
-                weighted[i, 0] * gain[j, 0] + weighted[i, 1] * gain[j, 1]
+                weighted[i, 0] * gain[j, 0]
+                + weighted[i, 1] * gain[j, 1]
                 + weighted[i, 2] * gain[j, 2]
-            )  # fmt: skip
+            )
             p[j, i] = p[i, j]
     for i in range(3):
         scratch.rotation[i] = gain[i, 0] * a + gain[i, 1] * b + gain[i, 2] * c

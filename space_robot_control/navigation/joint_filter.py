@@ -86,9 +86,14 @@ def tune(
 
 @kernel
 def steady_gains(
-    angle_gain: Array, rate_gain: Array, angle_variance: float, rate_variance: float,
-    density: float, period: float, steps: int,
-) -> Array:  # fmt: skip
+    angle_gain: Array,
+    rate_gain: Array,
+    angle_variance: float,
+    rate_variance: float,
+    density: float,
+    period: float,
+    steps: int,
+) -> Array:
     """Step the Riccati equation until it has settled; write the gains.
 
     By steps in plain arithmetic, for a library's solver gives other last bits on other machines.

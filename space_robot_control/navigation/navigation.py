@@ -75,17 +75,22 @@ class Navigation(Record):
         about = settings.tracker_about * settings.tracker_about
         assign(navigation, is_filtered=1.0)
         assign(
-            navigation.attitude, noise=across * (np.eye(3) - along) + about * along,
+            navigation.attitude,
+            noise=across * (np.eye(3) - along) + about * along,
             angle_walk=settings.gyro_angle_walk * settings.gyro_angle_walk,
             rate_walk=settings.gyro_rate_walk * settings.gyro_rate_walk,
             initial_bias_variance=settings.gyro_bias * settings.gyro_bias,
-            gate=settings.gate * settings.gate, delay=delay,
-        )  # fmt: skip
+            gate=settings.gate * settings.gate,
+            delay=delay,
+        )
         assign(navigation.low_pass, weight=low_pass_weight(settings.rate_filter_hz, period))
         tune(
-            navigation.joints, settings.joint_bandwidth_hz, settings.joint_angle_noise,
-            settings.joint_rate_noise, period,
-        )  # fmt: skip
+            navigation.joints,
+            settings.joint_bandwidth_hz,
+            settings.joint_angle_noise,
+            settings.joint_rate_noise,
+            period,
+        )
         return navigation
 
 
@@ -126,9 +131,11 @@ def _begin(navigation: Navigation, tick: int, measured: State, period: float) ->
     _unbiased(navigation, measured.omega_base)
     begin_low_pass(navigation.low_pass, navigation.between, measured.applied_torque)
     begin_joints(
-        navigation.joints, measured.joint_positions, measured.joint_velocities,
+        navigation.joints,
+        measured.joint_positions,
+        measured.joint_velocities,
         measured.applied_torque[3:],
-    )  # fmt: skip
+    )
 
 
 @kernel
@@ -143,9 +150,12 @@ def _go_on(navigation: Navigation, tick: int, elapsed: int, measured: State, per
         _unbiased(navigation, between)
         pass_low(navigation.low_pass, between, measured.applied_torque)
     filter_joints(
-        navigation.joints, measured.joint_positions, measured.joint_velocities,
-        measured.applied_torque[3:], elapsed * period,
-    )  # fmt: skip
+        navigation.joints,
+        measured.joint_positions,
+        measured.joint_velocities,
+        measured.applied_torque[3:],
+        elapsed * period,
+    )
 
 
 @kernel

@@ -44,9 +44,13 @@ Array = NDArray[np.float64]
 
 @kernel
 def aba(
-    model: Model, omega_inertial: Array, joint_velocities: Array, force: Array, data: Data,
+    model: Model,
+    omega_inertial: Array,
+    joint_velocities: Array,
+    force: Array,
+    data: Data,
     out: Array,
-) -> None:  # fmt: skip
+) -> None:
     """Write the acceleration ``[v0dot, w0dot, thetadd]`` (N+6,) into ``out``.
 
     It comes after `forward_kinematics` and `spatial_velocities`. ``force`` (N+6,) is
@@ -118,9 +122,12 @@ def aba(
         )
     # the base floats: no joint to the ground
     angular, linear = solve_spatial(
-        inertia, coupling, mass,
-        subtract(vector(force, 3), bias_moment), subtract(vector(force, 0), bias_force),
-    )  # fmt: skip
+        inertia,
+        coupling,
+        mass,
+        subtract(vector(force, 3), bias_moment),
+        subtract(vector(force, 0), bias_force),
+    )
     store(linear, out, 0)
     store(angular, out, 3)
     # outwards: the accelerations

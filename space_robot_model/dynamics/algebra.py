@@ -56,11 +56,7 @@ def dot(a: Vector, b: Vector) -> float:
 @subroutine
 def cross(a: Vector, b: Vector) -> Vector:
     """Return ``a x b``."""
-    return (
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    )
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @subroutine
@@ -79,9 +75,13 @@ def add_symmetric(a: Symmetric, b: Symmetric) -> Symmetric:
 def outer_subtracted(s: Symmetric, a: Vector, b: Vector) -> Symmetric:
     """Return ``s - a b^T`` for parallel ``a`` and ``b``."""
     return (
-        s[0] - a[0] * b[0], s[1] - a[1] * b[1], s[2] - a[2] * b[2],
-        s[3] - a[0] * b[1], s[4] - a[0] * b[2], s[5] - a[1] * b[2],
-    )  # fmt: skip
+        s[0] - a[0] * b[0],
+        s[1] - a[1] * b[1],
+        s[2] - a[2] * b[2],
+        s[3] - a[0] * b[1],
+        s[4] - a[0] * b[2],
+        s[5] - a[1] * b[2],
+    )
 
 
 @subroutine
@@ -118,20 +118,32 @@ def transform_transposed(m: Matrix, a: Vector) -> Vector:
 def skew_added(m: Matrix, a: Vector) -> Matrix:
     """Return ``m + skew(a)``, ``skew(a) b = a x b``."""
     return (
-        m[0], m[1] - a[2], m[2] + a[1],
-        m[3] + a[2], m[4], m[5] - a[0],
-        m[6] - a[1], m[7] + a[0], m[8],
-    )  # fmt: skip
+        m[0],
+        m[1] - a[2],
+        m[2] + a[1],
+        m[3] + a[2],
+        m[4],
+        m[5] - a[0],
+        m[6] - a[1],
+        m[7] + a[0],
+        m[8],
+    )
 
 
 @subroutine
 def outer_subtracted_general(m: Matrix, a: Vector, b: Vector) -> Matrix:
     """Return ``m - a b^T``."""
     return (
-        m[0] - a[0] * b[0], m[1] - a[0] * b[1], m[2] - a[0] * b[2],
-        m[3] - a[1] * b[0], m[4] - a[1] * b[1], m[5] - a[1] * b[2],
-        m[6] - a[2] * b[0], m[7] - a[2] * b[1], m[8] - a[2] * b[2],
-    )  # fmt: skip
+        m[0] - a[0] * b[0],
+        m[1] - a[0] * b[1],
+        m[2] - a[0] * b[2],
+        m[3] - a[1] * b[0],
+        m[4] - a[1] * b[1],
+        m[5] - a[1] * b[2],
+        m[6] - a[2] * b[0],
+        m[7] - a[2] * b[1],
+        m[8] - a[2] * b[2],
+    )
 
 
 @subroutine

@@ -70,9 +70,16 @@ def collect_children(
     mass = add_symmetric(mass, symmetric(row[15:]))
     c = coupling
     coupling = (
-        c[0] + row[6], c[1] + row[7], c[2] + row[8], c[3] + row[9], c[4] + row[10],
-        c[5] + row[11], c[6] + row[12], c[7] + row[13], c[8] + row[14],
-    )  # fmt: skip
+        c[0] + row[6],
+        c[1] + row[7],
+        c[2] + row[8],
+        c[3] + row[9],
+        c[4] + row[10],
+        c[5] + row[11],
+        c[6] + row[12],
+        c[7] + row[13],
+        c[8] + row[14],
+    )
     for k in range(21):
         row[k] = 0.0
     moment, force = taken_in_wrench(row[21:], moment, force)

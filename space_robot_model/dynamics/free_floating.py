@@ -36,9 +36,13 @@ Block = NDArray[Any]
 
 @kernel
 def free_floating_into(
-    model: Model, quaternion: Array, joint_positions: Array, omega_base: Array,
-    joint_velocities: Array, out: RhoSpaceModel,
-) -> None:  # fmt: skip
+    model: Model,
+    quaternion: Array,
+    joint_positions: Array,
+    omega_base: Array,
+    joint_velocities: Array,
+    out: RhoSpaceModel,
+) -> None:
     """Fill the joints' part of ``out.inertia`` and ``out.bias`` with H_f and c_f.
 
     Args: see `rho_space_into`.

@@ -42,9 +42,7 @@ def forward_kinematics(model: Model, quaternion: Array, joint_positions: Array, 
     """
     rotation_matrix(quaternion, data.rotation)
     r = data.rotation
-    axes = (
-        r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2]
-    )  # fmt: skip
+    axes = (r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2])
     joint = (0.0, 0.0, 0.0)
     keep_frame(axes, joint, data.frame[0])
     # loops of their own: a call within the long one would drive its numbers out of the registers

@@ -45,9 +45,13 @@ class RhoSpaceModel(Record):
 
 @kernel
 def rho_space_into(
-    model: Model, quaternion: Array, joint_positions: Array, omega_base: Array,
-    joint_velocities: Array, out: RhoSpaceModel,
-) -> None:  # fmt: skip
+    model: Model,
+    quaternion: Array,
+    joint_positions: Array,
+    omega_base: Array,
+    joint_velocities: Array,
+    out: RhoSpaceModel,
+) -> None:
     """Fill ``out.inertia`` and ``out.bias`` with H_S and c_S of the floating robot.
 
     Args:
@@ -90,9 +94,13 @@ def to_rho_space(quaternion: Array, out: RhoSpaceModel) -> None:
 
 @kernel
 def semi_floating_into(
-    model: Model, quaternion: Array, joint_positions: Array, omega_base: Array,
-    joint_velocities: Array, out: RhoSpaceModel,
-) -> None:  # fmt: skip
+    model: Model,
+    quaternion: Array,
+    joint_positions: Array,
+    omega_base: Array,
+    joint_velocities: Array,
+    out: RhoSpaceModel,
+) -> None:
     """Fill ``out.inertia`` and ``out.bias`` with H_r and c_r, the base's part on inertial axes.
 
     Args: see `rho_space_into`; no attitude is singular. ``out.vectors[0]`` is then the base's

@@ -21,17 +21,7 @@ from numpy.typing import NDArray
 
 from space_robot_msgs_py.compiled.kernels import kernel
 
-from .algebra import (
-    Symmetric,
-    Vector,
-    add,
-    cross,
-    dot,
-    outer_subtracted,
-    scale,
-    store,
-    vector,
-)
+from .algebra import Symmetric, Vector, add, cross, dot, outer_subtracted, scale, store, vector
 from .model import Data, Model
 
 Array = NDArray[np.float64]
@@ -39,9 +29,14 @@ Array = NDArray[np.float64]
 
 @kernel
 def take_wheels(
-    model: Model, omega_inertial: Array, velocities: Array, force: Array, data: Data,
-    inertia: Symmetric, bias_moment: Vector,
-) -> tuple[Symmetric, Vector]:  # fmt: skip
+    model: Model,
+    omega_inertial: Array,
+    velocities: Array,
+    force: Array,
+    data: Data,
+    inertia: Symmetric,
+    bias_moment: Vector,
+) -> tuple[Symmetric, Vector]:
     """Return the base's articulated inertia and bias moment with its wheels in them.
 
     Args:

@@ -11,14 +11,15 @@ from space_robot_msgs_py.compiled.kernels import kernel
 
 Array = NDArray[np.float64]
 
-OF_QUARTERS = (
-    0.0, 0.24497866312686414, 0.4636476090008061, 0.6435011087932844, 0.7853981633974483,
-)  # fmt: skip
+OF_QUARTERS = (0.0, 0.24497866312686414, 0.4636476090008061, 0.6435011087932844, 0.7853981633974483)
 """Arctangents of 0, 1/4, 1/2, 3/4 and 1, rad."""
 REST_OF_QUARTERS = (
-    0.0, 1.0698755618734451e-17, 2.2698777452961687e-17, 1.5834785051444286e-17,
+    0.0,
+    1.0698755618734451e-17,
+    2.2698777452961687e-17,
+    1.5834785051444286e-17,
     3.061616997868383e-17,
-)  # fmt: skip
+)
 """What their rounding took from them."""
 REST_OF_HALF_PI = 6.123233995736766e-17
 (A3, A5, A7, A9, A11, A13, A15, A17, A19) = ((-1.0) ** k / (2 * k + 1) for k in range(1, 10))
@@ -30,8 +31,9 @@ def arctan2(y: ArrayLike, x: ArrayLike) -> Array:
     found = np.empty(sines.shape)
     _fill(
         np.ascontiguousarray(sines, dtype=np.float64).reshape(-1),
-        np.ascontiguousarray(cosines, dtype=np.float64).reshape(-1), found.reshape(-1),
-    )  # fmt: skip
+        np.ascontiguousarray(cosines, dtype=np.float64).reshape(-1),
+        found.reshape(-1),
+    )
     return found
 
 

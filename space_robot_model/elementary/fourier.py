@@ -62,9 +62,15 @@ def _factors(size: int) -> list[tuple[int, int]]:
 
 @kernel
 def _stage(
-    factor: int, stride: int, cosines: Array, sines: Array, real: Array, imaginary: Array,
-    real_out: Array, imaginary_out: Array,
-) -> None:  # fmt: skip
+    factor: int,
+    stride: int,
+    cosines: Array,
+    sines: Array,
+    real: Array,
+    imaginary: Array,
+    real_out: Array,
+    imaginary_out: Array,
+) -> None:
     """Transform over one ``factor``; ``stride`` transforms of one row each are done before."""
     size, axes = real.shape
     rest = size // (stride * factor)

@@ -11,9 +11,7 @@ import numpy as np
 
 TURNS = 2.0 / math.pi
 """Quarter turns a radian."""
-QUARTER = (
-    1.5707963267341256, 6.077100506303966e-11, 2.0222662487111665e-21, 8.4784276603689e-32,
-)  # fmt: skip
+QUARTER = (1.5707963267341256, 6.077100506303966e-11, 2.0222662487111665e-21, 8.4784276603689e-32)
 """Parts of a quarter turn, rad: three of 33 bits, so that a multiple by 20 bits is exact."""
 EXACT_LIMIT = 1.6e6
 """Up to this angle, rad, a multiple of a quarter turn has no more than 20 bits."""

@@ -18,8 +18,7 @@ class EncoderSettings(StrictModel):
     """The encoders of all joints; by default without error."""
 
     bits: Annotated[int, Field(ge=0, le=32)] = Field(
-        0,
-        description="steps of a turn, or of a metre, are two to this power (0: no steps)",
+        0, description="steps of a turn, or of a metre, are two to this power (0: no steps)"
     )
     noise: Sigma = Field(0.0, description="white noise of each angle, rad or m")
     difference_ticks: Annotated[int, Field(ge=0, le=MOST_DIFFERENCED)] = Field(

@@ -56,13 +56,15 @@ class ThrusterSettings(StrictModel):
     )
     force: Positive = Field([1.0], description=f"of an open thruster, N; {PER_THRUSTER}")
     shortest_pulse: Times = Field(
-        [0.0], description="time for which a valve stays open once it is open, s, to a whole "
+        [0.0],
+        description="time for which a valve stays open once it is open, s, to a whole "
         f"number of ticks; {PER_THRUSTER}",
-    )  # fmt: skip
+    )
     delay: Times = Field(
-        [0.0], description="time from a command to its valve, s, to a whole number of ticks; "
+        [0.0],
+        description="time from a command to its valve, s, to a whole number of ticks; "
         f"{PER_THRUSTER}",
-    )  # fmt: skip
+    )
     specific_impulse: Positive = Field(
         [220.0], description=f"impulse for a weight of propellant, s; {PER_THRUSTER}"
     )

@@ -12,15 +12,7 @@ from space_robot_msgs_py.config.validation import StrictModel
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import MOST_WHEELS
 
-from .mounting import (
-    NO_VECTORS,
-    Positive,
-    Sizes,
-    Vectors,
-    are_directions,
-    directions,
-    values_of,
-)
+from .mounting import NO_VECTORS, Positive, Sizes, Vectors, are_directions, directions, values_of
 
 Array = NDArray[np.float64]
 

@@ -62,9 +62,7 @@ def _link(robot: Robot, joint: int) -> dict[str, Any]:
         return link
     spring = robot.springs[joint - robot.n]
     rest = spring.rest if is_prismatic else float(np.degrees(spring.rest))
-    link["passive"] = {
-        "stiffness": spring.stiffness, "damping": spring.damping, "rest_deg": rest
-    }  # fmt: skip
+    link["passive"] = {"stiffness": spring.stiffness, "damping": spring.damping, "rest_deg": rest}
     return link
 
 

@@ -197,8 +197,9 @@ class RobotFile(StrictModel):
 def _tools_of(body: str, tools: list[ToolFile], last: str) -> tuple[Tool, ...]:
     return tuple(
         Tool(tool.name, tool.rotation, product(tool.rotation, tool.offset), rank=rank)
-        for rank, tool in enumerate(tools) if (tool.link or last) == body
-    )  # fmt: skip
+        for rank, tool in enumerate(tools)
+        if (tool.link or last) == body
+    )
 
 
 def _body(link: LinkFile, parent: str) -> Body:
@@ -222,9 +223,13 @@ def _body(link: LinkFile, parent: str) -> Body:
         friction = JointFriction(link.friction.coulomb, link.friction.viscous)
     axis = np.array(link.axis) / norm(link.axis)
     return Body(
-        link.name, link.mass, inertia_tensor(link.inertia), np.array(link.com), parent,
+        link.name,
+        link.mass,
+        inertia_tensor(link.inertia),
+        np.array(link.com),
+        parent,
         Joint(link.name, kind, link.rotation, link.offset, axis, limits, friction, spring),
-    )  # fmt: skip
+    )
 
 
 class _RobotDocument(StrictModel):

@@ -161,9 +161,11 @@ def _own_folder(file: Path) -> RobotFiles:
     folder = file.parent
     mission, gains = folder / OWN_MISSION, folder / OWN_GAINS
     return RobotFiles(
-        folder.resolve().name, file, mission if mission.is_file() else None,
+        folder.resolve().name,
+        file,
+        mission if mission.is_file() else None,
         gains if is_folder(gains) else None,
-    )  # fmt: skip
+    )
 
 
 def _file_of(folder: Path) -> Path:

@@ -60,10 +60,8 @@ def body_frames(
 def _combined(vectors: tuple[Array, Array, Array], factors: Array) -> Array:
     """Return the sum of the vectors times the factors; most factors of most robots are zero."""
     terms = [
-        factor * vector
-        for factor, vector in zip(factors, vectors, strict=True)
-        if factor != 0.0
-    ]  # fmt: skip
+        factor * vector for factor, vector in zip(factors, vectors, strict=True) if factor != 0.0
+    ]
     total = terms[0] if terms else np.zeros_like(vectors[0])
     for term in terms[1:]:
         total = total + term

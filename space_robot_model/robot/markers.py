@@ -88,9 +88,14 @@ def _marker(shape: Visual, name: str, number: int) -> Marker:
         x, y, z = shape.size
         is_plain = shape.colour is None
         return Marker(
-            name, number, MESH, (x, y, z), WHITE if is_plain else colour, mesh_address(shape.mesh),
+            name,
+            number,
+            MESH,
+            (x, y, z),
+            WHITE if is_plain else colour,
+            mesh_address(shape.mesh),
             has_own_colours=is_plain,
-        )  # fmt: skip
+        )
     if shape.shape == "cylinder":
         radius, length = shape.size
         scale = (2.0 * radius, 2.0 * radius, length)

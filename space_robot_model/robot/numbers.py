@@ -62,19 +62,27 @@ class BodyNumbers(StrictModel):
         joint, given = None, self.joint
         if given:
             joint = Joint(
-                given.name, given.kind, np.array(given.rotation), np.array(given.offset),
+                given.name,
+                given.kind,
+                np.array(given.rotation),
+                np.array(given.offset),
                 limits=JointLimits(*_or(given.limits, JointLimits())),
                 friction=JointFriction(*_or(given.friction, JointFriction())),
                 spring=Spring(*given.spring) if given.spring else None,
-            )  # fmt: skip
+            )
         tools = (
             Tool(t.name, np.array(t.rotation), np.array(t.position), rank=t.rank)
             for t in self.tools
         )
         return Body(
-            self.name, self.mass, np.array(self.inertia), np.array(self.com), self.parent, joint,
+            self.name,
+            self.mass,
+            np.array(self.inertia),
+            np.array(self.com),
+            self.parent,
+            joint,
             tuple(tools),
-        )  # fmt: skip
+        )
 
 
 class RobotNumbers(StrictModel):
@@ -114,15 +122,22 @@ def _body_numbers(body: Body) -> dict[str, Any]:
     }
     tools = [
         {
-            "name": t.name, "rotation": t.rotation.tolist(), "position": t.position.tolist(),
+            "name": t.name,
+            "rotation": t.rotation.tolist(),
+            "position": t.position.tolist(),
             "rank": t.rank,
         }
         for t in body.tools
-    ]  # fmt: skip
+    ]
     return {
-        "name": body.name, "mass": float(body.mass), "inertia": body.inertia.tolist(),
-        "com": body.com.tolist(), "parent": body.parent, "joint": joint, "tools": tools,
-    }  # fmt: skip
+        "name": body.name,
+        "mass": float(body.mass),
+        "inertia": body.inertia.tolist(),
+        "com": body.com.tolist(),
+        "parent": body.parent,
+        "joint": joint,
+        "tools": tools,
+    }
 
 
 def _known(row: Sequence[float]) -> list[float | None]:

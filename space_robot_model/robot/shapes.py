@@ -43,9 +43,12 @@ def drawn_shapes(robot: Robot) -> Iterator[Visual]:
         start: Array = np.zeros(3)
         if is_base or is_panel:
             box = even_box(
-                float(robot.mass[body]), robot.inertia[body], robot.com[body], body,
+                float(robot.mass[body]),
+                robot.inertia[body],
+                robot.com[body],
+                body,
                 BASE_COLOUR if is_base else PANEL_COLOUR,
-            )  # fmt: skip
+            )
             yield box
         else:
             hub = (1.5 * radius, 3.2 * radius)
@@ -103,9 +106,13 @@ def _tube(start: Array, end: Array, radius: float, body: int) -> Iterator[Visual
     if length < THINNEST:
         return
     yield Visual(
-        "cylinder", (radius, length), _turn_to(along / length), 0.5 * (start + end),
-        colour=LINK_COLOUR, body=body,
-    )  # fmt: skip
+        "cylinder",
+        (radius, length),
+        _turn_to(along / length),
+        0.5 * (start + end),
+        colour=LINK_COLOUR,
+        body=body,
+    )
 
 
 def _turn_to(z: Array) -> Array:

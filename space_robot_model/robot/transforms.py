@@ -56,11 +56,13 @@ def tool_transforms(robot: Robot) -> list[Transform]:
     names = frame_names(robot)
     return [
         Transform(
-            names.bodies[tool.body], name, tool.position[np.newaxis],
+            names.bodies[tool.body],
+            name,
+            tool.position[np.newaxis],
             wxyz(tool.rotation)[np.newaxis],
         )
         for tool, name in zip(robot.tools, names.tools, strict=True)
-    ]  # fmt: skip
+    ]
 
 
 def wxyz(rotation: Array) -> Array:

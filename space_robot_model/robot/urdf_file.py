@@ -56,11 +56,12 @@ class UrdfFile(StrictModel):
         }
         springs = {
             name: Spring(
-                given.stiffness, given.damping,
+                given.stiffness,
+                given.damping,
                 given.rest_deg if is_prismatic.get(name) else float(np.radians(given.rest_deg)),
             )
             for name, given in self.passive.items()
-        }  # fmt: skip
+        }
         found = with_springs(found, springs, where)
         return replace(found, name=self.name or found.name)
 

@@ -36,6 +36,12 @@ class Batch:
     def select(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Batch:
         """Some of the messages."""
         return Batch(
-            self.topic, self.type, self.encoding, self.data, self.starts[which],
-            self.lengths[which], self.log_ns[which], self.publish_ns[which],
-        )  # fmt: skip
+            self.topic,
+            self.type,
+            self.encoding,
+            self.data,
+            self.starts[which],
+            self.lengths[which],
+            self.log_ns[which],
+            self.publish_ns[which],
+        )

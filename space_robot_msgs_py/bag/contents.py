@@ -42,9 +42,13 @@ class Bag:
     """The files that a flight is read from, and what rosbag2's metadata says of them."""
 
     def __init__(
-        self, files: Sequence[Storage], information: BagInformation | None, damage: list[str],
-        closed: bool, lacks_files: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        files: Sequence[Storage],
+        information: BagInformation | None,
+        damage: list[str],
+        closed: bool,
+        lacks_files: bool = False,
+    ) -> None:
         """Take what was found in a folder.
 
         Args:

@@ -57,7 +57,12 @@ def _take(numbers: Numbers, batch: Batch, left: Places) -> tuple[NDArray[np.bool
     found = np.empty((len(left), len(numbers.offsets)))
     fits = np.empty(len(left), np.bool_)
     gather(
-        batch.data, batch.starts[left], batch.lengths[left], numbers.layout.pattern,
-        numbers.offsets, found, fits,
-    )  # fmt: skip
+        batch.data,
+        batch.starts[left],
+        batch.lengths[left],
+        numbers.layout.pattern,
+        numbers.offsets,
+        found,
+        fits,
+    )
     return fits, found

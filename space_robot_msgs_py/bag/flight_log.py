@@ -161,9 +161,14 @@ class FlightLog:
 
     @classmethod
     def allocate(
-        cls, ticks: int, joint_names: tuple[str, ...], timebase: Timebase, wheels: int = 0,
-        thrusters: int = 0, passive_names: tuple[str, ...] = (),
-    ) -> FlightLog:  # fmt: skip
+        cls,
+        ticks: int,
+        joint_names: tuple[str, ...],
+        timebase: Timebase,
+        wheels: int = 0,
+        thrusters: int = 0,
+        passive_names: tuple[str, ...] = (),
+    ) -> FlightLog:
         """A log of ``ticks`` rows of NaN, for a base with so many wheels and thrusters."""
         n, passive = len(joint_names), len(passive_names)
         shapes = [

@@ -68,9 +68,14 @@ def read_stamps(data: Bytes, starts: Integers, lengths: Integers, stamps: Intege
 
 @kernel
 def gather(
-    data: Bytes, starts: Integers, lengths: Integers, pattern: Bytes, offsets: Offsets,
-    numbers: NDArray[np.float64], fits: NDArray[np.bool_],
-) -> None:  # fmt: skip
+    data: Bytes,
+    starts: Integers,
+    lengths: Integers,
+    pattern: Bytes,
+    offsets: Offsets,
+    numbers: NDArray[np.float64],
+    fits: NDArray[np.bool_],
+) -> None:
     """Copy the numbers of all messages that are laid out alike.
 
     Args:

@@ -88,10 +88,13 @@ class McapFile:
         content, (first, last) = bytes(chunk.content), chunk.span_ns
         data = self._compress(content)
         head = Chunk(
-            compression=self._compression, data=data, message_start_time=first,
-            message_end_time=last, uncompressed_crc=zlib.crc32(content),
+            compression=self._compression,
+            data=data,
+            message_start_time=first,
+            message_end_time=last,
+            uncompressed_crc=zlib.crc32(content),
             uncompressed_size=len(content),
-        )  # fmt: skip
+        )
         record, start = record_bytes(head), self.size
         indexes = chunk.message_indexes()
         offsets, end = {}, start + len(record)
@@ -101,12 +104,17 @@ class McapFile:
         self._put(b"".join((record, *indexes.values())))
         self._chunks.append(
             ChunkIndex(
-                message_start_time=first, message_end_time=last, chunk_start_offset=start,
-                chunk_length=len(record), message_index_offsets=offsets,
-                message_index_length=end - start - len(record), compression=self._compression,
-                compressed_size=len(data), uncompressed_size=len(content),
+                message_start_time=first,
+                message_end_time=last,
+                chunk_start_offset=start,
+                chunk_length=len(record),
+                message_index_offsets=offsets,
+                message_index_length=end - start - len(record),
+                compression=self._compression,
+                compressed_size=len(data),
+                uncompressed_size=len(content),
             )
-        )  # fmt: skip
+        )
         self.counts.update(chunk.counts)
         old = self.span_ns or (first, last)
         self.span_ns = min(first, old[0]), max(last, old[1])
@@ -188,8 +196,13 @@ class McapFile:
     def _statistics(self, schemas: int, channels: int) -> Statistics:
         first, last = self.span_ns or (0, 0)
         return Statistics(
-            attachment_count=0, channel_count=channels, channel_message_counts=dict(self.counts),
-            chunk_count=len(self._chunks), message_count=self.counts.total(),
-            message_start_time=first, message_end_time=last,
-            metadata_count=len(self._metadata), schema_count=schemas,
-        )  # fmt: skip
+            attachment_count=0,
+            channel_count=channels,
+            channel_message_counts=dict(self.counts),
+            chunk_count=len(self._chunks),
+            message_count=self.counts.total(),
+            message_start_time=first,
+            message_end_time=last,
+            metadata_count=len(self._metadata),
+            schema_count=schemas,
+        )

@@ -21,16 +21,24 @@ from mcap.stream_reader import get_chunk_data_stream
 from .kernels import walk_messages
 
 BROKEN = (
-    McapError, zstandard.ZstdError, struct.error, ValueError, RuntimeError, OverflowError,
+    McapError,
+    zstandard.ZstdError,
+    struct.error,
+    ValueError,
+    RuntimeError,
+    OverflowError,
     MemoryError,
-)  # fmt: skip
+)
 """The errors of mcap, lz4 and zstd on bytes that end early or make no sense."""
 HEAD = struct.Struct("<BQ")
 INDEX_HEAD = struct.Struct("<HI")
 _PARSED: dict[int, Any] = {
-    Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.METADATA: Metadata,
-    Opcode.CHUNK: Chunk, Opcode.STATISTICS: Statistics,
-}  # fmt: skip
+    Opcode.SCHEMA: Schema,
+    Opcode.CHANNEL: Channel,
+    Opcode.METADATA: Metadata,
+    Opcode.CHUNK: Chunk,
+    Opcode.STATISTICS: Statistics,
+}
 DESCRIPTIONS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.METADATA)
 PASSED = (Opcode.HEADER, Opcode.ATTACHMENT)
 _CHUNK = re.compile(

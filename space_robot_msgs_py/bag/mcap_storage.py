@@ -232,9 +232,15 @@ class McapStorage:
                 self._of_no_topic += own.shape[1]
                 continue
             yield Batch(
-                channel.topic, self._type(channel), channel.message_encoding, data,
-                own[START], own[LENGTH], own[LOG_NS], own[PUBLISH_NS],
-            )  # fmt: skip
+                channel.topic,
+                self._type(channel),
+                channel.message_encoding,
+                data,
+                own[START],
+                own[LENGTH],
+                own[LOG_NS],
+                own[PUBLISH_NS],
+            )
 
     def _type(self, channel: Channel) -> str:
         schema = self._schemas.get(channel.schema_id)

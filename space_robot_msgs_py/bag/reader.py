@@ -39,9 +39,11 @@ _STAMPS_LOOKED_AT = 200
 
 
 def read_flight(
-    path: Path, remap: Mapping[str, str] | None = None, trust: bool = False,
+    path: Path,
+    remap: Mapping[str, str] | None = None,
+    trust: bool = False,
     namespace: str | None = None,
-) -> FlightLog:  # fmt: skip
+) -> FlightLog:
     """Read a flight; what is broken is left out and told (`FlightLog.damage`).
 
     Ticks between the first and the last that have no whole state and reference are NaN. Of a bag
@@ -204,9 +206,12 @@ def _gone(selection: Selection, rows: Rows) -> dict[str, int]:
 
 
 def _count_lost(
-    bag: Bag, selection: Selection, rows: Rows, gone: Mapping[str, int],
+    bag: Bag,
+    selection: Selection,
+    rows: Rows,
+    gone: Mapping[str, int],
     accounts: Mapping[str, Account],
-) -> None:  # fmt: skip
+) -> None:
     """`FlightLog.lost` and `FlightLog.unanswered`: what never came and what is gone since."""
     log = rows.log
     there = selection.topics()

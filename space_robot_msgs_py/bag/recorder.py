@@ -74,10 +74,12 @@ class BagRecorder:
         }
         """The topics under the names that they have in the bag."""
         self._writer = BagWriter(
-            path, self._written.values(),
+            path,
+            self._written.values(),
             {FLIGHT_KEY: json.dumps(self._flight), **remappings_note(names, namespace)},
-            compression, split_size,
-        )  # fmt: skip
+            compression,
+            split_size,
+        )
         self._chunk_bytes = min(CHUNK_BYTES, split_size or CHUNK_BYTES)
         self._most_bytes = min(MOST_CHUNKS * CHUNK_BYTES, split_size or MOST_CHUNKS * CHUNK_BYTES)
         self._timebase = timebase
@@ -96,9 +98,13 @@ class BagRecorder:
         self._closed = False
 
     def record(
-        self, topic: topics.Topic, data: bytes, sent_ns: int = 0, publisher: bytes = b"",
+        self,
+        topic: topics.Topic,
+        data: bytes,
+        sent_ns: int = 0,
+        publisher: bytes = b"",
         sequence: int = 0,
-    ) -> bool:  # fmt: skip
+    ) -> bool:
         """Add one serialized message, if it is from the graph's own publisher; whether it is.
 
         One whose stamp cannot be right is kept at the time of the last good one.

@@ -11,9 +11,7 @@ from ..errors import InputError
 from .contents import Bag
 from .findings import some_of
 
-REQUIRED = (
-    topics.JOINT_STATES, topics.BASE_STATE, topics.REFERENCE_JOINTS, topics.REFERENCE_BASE,
-)  # fmt: skip
+REQUIRED = (topics.JOINT_STATES, topics.BASE_STATE, topics.REFERENCE_JOINTS, topics.REFERENCE_BASE)
 """Topics that a flight cannot be read without."""
 
 

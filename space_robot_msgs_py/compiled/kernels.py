@@ -65,9 +65,11 @@ class RecordFunction(_FunctionType):  # type: ignore[misc]
     """
 
     def __init__(
-        self, function: Callable[..., Any], records: Iterable[type[Record]],
+        self,
+        function: Callable[..., Any],
+        records: Iterable[type[Record]],
         seen_as: Iterable[type[Record]],
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Compile a kernel.
 
         Args:

@@ -70,9 +70,10 @@ def _unbox_record(kind: RecordType, scalar: Any, c: Any) -> Any:
     length = c.builder.load(c.builder.gep(words, [_INT(2)]))  # Py_buffer.len
     record.n = joints(c.builder, kind.layout.size, length)
     return NativeValue(
-        record._getvalue(), is_error=cgutils.is_null(c.builder, pointer),
+        record._getvalue(),
+        is_error=cgutils.is_null(c.builder, pointer),
         cleanup=lambda: c.pyapi.release_buffer(buffer),
-    )  # fmt: skip
+    )
 
 
 def joints(builder: Any, size: Polynomial, itemsize: Any) -> Any:
@@ -123,10 +124,14 @@ def _get_field(context: Any, builder: Any, kind: RecordType, value: Any, name: s
         strides.insert(0, step)
         step = builder.mul(step, length, flags=["nsw"]) if k + 1 < len(shape) else step
     arrayobj.populate_array(
-        array, data=numbers, shape=cgutils.pack_array(builder, shape),
-        strides=cgutils.pack_array(builder, strides), itemsize=_INT(BYTES), meminfo=None,
+        array,
+        data=numbers,
+        shape=cgutils.pack_array(builder, shape),
+        strides=cgutils.pack_array(builder, strides),
+        itemsize=_INT(BYTES),
+        meminfo=None,
         parent=None,
-    )  # fmt: skip
+    )
     return array._getvalue()
 
 

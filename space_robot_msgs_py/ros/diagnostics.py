@@ -54,9 +54,10 @@ class Diagnostics:
         status = DiagnosticStatus(
             level=bytes([health.level]),
             name=self._node.get_fully_qualified_name().lstrip("/"),
-            message=health.mode, hardware_id="space_robot",
+            message=health.mode,
+            hardware_id="space_robot",
             values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()],
-        )  # fmt: skip
+        )
         message = DiagnosticArray(status=[status])
         tick = health.values.get("tick", 0)
         seconds, rest_ns = divmod(timebase.stamp_ns(max(0, int(tick))), 1_000_000_000)

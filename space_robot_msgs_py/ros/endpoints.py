@@ -125,9 +125,13 @@ class RawSubscription:
     """A subscription whose messages the loop takes itself, serialized."""
 
     def __init__(
-        self, node: Node, topic: Topic, group: PolledCallbackGroup, depth: int = 0,
+        self,
+        node: Node,
+        topic: Topic,
+        group: PolledCallbackGroup,
+        depth: int = 0,
         best_effort: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Subscribe.
 
         Args:
@@ -143,9 +147,13 @@ class RawSubscription:
         if best_effort:
             profile.reliability = ReliabilityPolicy.BEST_EFFORT
         self._subscription = node.create_subscription(
-            message_type(topic.type), topic.name, lambda message: None, profile,
-            raw=True, callback_group=group,
-        )  # fmt: skip
+            message_type(topic.type),
+            topic.name,
+            lambda message: None,
+            profile,
+            raw=True,
+            callback_group=group,
+        )
         self.full_name = str(self._subscription.topic_name)
         """In the node's namespace, remapped as the user wants."""
         self.handle = self._subscription.handle

@@ -34,11 +34,22 @@ TIME = "builtin_interfaces/msg/Time"
 _PRIMITIVES = {
     name: struct.Struct(f"<{letter}")
     for name, letter in {
-        "bool": "?", "byte": "B", "octet": "B", "char": "B", "uint8": "B", "int8": "b",
-        "uint16": "H", "int16": "h", "uint32": "I", "int32": "i", "uint64": "Q", "int64": "q",
-        "float32": "f", "float64": "d",
+        "bool": "?",
+        "byte": "B",
+        "octet": "B",
+        "char": "B",
+        "uint8": "B",
+        "int8": "b",
+        "uint16": "H",
+        "int16": "h",
+        "uint32": "I",
+        "int32": "i",
+        "uint64": "Q",
+        "int64": "q",
+        "float32": "f",
+        "float64": "d",
     }.items()
-}  # fmt: skip
+}
 _LENGTH = _PRIMITIVES["uint32"]
 _NUMBER = (Nodetype.BASE, ("float64", 0))
 

@@ -24,8 +24,9 @@ class TruthWriter:
 
     def __init__(self, names: RobotNames, timebase: Timebase) -> None:
         descriptions: tuple[MessageDescription, ...] = (
-            TruthJoints.of_robot(names, timebase), TruthBase.of_robot(names, timebase),
-        )  # fmt: skip
+            TruthJoints.of_robot(names, timebase),
+            TruthBase.of_robot(names, timebase),
+        )
         self._codecs = [(describe, Codec(describe)) for describe in descriptions]
         self._timebase = timebase
         self._rows = np.empty(CHUNK_TICKS, State.dtype(len(names.joints)))

@@ -32,11 +32,7 @@ from space_robot_msgs_py.samples import MOST_THRUSTERS, MOST_WHEELS, State
 
 from ..faults.schedule import PartFault, Schedule
 from .command_delay import CommandDelaySettings, delay_command, ring_of
-from .drive import (
-    Drive,
-    WrongDrive,
-    drive_torque,
-)
+from .drive import Drive, WrongDrive, drive_torque
 from .thrusters import StuckThruster, Thrusters, fire
 from .torque_echo import TorqueEcho, TorqueEchoSettings, WrongEcho, report_torque
 from .torque_limit import (
@@ -52,9 +48,12 @@ Array = NDArray[np.float64]
 
 
 class ActuatorSettings(
-    BaseActuatorSettings, TorqueEchoSettings, DriveSettings, TorqueLimitSettings,
+    BaseActuatorSettings,
+    TorqueEchoSettings,
+    DriveSettings,
+    TorqueLimitSettings,
     CommandDelaySettings,
-):  # fmt: skip
+):
     """Settings of the actuators."""
 
     def check(self, robot: Robot, file: str) -> None:
@@ -151,9 +150,14 @@ def command_delay_buffer(actuators: Actuators, names: int) -> Array:
 
 @kernel
 def actuate(
-    actuators: Actuators, command_delay_buffer: Array, command: Array, tick: int, period: float,
-    truth: State, measured: State,
-) -> None:  # fmt: skip
+    actuators: Actuators,
+    command_delay_buffer: Array,
+    command: Array,
+    tick: int,
+    period: float,
+    truth: State,
+    measured: State,
+) -> None:
     """Write what ``command`` makes the actuators give from ``tick`` to the next.
 
     Args:

@@ -66,9 +66,11 @@ class Drive(Record):
         decays = np.array([lag_decays(lag, period) for lag in lags])
         drive = cls.allocate(n)
         assign(
-            drive, **{name: per_axis(settings, f"drive_{name}", n) for name in names},
-            decay=decays[:, 0], mean_decay=decays[:, 1],
-        )  # fmt: skip
+            drive,
+            **{name: per_axis(settings, f"drive_{name}", n) for name in names},
+            decay=decays[:, 0],
+            mean_decay=decays[:, 1],
+        )
         judge(drive)
         return drive
 
@@ -112,13 +114,17 @@ def drive_torque(drive: Drive, asked: Array, given: Array) -> None:
 
 
 DRIVE_SCALE = Kind(
-    "drive_scale", Argument("FACTOR", "1", -100.0, 100.0, about=About.AXIS), None,
+    "drive_scale",
+    Argument("FACTOR", "1", -100.0, 100.0, about=About.AXIS),
+    None,
     "the torque given is FACTOR times the one asked for",
-)  # fmt: skip
+)
 DRIVE_BIAS = Kind(
-    "drive_bias", Argument("TORQUE", "N m", -1e6, 1e6, about=About.AXIS), None,
+    "drive_bias",
+    Argument("TORQUE", "N m", -1e6, 1e6, about=About.AXIS),
+    None,
     "TORQUE is given beside what is asked for",
-)  # fmt: skip
+)
 
 
 class WrongDrive:

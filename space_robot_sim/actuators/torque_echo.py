@@ -17,11 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from space_robot_model.hardware.per_axis import (
-    PER_AXIS,
-    Numbers,
-    per_axis,
-)
+from space_robot_model.hardware.per_axis import PER_AXIS, Numbers, per_axis
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.config.validation import StrictModel
@@ -68,9 +64,11 @@ class TorqueEcho(Record):
         """
         echo = cls.allocate(n)
         assign(
-            echo, is_of_given=settings.torque_echo == "given",
-            scale=per_axis(settings, "echo_scale", n), bias=per_axis(settings, "echo_bias", n),
-        )  # fmt: skip
+            echo,
+            is_of_given=settings.torque_echo == "given",
+            scale=per_axis(settings, "echo_scale", n),
+            bias=per_axis(settings, "echo_bias", n),
+        )
         judge(echo)
         return echo
 
@@ -94,13 +92,17 @@ def report_torque(echo: TorqueEcho, given: Array, reported: Array) -> None:
 
 
 TORQUE_SCALE = Kind(
-    "torque_scale", Argument("FACTOR", "1", 1e-3, 1e3, about=About.AXIS), None,
+    "torque_scale",
+    Argument("FACTOR", "1", 1e-3, 1e3, about=About.AXIS),
+    None,
     "the torque given is FACTOR times the one reported",
-)  # fmt: skip
+)
 TORQUE_BIAS = Kind(
-    "torque_bias", Argument("TORQUE", "N m", -1e6, 1e6, about=About.AXIS), None,
+    "torque_bias",
+    Argument("TORQUE", "N m", -1e6, 1e6, about=About.AXIS),
+    None,
     "the torque given is TORQUE more than the one reported",
-)  # fmt: skip
+)
 
 
 class WrongEcho:

@@ -98,9 +98,11 @@ def drive_wheels(
 
 
 WHEEL_FAIL = Kind(
-    "wheel_fail", Argument("", "", 0.0, 0.0, about=About.WHEEL), None,
+    "wheel_fail",
+    Argument("", "", 0.0, 0.0, about=About.WHEEL),
+    None,
     "the motor of a reaction wheel is dead: the wheel runs on freely",
-)  # fmt: skip
+)
 
 
 class DeadWheel:

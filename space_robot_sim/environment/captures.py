@@ -36,9 +36,7 @@ class CaptureEvent(NamedTuple):
     ) -> Impact:
         """Return what passes over in a configuration, see `Impact`."""
         holding = self.after if isinstance(self.event, Capture) else self.before
-        return Impact(
-            holding, self.grasp, quaternion, joint_positions, wheel_axes, wheel_inertia
-        )  # fmt: skip
+        return Impact(holding, self.grasp, quaternion, joint_positions, wheel_axes, wheel_inertia)
 
     def velocity_after(self, impact: Impact, velocity: Array) -> Array:
         """Return the velocities that the event leads to, as in `Impact`."""

@@ -51,9 +51,10 @@ class Disturbance(Record):
         frequencies = [s.base_frequencies, s.inner_frequencies, s.outer_frequencies]
         disturbance = cls.allocate(n)
         assign(
-            disturbance, amplitude=s.scale * np.array(amplitudes),
+            disturbance,
+            amplitude=s.scale * np.array(amplitudes),
             angular_frequency=2.0 * np.pi * np.array(frequencies),
-        )  # fmt: skip
+        )
         return disturbance
 
 

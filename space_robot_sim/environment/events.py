@@ -19,10 +19,7 @@ from space_robot_msgs_py.config.settings import Texts
 from space_robot_msgs_py.config.validation import one_of, short
 from space_robot_msgs_py.config.yaml_text import YamlTextError, parse_yaml
 from space_robot_msgs_py.errors import InputError
-from space_robot_msgs_py.simulated_time import (
-    check_time,
-    shortest,
-)
+from space_robot_msgs_py.simulated_time import check_time, shortest
 
 from ..faults.grammar import NUMBER
 from .target import Target, find_target

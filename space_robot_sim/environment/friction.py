@@ -109,9 +109,13 @@ class StuckJoint:
     """Raises the Coulomb friction of a joint for a while."""
 
     KINDS: ClassVar[tuple[Kind, ...]] = (
-        Kind("stuck_joint", Argument("TORQUE", "N m", 0.0, 1e3, about=About.JOINT), None,
-             "a joint's Coulomb friction rises to TORQUE"),
-    )  # fmt: skip
+        Kind(
+            "stuck_joint",
+            Argument("TORQUE", "N m", 0.0, 1e3, about=About.JOINT),
+            None,
+            "a joint's Coulomb friction rises to TORQUE",
+        ),
+    )
 
     def __init__(self, schedule: Schedule) -> None:
         self._change = TemporaryChange(schedule.of(*self.KINDS))

@@ -8,10 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import (
-    product,
-    rotate_tensor,
-)
+from space_robot_model.elementary.matrices import product, rotate_tensor
 from space_robot_model.robot import Robot
 from space_robot_model.robot.inertia import inertia_tensor
 from space_robot_model.robot.tree import parallel_axes
@@ -50,9 +47,12 @@ class Grasp(NamedTuple):
             tool = tools[one_of(target.tool, tools, "tool", where)]
         axes = product(tool.rotation, target.rotation)
         return cls(
-            tool.body, target.mass, tool.position + product(tool.rotation, target.place.position),
-            rotate_tensor(axes, inertia_tensor(target.inertia)), tool.rotation,
-        )  # fmt: skip
+            tool.body,
+            target.mass,
+            tool.position + product(tool.rotation, target.place.position),
+            rotate_tensor(axes, inertia_tensor(target.inertia)),
+            tool.rotation,
+        )
 
     def holding(self, robot: Robot) -> Robot:
         """Return ``robot`` with the target welded to its body."""

@@ -19,18 +19,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.elementary.matrices import (
-    product,
-    rotate_tensor,
-    solve,
-)
+from space_robot_model.elementary.matrices import product, rotate_tensor, solve
 from space_robot_model.robot import Robot
 from space_robot_model.robot.base_axes import base_axes
 from space_robot_model.robot.dynamics import mass_matrix
-from space_robot_model.robot.frames import (
-    BodyFrame,
-    body_frames,
-)
+from space_robot_model.robot.frames import BodyFrame, body_frames
 
 from .grasp import Grasp
 from .target import TargetMotion
@@ -46,9 +39,14 @@ class Impact:
     """
 
     def __init__(
-        self, holding: Robot, grasp: Grasp, quaternion: Array, joint_positions: Array,
-        wheel_axes: Array, wheel_inertia: Array,
-    ) -> None:  # fmt: skip
+        self,
+        holding: Robot,
+        grasp: Grasp,
+        quaternion: Array,
+        joint_positions: Array,
+        wheel_axes: Array,
+        wheel_inertia: Array,
+    ) -> None:
         """Compute J and ``H^-1 J^T M``.
 
         Args:
@@ -74,8 +72,9 @@ class Impact:
         mass[3:, 3:] = rotate_tensor(axes, grasp.inertia)
         inertia = _with_wheels(
             mass_matrix(holding, quaternion, joint_positions),
-            product(wheel_axes, base[:, :, 0]), wheel_inertia,
-        )  # fmt: skip
+            product(wheel_axes, base[:, :, 0]),
+            wheel_inertia,
+        )
         self._gain = solve(inertia, product(mass, self.jacobian).T)
         """(N+6+W, 6) change of qdot by u."""
 

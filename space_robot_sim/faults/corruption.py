@@ -14,9 +14,13 @@ STAMP_BACK_TICKS = 10
 """A stamp goes back by one tick to as many."""
 STAMP_JUMP_TICKS = 1_000_000
 MEASURED = (
-    "base_position", "quaternion", "base_velocity", "omega_base", "joint_positions",
+    "base_position",
+    "quaternion",
+    "base_velocity",
+    "omega_base",
+    "joint_positions",
     "joint_velocities",
-)  # fmt: skip
+)
 
 NAN_STATE = Kind("nan_state", PROBABILITY, 1.0, "one measured number is NaN")
 INF_STATE = Kind("inf_state", PROBABILITY, 1.0, "one measured number is infinite")
@@ -33,21 +37,29 @@ class Corruption:
     """Spoils samples in place; what is spoilt at a tick depends on the tick alone."""
 
     KINDS = (
-        NAN_STATE, INF_STATE, SCALED_QUATERNION, STAMP_BACK, STAMP_JUMP, NAN_COMMAND, INF_COMMAND,
-    )  # fmt: skip
+        NAN_STATE,
+        INF_STATE,
+        SCALED_QUATERNION,
+        STAMP_BACK,
+        STAMP_JUMP,
+        NAN_COMMAND,
+        INF_COMMAND,
+    )
 
     def __init__(self, schedule: Schedule, passive: int = 0) -> None:
         """``passive``: the robot has so many joints without motors."""
         self._passive = passive
         self._states = [
-            (fault, value) for kind, value in ((NAN_STATE, np.nan), (INF_STATE, np.inf))
+            (fault, value)
+            for kind, value in ((NAN_STATE, np.nan), (INF_STATE, np.inf))
             for fault in schedule.of(kind)
-        ]  # fmt: skip
+        ]
         self._quaternions = schedule.of(SCALED_QUATERNION)
         self._commands = [
-            (fault, value) for kind, value in ((NAN_COMMAND, np.nan), (INF_COMMAND, np.inf))
+            (fault, value)
+            for kind, value in ((NAN_COMMAND, np.nan), (INF_COMMAND, np.inf))
             for fault in schedule.of(kind)
-        ]  # fmt: skip
+        ]
         self._back = schedule.of(STAMP_BACK)
         self._jump = schedule.of(STAMP_JUMP)
 

@@ -19,8 +19,7 @@ from .axes import About
 
 NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _FAULT = re.compile(
-    rf"(?P<kind>[^@]*)@(?P<start>{NUMBER})(?:-(?P<stop>{NUMBER}))?(?::(?P<argument>.+))?",
-    re.ASCII,
+    rf"(?P<kind>[^@]*)@(?P<start>{NUMBER})(?:-(?P<stop>{NUMBER}))?(?::(?P<argument>.+))?", re.ASCII
 )
 _AXIS_AND_NUMBER = re.compile(r"(?P<axis>(?!0+=).+)=(?P<number>[^=]+)", re.ASCII)
 

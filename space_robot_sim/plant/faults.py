@@ -85,8 +85,9 @@ class PartFaults:
         """Prepare those that ``schedule`` has."""
         self._faults = [
             (group, part, fault(schedule))
-            for group, faults in PARTS.items() for part, fault in faults.items()
-        ]  # fmt: skip
+            for group, faults in PARTS.items()
+            for part, fault in faults.items()
+        ]
         self._schedule = schedule
         acting = schedule.of(*PART_KINDS.values())
         self._turns = sorted({tick for fault in acting for tick in (fault.first, fault.stop)})

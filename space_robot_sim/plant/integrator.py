@@ -6,19 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from space_robot_model.dynamics.aba import aba
-from space_robot_model.dynamics.attitude import (
-    quaternion_rate,
-    rotate,
-)
-from space_robot_model.dynamics.kinematics import (
-    forward_kinematics,
-    spatial_velocities,
-)
-from space_robot_model.dynamics.model import (
-    MOST_JOINTS,
-    Data,
-    Model,
-)
+from space_robot_model.dynamics.attitude import quaternion_rate, rotate
+from space_robot_model.dynamics.kinematics import forward_kinematics, spatial_velocities
+from space_robot_model.dynamics.model import MOST_JOINTS, Data, Model
 from space_robot_msgs_py.compiled.kernels import kernel, subroutine
 from space_robot_msgs_py.compiled.records import Record, nested, shaped
 from space_robot_msgs_py.samples import MOST_WHEELS
@@ -81,9 +71,8 @@ def state_size(model: Model) -> int:
 
 @kernel
 def state_derivative(
-    model: Model, environment: Environment, x: Array, disturbance: Array, stages: Stages,
-    out: Array,
-) -> None:  # fmt: skip
+    model: Model, environment: Environment, x: Array, disturbance: Array, stages: Stages, out: Array
+) -> None:
     """Write xdot into ``out``: (27).
 
     Args:

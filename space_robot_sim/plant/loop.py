@@ -32,11 +32,7 @@ from .actuator_health import ActuatorHealth
 from .command_guard import CommandGuard
 from .description import plant_description
 from .late_listeners import LateListeners
-from .messages import (
-    NONE,
-    SentState,
-    exchange_of,
-)
+from .messages import NONE, SentState, exchange_of
 from .plant import Plant
 from .run_control import PAUSED, RunControl
 from .scene_output import SceneOutput
@@ -95,9 +91,12 @@ class PlantLoop:
         self._scene = SceneOutput(node, robot, timebase)
         self._description_out = RawPublisher(node, topics.PLANT_DESCRIPTION)
         self.outputs = (
-            *self._state_out, self._clock_out, *self._truth.outputs, *self._scene.outputs,
+            *self._state_out,
+            self._clock_out,
+            *self._truth.outputs,
+            *self._scene.outputs,
             self._description_out,
-        )  # fmt: skip
+        )
         self._late_listeners = LateListeners(
             (self._state_out[0], self._clock_out, *self._scene.viewed)
         )

@@ -86,9 +86,12 @@ class FaultyExchange(PlantMessages):
 
 
 def exchange_of(
-    settings: FaultSettings, names: RobotNames, period: float, codec: StateCodec,
+    settings: FaultSettings,
+    names: RobotNames,
+    period: float,
+    codec: StateCodec,
     guard: CommandGuard,
-) -> PlantMessages:  # fmt: skip
+) -> PlantMessages:
     """Return the exchange of a robot's flight: a faulty one if any of its messages are to fail."""
     if not settings.has_message_faults:
         return PlantMessages(codec, guard)

@@ -31,11 +31,7 @@ from ..environment.captures import Captures
 from ..environment.environment import Environment, EnvironmentSettings
 from ..environment.payload import with_payload
 from ..sensors.noise import NoiseDraws
-from ..sensors.sensors import (
-    Sensors,
-    arrays_of_draws,
-    sense,
-)
+from ..sensors.sensors import Sensors, arrays_of_draws, sense
 from .faults import FaultSettings, PartFaults
 from .integrator import MOST_NUMBERS, Stages, state_size
 from .stick_slip import integrate
@@ -135,9 +131,12 @@ class Plant(RecordOwner):
         """The plant's `PlantMemory`, for compiled loops."""
         memory = self.memory
         assign(
-            memory, model=robot.model, environment=Environment.build(robot, settings),
-            actuators=Actuators.build(n, settings, period), substeps=settings.substeps,
-        )  # fmt: skip
+            memory,
+            model=robot.model,
+            environment=Environment.build(robot, settings),
+            actuators=Actuators.build(n, settings, period),
+            substeps=settings.substeps,
+        )
         self.command_delay_buffer = command_delay_buffer(
             memory.actuators, len(self.names.commanded)
         )
@@ -166,9 +165,11 @@ class Plant(RecordOwner):
         assign(memory, sensors=sensors)
         self._is_ideal = bool(sensors.are_ideal)
         self.measures_truth = (
-            self._is_ideal and reports_given(memory.actuators)
-            and not self._part_faults.are_in("actuators") and not settings.has_message_faults
-        )  # fmt: skip
+            self._is_ideal
+            and reports_given(memory.actuators)
+            and not self._part_faults.are_in("actuators")
+            and not settings.has_message_faults
+        )
         """True if what comes of `state` can never differ from `truth`."""
         self._draws.drawn = settings.fault_seed, -1
         self.next_change = math.inf
@@ -241,9 +242,7 @@ class Plant(RecordOwner):
         memory = self.memory
         if self.captures.apply(tick, memory.model, memory.x):
             update_true_state(self.block)
-        self.next_change = min(
-            self._part_faults.apply(tick, memory), self.captures.next_tick(tick)
-        )  # fmt: skip
+        self.next_change = min(self._part_faults.apply(tick, memory), self.captures.next_tick(tick))
         if not self._is_ideal:
             self.next_change = min(self.next_change, self._draws.refill(tick))
         if self.measures_truth and tick == 0:  # what `sense` would say, without compiled code
@@ -254,9 +253,13 @@ class Plant(RecordOwner):
     def save(self) -> PlantSnapshot:
         """Copy all that the rest of the flight depends on, but the commands to come."""
         return PlantSnapshot(
-            self.tick, self.block.copy(), self.command_delay_buffer.copy(), self.next_change,
-            self._draws.drawn, copy.deepcopy(self._part_faults),
-        )  # fmt: skip
+            self.tick,
+            self.block.copy(),
+            self.command_delay_buffer.copy(),
+            self.next_change,
+            self._draws.drawn,
+            copy.deepcopy(self._part_faults),
+        )
 
     def restore(self, snapshot: PlantSnapshot) -> None:
         """Go back, or on, to the tick of a snapshot of this flight: from there the bits repeat."""
@@ -274,9 +277,13 @@ class Plant(RecordOwner):
 
 @kernel
 def step(
-    block: Block, command_delay_buffer: Array, torque: Array, tick: int, period: float,
+    block: Block,
+    command_delay_buffer: Array,
+    torque: Array,
+    tick: int,
+    period: float,
     goes_on: bool,
-) -> float:  # fmt: skip
+) -> float:
     """Call `advance` from Python and, if ``goes_on``, let the sensors measure the next tick."""
     memory = block[0]
     fastest: float = advance(memory, command_delay_buffer, torque, tick, period)
@@ -322,9 +329,13 @@ def advance(
         actuation[6 + joints + k] = truth.wheel_torques[k]
     for k in range(substeps):
         integrate(
-            memory.model, memory.environment, memory.x, tick * period + k * step, step,
+            memory.model,
+            memory.environment,
+            memory.x,
+            tick * period + k * step,
+            step,
             memory.stages,
-        )  # fmt: skip
+        )
     write_truth(memory.model, memory.x, memory.rotation, truth)
     fastest: float = fastest_rate(memory.model, memory.x)
     return fastest

@@ -25,10 +25,15 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
     node: ClassVar[str] = "plant"
     selectors: ClassVar[tuple[str, ...]] = ("robot", "mission", "case", "sensors", "actuators")
     sends: ClassVar[tuple[topics.Topic, ...]] = (
-        topics.JOINT_STATES, topics.BASE_STATE, topics.CLOCK, *topics.TRUTH,
-        topics.WHEELS_STATE, topics.THRUSTERS_STATE, *topics.SCENE,
+        topics.JOINT_STATES,
+        topics.BASE_STATE,
+        topics.CLOCK,
+        *topics.TRUTH,
+        topics.WHEELS_STATE,
+        topics.THRUSTERS_STATE,
+        *topics.SCENE,
         topics.PLANT_DESCRIPTION,
-    )  # fmt: skip
+    )
 
     mission: str = Field(
         "", description="a mission of config/missions (empty: the robot's), or a path"

@@ -13,9 +13,13 @@ from space_robot_msgs_py.errors import FlightError, InputError
 from .simulation import Simulation, SimulationState
 
 FEATURES = (
-    "SIMULATION_RESET", "SIMULATION_STATE_GETTING", "SIMULATION_STATE_SETTING",
-    "SIMULATION_STATE_PAUSE", "STEP_SIMULATION_SINGLE", "STEP_SIMULATION_MULTIPLE",
-)  # fmt: skip
+    "SIMULATION_RESET",
+    "SIMULATION_STATE_GETTING",
+    "SIMULATION_STATE_SETTING",
+    "SIMULATION_STATE_PAUSE",
+    "STEP_SIMULATION_SINGLE",
+    "STEP_SIMULATION_MULTIPLE",
+)
 """Names of constants of SimulatorFeatures.
 
 SIMULATION_RESET_TIME and SIMULATION_RESET_STATE are missing: they announce that each can be reset

@@ -127,9 +127,14 @@ def first_at_rest(model: Model, environment: Environment, x: Array, stages: Stag
 
 @kernel
 def cut(
-    model: Model, environment: Environment, x: Array, time: float, length: float, velocity: int,
+    model: Model,
+    environment: Environment,
+    x: Array,
+    time: float,
+    length: float,
+    velocity: int,
     stages: Stages,
-) -> float:  # fmt: skip
+) -> float:
     """Return the time after which ``x[velocity]`` is zero, s, and leave that state in the stages.
 
     It has changed its sign in ``stages.end``, which is ``length`` later. The root is found by the

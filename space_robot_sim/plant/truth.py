@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.dynamics.attitude import (
-    rotate_back,
-    rotation_matrix,
-)
+from space_robot_model.dynamics.attitude import rotate_back, rotation_matrix
 from space_robot_model.dynamics.model import Model
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.samples import State

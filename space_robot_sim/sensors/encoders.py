@@ -11,10 +11,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.hardware.encoders import (
-    MOST_DIFFERENCED,
-    EncoderSettings,
-)
+from space_robot_model.hardware.encoders import MOST_DIFFERENCED, EncoderSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.samples import State
@@ -64,9 +61,13 @@ class Encoders(Record):
 
     @classmethod
     def build(
-        cls, n: int, settings: EncoderSettings, period: float, truth: State,
+        cls,
+        n: int,
+        settings: EncoderSettings,
+        period: float,
+        truth: State,
         is_prismatic: Sequence[bool] | NDArray[np.bool_] = (),
-    ) -> Encoders:  # fmt: skip
+    ) -> Encoders:
         """Read the settings; before tick 0 the robot was at rest at ``truth``.
 
         ``is_prismatic`` (n,): which joints slide (empty: none).
@@ -77,10 +78,14 @@ class Encoders(Record):
         step = whole / 2.0**settings.bits if settings.bits else np.zeros(n)
         at_rest = truth.joint_positions
         assign(
-            encoders, sigma=settings.noise, step=step, difference_ticks=settings.difference_ticks,
-            velocity_sigma=settings.velocity_noise, velocity_step=settings.velocity_step,
+            encoders,
+            sigma=settings.noise,
+            step=step,
+            difference_ticks=settings.difference_ticks,
+            velocity_sigma=settings.velocity_noise,
+            velocity_step=settings.velocity_step,
             told=step * np.floor(at_rest / step + 0.5) if settings.bits else at_rest,
-        )  # fmt: skip
+        )
         return encoders
 
 
@@ -116,14 +121,38 @@ class EncoderFault(SensorFault):
     """Encoders that are noisier or coarser, or stuck."""
 
     CHANGES: ClassVar[Mapping[str, Mapping[Kind, Change]]] = {
-        "sigma": {Kind("noise_joint_position", SIGMA_RAD, None,
-                       "noise on the measured joint angles"): add_noise},
-        "velocity_sigma": {Kind("noise_joint_velocity", SIGMA_RAD_PER_S, None,
-                                "noise on the measured joint velocities"): add_noise},
-        "stuck": {Kind("encoder_stuck", Argument("", "", 0.0, 0.0, about=About.JOINT), None,
-                       "the measured joint angle stands, its rate is zero"): _hold},
-        "step": {Kind("quantise_joint_position", STEP_RAD, None,
-                      "the measured joint angles come in steps"): coarsen},
-        "velocity_step": {Kind("quantise_joint_velocity", STEP_RAD_PER_S, None,
-                               "the measured joint velocities come in steps"): coarsen},
-    }  # fmt: skip
+        "sigma": {
+            Kind(
+                "noise_joint_position", SIGMA_RAD, None, "noise on the measured joint angles"
+            ): add_noise
+        },
+        "velocity_sigma": {
+            Kind(
+                "noise_joint_velocity",
+                SIGMA_RAD_PER_S,
+                None,
+                "noise on the measured joint velocities",
+            ): add_noise
+        },
+        "stuck": {
+            Kind(
+                "encoder_stuck",
+                Argument("", "", 0.0, 0.0, about=About.JOINT),
+                None,
+                "the measured joint angle stands, its rate is zero",
+            ): _hold
+        },
+        "step": {
+            Kind(
+                "quantise_joint_position", STEP_RAD, None, "the measured joint angles come in steps"
+            ): coarsen
+        },
+        "velocity_step": {
+            Kind(
+                "quantise_joint_velocity",
+                STEP_RAD_PER_S,
+                None,
+                "the measured joint velocities come in steps",
+            ): coarsen
+        },
+    }

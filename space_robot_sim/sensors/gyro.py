@@ -57,10 +57,14 @@ class Gyro(Record):
         """Read the settings."""
         gyro = cls.allocate(n)
         assign(
-            gyro, sigma=settings.noise, angle_random_walk=settings.angle_random_walk,
-            rate_random_walk=settings.rate_random_walk, offset=settings.initial_bias,
-            scale=1.0 + np.array(settings.scale_factor_error), step=settings.step,
-        )  # fmt: skip
+            gyro,
+            sigma=settings.noise,
+            angle_random_walk=settings.angle_random_walk,
+            rate_random_walk=settings.rate_random_walk,
+            offset=settings.initial_bias,
+            scale=1.0 + np.array(settings.scale_factor_error),
+            step=settings.step,
+        )
         return gyro
 
 
@@ -88,10 +92,20 @@ class GyroFault(SensorFault):
     """A gyro that is noisier or coarser, or has another bias."""
 
     CHANGES: ClassVar[Mapping[str, Mapping[Kind, Change]]] = {
-        "sigma": {Kind("noise_gyro", SIGMA_RAD_PER_S, None,
-                       "noise on the measured base rate"): add_noise},
-        "offset": {Kind("gyro_bias", Argument("RATE", "rad/s", -10.0, 10.0, about=About.BASE_AXIS),
-                        None, "RATE is measured beside the base's rate about an axis"): _add_bias},
-        "step": {Kind("quantise_gyro", STEP_RAD_PER_S, None,
-                      "the measured base rate comes in steps"): coarsen},
-    }  # fmt: skip
+        "sigma": {
+            Kind("noise_gyro", SIGMA_RAD_PER_S, None, "noise on the measured base rate"): add_noise
+        },
+        "offset": {
+            Kind(
+                "gyro_bias",
+                Argument("RATE", "rad/s", -10.0, 10.0, about=About.BASE_AXIS),
+                None,
+                "RATE is measured beside the base's rate about an axis",
+            ): _add_bias
+        },
+        "step": {
+            Kind(
+                "quantise_gyro", STEP_RAD_PER_S, None, "the measured base rate comes in steps"
+            ): coarsen
+        },
+    }

@@ -32,9 +32,13 @@ class Sensors(Record):
 
     @classmethod
     def build(
-        cls, n: int, settings: SensorSettings, period: float, truth: State,
+        cls,
+        n: int,
+        settings: SensorSettings,
+        period: float,
+        truth: State,
         is_prismatic: Sequence[bool] | NDArray[np.bool_] = (),
-    ) -> Sensors:  # fmt: skip
+    ) -> Sensors:
         """Read the numbers of the settings for a robot of ``n`` joints, at rest at ``truth``.
 
         ``is_prismatic`` (n,): which joints slide (empty: none).
@@ -66,8 +70,10 @@ IDEAL = [(name, getattr(SensorSettings(), name)) for name in SensorSettings.mode
 """The settings of each sensor without error."""
 
 FAULTS: dict[str, type[PartFault]] = {
-    "star_tracker": StarTrackerFault, "gyro": GyroFault, "encoders": EncoderFault,
-}  # fmt: skip
+    "star_tracker": StarTrackerFault,
+    "gyro": GyroFault,
+    "encoders": EncoderFault,
+}
 """The faults of each field of `Sensors`."""
 
 

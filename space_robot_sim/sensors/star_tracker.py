@@ -10,11 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.elementary.matrices import norm
 from space_robot_model.elementary.sine import sin_cos
-from space_robot_model.hardware.star_tracker import (
-    LEAST_RATE,
-    MOST_UNDER_WAY,
-    StarTrackerSettings,
-)
+from space_robot_model.hardware.star_tracker import LEAST_RATE, MOST_UNDER_WAY, StarTrackerSettings
 from space_robot_msgs_py.compiled.kernels import kernel
 from space_robot_msgs_py.compiled.records import Record, assign, shaped
 from space_robot_msgs_py.errors import InputError
@@ -85,10 +81,14 @@ class StarTracker(Record):
             )
         tracker = cls.allocate(n)
         assign(
-            tracker, sigma=[settings.noise_across, settings.noise_about], step=settings.step,
+            tracker,
+            sigma=[settings.noise_across, settings.noise_about],
+            step=settings.step,
             boresight=np.array(settings.boresight) / norm(settings.boresight),
-            interval=interval, delay=delay, held=truth.quaternion,
-        )  # fmt: skip
+            interval=interval,
+            delay=delay,
+            held=truth.quaternion,
+        )
         return tracker
 
 
@@ -151,10 +151,25 @@ class StarTrackerFault(SensorFault):
     """A star tracker that is noisier or coarser, or blind."""
 
     CHANGES: ClassVar[Mapping[str, Mapping[Kind, Change]]] = {
-        "sigma": {Kind("noise_attitude", SIGMA_RAD, None,
-                       "the measured attitude is turned by SIGMA about each axis"): add_noise},
-        "blind": {Kind("tracker_blind", None, None,
-                       "no attitude is measured, the last one is held"): _blind},
-        "step": {Kind("quantise_attitude", Argument("STEP", "rad", 1e-12, 1.0), None,
-                      "the measured quaternion's numbers come in steps of STEP / 2"): coarsen},
-    }  # fmt: skip
+        "sigma": {
+            Kind(
+                "noise_attitude",
+                SIGMA_RAD,
+                None,
+                "the measured attitude is turned by SIGMA about each axis",
+            ): add_noise
+        },
+        "blind": {
+            Kind(
+                "tracker_blind", None, None, "no attitude is measured, the last one is held"
+            ): _blind
+        },
+        "step": {
+            Kind(
+                "quantise_attitude",
+                Argument("STEP", "rad", 1e-12, 1.0),
+                None,
+                "the measured quaternion's numbers come in steps of STEP / 2",
+            ): coarsen
+        },
+    }

@@ -12,17 +12,27 @@ from typing import Any
 
 import click
 
-from space_robot.cli.options import (
-    OUTPUT,
-    put_json,
-)
+from space_robot.cli.options import OUTPUT, put_json
 from space_robot.console.files import check_writable
 from space_robot_msgs_py.errors import SpaceRobotError
 
 SECTIONS = (
-    "plant", "wheels", "laws", "simulate", "reproduce", "campaign", "graph", "composed", "clock",
-    "recorder", "start-up", "compile", "python", "peers", "growth",
-)  # fmt: skip
+    "plant",
+    "wheels",
+    "laws",
+    "simulate",
+    "reproduce",
+    "campaign",
+    "graph",
+    "composed",
+    "clock",
+    "recorder",
+    "start-up",
+    "compile",
+    "python",
+    "peers",
+    "growth",
+)
 BESIDE_PEERS = {"peers", "growth"}
 
 
@@ -39,9 +49,14 @@ BESIDE_PEERS = {"peers", "growth"}
 @click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), help="PNG of the growth.")
 @click.option("--cold", is_flag=True, help="Compile anew, to see how long first calls take.")
 def bench(
-    sections: tuple[str, ...], short: bool, repetitions: int | None, as_json: bool,
-    output: Path | None, plot: Path | None, cold: bool,
-) -> None:  # fmt: skip
+    sections: tuple[str, ...],
+    short: bool,
+    repetitions: int | None,
+    as_json: bool,
+    output: Path | None,
+    plot: Path | None,
+    cold: bool,
+) -> None:
     """Measure how fast it is on this machine, each figure beside its competitor in the same run.
 
     SECTION is one of plant, wheels (beside Basilisk's), laws, simulate, reproduce, campaign; on the
@@ -80,9 +95,13 @@ def bench(
 
 
 def _run(
-    names: tuple[str, ...], short: bool, repetitions: int | None, plot: Path | None,
-    is_shown: bool, cold: bool,
-) -> tuple[dict[str, Any], bool]:  # fmt: skip
+    names: tuple[str, ...],
+    short: bool,
+    repetitions: int | None,
+    plot: Path | None,
+    is_shown: bool,
+    cold: bool,
+) -> tuple[dict[str, Any], bool]:
     """The report, and whether all conditions were kept."""
     from space_robot.console.terminal import terminal
     from space_robot.flight.compilation import compile_kernels

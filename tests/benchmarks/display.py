@@ -10,10 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from space_robot.console.terminal import (
-    say,
-    show,
-)
+from space_robot.console.terminal import say, show
 
 from .result import Result
 

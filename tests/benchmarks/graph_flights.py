@@ -15,15 +15,8 @@ import psutil
 from numpy.typing import NDArray
 
 from space_robot.flight.graph.domain import ros_domain
-from space_robot.flight.graph.orchestrator import (
-    flight_parameters,
-    require_ros,
-)
-from space_robot.flight.graph.processes import (
-    Graph,
-    node_environment,
-    ros_arguments,
-)
+from space_robot.flight.graph.orchestrator import flight_parameters, require_ros
+from space_robot.flight.graph.processes import Graph, node_environment, ros_arguments
 from space_robot.flight.plan import Flight
 from space_robot.processes.node_modules import MODULES
 from space_robot_msgs_py.bag.accounts import noted_accounts

@@ -21,9 +21,14 @@ def draw_growth(growth: Growth, path: Path) -> None:
         ours = name.startswith("space_robot")
         label = f"{name}: $n^{{{median(exponents):.2f}}}$" if exponents else name
         axes.loglog(
-            growth.joints, [median(samples) for samples in sizes], marker="o", markersize=4,
-            label=label, linewidth=2.0 if ours else 1.2, linestyle="-" if ours else "--",
-        )  # fmt: skip
+            growth.joints,
+            [median(samples) for samples in sizes],
+            marker="o",
+            markersize=4,
+            label=label,
+            linewidth=2.0 if ours else 1.2,
+            linestyle="-" if ours else "--",
+        )
     axes.set_xlabel("joints")
     axes.set_ylabel("time, us")
     axes.set_xticks(growth.joints, [str(n) for n in growth.joints])

@@ -8,10 +8,7 @@ from numpy.typing import NDArray
 from space_robot_control.controller.kernels import controller_tick
 from space_robot_control.laws.compiled import LawCode
 from space_robot_model.dynamics.aba import aba
-from space_robot_model.dynamics.kinematics import (
-    forward_kinematics,
-    spatial_velocities,
-)
+from space_robot_model.dynamics.kinematics import forward_kinematics, spatial_velocities
 from space_robot_msgs_py.compiled.kernels import RecordFunction, kernel
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_sim.plant.integrator import state_derivative
@@ -58,9 +55,15 @@ def state_derivatives(block: Block, disturbance: Array, calls: int) -> None:
 
 @kernel
 def controller_ticks(
-    law: LawCode, allocate: RecordFunction, block: Block, states: Block, references: Block,
-    ticks: int, torque: Array, period: float,
-) -> None:  # fmt: skip
+    law: LawCode,
+    allocate: RecordFunction,
+    block: Block,
+    states: Block,
+    references: Block,
+    ticks: int,
+    torque: Array,
+    period: float,
+) -> None:
     """All that an on-board computer does in a tick, over the rows of a recorded flight."""
     for i in range(ticks):
         k = i % states.size

@@ -22,10 +22,7 @@ set_defaults()
 
 import rclpy  # noqa: E402
 import rclpy.utilities  # noqa: E402
-from rclpy.executors import (  # noqa: E402
-    ExternalShutdownException,
-    SingleThreadedExecutor,
-)
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 
 WARM_UP_TICKS = 200

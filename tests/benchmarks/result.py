@@ -127,9 +127,11 @@ class Result:
         asked = None
         if self.target:
             asked = {
-                "of": self.target.of, "relation": self.relation, "limit": self.target.limit,
+                "of": self.target.of,
+                "relation": self.relation,
+                "limit": self.target.limit,
                 "aim": self.target.aim,
-            }  # fmt: skip
+            }
         return {
             "name": self.name,
             "unit": self.unit,

@@ -23,10 +23,7 @@ from benchmarks.measure import Options, interleave, repeated
 from benchmarks.result import Result, Target
 from benchmarks.sections import section
 from benchmarks.sections.laws import Recorded
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 
 COMMAND = [sys.executable, str(TESTS / "benchmarks")]
@@ -206,8 +203,10 @@ def test_peers_fly_the_same_robot(tmp_path: Path) -> None:
     picture = tmp_path / "growth.png"
     result = subprocess.run(
         [*COMMAND, "peers", "growth", "--short", "--json", "--plot", str(picture)],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert result.returncode == 0, result.stderr
     found = json.loads(result.stdout)["sections"]
     beside = {row["beside"] for row in found["peers"]}

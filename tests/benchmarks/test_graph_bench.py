@@ -19,10 +19,21 @@ def sections() -> dict[str, list[dict[str, Any]]]:
     pytest.importorskip("rclpy")
     sections = ("graph", "composed", "clock", "recorder", "start-up")
     result = subprocess.run(
-        [sys.executable, str(TESTS / "benchmarks"), *sections, "--short", "--repetitions", "1",
-         "--json"],
-        capture_output=True, text=True, timeout=500.0, check=False, env=ros_environment(),
-    )  # fmt: skip
+        [
+            sys.executable,
+            str(TESTS / "benchmarks"),
+            *sections,
+            "--short",
+            "--repetitions",
+            "1",
+            "--json",
+        ],
+        capture_output=True,
+        text=True,
+        timeout=500.0,
+        check=False,
+        env=ros_environment(),
+    )
     assert result.returncode == 0, result.stderr
     found: dict[str, list[dict[str, Any]]] = json.loads(result.stdout)["sections"]
     assert list(found) == list(sections)

@@ -62,8 +62,9 @@ def _start(name: str, domain: int, bag: Path) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
         [sys.executable, "-m", MODULES[name], *options],
         env={**DEFAULTS, **os.environ, "ROS_DOMAIN_ID": str(domain)},
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
 
 
 def _until_nominal(monitor: Monitor, when: str) -> list[str]:

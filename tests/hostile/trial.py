@@ -60,12 +60,18 @@ class Trial:
     def run(self, *arguments: str) -> subprocess.Popen[str]:
         """Start Python with ``arguments`` in the trial's domain."""
         environment = {
-            **DEFAULTS, **os.environ, "ROS_DOMAIN_ID": str(self.domain), MARK: self._mark,
-        }  # fmt: skip
+            **DEFAULTS,
+            **os.environ,
+            "ROS_DOMAIN_ID": str(self.domain),
+            MARK: self._mark,
+        }
         return subprocess.Popen(
-            [sys.executable, *arguments], env=environment, text=True,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        )  # fmt: skip
+            [sys.executable, *arguments],
+            env=environment,
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        )
 
     def publish_foreign(self, topic: str, kind: str, rate_hz: float) -> None:
         """Let somebody else publish on a topic, from now to the trial's end."""

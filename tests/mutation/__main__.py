@@ -105,8 +105,9 @@ def main(areas: tuple[str, ...], count: int, seed: int | None, jobs: int, only_l
                 console.print(
                     f"{len(results)}/{len(chosen)} {area} {mutant.module}:{mutant.line} "
                     f"{outcome.verdict} {outcome.by} ({outcome.seconds:.0f} s)",
-                    markup=False, highlight=False,
-                )  # fmt: skip
+                    markup=False,
+                    highlight=False,
+                )
                 if outcome.verdict == "survived":
                     console.print(change(mutant), markup=False, highlight=False)
 

@@ -74,9 +74,7 @@ FURTHER = (
     "tests/laboratory/flight/graph/test_graph_nodes.py",
 )
 """Pages made from the code, commands with their output, flights in process and on the graph."""
-CLOSED_LOOP = (
-    "laboratory/flight/test_compiled_loop.py", "laboratory/flight/test_closed_loop.py",
-)  # fmt: skip
+CLOSED_LOOP = ("laboratory/flight/test_compiled_loop.py", "laboratory/flight/test_closed_loop.py")
 AREAS = {
     "messages": _files("msgs", "msgs/test_*.py", "msgs/bag/test_*.py", marks="not slow"),
     "bag": _room("msgs/bag"),
@@ -84,11 +82,11 @@ AREAS = {
     "config": _room("msgs/config", "laboratory/cli/test_options.py"),
     "ros": _room("msgs/ros", "laboratory/flight/graph/test_graph_nodes.py", marks=""),
     "wire": _room("msgs/wire"),
-    "actuators": _room(
-        "sim/actuators", "sim/plant/test_*.py", "control/allocation/test_*.py"
-    ),
+    "actuators": _room("sim/actuators", "sim/plant/test_*.py", "control/allocation/test_*.py"),
     "dynamics": _room(
-        "model/dynamics", "model/robot/test_*.py", "sim/plant/test_conservation.py",
+        "model/dynamics",
+        "model/robot/test_*.py",
+        "sim/plant/test_conservation.py",
         "sim/plant/test_plant.py",
     ),
     "elementary": _room("model/elementary"),
@@ -99,7 +97,8 @@ AREAS = {
     "sensors": _room("sim/sensors", "sim/plant/test_*.py"),
     "nodes": Area(
         tuple(f"{PACKAGES[name]}/*.py" for name in ("sim", "control", "laboratory")),
-        ("tests/laboratory/flight/graph/test_graph_nodes.py",), "",
+        ("tests/laboratory/flight/graph/test_graph_nodes.py",),
+        "",
     ),
     "analysis": _room("laboratory/analysis", marks="not ros"),
     "campaign": _room("laboratory/campaign", marks="not ros"),
@@ -115,7 +114,9 @@ AREAS = {
     "paper": _room("laboratory/paper", "laboratory/cli/test_stability_command.py", marks="not ros"),
     "api": _room("laboratory/api", marks="not ros"),
     "scenario": _room(
-        "laboratory/scenario", "laboratory/api/test_*.py", "laboratory/flight/test_*.py",
+        "laboratory/scenario",
+        "laboratory/api/test_*.py",
+        "laboratory/flight/test_*.py",
         marks="not ros",
     ),
     "console": _room("laboratory/console", "laboratory/cli/test_output.py", marks="not ros"),
@@ -125,5 +126,5 @@ AREAS = {
     "hardware": _room("model/hardware", "sim/actuators/test_*.py", "sim/sensors/test_*.py"),
     "tuning": _room("laboratory/tuning", "laboratory/cli/test_gains_command.py", marks="not ros"),
     "view": _room("laboratory/view", "laboratory/cli/test_view_command.py", marks="not ros"),
-}  # fmt: skip
+}
 """Every module of the five packages is in one of them, by what is said on the command line."""

@@ -41,8 +41,11 @@ class Copy:
         self._passing: set[str] = set()
         listed = subprocess.run(
             ["git", "ls-files", "-co", "--exclude-standard"],
-            cwd=ROOT, check=True, text=True, capture_output=True,
-        ).stdout.splitlines()  # fmt: skip
+            cwd=ROOT,
+            check=True,
+            text=True,
+            capture_output=True,
+        ).stdout.splitlines()
         for name in listed:
             if (ROOT / name).is_file():
                 target = self._tree / name
@@ -91,11 +94,26 @@ class Copy:
         }
         begun = time.monotonic()
         process = subprocess.Popen(
-            [sys.executable, "-m", "pytest", "-x", "-p", "no:cacheprovider", "--tb=no",
-             "-m", marks, *tests],
-            cwd=self._tree, env=environment, text=True, start_new_session=True,
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-        )  # fmt: skip
+            [
+                sys.executable,
+                "-m",
+                "pytest",
+                "-x",
+                "-p",
+                "no:cacheprovider",
+                "--tb=no",
+                "-m",
+                marks,
+                *tests,
+            ],
+            cwd=self._tree,
+            env=environment,
+            text=True,
+            start_new_session=True,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        )
         self._process = process
         try:
             output, _ = process.communicate(timeout=LIMIT_S)

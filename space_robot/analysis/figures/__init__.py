@@ -12,6 +12,16 @@ from .single_flight import control_results, desired_joints
 from .style import save_figure
 
 __all__ = [
-    "chatter", "control_results", "desired_joints", "errors_and_torques", "junctions",
-    "latency_histogram", "momentum", "pointing", "ripple", "save_figure", "thrusters", "wheels",
-]  # fmt: skip
+    "chatter",
+    "control_results",
+    "desired_joints",
+    "errors_and_torques",
+    "junctions",
+    "latency_histogram",
+    "momentum",
+    "pointing",
+    "ripple",
+    "save_figure",
+    "thrusters",
+    "wheels",
+]

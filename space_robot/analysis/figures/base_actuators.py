@@ -115,9 +115,14 @@ def _draw_pulses(axes: Axes, time: Array, is_open: Array, period: float) -> None
     share = np.add.reduceat(np.nan_to_num(is_open), starts, axis=0) / counts[:, np.newaxis]
     count = is_open.shape[1]
     axes.imshow(
-        share.T, cmap="Greys", vmin=0.0, vmax=1.0, aspect="auto", interpolation="nearest",
+        share.T,
+        cmap="Greys",
+        vmin=0.0,
+        vmax=1.0,
+        aspect="auto",
+        interpolation="nearest",
         extent=(time[0] - period, time[0] + (starts[-1] + length - 1) * period, count + 0.5, 0.5),
-    )  # fmt: skip
+    )
     axes.grid(visible=False)
     axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_ylabel("thruster, open")
@@ -132,7 +137,11 @@ def _draw_cycle(axes: Axes, log: FlightLog) -> None:
     for i in range(3):
         look = LineStyle.of(i)
         axes.plot(
-            angle[:, i], rate[:, i], color=look.colour, linewidth=0.5, marker=look.marker,
+            angle[:, i],
+            rate[:, i],
+            color=look.colour,
+            linewidth=0.5,
+            marker=look.marker,
             markevery=[len(angle) // 2],
-        )  # fmt: skip
+        )
     axes.set(xlabel="attitude error (rad)", ylabel="rate error (rad/s)")

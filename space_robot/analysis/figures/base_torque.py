@@ -134,9 +134,13 @@ def _draw_spectra(axes: Axes, spectra: Mapping[str, tuple[Array, Array]]) -> Non
         even = np.geomspace(frequency[0], frequency[-1], 1000)
         marks = np.searchsorted(frequency, even[scattered(len(even), index, len(spectra))])
         axes.plot(
-            frequency, density,
-            color=look.colour, linestyle=look.dashes, marker=look.marker, markevery=marks.tolist(),
-        )  # fmt: skip
+            frequency,
+            density,
+            color=look.colour,
+            linestyle=look.dashes,
+            marker=look.marker,
+            markevery=marks.tolist(),
+        )
     axes.set(xscale="log", yscale="log")
     if not axes.get_lines():  # one mark alone gives no scale
         axes.set_xlim(0.1 * CHATTER_FREQUENCY, 10.0 * CHATTER_FREQUENCY)
@@ -183,8 +187,9 @@ def _draw_side_by_side(
             marks = None if torque.shape[1] > 1 else np.empty(0, np.intp)
             plot_lines(axes, 1e3 * time, torque, marks=marks, steps=steps)
         else:
-            axes.text(0.03, 0.5, f"ended at {flights[name].end:g} s", color=GREY,
-                      transform=axes.transAxes)  # fmt: skip
+            axes.text(
+                0.03, 0.5, f"ended at {flights[name].end:g} s", color=GREY, transform=axes.transAxes
+            )
         axes.set_title(plain(name + _cut(torque, low, high)))
         if number + columns >= len(panels):
             axes.set_xlabel(f"time from {stretch.moment:g} s (ms)")

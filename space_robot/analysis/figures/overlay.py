@@ -38,10 +38,11 @@ def errors_and_torques(flights: Mapping[str, PlotSeries]) -> Figure:
         flights: by name.
     """
     errors = _panels(
-        flights, lambda series: series.errors,
+        flights,
+        lambda series: series.errors,
         lambda key: f"|{words(key)} error|{'' if key == 'attitude' else f' ({unit_of(key)})'}",
         True,
-    )  # fmt: skip
+    )
     torques = _panels(
         flights,
         lambda series: series.torques,
@@ -88,8 +89,12 @@ def latency_histogram(flights: Mapping[str, PlotSeries]) -> Figure:
         look = LineStyle.of(index)
         counts, _ = np.histogram(np.maximum(values, low), edges)
         axes.stairs(counts, edges, color=look.colour, linestyle=look.dashes, linewidth=0.9)
-    axes.set(xscale="log", yscale="log", xlabel="from a state's sending to its command's (ms)",
-             ylabel="answers")  # fmt: skip
+    axes.set(
+        xscale="log",
+        yscale="log",
+        xlabel="from a state's sending to its command's (ms)",
+        ylabel="answers",
+    )
     axes.set_ylim(bottom=0.7)
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_formatter("")

@@ -41,10 +41,14 @@ def ripple(flights: Mapping[str, PlotSeries]) -> Figure:
                 continue
             look = LineStyle.of(names.index(name))
             panel.plot(
-                frequency, np.where(density > 0.0, density, np.nan), color=look.colour,
-                linestyle=look.dashes, marker=look.marker, linewidth=0.7,
+                frequency,
+                np.where(density > 0.0, density, np.nan),
+                color=look.colour,
+                linestyle=look.dashes,
+                marker=look.marker,
+                linewidth=0.7,
                 markevery=_marks(frequency, names.index(name), len(names)),
-            )  # fmt: skip
+            )
         squared = "N²" if unit_of(key) == "N" else "(N m)²"
         panel.set(xscale="log", yscale="log", ylabel=f"PSD of {words(key)} ({squared}/Hz)")
     panels[-1].set_xlabel("frequency (Hz)")

@@ -85,10 +85,12 @@ def control_results(log: FlightLog, title: str) -> Figure:
     rows = 3 if len(moments) else 2
     figure = page(22.0 + 46.0 * rows, title)
     cells = figure.add_gridspec(rows, 2)
-    for column, (part, names, error_label, torque_label) in enumerate((
-        (slice(0, 3), BASE_AXES, of_base, "base torque (N m)"),
-        (slice(3, None), log.joint_names, *_joint_labels(log)),
-    )):  # fmt: skip
+    for column, (part, names, error_label, torque_label) in enumerate(
+        (
+            (slice(0, 3), BASE_AXES, of_base, "base torque (N m)"),
+            (slice(3, None), log.joint_names, *_joint_labels(log)),
+        )
+    ):
         errors = figure.add_subplot(cells[0, column])
         torques = figure.add_subplot(cells[1, column], sharex=errors)
         plot_lines(errors, time, error[:, part])
@@ -129,8 +131,11 @@ def _enlarge(
         near = np.abs(time - moment) < JUNCTION_HALF_WIDTH + 1e-9
         plot_lines(axes, 1e3 * (time[near] - moment), torque[near])
         mark_moments(axes, np.zeros(1))
-        axes.set_xlabel(f"time from {moment:g} s (ms)" if len(moments) < MOST_JUNCTIONS
-                        else f"from {moment:g} s (ms)")  # fmt: skip
+        axes.set_xlabel(
+            f"time from {moment:g} s (ms)"
+            if len(moments) < MOST_JUNCTIONS
+            else f"from {moment:g} s (ms)"
+        )
         axes.locator_params(axis="x", nbins=7 if len(moments) == 1 else 3)
     first: Axes = panels[0]
     return first

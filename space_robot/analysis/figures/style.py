@@ -27,10 +27,7 @@ from numpy.typing import NDArray
 from space_robot_msgs_py.config.text import shortened
 from space_robot_msgs_py.errors import InputError
 
-from ...console.files import (
-    make_folder,
-    whole_file,
-)
+from ...console.files import make_folder, whole_file
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -117,11 +114,15 @@ def plot_lines(
         marked = scattered(len(x), index, max(looks) + 1) if marks is None else marks
         drawn = np.union1d(thinned(shown[:, column]), marked)
         axes.plot(
-            x[drawn], shown[drawn, column],
-            color=look.colour, linestyle=look.dashes if dashed else "-", marker=look.marker,
-            markevery=np.searchsorted(drawn, marked).tolist(), zorder=2.0 + 0.01 * depth,
+            x[drawn],
+            shown[drawn, column],
+            color=look.colour,
+            linestyle=look.dashes if dashed else "-",
+            marker=look.marker,
+            markevery=np.searchsorted(drawn, marked).tolist(),
+            zorder=2.0 + 0.01 * depth,
             drawstyle="steps-pre" if steps else "default",
-        )  # fmt: skip
+        )
 
 
 def thinned(signal: Array, stretches: int = STRETCHES) -> Indices:

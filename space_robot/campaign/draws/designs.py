@@ -98,9 +98,11 @@ class Saltelli(Design):
 
 
 DESIGNS: dict[str, type[Design]] = {
-    "independent": Independent, "latin_hypercube": LatinHypercube, "sobol": Sobol,
+    "independent": Independent,
+    "latin_hypercube": LatinHypercube,
+    "sobol": Sobol,
     "saltelli": Saltelli,
-}  # fmt: skip
+}
 
 
 def shifted(seed: int, name: str, index: int, dimension: int) -> float:

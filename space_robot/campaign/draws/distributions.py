@@ -10,14 +10,8 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 from typing_extensions import Self
 
-from space_robot_model.elementary.exponential import (
-    exp,
-    log,
-)
-from space_robot_model.elementary.normal import (
-    normal_cdf,
-    quantile,
-)
+from space_robot_model.elementary.exponential import exp, log
+from space_robot_model.elementary.normal import normal_cdf, quantile
 from space_robot_msgs_py.config.validation import StrictModel, short, validate
 from space_robot_msgs_py.errors import InputError
 
@@ -226,8 +220,12 @@ class Grid(Categorical):
 
 
 KINDS: dict[str, type[Distribution]] = {
-    "normal": Normal, "uniform": Uniform, "log_uniform": LogUniform, "choice": Choice, "grid": Grid,
-}  # fmt: skip
+    "normal": Normal,
+    "uniform": Uniform,
+    "log_uniform": LogUniform,
+    "choice": Choice,
+    "grid": Grid,
+}
 """Distributions by the key that tells them."""
 
 

@@ -116,10 +116,11 @@ class Draws:
             of_grid[variable.name] = values[index]
         numbers = itertools.count()
         return [
-            of_grid[v.name] if v.name in of_grid
+            of_grid[v.name]
+            if v.name in of_grid
             else v.distribution.quantile(self._design.uniform(place, v.name, next(numbers)))
             for v in self._variables
-        ]  # fmt: skip
+        ]
 
     def _changes(self, law: str, drawn: Sequence[tuple[Variable, Value]]) -> Changes:
         changes = Changes(self._nominal(law, {}))

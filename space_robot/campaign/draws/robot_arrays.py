@@ -42,9 +42,13 @@ class RobotArrays:
         for body, own in self.spreads.items():
             inertia[body] = spread(inertia[body].tolist(), own.factors, own.turn)
         found = replace(
-            self.nominal, mass=self.mass, inertia=inertia, com=self.com,
-            friction=tuple(self.friction), springs=tuple(self.springs),
-        )  # fmt: skip
+            self.nominal,
+            mass=self.mass,
+            inertia=inertia,
+            com=self.com,
+            friction=tuple(self.friction),
+            springs=tuple(self.springs),
+        )
         return _with_base_moved(found, shift) if shift.any() else found
 
 

@@ -213,15 +213,20 @@ def _of_inertia(name: str, key: str, given: Any, where: str, body: int) -> list[
             InertiaSpread(
                 f"{name}.scale_{i + 1}", key, Normal(normal=0.0, sigma=spread.scale), body, i
             )
-            for i in range(3) if spread.scale
-        ]  # fmt: skip
+            for i in range(3)
+            if spread.scale
+        ]
         turns = [
             InertiaSpread(
-                f"{name}.rotate_{XYZ[i]}", key, Normal(normal=0.0, sigma=spread.rotate_deg), body,
+                f"{name}.rotate_{XYZ[i]}",
+                key,
+                Normal(normal=0.0, sigma=spread.rotate_deg),
+                body,
                 3 + i,
             )
-            for i in range(3) if spread.rotate_deg
-        ]  # fmt: skip
+            for i in range(3)
+            if spread.rotate_deg
+        ]
         return [*factors, *turns]
     distribution = _positive(given, where, 1.0)
     if not distribution.relative:

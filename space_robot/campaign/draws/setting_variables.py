@@ -133,18 +133,27 @@ def node_variables(
     if node == "mission" and name == START:
         names = nominal.robot.joint_names
         return [
-            OfNode(f"mission.{START}[{joint}]", key, _numbers(distribution, where), "plant",
-                   START_PARAMETER, number)
+            OfNode(
+                f"mission.{START}[{joint}]",
+                key,
+                _numbers(distribution, where),
+                "plant",
+                START_PARAMETER,
+                number,
+            )
             for number, joint in chosen(element or ALL, names, "joint")
-        ]  # fmt: skip
+        ]
     if name in BY_OPTION:
         hint = "laws" if name in ("controller", "gains") else f"scenario.{name}"
         raise InputError(f"{name} is chosen for the whole flight: {hint}")
     allowed = nominal.parameters[node]
     if name not in allowed:
         inner = [full for full in allowed if full.startswith(f"{name}.")]
-        one_of(name, inner or [*allowed, *([START] if node == "mission" else [])],
-               f"parameter of the {node}")  # fmt: skip
+        one_of(
+            name,
+            inner or [*allowed, *([START] if node == "mission" else [])],
+            f"parameter of the {node}",
+        )
     value = allowed[name]
     if not isinstance(value, list):
         if element:

@@ -17,10 +17,7 @@ from space_robot_msgs_py.config.validation import short, validate
 from space_robot_msgs_py.config.yaml_text import read_file
 from space_robot_msgs_py.errors import InputError
 
-from ...processes.pool import (
-    check_scheduler,
-    cores,
-)
+from ...processes.pool import check_scheduler, cores
 from ...processes.scratch_folder import ScratchFolder
 from ..store.folder import MANIFEST, begin_or_resume, held_folder
 from ..store.recovery import open_journal

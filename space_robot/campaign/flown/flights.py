@@ -11,11 +11,7 @@ import numpy as np
 from space_robot_msgs_py.config.text import one_line_of
 
 from ...flight.ending import FAILED
-from ...processes.pool import (
-    OutOfTimeError,
-    WorkerDiedError,
-    run_many,
-)
+from ...processes.pool import OutOfTimeError, WorkerDiedError, run_many
 from ..row.fly import RowFlyer
 from ..row.row import KILLED, OUT_OF_TIME, Row, Task
 from ..store.journal import Journal

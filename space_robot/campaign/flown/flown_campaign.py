@@ -34,9 +34,12 @@ class FlownCampaign:
     """What is in a campaign's folder."""
 
     def __init__(
-        self, folder: Path, trust: bool = False,
-        temporary: TemporaryDirectory[str] | None = None, kept: int = 0,
-    ) -> None:  # fmt: skip
+        self,
+        folder: Path,
+        trust: bool = False,
+        temporary: TemporaryDirectory[str] | None = None,
+        kept: int = 0,
+    ) -> None:
         """Read the folder's manifest.
 
         Args:
@@ -126,12 +129,16 @@ class FlownCampaign:
         flown = fly_in_process(flight, None if bag is None else Path(bag))
         row = flyer.row_of_log(task, flight, flown.ending, blocks_of(flown.log))
         return Rerun(
-            flown, task, row.digest, rows.iloc[0]["digest"],
+            flown,
+            task,
+            row.digest,
+            rows.iloc[0]["digest"],
             [
                 f"{name} {then or 'none'}, now {software()[name] or 'none'}"
-                for name, then in self.manifest.software.items() if then != software().get(name)
+                for name, then in self.manifest.software.items()
+                if then != software().get(name)
             ],
-        )  # fmt: skip
+        )
 
     def __repr__(self) -> str:
         laws = ", ".join(self.study.laws)

@@ -73,11 +73,15 @@ class Preparation:
                 check_requirements(flight, self.study.require, where, option)
         study = self.study.content
         return Manifest(
-            seed=self.seed, runs=self.runs, study=study,
-            software=software(), commit=commit(), files=file_digests(study),
+            seed=self.seed,
+            runs=self.runs,
+            study=study,
+            software=software(),
+            commit=commit(),
+            files=file_digests(study),
             flights={law: flight_digest(flight) for law, flight in self.flights.items()},
             table=self._schema(),
-        )  # fmt: skip
+        )
 
     def compile(self) -> None:
         """Compile what the flights need once, before there are several processes to do so."""
@@ -92,6 +96,8 @@ class Preparation:
         return Schema(
             vary={n: "str" if isinstance(first[n], str) else "float64" for n in draws.names},
             grid=draws.grid,
-            metrics=list(columns.metrics), require=list(self.study.require),
-            bands=list(columns.names), bins=min(BINS, nominal.ticks),
-        )  # fmt: skip
+            metrics=list(columns.metrics),
+            require=list(self.study.require),
+            bands=list(columns.names),
+            bins=min(BINS, nominal.ticks),
+        )

@@ -12,9 +12,13 @@ class Rerun(FlownFlight):
     """A `FlownFlight` that knows whether it is the one of the campaign's table."""
 
     def __init__(
-        self, flown: FlownFlight, task: Task, digest: str, digest_of_row: str,
+        self,
+        flown: FlownFlight,
+        task: Task,
+        digest: str,
+        digest_of_row: str,
         other_software: Sequence[str],
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Take the flight, what it is of, and its digest and that of the row.
 
         Args:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from space_robot_control.laws.trust import (
-    check_file,
-    check_law,
-)
+from space_robot_control.laws.trust import check_file, check_law
 
 from ..store.software import texts_of
 from ..study import Law, Study

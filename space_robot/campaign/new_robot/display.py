@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from ...analysis.metrics import unit_of
-from ...console.tables import (
-    Column,
-    Table,
-)
+from ...console.tables import Column, Table
 from .make import NewRobot
 
 

@@ -8,10 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from secrets import token_hex
 
-from space_robot_model.robot.find import (
-    OWN_GAINS,
-    OWN_MISSION,
-)
+from space_robot_model.robot.find import OWN_GAINS, OWN_MISSION
 from space_robot_msgs_py.errors import InputError
 
 from ...console.files import make_folder

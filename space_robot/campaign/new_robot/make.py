@@ -12,19 +12,13 @@ from space_robot_control.controller.settings import DEFAULT_SETS
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
-from space_robot_model.robot.find import (
-    OWN_GAINS,
-    OWN_MISSION,
-)
+from space_robot_model.robot.find import OWN_GAINS, OWN_MISSION
 from space_robot_msgs_py.errors import FlightError
 
 from ...analysis import Analysis
 from ...flight.plan import Flight, FlightPlan
 from ...flight.simulate import fly_blocks
-from ...processes.pool import (
-    cores,
-    run_all,
-)
+from ...processes.pool import cores, run_all
 from ...tuning.method import TuningOptions
 from ...tuning.warning import estimate_remark
 from ..gain_set import tuned_set, write_set
@@ -78,9 +72,12 @@ class NewRobot:
 
 
 def make_robot(
-    files: Mapping[str, str], robot: Robot, folder: Path, command: str,
+    files: Mapping[str, str],
+    robot: Robot,
+    folder: Path,
+    command: str,
     step: Callable[[str], None] = lambda text: None,
-) -> NewRobot:  # fmt: skip
+) -> NewRobot:
     """Make the folder of a robot and fly every law once with what is in it.
 
     Args:

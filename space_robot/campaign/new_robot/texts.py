@@ -8,10 +8,7 @@ import yaml
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import OWN
-from space_robot_model.robot.source import (
-    URDF,
-    read_robot_file,
-)
+from space_robot_model.robot.source import URDF, read_robot_file
 from space_robot_model.robot.urdf import read_urdf
 
 ROBOT_FILE = f"{OWN}.yaml"

@@ -11,15 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ...analysis.figures.overlay import words
-from ...analysis.figures.style import (
-    COLOURS,
-    GREY,
-    LineStyle,
-    grid,
-    house_style,
-    page,
-    plain,
-)
+from ...analysis.figures.style import COLOURS, GREY, LineStyle, grid, house_style, page, plain
 from ...analysis.metrics import unit_of
 from ..study import short_names
 from ..verdicts.values import GridPoint, laws_of, of_law
@@ -143,8 +135,9 @@ def _name_bands(figure: Figure) -> None:
             Patch(color=colour, alpha=0.25, linewidth=0.0, label="5 % to 95 %"),
             Line2D([], [], color=GREY, linewidth=0.6, label="worst of those still flying"),
         ],
-        loc="outside upper left", ncols=3,
-    )  # fmt: skip
+        loc="outside upper left",
+        ncols=3,
+    )
 
 
 def _scale(axes: Axes, found: Sequence[Array]) -> None:

@@ -8,11 +8,7 @@ from typing import Any
 
 from rich.console import Console
 
-from ...console.tables import (
-    Group,
-    Table,
-    as_markdown,
-)
+from ...console.tables import Group, Table, as_markdown
 from ...console.terminal import say
 from ...console.terminal_tables import print_table
 from .findings import Findings

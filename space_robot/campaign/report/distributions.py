@@ -100,9 +100,7 @@ def _draw(axes: Axes, values: Array, index: int, above: bool = False, small: boo
     share = (zeros + drawn + 1) / runs
     if above:
         share = np.where(share < 1.0, 1.0 - share, np.nan)
-    axes.plot(
-        known[drawn], share, color=look.colour, linestyle=look.dashes, drawstyle="steps-post"
-    )  # fmt: skip
+    axes.plot(known[drawn], share, color=look.colour, linestyle=look.dashes, drawstyle="steps-post")
     marks = np.searchsorted(drawn, ((0.1 + 0.13 * index % 0.8) * len(known),)).clip(
         0, len(drawn) - 1
     )

@@ -10,12 +10,7 @@ import numpy as np
 
 from ..flown.precision import is_narrow
 from ..study import short_names
-from ..verdicts.design import (
-    SALTELLI,
-    independent_rows,
-    saltelli_values,
-    variables,
-)
+from ..verdicts.design import SALTELLI, independent_rows, saltelli_values, variables
 from ..verdicts.league import League, league
 from ..verdicts.requirements import Verdict, family_error, verdicts
 from ..verdicts.sensitivity import Sensitivity, sensitivity
@@ -128,12 +123,15 @@ class Findings:
             return []
         found = [
             sobol_indices(
-                saltelli_values(table, law, metric.column), variables(table), law, metric.heading,
+                saltelli_values(table, law, metric.column),
+                variables(table),
+                law,
+                metric.heading,
                 CONFIDENCE,
             )
             for metric in self.metrics
             for law in self.laws
-        ]  # fmt: skip
+        ]
         return [each for each in found if each]
 
     @property

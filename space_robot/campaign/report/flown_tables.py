@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import json
 
-from ...console.tables import (
-    Column,
-    Table,
-)
+from ...console.tables import Column, Table
 from .findings import Findings
 
 

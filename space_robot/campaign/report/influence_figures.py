@@ -53,9 +53,13 @@ def influence_figure(found: Sequence[Sensitivity]) -> Figure:
             if best := influence.partial or influence.correlation:
                 value, low, high = best
                 axes.errorbar(
-                    value, place, xerr=[[value - low], [high - value]], color=COLOURS[0],
-                    marker="o", markersize=3.0,
-                )  # fmt: skip
+                    value,
+                    place,
+                    xerr=[[value - low], [high - value]],
+                    color=COLOURS[0],
+                    marker="o",
+                    markersize=3.0,
+                )
         axes.axvline(0.0, color=COLOURS[0], linewidth=0.6)
         axes.set(xlim=(-1.0, 1.0), xticks=(-1.0, 0.0, 1.0), title=plain(laws[each.law]))
         axes.xaxis.set_major_formatter("{x:g}")
@@ -134,9 +138,13 @@ def grid_figure(
                     continue  # most of them failed
                 top = high if np.isfinite(high) else float(values[np.isfinite(values)].max())
                 axes.errorbar(
-                    place + shift, middle, yerr=[[middle - low], [top - middle]],
-                    color=look.colour, marker=look.marker, linewidth=0.8,
-                )  # fmt: skip
+                    place + shift,
+                    middle,
+                    yerr=[[middle - low], [top - middle]],
+                    color=look.colour,
+                    marker=look.marker,
+                    linewidth=0.8,
+                )
         axes.set_yscale("log")
         number_log_axis(axes, "y")
         axes.set_ylabel(metric.label)

@@ -6,12 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from ...console.tables import (
-    Column,
-    Group,
-    JudgedCell,
-    Table,
-)
+from ...console.tables import Column, Group, JudgedCell, Table
 from ..verdicts.league import League, Ranking
 from ..verdicts.paired import PairedComparison
 from ..verdicts.quantiles import Estimate
@@ -48,9 +43,14 @@ def span(estimate: Estimate, spec: str = ".3g") -> str:
 def league_table(findings: Findings) -> Table:
     """Tabulate the leagues of a campaign without a grid, a group for every metric."""
     columns = [
-        Column("law", is_label=True), Column("rank"), Column("median"), Column("interval"),
-        Column("99 %"), Column("interval"), Column("failed"),
-    ]  # fmt: skip
+        Column("law", is_label=True),
+        Column("rank"),
+        Column("median"),
+        Column("interval"),
+        Column("99 %"),
+        Column("interval"),
+        Column("failed"),
+    ]
     groups = [
         Group([_standing(s, findings.names[s.law]) for s in found.standings], metric.label)
         for _, metric, found in findings.leagues
@@ -60,18 +60,29 @@ def league_table(findings: Findings) -> Table:
 
 def _standing(s: Ranking, name: str) -> list[str]:
     return [
-        name, str(s.rank), number(s.median.value), span(s.median), number(s.tail.value),
-        span(s.tail), f"{s.failures} of {s.runs}",
-    ]  # fmt: skip
+        name,
+        str(s.rank),
+        number(s.median.value),
+        span(s.median),
+        number(s.tail.value),
+        span(s.tail),
+        f"{s.failures} of {s.runs}",
+    ]
 
 
 def pair_table(findings: Findings) -> Table:
     """Tabulate every pair of laws, a group for every metric and point of the grid."""
     columns = [
-        Column("law", is_label=True), Column("beside", is_label=True), Column("better in"),
-        Column("median ratio"), Column("interval"), Column("p"), Column("fails alone"),
-        Column("p of failures"), Column("is", is_label=True),
-    ]  # fmt: skip
+        Column("law", is_label=True),
+        Column("beside", is_label=True),
+        Column("better in"),
+        Column("median ratio"),
+        Column("interval"),
+        Column("p"),
+        Column("fails alone"),
+        Column("p of failures"),
+        Column("is", is_label=True),
+    ]
     groups = [
         Group([_pair(c, findings.names) for c in found.comparisons], metric.label, part.point)
         for part, metric, found in findings.leagues
@@ -86,11 +97,16 @@ def pair_table(findings: Findings) -> Table:
 
 def _pair(c: PairedComparison, names: Mapping[str, str]) -> list[str | JudgedCell]:
     return [
-        names[c.law], names[c.other],
-        f"{c.better} of {c.runs}", number(c.ratio.value), span(c.ratio),
-        f"{c.p_better:.2g}", f"{c.failed}, other {c.other_failed}", f"{c.p_failed:.2g}",
+        names[c.law],
+        names[c.other],
+        f"{c.better} of {c.runs}",
+        number(c.ratio.value),
+        span(c.ratio),
+        f"{c.p_better:.2g}",
+        f"{c.failed}, other {c.other_failed}",
+        f"{c.p_failed:.2g}",
         JudgedCell("", WORDS[c.finding], TONES[c.finding]),
-    ]  # fmt: skip
+    ]
 
 
 def choice_tables(findings: Findings) -> list[Table]:

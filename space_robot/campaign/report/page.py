@@ -84,8 +84,6 @@ def _worst(findings: Findings) -> list[tuple[Table, list[Table]]]:
         for part in findings.parts:
             each = []
             if len(findings.parts) == 1 and len(findings.laws) > 1:
-                each = [
-                    worst_table(findings, part, quantity, law=law) for law in findings.laws
-                ]  # fmt: skip
+                each = [worst_table(findings, part, quantity, law=law) for law in findings.laws]
             found.append((worst_table(findings, part, quantity), each))
     return found

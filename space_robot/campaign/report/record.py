@@ -13,9 +13,14 @@ def record(findings: Findings) -> dict[str, Any]:
     """Return verdicts, leagues, comparisons, sensitivities and the worst runs."""
     subject = findings.subject
     return {
-        "campaign": str(subject.folder), "seed": subject.seed, "runs": subject.runs,
-        "rows": len(subject.table), "laws": findings.laws, "grid": list(findings.grid),
-        "about": dict(subject.about), "remarks": findings.remarks,
+        "campaign": str(subject.folder),
+        "seed": subject.seed,
+        "runs": subject.runs,
+        "rows": len(subject.table),
+        "laws": findings.laws,
+        "grid": list(findings.grid),
+        "about": dict(subject.about),
+        "remarks": findings.remarks,
         "outcomes": {
             law: {str(k): int(n) for k, n in rows["outcome"].value_counts().items()}
             for law, rows in subject.table.groupby("law", sort=False)
@@ -24,7 +29,9 @@ def record(findings: Findings) -> dict[str, Any]:
         "any_verdict_false_at_most": findings.family_error,
         "leagues": [
             {
-                "point": part.point, "metric": metric.name, "standings": plain(found.standings),
+                "point": part.point,
+                "metric": metric.name,
+                "standings": plain(found.standings),
                 "comparisons": [{**plain(c), "finding": c.finding} for c in found.comparisons],
             }
             for part, metric, found in findings.leagues
@@ -36,8 +43,12 @@ def record(findings: Findings) -> dict[str, Any]:
         "sobol": plain(findings.sobol),
         "worst": [
             {
-                "point": part.point, "of": quantity.column, "run": int(row["run"]),
-                "law": row["law"], "outcome": row["outcome"], "reason": row["reason"],
+                "point": part.point,
+                "of": quantity.column,
+                "run": int(row["run"]),
+                "law": row["law"],
+                "outcome": row["outcome"],
+                "reason": row["reason"],
                 "value": row[quantity.column],
                 "command": command(subject.folder, int(row["run"]), row["law"]),
             }
@@ -45,7 +56,7 @@ def record(findings: Findings) -> dict[str, Any]:
             for part in findings.parts
             for row in findings.worst(part, quantity).to_dict("records")
         ],
-    }  # fmt: skip
+    }
 
 
 def plain(value: Any) -> Any:

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...console.tables import (
-    Column,
-    Group,
-    Table,
-)
+from ...console.tables import Column, Group, Table
 from ..verdicts.sensitivity import Influence
 from ..verdicts.sobol import SobolIndices
 from .findings import CONFIDENCE, Findings
@@ -24,9 +20,13 @@ def sensitivity_table(findings: Findings, shown: int = SHOWN) -> Table:
     Only influences that are shown to be there are in it; a note says where none is.
     """
     columns = [
-        Column("variable", is_label=True), Column("rank corr."), Column("partial"),
-        Column("interval"), Column("spread"), Column("p"),
-    ]  # fmt: skip
+        Column("variable", is_label=True),
+        Column("rank corr."),
+        Column("partial"),
+        Column("interval"),
+        Column("spread"),
+        Column("p"),
+    ]
     groups, without = [], []
     for part, quantity, found in findings.sensitivities:
         explained = "" if found.explained is None else f"{found.explained:.0%} explained by all"
@@ -62,16 +62,24 @@ def _row(influence: Influence) -> list[str]:
 def sobol_table(found: Sequence[SobolIndices], shown: int = SHOWN) -> Table:
     """Tabulate Sobol indices, a group for every law and metric."""
     columns = [
-        Column("variable", is_label=True), Column("first"), Column("interval"), Column("total"),
+        Column("variable", is_label=True),
+        Column("first"),
         Column("interval"),
-    ]  # fmt: skip
+        Column("total"),
+        Column("interval"),
+    ]
     groups = []
     for each in found:
         rows = [
-            [i.variable, f"{i.first.value:.3f}", span(i.first, ".3f"), f"{i.total.value:.3f}",
-             span(i.total, ".3f")]
+            [
+                i.variable,
+                f"{i.first.value:.3f}",
+                span(i.first, ".3f"),
+                f"{i.total.value:.3f}",
+                span(i.total, ".3f"),
+            ]
             for i in each.indices[:shown]
-        ]  # fmt: skip
+        ]
         left_out = f"; {each.left_out} with failed flights left out" if each.left_out else ""
         note = f"{each.rows} rows of the design{left_out}"
         groups.append(Group(rows, f"{each.law}, {each.metric}", note))

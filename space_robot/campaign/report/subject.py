@@ -81,6 +81,12 @@ def subject_of(campaign: FlownCampaign, study: Study | None = None) -> Subject:
         about["commit"] = manifest.commit
     about |= {f"digest of {name}": digest[:16] for name, digest in manifest.files.items()}
     return Subject(
-        campaign.folder, study or campaign.study, campaign.seed, campaign.runs, table,
-        list(manifest.table.grid), about, remarks,
-    )  # fmt: skip
+        campaign.folder,
+        study or campaign.study,
+        campaign.seed,
+        campaign.runs,
+        table,
+        list(manifest.table.grid),
+        about,
+        remarks,
+    )

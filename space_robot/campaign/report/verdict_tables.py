@@ -5,12 +5,7 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-from ...console.tables import (
-    Column,
-    Group,
-    JudgedCell,
-    Table,
-)
+from ...console.tables import Column, Group, JudgedCell, Table
 from ..verdicts import requirements
 from ..verdicts.values import GridPoint
 from .findings import Findings
@@ -24,17 +19,22 @@ MORE_RUNS = "more runs"
 def verdict_table(findings: Findings) -> Table:
     """Tabulate the verdicts, a group for every requirement and point of the grid."""
     columns = [
-        Column("law", is_label=True), Column("verdict", is_label=True), Column("missed in"),
-        Column("at least"), Column("at most"), Column("bound"),
+        Column("law", is_label=True),
+        Column("verdict", is_label=True),
+        Column("missed in"),
+        Column("at least"),
+        Column("at most"),
+        Column("bound"),
         *([] if findings.subject.study.has_fixed_runs else [Column(MORE_RUNS)]),
-    ]  # fmt: skip
+    ]
     groups = []
     for quantity in findings.required:
         for part in findings.parts:
             rows = [
-                _row(v, findings.names[v.law])[: len(columns)] for v in findings.verdicts
+                _row(v, findings.names[v.law])[: len(columns)]
+                for v in findings.verdicts
                 if (v.requirement, v.point) == (quantity.name, part.point)
-            ]  # fmt: skip
+            ]
             name = f"{quantity.name}, {part.point}" if part.point else quantity.name
             groups.append(Group(rows, name, demanded(quantity)))
     return Table("Requirements", columns, groups, notes(findings))
@@ -107,11 +107,14 @@ def _how_often_false(findings: Findings) -> str:
 def _row(v: requirements.Verdict, name: str) -> list[str | JudgedCell]:
     missed = f"{v.failures} of {v.runs}"
     return [
-        name, JudgedCell("", v.word, TONES[v.word]),
+        name,
+        JudgedCell("", v.word, TONES[v.word]),
         f"{missed}, {v.not_measured} not measured" if v.not_measured else missed,
-        f"{100.0 * v.limits.low:.4g} %", f"{100.0 * v.limits.high:.4g} %",
-        "-" if v.bound is None else number(v.bound), _more(v),
-    ]  # fmt: skip
+        f"{100.0 * v.limits.low:.4g} %",
+        f"{100.0 * v.limits.high:.4g} %",
+        "-" if v.bound is None else number(v.bound),
+        _more(v),
+    ]
 
 
 def _more(v: requirements.Verdict) -> str:
@@ -152,20 +155,23 @@ def worst_table(
 ) -> Table:
     """Tabulate the worst runs with the commands that fly them again."""
     columns = [
-        Column("run"), Column("law", is_label=True), Column("value"),
+        Column("run"),
+        Column("law", is_label=True),
+        Column("value"),
         Column("to fly it again", is_label=True),
-    ]  # fmt: skip
+    ]
     rows = findings.worst(part, quantity, count, law)
     of = f", {part.point}" if part.point else ""
     return Table.of(
-        f"Worst runs by {quantity.label}{of}", columns,
+        f"Worst runs by {quantity.label}{of}",
+        columns,
         [
             [str(run), name, _value(row, quantity), command(findings.subject.folder, run, name)]
             for run, name, row in zip(
                 rows["run"].tolist(), rows["law"], rows.to_dict("records"), strict=True
             )
         ],
-    )  # fmt: skip
+    )
 
 
 def _value(row: dict[str, object], quantity: Quantity) -> str:

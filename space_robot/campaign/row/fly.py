@@ -106,9 +106,15 @@ def _row(
         found = Row(task, ending.outcome, ending.reason, ending.ended_at_s, vary)
     else:
         found = Row(
-            task, ending.outcome, "", ending.ended_at_s, vary,
-            measure.metrics(), measure.require(), measure.bands(),
-        )  # fmt: skip
+            task,
+            ending.outcome,
+            "",
+            ending.ended_at_s,
+            vary,
+            measure.metrics(),
+            measure.require(),
+            measure.bands(),
+        )
     return found.digested(state)
 
 

@@ -7,10 +7,7 @@ from typing import Any
 
 from rich.console import Console
 
-from ...console.tables import (
-    Column,
-    Table,
-)
+from ...console.tables import Column, Table
 from ...console.terminal import say
 from ...console.terminal_tables import print_table
 
@@ -49,8 +46,9 @@ def rows(report: dict[str, Any]) -> list[tuple[str, str, str]]:
 
 def _errors(errors: dict[str, Any]) -> Iterator[tuple[str, str, str]]:
     for key, remark in (
-        ("tracking", "torque and reference whole"), ("disturbed", "torque or reference taken away"),
-    ):  # fmt: skip
+        ("tracking", "torque and reference whole"),
+        ("disturbed", "torque or reference taken away"),
+    ):
         for what, unit in (("attitude", ""), ("joint", " rad")):
             name, largest = f"largest {what} error", errors[key][what]
             if largest:

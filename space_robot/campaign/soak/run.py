@@ -55,13 +55,20 @@ class SoakedFlight:
         plan = self.plan
         return {
             "number": self.number,
-            "controller": plan.controller, "case": plan.case, "swaps": plan.swaps,
-            "faults": plan.faults, "seed": plan.seed, "command": command_line(plan),
+            "controller": plan.controller,
+            "case": plan.case,
+            "swaps": plan.swaps,
+            "faults": plan.faults,
+            "seed": plan.seed,
+            "command": command_line(plan),
             "breaks_tracking": breaks_tracking(plan),
-            "survived": self.verdict.survived, **asdict(self.verdict),
-            "seconds": self.seconds, "memory_mb": self.memory_mb,
-            "own_memory_mb": self.own_memory_mb, "bag": str(self.bag) if self.bag else None,
-        }  # fmt: skip
+            "survived": self.verdict.survived,
+            **asdict(self.verdict),
+            "seconds": self.seconds,
+            "memory_mb": self.memory_mb,
+            "own_memory_mb": self.own_memory_mb,
+            "bag": str(self.bag) if self.bag else None,
+        }
 
     def line(self) -> str:
         """Return the line that people see while the soak goes on."""
@@ -104,14 +111,15 @@ class Soak:
             "largest_error": {"tracking": _largest(calm), "disturbed": _largest(disturbed)},
             "memory_growth_mb": {
                 "soak": own[-1] - own[WARM_UP - 1] if len(own) > WARM_UP else None,
-                "largest_node": _growth([max(f.memory_mb.values(), default=0.0)
-                                         for f in self.flights]),
+                "largest_node": _growth(
+                    [max(f.memory_mb.values(), default=0.0) for f in self.flights]
+                ),
             },
             "shared_memory_files": dict(
                 zip(("start", "end"), self.shared_memory_files, strict=True)
             ),
             "each": [flown.record() for flown in self.flights],
-        }  # fmt: skip
+        }
 
 
 def soak(
@@ -189,9 +197,14 @@ def _fly(number: int, plan: FlightPlan, bag: Path, keep: bool) -> SoakedFlight:
     if verdict.survived and not keep:
         shutil.rmtree(bag)
     return SoakedFlight(
-        number, plan, time.monotonic() - begin, verdict, process_monitor.peak_mb,
-        psutil.Process().memory_info().rss / 1e6, bag if bag.exists() else None,
-    )  # fmt: skip
+        number,
+        plan,
+        time.monotonic() - begin,
+        verdict,
+        process_monitor.peak_mb,
+        psutil.Process().memory_info().rss / 1e6,
+        bag if bag.exists() else None,
+    )
 
 
 def _largest(flights: Sequence[SoakedFlight]) -> dict[str, dict[str, float] | None]:

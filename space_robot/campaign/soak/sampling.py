@@ -12,10 +12,7 @@ from space_robot_sim.faults.axes import About
 from space_robot_sim.faults.grammar import Argument, Kind, parse_faults
 
 from ...flight.plan import FlightPlan
-from ...scenario.faults import (
-    KINDS,
-    NODE_OF,
-)
+from ...scenario.faults import KINDS, NODE_OF
 
 CASES = ("1", "2", "3", "4-1", "4-2")
 JOINTS = 6
@@ -23,9 +20,10 @@ JOINTS = 6
 Counts = Mapping[About, int]
 """How many of each there are, counted from 1."""
 ACTUATORS: dict[str, Counts] = {
-    "ideal": {}, "wheels": {About.WHEEL: 4},
+    "ideal": {},
+    "wheels": {About.WHEEL: 4},
     "wheels_and_thrusters": {About.WHEEL: 4, About.THRUSTER: 12},
-}  # fmt: skip
+}
 """Actuators that can fly a case, with how many wheels and thrusters they have."""
 MOST_FAULTS, MOST_SWAPS = 4, 2
 SHORTEST_S = 0.5
@@ -46,9 +44,12 @@ LIMITS = {
 }
 """Least and largest argument by its symbol, or by the kind of the fault."""
 LONGEST_S = {
-    "saturate_base": 0.2, "saturate_joints": 0.2, "stuck_joint": 1.0, "tracker_blind": 0.02,
+    "saturate_base": 0.2,
+    "saturate_joints": 0.2,
+    "stuck_joint": 1.0,
+    "tracker_blind": 0.02,
     "encoder_stuck": 0.02,
-}  # fmt: skip
+}
 """Longest time of a fault that takes too much to be flown with for long."""
 SILENCING = ("drop_state", "drop_command")
 SILENCE_S = 0.3
@@ -56,10 +57,19 @@ SILENCE_SHARE = 0.25
 EARLIEST_S = {"kill_recorder": 1.5}
 """Before that the bag may hold nothing yet: its first chunk ends after 0.25 s of the wall clock."""
 BREAKING = (
-    "kill_controller", "stop_controller", "kill_mission", "stop_mission",
-    "saturate_base", "saturate_joints", "stuck_joint", "tracker_blind", "encoder_stuck",
-    "wheel_fail", "thruster_stuck_on", "thruster_stuck_off",
-)  # fmt: skip
+    "kill_controller",
+    "stop_controller",
+    "kill_mission",
+    "stop_mission",
+    "saturate_base",
+    "saturate_joints",
+    "stuck_joint",
+    "tracker_blind",
+    "encoder_stuck",
+    "wheel_fail",
+    "thruster_stuck_on",
+    "thruster_stuck_off",
+)
 """Faults that take torque, reference or a measurement away, or give a torque nobody asked for."""
 
 
@@ -102,9 +112,19 @@ def breaks_tracking(plan: FlightPlan) -> bool:
 def command_line(plan: FlightPlan) -> str:
     """Return the command that flies a sampled flight again."""
     words = [
-        "space-robot", "fly", "--controller", plan.controller, "--case", plan.case,
-        "--actuators", plan.actuators, "--duration", str(plan.duration), "--seed", str(plan.seed),
-    ]  # fmt: skip
+        "space-robot",
+        "fly",
+        "--controller",
+        plan.controller,
+        "--case",
+        plan.case,
+        "--actuators",
+        plan.actuators,
+        "--duration",
+        str(plan.duration),
+        "--seed",
+        str(plan.seed),
+    ]
     for option, texts in (("--swap", plan.swaps), ("--fault", plan.faults)):
         for text in texts:
             words += [option, text]

@@ -12,10 +12,7 @@ from typing import Any
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
-from ...console.files import (
-    make_folder,
-    whole_file,
-)
+from ...console.files import make_folder, whole_file
 from ..study import read_study
 from .journal_codec import JournalCodec
 from .journal_file import whole_rows
@@ -23,8 +20,12 @@ from .manifest import NEW_FOLDER, Manifest, differences, read_manifest
 from .table import check_table
 
 LOCK, STUDY, MANIFEST, JOURNAL, TABLE = (
-    ".lock", "campaign.yaml", "campaign.json", "journal.db", "table.parquet",
-)  # fmt: skip
+    ".lock",
+    "campaign.yaml",
+    "campaign.json",
+    "journal.db",
+    "table.parquet",
+)
 BAGS = "bags"
 _OWN = STUDY, MANIFEST, JOURNAL, TABLE, BAGS
 

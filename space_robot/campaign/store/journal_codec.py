@@ -25,11 +25,17 @@ class JournalCodec(NamedTuple):
 
     def encode(self, row: Row) -> Stored:
         """Return a row as it is stored; JSON and the bands' bytes keep every digit."""
-        numbers = json.dumps({
-            "reason": row.reason, "ended_at_s": row.ended_at_s, "vary": dict(row.vary),
-            "metrics": dict(row.metrics), "require": dict(row.require), "digest": row.digest,
-            "bands": {name: len(band) for name, band in row.bands.items()},
-        })  # fmt: skip
+        numbers = json.dumps(
+            {
+                "reason": row.reason,
+                "ended_at_s": row.ended_at_s,
+                "vary": dict(row.vary),
+                "metrics": dict(row.metrics),
+                "require": dict(row.require),
+                "digest": row.digest,
+                "bands": {name: len(band) for name, band in row.bands.items()},
+            }
+        )
         bands = b"".join(band.astype("<f4").tobytes() for band in row.bands.values())
         law = list(self.laws).index(row.task.law)
         digest = self._digest(row.task, row.outcome, numbers, bands)

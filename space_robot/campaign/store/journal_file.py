@@ -25,9 +25,12 @@ INSERT = "INTO rows VALUES (?, ?, ?, ?, ?, ?)"
 SET_ASIDE = ".damaged"
 """What the name of a damaged journal ends with when another one has taken its place."""
 NOT_OF_THE_FILE = (
-    "database is locked", "unable to open database file", "database or disk is full",
-    "attempt to write a readonly database", "out of memory",
-)  # fmt: skip
+    "database is locked",
+    "unable to open database file",
+    "database or disk is full",
+    "attempt to write a readonly database",
+    "out of memory",
+)
 """Errors of SQLite that say nothing about the bytes of the file."""
 
 

@@ -58,8 +58,13 @@ class Schema(StrictModel):
 
         bands = known("band", self.bands)
         return Row(
-            Task(values["run"], values["law"]), values["outcome"], values["reason"],
-            values["ended_at_s"], known("vary", self.vary), known("metric", self.metrics),
+            Task(values["run"], values["law"]),
+            values["outcome"],
+            values["reason"],
+            values["ended_at_s"],
+            known("vary", self.vary),
+            known("metric", self.metrics),
             known("require", self.require),
-            {name: np.array(band, np.float32) for name, band in bands.items()}, values["digest"],
-        )  # fmt: skip
+            {name: np.array(band, np.float32) for name, band in bands.items()},
+            values["digest"],
+        )

@@ -65,10 +65,15 @@ def write_table(path: Path, schema: Schema, campaign: str, rows: Iterable[Row]) 
     with (
         whole_file(path, replace=True) as file,
         ParquetWriter(
-            file, columns, version="2.6", compression="zstd", compression_level=3,
-            data_page_version="1.0", store_schema=False,
+            file,
+            columns,
+            version="2.6",
+            compression="zstd",
+            compression_level=3,
+            data_page_version="1.0",
+            store_schema=False,
         ) as writer,
-    ):  # fmt: skip
+    ):
         while group := list(itertools.islice(remaining, ROW_GROUP)):
             writer.write_batch(_batch(group, schema, columns), row_group_size=ROW_GROUP)
     digest = file_digest(path)
@@ -158,9 +163,11 @@ def _arrow_schema(schema: Schema) -> pyarrow.Schema:
     import pyarrow
 
     kinds: dict[Kind, Any] = {
-        "int64": pyarrow.int64(), "float64": pyarrow.float64(), "str": pyarrow.string(),
+        "int64": pyarrow.int64(),
+        "float64": pyarrow.float64(),
+        "str": pyarrow.string(),
         "float32s": pyarrow.list_(pyarrow.float32()),
-    }  # fmt: skip
+    }
     return pyarrow.schema([(name, kinds[kind]) for name, kind in schema.columns()])
 
 

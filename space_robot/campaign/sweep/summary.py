@@ -9,11 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ...analysis.figures.style import LineStyle, grid, house_style, legend_above, page, plain
-from ...console.tables import (
-    Column,
-    Group,
-    Table,
-)
+from ...console.tables import Column, Group, Table
 from ..report.quantities import ERRORS, FAST, RIPPLE, Quantity, of_metric
 from ..row.row import Row
 from ..study import Law
@@ -72,9 +68,14 @@ def row_record(row: Row) -> dict[str, Any]:
     """Return a flight and what came of it as a flat dictionary."""
     law, (sensors, actuators) = Law.parse(row.task.law), hardware_of(row)
     return {
-        "run": row.task.run, "controller": law.controller, "gains": law.gains, "sensors": sensors,
-        "actuators": actuators, "failure": row.reason, **row.metrics,
-    }  # fmt: skip
+        "run": row.task.run,
+        "controller": law.controller,
+        "gains": law.gains,
+        "sensors": sensors,
+        "actuators": actuators,
+        "failure": row.reason,
+        **row.metrics,
+    }
 
 
 def _cell(law: Law, sensors: str, actuators: str, rows: Sequence[Row]) -> SweepCell:
@@ -100,10 +101,11 @@ def summary_table(found: Sequence[SweepCell]) -> Table:
     """Tabulate the medians, a group for every hardware."""
     flown_with, told = hardware(found), [of_metric(name) for name in shown(found)]
     columns = (
-        Column("law", is_label=True), Column("gains", is_label=True),
+        Column("law", is_label=True),
+        Column("gains", is_label=True),
         *(Column(_short(metric), metric.unit, ".2g") for metric in told),
         Column("failed"),
-    )  # fmt: skip
+    )
     groups: dict[tuple[str, ...], list[list[Any]]] = {}
     for cell, *names in zip(found, *flown_with.values(), strict=True):
         middles = [cell.metrics[m.name][1] if m.name in cell.metrics else None for m in told]
@@ -128,15 +130,19 @@ def as_records(found: Sequence[SweepCell]) -> list[dict[str, Any]]:
     """Return a dictionary a cell, ready for JSON."""
     return [
         {
-            "controller": cell.law.controller, "gains": cell.law.gains, "sensors": cell.sensors,
-            "actuators": cell.actuators, "flights": cell.flights, "failed": cell.failed,
+            "controller": cell.law.controller,
+            "gains": cell.law.gains,
+            "sensors": cell.sensors,
+            "actuators": cell.actuators,
+            "flights": cell.flights,
+            "failed": cell.failed,
             "metrics": {
                 name: dict(zip(("low", "median", "high"), values, strict=True))
                 for name, values in cell.metrics.items()
             },
         }
         for cell in found
-    ]  # fmt: skip
+    ]
 
 
 @house_style()
@@ -160,9 +166,14 @@ def figure(found: Sequence[SweepCell]) -> Figure:
             places = [place for place, _ in own]
             low, middle, high = np.array([values for _, values in own]).reshape(-1, 3).T
             axes.errorbar(
-                places, middle, yerr=(middle - low, high - middle), color=look.colour,
-                marker=look.marker, linestyle="none", markersize=4,
-            )  # fmt: skip
+                places,
+                middle,
+                yerr=(middle - low, high - middle),
+                color=look.colour,
+                marker=look.marker,
+                linestyle="none",
+                markersize=4,
+            )
         axes.set_yscale("log")
         axes.set_ylabel(of_metric(name).label)
         axes.set_xticks(range(len(kinds)), kinds)

@@ -99,9 +99,7 @@ def compare_all(table: DataFrame, column: str, confidence: float = 0.95) -> list
         found.append(compare(both["a"].to_numpy(), both["b"].to_numpy(), confidence, law, other))
     corrected = holm([p for c in found for p in (c.p_better, c.p_failed)])
     pairs = zip(corrected[::2], corrected[1::2], strict=True)
-    return [
-        replace(c, p_better=p, p_failed=q) for c, (p, q) in zip(found, pairs, strict=True)
-    ]  # fmt: skip
+    return [replace(c, p_better=p, p_failed=q) for c, (p, q) in zip(found, pairs, strict=True)]
 
 
 def compare(
@@ -123,11 +121,19 @@ def compare(
     with np.errstate(divide="ignore", invalid="ignore"):
         ratios = np.where(a == b, 1.0, a / b)
     return PairedComparison(
-        law, other, runs, better, worse, share_interval(better, runs, confidence),
+        law,
+        other,
+        runs,
+        better,
+        worse,
+        share_interval(better, runs, confidence),
         quantile(ratios, 0.5, confidence) if runs else Estimate(np.nan, 0.0, np.inf),
-        failed, other_failed, _sign_test(better, worse), _sign_test(failed, other_failed),
+        failed,
+        other_failed,
+        _sign_test(better, worse),
+        _sign_test(failed, other_failed),
         confidence,
-    )  # fmt: skip
+    )
 
 
 def _sign_test(one: int, two: int) -> float:

@@ -138,10 +138,20 @@ def verdict(
         if runs and word == "undecided":
             projected = projected_decision(sequential, failures, runs)
     return Verdict(
-        name, law, point, word, runs, failures,
-        int(np.sum(~has_ended)), int(rows["outcome"].isin(NOT_OF_THE_LAW).sum()), not_measured,
-        limits, bound, needed, projected,
-    )  # fmt: skip
+        name,
+        law,
+        point,
+        word,
+        runs,
+        failures,
+        int(np.sum(~has_ended)),
+        int(rows["outcome"].isin(NOT_OF_THE_LAW).sum()),
+        not_measured,
+        limits,
+        bound,
+        needed,
+        projected,
+    )
 
 
 def family_error(study: Study, found: list[Verdict]) -> float:

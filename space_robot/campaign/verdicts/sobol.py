@@ -70,12 +70,15 @@ def sobol_indices(
             np.array(drawn), shares, axis=0
         )  # low, high; first, total; variable
     found = [
-        SobolIndex(name, *(
-            Estimate(float(value[i]), *map(float, bounds[:, kind, i]))
-            for kind, value in enumerate((first, total))
-        ))
+        SobolIndex(
+            name,
+            *(
+                Estimate(float(value[i]), *map(float, bounds[:, kind, i]))
+                for kind, value in enumerate((first, total))
+            ),
+        )
         for i, name in enumerate(variables)
-    ]  # fmt: skip
+    ]
     found.sort(key=lambda index: index.total.value, reverse=True)
     return SobolIndices(law, metric, len(used), int(np.sum(~whole)), found)
 

@@ -43,10 +43,7 @@ def write_parameters(parameters: Mapping[str, Mapping[str, Any]], folder: Path) 
 
 def main() -> NoReturn:
     """Run the four nodes."""
-    from space_robot_control import (
-        controller_node,
-        mission_node,
-    )
+    from space_robot_control import controller_node, mission_node
     from space_robot_msgs_py import recorder_node
     from space_robot_msgs_py.ros.node_host import run_nodes
     from space_robot_sim import plant_node

@@ -10,10 +10,7 @@ from typing import Any
 from space_robot_msgs_py.errors import FlightError
 from space_robot_sim.plant.run_control import PAUSED
 
-from ...console.progress import (
-    FlightProgress,
-    flight_progress,
-)
+from ...console.progress import FlightProgress, flight_progress
 from ...processes.interruption import exit_code
 from ...scenario.faults import NODE_OF
 from ..plan import Flight
@@ -44,9 +41,12 @@ class InterruptedFlightError(FlightError):
 
 
 def follow(
-    graph: Graph, flight: Flight, parameters: dict[str, dict[str, Any]], domain: int,
+    graph: Graph,
+    flight: Flight,
+    parameters: dict[str, dict[str, Any]],
+    domain: int,
     stopped: list[int],
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Fly on started nodes until the plant has ended the flight; report what happened.
 
     Args:
@@ -74,9 +74,13 @@ def follow(
 
 class _Follower:
     def __init__(
-        self, graph: Graph, flight: Flight, parameters: dict[str, dict[str, Any]],
-        monitor: Monitor, stopped: list[int],
-    ) -> None:  # fmt: skip
+        self,
+        graph: Graph,
+        flight: Flight,
+        parameters: dict[str, dict[str, Any]],
+        monitor: Monitor,
+        stopped: list[int],
+    ) -> None:
         slides = flight.robot.is_prismatic[: flight.robot.n]
         self._unit = "m" if slides.all() else "rad or m" if slides.any() else "rad"
         self.total_s = flight.ticks * flight.period
@@ -87,7 +91,8 @@ class _Follower:
         self._realtime = flight.plant_settings.realtime
         self._injector = Injector(flight.orchestrator_faults, graph)
         self._watch = Watch(
-            graph, monitor,
+            graph,
+            monitor,
             planned=frozenset(NODE_OF[fault.kind] for fault in flight.orchestrator_faults),
             restart_command=(
                 partial(_restart_command, parameters["controller"], flight.plan.namespace)
@@ -95,7 +100,7 @@ class _Follower:
                 else None
             ),
             last_tick=flight.ticks,
-        )  # fmt: skip
+        )
         self._events: list[Event] = []
         self._begun_at = 0.0
         """The time when the first tick was seen; 0 before."""

@@ -9,10 +9,7 @@ from collections.abc import Sequence
 
 from space_robot_sim.faults.grammar import Fault
 
-from ...scenario.faults import (
-    KILLS,
-    NODE_OF,
-)
+from ...scenario.faults import KILLS, NODE_OF
 from .monitor import Event
 from .processes import Graph
 

@@ -107,9 +107,14 @@ def call_trigger(node: Any, service: str, check: Check) -> tuple[bool, str]:
 
 
 def _call(
-    node: Any, kind: Any, services: Sequence[str], request: Any, check: Check,
-    timeout_s: float = TIMEOUT_S, may_repeat: bool = False,
-) -> list[Any]:  # fmt: skip
+    node: Any,
+    kind: Any,
+    services: Sequence[str],
+    request: Any,
+    check: Check,
+    timeout_s: float = TIMEOUT_S,
+    may_repeat: bool = False,
+) -> list[Any]:
     """Call services of one kind at the same time; return their answers.
 
     An answer may be lost: see `_Repeated`. A call that ``may_repeat`` is then made again; any other

@@ -143,13 +143,12 @@ def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
     """The parameters of every node of a flight that is recorded to ``bag``."""
     parameters = {node: dict(given) for node, given in flight.parameters.items()}
     parameters["plant"] |= {
-        "ticks": flight.ticks, "wait_for": wait_for("plant"), "reset_with": RESET_WITH,
-    }  # fmt: skip
-    parameters["controller"] |= {"wait_for": wait_for("controller")}
-    parameters["recorder"] |= {
-        "bag": str(bag.absolute()),
-        "flight": json.dumps(flight.description),
+        "ticks": flight.ticks,
+        "wait_for": wait_for("plant"),
+        "reset_with": RESET_WITH,
     }
+    parameters["controller"] |= {"wait_for": wait_for("controller")}
+    parameters["recorder"] |= {"bag": str(bag.absolute()), "flight": json.dumps(flight.description)}
     if flight.plan.composed:
         parameters["recorder"].setdefault("drain_period", COMPOSED_DRAIN_S)
     return parameters

@@ -41,9 +41,7 @@ def has_ros2_run() -> bool:
 
 def node_environment(domain: int) -> dict[str, str]:
     """Return a node's environment: the project's defaults unless the user set others."""
-    return {
-        **defaults(), **clean_environment(), **lifeline.held(), "ROS_DOMAIN_ID": str(domain),
-    }  # fmt: skip
+    return {**defaults(), **clean_environment(), **lifeline.held(), "ROS_DOMAIN_ID": str(domain)}
 
 
 def node_command(node: str, parameters: Mapping[str, Any], namespace: str = ROOT) -> list[str]:
@@ -77,9 +75,12 @@ class NodeProcess:
         self._output = tempfile.TemporaryFile()  # noqa: SIM115  (closed in `close`)
         self._process = subprocess.Popen(
             command,
-            stdin=subprocess.PIPE, stdout=self._output, stderr=subprocess.STDOUT,
-            env=dict(environment), start_new_session=True,
-        )  # fmt: skip
+            stdin=subprocess.PIPE,
+            stdout=self._output,
+            stderr=subprocess.STDOUT,
+            env=dict(environment),
+            start_new_session=True,
+        )
 
     @property
     def pid(self) -> int:

@@ -26,15 +26,20 @@ class TemporaryNode:
         self._context = Context()
         try:
             rclpy.init(
-                args=[], context=self._context, domain_id=domain,
+                args=[],
+                context=self._context,
+                domain_id=domain,
                 signal_handler_options=SignalHandlerOptions.NO,
-            )  # fmt: skip
+            )
         except Exception as error:  # RCLError is private
             raise FlightError(f"ROS does not start: {str(error).splitlines()[0]}") from None
         self.node = rclpy.create_node(
-            f"{name}_{os.getpid()}", context=self._context, namespace=namespace,
-            start_parameter_services=False, enable_rosout=False,
-        )  # fmt: skip
+            f"{name}_{os.getpid()}",
+            context=self._context,
+            namespace=namespace,
+            start_parameter_services=False,
+            enable_rosout=False,
+        )
 
     def leave(self) -> None:
         """Leave the graph."""

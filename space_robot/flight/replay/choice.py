@@ -10,10 +10,7 @@ from typing import Any
 
 import yaml
 
-from space_robot_control.allocation.assumed_actuators import (
-    OWNER,
-    believed_actuators,
-)
+from space_robot_control.allocation.assumed_actuators import OWNER, assumed_actuators
 from space_robot_control.controller.gains import (
     build_law,
     build_laws,
@@ -23,20 +20,10 @@ from space_robot_control.controller.gains import (
 )
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.controller.swaps import parse_swaps
-from space_robot_control.laws import (
-    ControlLaw,
-    find_law,
-)
-from space_robot_control.laws.trust import (
-    check_file,
-    check_law,
-    is_plain,
-)
+from space_robot_control.laws import ControlLaw, find_law
+from space_robot_control.laws.trust import check_file, check_law, is_plain
 from space_robot_model.robot import Robot
-from space_robot_model.robot.find import (
-    OWN,
-    find_robot,
-)
+from space_robot_model.robot.find import OWN, find_robot
 from space_robot_msgs_py.config.validation import one_of
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import LawInForce, RobotNames
@@ -53,9 +40,14 @@ class ControllerChoice:
     """
 
     def __init__(
-        self, flight: Mapping[str, Any], folder: Path, controller: str = "", gains: str = "",
-        given: Mapping[str, Any] | None = None, trust: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        flight: Mapping[str, Any],
+        folder: Path,
+        controller: str = "",
+        gains: str = "",
+        given: Mapping[str, Any] | None = None,
+        trust: bool = False,
+    ) -> None:
         """Put the parameters together and check them.
 
         Args:
@@ -191,7 +183,7 @@ class ControllerChoice:
         laws = build_laws(settings, axes, gains)
         for swap in parse_swaps(settings.swaps, settings.period):
             one_of(swap.name, laws, "controller", " of swaps")
-        names = believed_actuators(settings.actuators, robot).robot_names(robot)
+        names = assumed_actuators(settings.actuators, robot).robot_names(robot)
         return robot, names, build_law(settings.controller, settings, axes)
 
 

@@ -44,9 +44,13 @@ class Comparison:
     """Commands of the ticks that were played."""
 
     def __init__(
-        self, axis_names: tuple[str, ...], played: Ticks, recorded: ReplayedCommands,
-        replayed: ReplayedCommands, forces: Collection[str] = (),
-    ) -> None:  # fmt: skip
+        self,
+        axis_names: tuple[str, ...],
+        played: Ticks,
+        recorded: ReplayedCommands,
+        replayed: ReplayedCommands,
+        forces: Collection[str] = (),
+    ) -> None:
         """Compare them.
 
         Args:
@@ -153,7 +157,8 @@ class Comparison:
             "unrecorded": len(self.unrecorded),
             "without_state": self.without_state,
             "unreadable": {
-                "recorded": self._recorded.unreadable, "replayed": self._replayed.unreadable,
+                "recorded": self._recorded.unreadable,
+                "replayed": self._replayed.unreadable,
             },
             "identical": self.is_identical,
             "stretches": [
@@ -165,7 +170,8 @@ class Comparison:
                 }
                 for stretch in self.stretches
             ],
-            "first_difference": first and {
+            "first_difference": first
+            and {
                 "tick": first[0],
                 "time_s": round(first[0] * period, 9),
                 "fields": [{**d._asdict(), "difference": d.amount} for d in first[1]],
@@ -180,7 +186,7 @@ class Comparison:
                 }
                 for i, name in enumerate(self.axis_names)
             },
-        }  # fmt: skip
+        }
 
     @property
     def _replayed_torque(self) -> Array:

@@ -85,9 +85,11 @@ class Player:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None,
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
         traceback: TracebackType | None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._claim.release()
         self._visitor.leave()
 
@@ -125,9 +127,12 @@ class Player:
                 self._outs[reference.topic.name].publish(reference.data)
 
     def lockstep(
-        self, states: Iterable[StateMessages], references: Iterable[Iterator[ReferenceMessage]],
-        before: Callable[[int], None], show: Callable[[int], None],
-    ) -> None:  # fmt: skip
+        self,
+        states: Iterable[StateMessages],
+        references: Iterable[Iterator[ReferenceMessage]],
+        before: Callable[[int], None],
+        show: Callable[[int], None],
+    ) -> None:
         """Send state after state, each when the one before has its answer.
 
         Args:
@@ -158,9 +163,13 @@ class Player:
             state = following
 
     def by_the_clock(
-        self, states: Iterable[StateMessages], references: Iterable[Iterator[ReferenceMessage]],
-        before: Callable[[int], None], show: Callable[[int], None], period_s: float,
-    ) -> None:  # fmt: skip
+        self,
+        states: Iterable[StateMessages],
+        references: Iterable[Iterator[ReferenceMessage]],
+        before: Callable[[int], None],
+        show: Callable[[int], None],
+        period_s: float,
+    ) -> None:
         """Send a tick's state every ``period_s`` of the wall clock, answered or not.
 
         Time begins when the first one is answered, and stands still in ``before``. Arguments and

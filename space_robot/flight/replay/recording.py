@@ -30,8 +30,12 @@ from space_robot_msgs_py.wire.controller_law import LawCodec
 from .commands import CommandList, ReplayedCommands
 
 COMPARED = (
-    *topics.STATES, topics.REFERENCE_JOINTS, topics.REFERENCE_BASE, topics.COMMAND, topics.LAW,
-)  # fmt: skip
+    *topics.STATES,
+    topics.REFERENCE_JOINTS,
+    topics.REFERENCE_BASE,
+    topics.COMMAND,
+    topics.LAW,
+)
 """Topics of what a controller is sent and answers."""
 
 

@@ -10,18 +10,11 @@ from pathlib import Path
 
 from space_robot_msgs_py.bag.law_history import within
 from space_robot_msgs_py.errors import FlightError, InputError
-from space_robot_msgs_py.simulated_time import (
-    LATEST_S,
-    check_time,
-    tick_from,
-)
+from space_robot_msgs_py.simulated_time import LATEST_S, check_time, tick_from
 from space_robot_msgs_py.topics import Topic
 from space_robot_msgs_py.wire.codecs import StateCodec
 
-from ...console.progress import (
-    FlightProgress,
-    flight_progress,
-)
+from ...console.progress import FlightProgress, flight_progress
 from ...processes.scratch_folder import ScratchFolder
 from ..compilation import compile_kernels
 from ..graph.domain import ros_domain
@@ -50,9 +43,13 @@ def replay(options: ReplayOptions) -> Replay:
     recording = Recording(options.bag, options.remap, options.namespace)
     with ScratchFolder() as folder:
         choice = ControllerChoice(
-            recording.flight, Path(folder), options.controller, options.gains, options.parameters,
+            recording.flight,
+            Path(folder),
+            options.controller,
+            options.gains,
+            options.parameters,
             options.trust,
-        )  # fmt: skip
+        )
         require_ros()
         return _Run(options, recording, choice).run()
 
@@ -130,7 +127,7 @@ class _Run:
         )
         return Replay(
             options, choice, recording, comparison, self._laws, self._skipped, elapsed, error
-        )  # fmt: skip
+        )
 
     def _recorded_until(self, played: Ticks, error: FlightError | None) -> ReplayedCommands:
         """Take of a replay, or a bag, that ended early only what came until then."""

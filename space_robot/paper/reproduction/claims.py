@@ -5,11 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
-from ...console.tables import (
-    Column,
-    JudgedCell,
-    Table,
-)
+from ...console.tables import Column, JudgedCell, Table
 from .flights import Result
 from .table import Cell
 from .table_v import TORQUE, TRACKING
@@ -39,16 +35,20 @@ class Claim(NamedTuple):
 def claims_table(records: Iterable[dict[str, Any]]) -> Table:
     """Tabulate claims, as `Claim.as_record` has them, each with its verdict."""
     columns = (
-        Column("claim", is_label=True), Column("measured", spec=".4g"), Column("limit"),
+        Column("claim", is_label=True),
+        Column("measured", spec=".4g"),
+        Column("limit"),
         Column(is_label=True),
-    )  # fmt: skip
+    )
     rows = [
         [
-            claim["text"], claim["value"], f"{claim['relation']} {claim['limit']:g}",
+            claim["text"],
+            claim["value"],
+            f"{claim['relation']} {claim['limit']:g}",
             JudgedCell("", "holds", "good") if claim["holds"] else JudgedCell("", "fails", "bad"),
         ]
         for claim in records
-    ]  # fmt: skip
+    ]
     return Table.of("", columns, rows)
 
 
@@ -67,8 +67,10 @@ def _torques(cells: Iterable[Cell]) -> Iterator[Claim]:
     if ratios := [c.ratio for c in flown if c.column in TORQUE and c.ratio is not None]:
         yield Claim(
             "TDE-STC's torques are Table V's, friction-free: largest relative difference",
-            max(abs(ratio - 1.0) for ratio in ratios), "<=", 0.01,
-        )  # fmt: skip
+            max(abs(ratio - 1.0) for ratio in ratios),
+            "<=",
+            0.01,
+        )
 
 
 def _tracking(cells: Iterable[Cell]) -> Iterator[Claim]:
@@ -76,8 +78,10 @@ def _tracking(cells: Iterable[Cell]) -> Iterator[Claim]:
     if ratios := [c.ratio for c in flown if c.column in TRACKING and c.ratio is not None]:
         yield Claim(
             "The TDE laws track closer than printed in every cell: largest measured / printed",
-            max(ratios), "<=", 1.0,
-        )  # fmt: skip
+            max(ratios),
+            "<=",
+            1.0,
+        )
 
 
 def _chatter(results: Sequence[Result]) -> Iterator[Claim]:
@@ -93,13 +97,18 @@ def _chatter(results: Sequence[Result]) -> Iterator[Claim]:
         if (law, "printed") in variation:
             yield Claim(
                 "TDE-STC is smoother, printed gains, ideal sensors: base torque's total "
-                f"variation, {law} / tde_stc", variation[law, "printed"] / own, ">=", factor,
-            )  # fmt: skip
+                f"variation, {law} / tde_stc",
+                variation[law, "printed"] / own,
+                ">=",
+                factor,
+            )
     if ("tde_tsmc", "tuned") in variation:
         yield Claim(
             "TDE-STC is the smoothest TDE law whatever the gains: tde_tsmc tuned / tde_stc",
-            variation["tde_tsmc", "tuned"] / own, ">=", 1.0,
-        )  # fmt: skip
+            variation["tde_tsmc", "tuned"] / own,
+            ">=",
+            1.0,
+        )
 
 
 def _robustness(cells: Sequence[Cell]) -> Iterator[Claim]:
@@ -115,5 +124,8 @@ def _robustness(cells: Sequence[Cell]) -> Iterator[Claim]:
             if growth:
                 yield Claim(
                     "Payload and disturbance hardly degrade TDE-STC, no error doubles, "
-                    f"{words}: case {case} / 1", max(growth), "<=", 2.0,
-                )  # fmt: skip
+                    f"{words}: case {case} / 1",
+                    max(growth),
+                    "<=",
+                    2.0,
+                )

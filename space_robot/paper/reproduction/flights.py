@@ -135,19 +135,26 @@ class Result:
 
 
 def fly(
-    planned: Planned, duration: float | None, figures: FigureFolder | None,
+    planned: Planned,
+    duration: float | None,
+    figures: FigureFolder | None,
     equipment: Equipment = PERFECT,
-) -> Result:  # fmt: skip
+) -> Result:
     """Fly one row in one variant; if it is shown it is also drawn into ``figures``."""
     row, variant, _ = planned
     flight = Flight(
         FlightPlan(
-            controller=row.controller, case=row.case, gains=variant.gains, robot=ROBOT,
-            friction=variant.friction, duration=duration, sensors=equipment.sensors,
+            controller=row.controller,
+            case=row.case,
+            gains=variant.gains,
+            robot=ROBOT,
+            friction=variant.friction,
+            duration=duration,
+            sensors=equipment.sensors,
             actuators=equipment.actuators,
             navigation=None if equipment.navigation == "direct" else equipment.navigation,
         )
-    )  # fmt: skip
+    )
     told = parameters(flight)
     try:
         log = simulate(flight)
@@ -158,10 +165,14 @@ def fly(
         figures.save(control_results(log, title), row.stem)
     is_judged = row.case == COMPARED_CASE and variant.friction
     return Result(
-        row, variant, told, None, of_log(Rms(log.axes), log),
+        row,
+        variant,
+        told,
+        None,
+        of_log(Rms(log.axes), log),
         of_log(Chatter(log.axes, log.timebase.period), log) if is_judged else None,
         BaseTorque.of(log) if planned.compared else None,
-    )  # fmt: skip
+    )
 
 
 def parameters(flight: Flight) -> dict[str, Any]:

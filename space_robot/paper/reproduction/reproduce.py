@@ -15,17 +15,10 @@ from space_robot_msgs_py.errors import InputError
 
 from ...analysis.figures.figure_set import FigureFolder
 from ...analysis.template import template
-from ...console.tables import (
-    as_csv,
-    as_markdown,
-    as_records,
-)
+from ...console.tables import as_csv, as_markdown, as_records
 from ...flight.plan import Flight, FlightPlan
 from ...processes.pool import run_all
-from ...processes.software import (
-    commit,
-    versions,
-)
+from ...processes.software import commit, versions
 from .claims import claims, claims_table
 from .figures import comparisons, figure_groups
 from .flights import PERFECT, Equipment, Planned, Result, TableRow, fly, plan

@@ -6,10 +6,7 @@ from collections.abc import Sequence
 from dataclasses import astuple
 from typing import NamedTuple
 
-from ...console.tables import (
-    Column,
-    Table,
-)
+from ...console.tables import Column, Table
 from .flights import DEFINITIONS, VARIANTS, Result, Variant
 from .table_v import COLUMNS, HEADINGS, TORQUE, printed
 
@@ -51,9 +48,17 @@ def _cell(result: Result, definition: str, column: str) -> Cell:
     expected = printed(row.controller, row.case, column)
     measured = result.rms[definition][column] if result.rms else None
     return Cell(
-        row.controller, row.case, variant.gains, variant.friction, definition, column, measured,
-        expected, None if measured is None else measured / expected, result.diverged_tick,
-    )  # fmt: skip
+        row.controller,
+        row.case,
+        variant.gains,
+        variant.friction,
+        definition,
+        column,
+        measured,
+        expected,
+        None if measured is None else measured / expected,
+        result.diverged_tick,
+    )
 
 
 def cells_table(comparison: Sequence[Cell]) -> Table:
@@ -113,16 +118,18 @@ def chatter_table(found: Sequence[LawChatter]) -> Table:
     """Tabulate the chatter of the laws."""
     names = ("base", "joints 1-3", "joints 4-6")
     columns = (
-        Column("controller", is_label=True), Column("gains", is_label=True),
+        Column("controller", is_label=True),
+        Column("gains", is_label=True),
         *(Column(f"{name}: variation", "N m/s", ".3g") for name in names),
         *(Column(f"{name}: power > 100 Hz", spec=".1e") for name in names),
-    )  # fmt: skip
+    )
     rows = [
         [
-            x.controller, x.gains,
+            x.controller,
+            x.gains,
             *(x.total_variation_per_s[column] for column in TORQUE),
             *(x.power_above_100_hz[column] for column in TORQUE),
         ]
         for x in found
-    ]  # fmt: skip
+    ]
     return Table.of("Chatter in case 1, printed friction", columns, rows)

@@ -7,12 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from rich.console import Console
 
-from ...console.tables import (
-    Column,
-    JudgedCell,
-    Table,
-    Value,
-)
+from ...console.tables import Column, JudgedCell, Table, Value
 from ...console.terminal import say
 from ...console.terminal_tables import print_table
 from .check import Check
@@ -86,14 +81,17 @@ def _above(check: Check) -> JudgedCell:
 def _lemma_1(study: StabilityStudy) -> Table:
     rows = [
         [
-            name, f"{extremes.min:.4f}", f"{extremes.max:.4f}", f"{extremes.max_at_s:.2f}",
+            name,
+            f"{extremes.min:.4f}",
+            f"{extremes.max:.4f}",
+            f"{extremes.max_at_s:.2f}",
             _verdict(f"{check.value:.4f} < {check.limit:g}", check),
         ]
         for name, extremes, check in (
             ("spectral norm, as printed", study.lemma_1.norm, study.lemma_1.norm_below_one),
             ("spectral radius", study.lemma_1.radius, study.lemma_1.radius_below_one),
         )
-    ]  # fmt: skip
+    ]
     heads = ("", "min", "max", "at t (s)", "below 1")
     columns = [Column(head, is_label=not head) for head in heads]
     return Table.of("Lemma 1: W = E - H_S^-1 H̄ (69)", columns, rows)

@@ -69,9 +69,13 @@ def _nyquist_panel(
         circles.append((measured, "-", ORANGE, r"radius 1/$\beta$, $\beta$ measured"))
     for beta, dashes, colour, label in circles:
         panel.plot(
-            np.cos(angle) / beta, np.sin(angle) / beta, dashes, color=colour, label=label,
+            np.cos(angle) / beta,
+            np.sin(angle) / beta,
+            dashes,
+            color=colour,
+            label=label,
             linewidth=1.6 if dashes == "-" else 1.0,
-        )  # fmt: skip
+        )
     panel.plot(g.real, g.imag, color=BLACK, label=r"$G(j\omega)$, all $\omega$")
     if measured > 0.0:  # its circle may be too small to be seen
         panel.plot(0.0, 0.0, "o", color=ORANGE, markersize=3.0)
@@ -94,9 +98,13 @@ def lyapunov(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
     reaching = twisting.reaching
     steps = np.unique(np.geomspace(1, len(reaching.time) - 1, POINTS).astype(int))
     rows = zip(
-        panels, names, twisting.certificates, twisting.measured_certificates,
-        twisting.reaching_time, strict=True,
-    )  # fmt: skip
+        panels,
+        names,
+        twisting.certificates,
+        twisting.measured_certificates,
+        twisting.reaching_time,
+        strict=True,
+    )
     for axis, (panel, name, certificate, measured, check) in enumerate(rows):
         panel.set_title(plain(name))
         if certificate is None:
@@ -109,14 +117,20 @@ def lyapunov(twisting: SuperTwisting, names: tuple[str, ...]) -> Figure:
             continue
         time = np.geomspace(reaching.time[1], 0.999 * check.limit, POINTS)
         panel.loglog(
-            reaching.time[steps], np.maximum.reduceat(value, steps) / start, color=BLUE,
-            linewidth=0.7, label="measured",
-        )  # fmt: skip
+            reaching.time[steps],
+            np.maximum.reduceat(value, steps) / start,
+            color=BLUE,
+            linewidth=0.7,
+            label="measured",
+        )
         which = "measured" if measured else "assumed"
         panel.loglog(
-            time, certificate.bound(start, time) / start, "--", color=ORANGE,
+            time,
+            certificate.bound(start, time) / start,
+            "--",
+            color=ORANGE,
             label=rf"bound (55) for the {which} $\beta$",
-        )  # fmt: skip
+        )
         if math.isfinite(check.value):
             panel.axvline(check.value, color=GREY, linestyle=":", label="|s| reached")
         panel.set_ylim(1e-8, 1e3)

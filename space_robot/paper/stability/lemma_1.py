@@ -14,10 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot_model.dynamics.rho_space import (
-    RhoSpaceModel,
-    rho_space_into,
-)
+from space_robot_model.dynamics.rho_space import RhoSpaceModel, rho_space_into
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
@@ -74,9 +71,13 @@ def inertia_along(robot: Robot, log: FlightLog, ticks: NDArray[np.intp]) -> Arra
     inertia = np.empty((len(ticks), log.axes, log.axes))
     for k, tick in enumerate(ticks):
         rho_space_into(
-            nominal, log.quaternion[tick], log.joint_positions[tick], log.omega_base[tick],
-            log.joint_velocities[tick], model,
-        )  # fmt: skip
+            nominal,
+            log.quaternion[tick],
+            log.joint_positions[tick],
+            log.omega_base[tick],
+            log.joint_velocities[tick],
+            model,
+        )
         inertia[k] = model.inertia
     return inertia
 

@@ -32,10 +32,7 @@ def report(study: StabilityStudy) -> dict[str, Any]:
             "spectral_norm_below_1": lemma_1.norm_below_one,
             "spectral_radius_below_1": lemma_1.radius_below_one,
         },
-        "time_delay_error": {
-            "as_flown": study.error,
-            "without_friction": study.frictionless_error,
-        },
+        "time_delay_error": {"as_flown": study.error, "without_friction": study.frictionless_error},
         "super_twisting": study.super_twisting and _super_twisting(study.super_twisting),
     }
     plain: dict[str, Any] = _plain(found)

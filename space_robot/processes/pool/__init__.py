@@ -5,5 +5,11 @@ from .done import Done, OutOfTimeError, WorkerDiedError
 from .run import cores, run_all, run_many
 
 __all__ = [
-    "Done", "OutOfTimeError", "WorkerDiedError", "check_scheduler", "cores", "run_all", "run_many",
-]  # fmt: skip
+    "Done",
+    "OutOfTimeError",
+    "WorkerDiedError",
+    "check_scheduler",
+    "cores",
+    "run_all",
+    "run_many",
+]

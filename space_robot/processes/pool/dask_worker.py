@@ -24,12 +24,7 @@ class OtherVersionsError(SpaceRobotError):
 
 
 def run_there(
-    job: str,
-    function: bytes,
-    item: Any,
-    timeout_s: float | None,
-    attempts: int,
-    asked: Versions,
+    job: str, function: bytes, item: Any, timeout_s: float | None, attempts: int, asked: Versions
 ) -> tuple[Any, Exception | None, str]:
     """Run an item in this thread's process; return its result, or its error with the traceback.
 

@@ -120,9 +120,13 @@ class Listener:
         state, passive = self._state, len(self._names.passive)
         angles = np.concatenate([state.joint_positions, state.passive_positions[:passive]])
         return Sample(
-            1e-9 * stamp_ns, state.base_position.copy(), state.quaternion.copy(), angles,
-            state.applied_torque.copy(), self._monitor.error,
-        )  # fmt: skip
+            1e-9 * stamp_ns,
+            state.base_position.copy(),
+            state.quaternion.copy(),
+            angles,
+            state.applied_torque.copy(),
+            self._monitor.error,
+        )
 
     @property
     def time(self) -> float:

@@ -27,10 +27,7 @@ class StateTopic:
     """Takes the messages of a topic; of each the last row is kept for a while."""
 
     def __init__(
-        self,
-        node: Node,
-        group: PolledCallbackGroup,
-        kind: type[MessageDescription],
+        self, node: Node, group: PolledCallbackGroup, kind: type[MessageDescription]
     ) -> None:
         """Subscribe to the messages of a kind as they come; they are never waited for.
 

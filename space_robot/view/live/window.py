@@ -34,9 +34,7 @@ HEIGHT = 150
 class Curves:
     """Errors and torques over the last seconds, a plot for each column of Table V."""
 
-    def __init__(
-        self, gui: GuiApi, robot: Robot, colours: Sequence[str], ink: str
-    ) -> None:  # fmt: skip
+    def __init__(self, gui: GuiApi, robot: Robot, colours: Sequence[str], ink: str) -> None:
         """Add the plots, empty.
 
         Args:
@@ -89,10 +87,14 @@ class _Plot:
         for label, colour in zip(columns, cycle(colours), strict=False):
             series.append({"label": label, "stroke": colour, "width": 1.5})
         self.handle = gui.add_uplot(
-            (np.array([0.0, LENGTH_S]), *[nothing] * len(columns)), tuple(series),
-            title=self._title, height=HEIGHT, axes=(axis, axis), scales={"x": {"time": False}},
+            (np.array([0.0, LENGTH_S]), *[nothing] * len(columns)),
+            tuple(series),
+            title=self._title,
+            height=HEIGHT,
+            axes=(axis, axis),
+            scales={"x": {"time": False}},
             legend={"show": False},
-        )  # fmt: skip
+        )
 
     @property
     def _title(self) -> str:

@@ -143,20 +143,25 @@ class TreeArrays:
         for number in (0, *(joint + 1 for joint in self.order)):
             name = self.body_names[number]
             body = Body(
-                name, float(self.mass[number]), self.inertia[number], self.com[number],
+                name,
+                float(self.mass[number]),
+                self.inertia[number],
+                self.com[number],
                 tools=tuple(tool for tool in self.tools if tool.body == number),
                 visuals=tuple(visual for visual in self.visuals if visual.body == number),
-            )  # fmt: skip
+            )
             if number:
                 j = number - 1
                 passive = j - self.n
                 joint = Joint(
-                    self.all_joint_names[j], "prismatic" if self.is_prismatic[j] else "revolute",
-                    self.rotation[j], self.offset[j],
+                    self.all_joint_names[j],
+                    "prismatic" if self.is_prismatic[j] else "revolute",
+                    self.rotation[j],
+                    self.offset[j],
                     limits=self.limits[j] if passive < 0 else JointLimits(),
                     friction=self.friction[j],
                     spring=self.springs[passive] if passive >= 0 else None,
-                )  # fmt: skip
+                )
                 body = replace(body, parent=self.body_names[self.parent[j]], joint=joint)
             found.append(body)
         return found
@@ -170,9 +175,7 @@ def _joint(moved: Moved) -> Joint:
 def _numbered_tools(members: Sequence[Body]) -> tuple[Tool, ...]:
     """Return the tools of all bodies; a robot without any has one on its last body."""
     found = [
-        replace(tool, body=number)
-        for number, body in enumerate(members)
-        for tool in body.tools
-    ]  # fmt: skip
+        replace(tool, body=number) for number, body in enumerate(members) for tool in body.tools
+    ]
     found = found or [Tool("tool", np.eye(3), np.zeros(3), len(members) - 1)]
     return tuple(sorted(found, key=lambda tool: tool.rank))

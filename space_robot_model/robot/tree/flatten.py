@@ -173,10 +173,13 @@ def _merged(first: Body, members: list[Body], where: str) -> Body:
             f"principal moment is {np.linalg.eigvalsh(inertia)[0]:g} kg m2"
         )
     return replace(
-        first, mass=mass, com=com, inertia=inertia,
+        first,
+        mass=mass,
+        com=com,
+        inertia=inertia,
         tools=tuple(tool for body in members for tool in body.tools),
         visuals=tuple(visual for body in members for visual in body.visuals),
-    )  # fmt: skip
+    )
 
 
 def _about(body: Body, point: Array) -> Array:

@@ -49,17 +49,22 @@ def mend_massless(links: Mapping[str, UrdfLink], tree: Tree, report: Report) -> 
             link = links[massless[0]]
             what = "a base that" if link.name == tree.base else "a link that moves and"
             raise report.error(
-                link.mass_line, link.part, f"{what} carries others must have a mass",
+                link.mass_line,
+                link.part,
+                f"{what} carries others must have a mass",
                 f"{link.mass:g}",
-            )  # fmt: skip
+            )
 
 
 def _lock_tip(link: UrdfLink, tree: Tree, carriers: Mapping[str, str], report: Report) -> None:
     edge = tree.edges[link.name]
     report.repaired(
-        link.mass_line, link.part, "a link that moves must have a mass", f"{link.mass:g}",
+        link.mass_line,
+        link.part,
+        "a link that moves must have a mass",
+        f"{link.mass:g}",
         f"{edge.joint.part} locked at 0, merged into link {short(carriers[edge.parent])}",
-    )  # fmt: skip
+    )
     edge.joint = replace(edge.joint, kind="fixed")
 
 
@@ -67,9 +72,12 @@ def _lock_root(root: UrdfLink, child: str, tree: Tree, report: Report) -> None:
     """Lock the one joint of a root without mass: what it carries floats freely anyway."""
     edge = tree.edges[child]
     report.repaired(
-        root.mass_line, root.part, "the base must have a mass", f"{root.mass:g}",
+        root.mass_line,
+        root.part,
+        "the base must have a mass",
+        f"{root.mass:g}",
         f"{edge.joint.part} locked at 0, merged into link {short(child)}",
-    )  # fmt: skip
+    )
     edge.joint = replace(edge.joint, kind="fixed")
 
 
@@ -82,10 +90,12 @@ def check_kinds(tree: Tree, report: Report) -> None:
     for edge in tree.edges.values():
         if edge.joint.kind in ("floating", "planar"):
             raise report.error(
-                edge.joint.line, edge.joint.part, "it moves in more than one way: use revolute, "
+                edge.joint.line,
+                edge.joint.part,
+                "it moves in more than one way: use revolute, "
                 "continuous and prismatic joints, with links between them that have a mass",
                 edge.joint.kind,
-            )  # fmt: skip
+            )
 
 
 def mend_inertias(links: Mapping[str, UrdfLink], tree: Tree, report: Report) -> None:
@@ -169,9 +179,14 @@ def _joint(edge: Edge, parent: UrdfFrame) -> Joint:
         offset = product(joint.frame.rotation.T, joint.frame.position - parent.position)
         axis = joint.axis
     return Joint(
-        joint.name, cast(JointKind, joint.kind), rotation, offset, axis, joint.limits,
+        joint.name,
+        cast(JointKind, joint.kind),
+        rotation,
+        offset,
+        axis,
+        joint.limits,
         joint.friction,
-    )  # fmt: skip
+    )
 
 
 def _body(
@@ -189,6 +204,12 @@ def _body(
     )
     tools = () if rank is None else (Tool(link.name, turn, -product(turn, at), rank=rank),)
     return Body(
-        link.name, link.mass, rotate_tensor(turn, link.inertia), product(turn, link.com - at),
-        parent, joint, tools, visuals,
-    )  # fmt: skip
+        link.name,
+        link.mass,
+        rotate_tensor(turn, link.inertia),
+        product(turn, link.com - at),
+        parent,
+        joint,
+        tools,
+        visuals,
+    )

@@ -82,26 +82,35 @@ class Report:
         for name, value in element.attributes.items():
             if name not in attributes and ":" not in name and name != "xmlns":
                 self.repaired(
-                    element.line, part, f"<{short_tag(element.tag)}> has an unknown attribute "
-                    f"{short(name)} (known: {', '.join(attributes) or 'none'})", value,
+                    element.line,
+                    part,
+                    f"<{short_tag(element.tag)}> has an unknown attribute "
+                    f"{short(name)} (known: {', '.join(attributes) or 'none'})",
+                    value,
                     "left out",
-                )  # fmt: skip
+                )
         for child in element.children:
             if child.tag not in children and ":" not in child.tag:
                 self.repaired(
-                    child.line, part, f"<{short_tag(element.tag)}> has an unknown element "
-                    f"<{short_tag(child.tag)}> (known: {', '.join(children) or 'none'})", "",
+                    child.line,
+                    part,
+                    f"<{short_tag(element.tag)}> has an unknown element "
+                    f"<{short_tag(child.tag)}> (known: {', '.join(children) or 'none'})",
+                    "",
                     "left out",
-                )  # fmt: skip
+                )
 
     def only(self, element: Element, tag: str, part: str) -> Element | None:
         """Return the child with a tag, None if there is none; a second one is a defect."""
         found = list(element.all(tag))
         for again in found[1:]:
             self.repaired(
-                again.line, part, f"<{tag}> stands there twice", f"line {found[0].line} and here",
+                again.line,
+                part,
+                f"<{tag}> stands there twice",
+                f"line {found[0].line} and here",
                 "the first one holds",
-            )  # fmt: skip
+            )
         return found[0] if found else None
 
 

@@ -90,16 +90,20 @@ def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], report
         if joint.child in above:
             other = above[joint.child]
             raise report.error(
-                joint.line, joint.part, f"its child {short(joint.child)} is the child of "
+                joint.line,
+                joint.part,
+                f"its child {short(joint.child)} is the child of "
                 f"joint {short(other.name)} (line {other.line}) already: loops cannot be closed",
-            )  # fmt: skip
+            )
         above[joint.child] = joint
     roots = [link for link in links.values() if link.name not in above]
     if len(roots) > 1:
         raise report.error(
-            roots[1].line, roots[1].part, "only the root may be no joint's child, here are "
-            f"{len(roots)} such links", ", ".join(link.name for link in roots),
-        )  # fmt: skip
+            roots[1].line,
+            roots[1].part,
+            f"only the root may be no joint's child, here are {len(roots)} such links",
+            ", ".join(link.name for link in roots),
+        )
     seen = {link.name for link in roots}
     below: dict[str, list[str]] = {name: [] for name in links}
     for joint in joints.values():

@@ -85,10 +85,16 @@ def _joint(element: Element, name: str, links: Mapping[str, UrdfLink], fields: F
     if parent == child:
         raise report.error(element.line, part, "parent and child must be two links", parent)
     joint = UrdfJoint(
-        name, element.line, KINDS[written], parent, child,
-        fields.frame(report.only(element, "origin", part)), np.array([1.0, 0.0, 0.0]),
-        JointLimits(), JointFriction(),
-    )  # fmt: skip
+        name,
+        element.line,
+        KINDS[written],
+        parent,
+        child,
+        fields.frame(report.only(element, "origin", part)),
+        np.array([1.0, 0.0, 0.0]),
+        JointLimits(),
+        JointFriction(),
+    )
     if joint.kind in ("revolute", "prismatic"):
         joint.axis = _axis(report.only(element, "axis", part), fields)
         limit = report.only(element, "limit", part)
@@ -97,9 +103,12 @@ def _joint(element: Element, name: str, links: Mapping[str, UrdfLink], fields: F
         mimic = report.only(element, "mimic", part)
         if mimic is not None:
             report.repaired(
-                mimic.line, part, "<mimic>: joints cannot be coupled",
-                mimic.attributes.get("joint", ""), "freed: it moves on its own",
-            )  # fmt: skip
+                mimic.line,
+                part,
+                "<mimic>: joints cannot be coupled",
+                mimic.attributes.get("joint", ""),
+                "freed: it moves on its own",
+            )
     return joint
 
 
@@ -141,8 +150,9 @@ def _limits(
         return JointLimits()
     report.check_content(element, part, (), LIMITS)
     lower, upper = (-math.inf, math.inf) if continuous else _range(element, fields)
-    return JointLimits(lower, upper, _most(element, "velocity", fields),
-                       _most(element, "effort", fields))  # fmt: skip
+    return JointLimits(
+        lower, upper, _most(element, "velocity", fields), _most(element, "effort", fields)
+    )
 
 
 def _range(element: Element, fields: Fields) -> tuple[float, float]:
@@ -151,15 +161,21 @@ def _range(element: Element, fields: Fields) -> tuple[float, float]:
     given = f"{lower:g} to {upper:g}"
     if lower > upper:
         fields.report.repaired(
-            element.line, fields.part, "the limits lower and upper are upside down", given,
+            element.line,
+            fields.part,
+            "the limits lower and upper are upside down",
+            given,
             "exchanged",
-        )  # fmt: skip
+        )
         return upper, lower
     if lower == upper:
         fields.report.repaired(
-            element.line, fields.part, "the limits lower and upper leave no room to move", given,
+            element.line,
+            fields.part,
+            "the limits lower and upper leave no room to move",
+            given,
             "no limits of position",
-        )  # fmt: skip
+        )
         return -math.inf, math.inf
     return lower, upper
 
@@ -171,9 +187,12 @@ def _most(element: Element, name: str, fields: Fields) -> float:
         return given
     repair = "made positive" if given else f"no limit of {name}"
     fields.report.repaired(
-        element.line, fields.part, f"limit.{name} must be given and above 0",
-        element.attributes.get(name, ""), repair,
-    )  # fmt: skip
+        element.line,
+        fields.part,
+        f"limit.{name} must be given and above 0",
+        element.attributes.get(name, ""),
+        repair,
+    )
     return abs(given) if given else math.inf
 
 
@@ -187,8 +206,11 @@ def _friction(element: Element | None, fields: Fields) -> JointFriction:
         value = fields.number(element, name, 0.0)
         if value < 0.0:
             fields.report.repaired(
-                element.line, fields.part, f"dynamics.{name} must be at least 0",
-                element.attributes[name], "read as 0",
-            )  # fmt: skip
+                element.line,
+                fields.part,
+                f"dynamics.{name} must be at least 0",
+                element.attributes[name],
+                "read as 0",
+            )
         found[name] = max(value, 0.0)
     return JointFriction(coulomb=found["friction"], viscous=found["damping"])

@@ -57,9 +57,10 @@ def read_links(
         name = read_name(element, report)
         if name in found:
             raise report.error(
-                element.line, f"link {short(name)}",
+                element.line,
+                f"link {short(name)}",
                 f"the name is taken by the link in line {found[name].line}",
-            )  # fmt: skip
+            )
         found[name] = _link(element, name, colours, folder, report)
     if not found:
         raise report.error(robot.line, "robot", "there is no <link>")
@@ -76,9 +77,14 @@ def read_name(element: Element, report: Report) -> str:
 
 def _link(element: Element, name: str, colours: Colours, folder: Path, report: Report) -> UrdfLink:
     link = UrdfLink(
-        name, element.line, element.line, 0.0, np.zeros((3, 3)), np.zeros(3),
+        name,
+        element.line,
+        element.line,
+        0.0,
+        np.zeros((3, 3)),
+        np.zeros(3),
         read_visuals(element, f"link {short(name)}", colours, folder, report),
-    )  # fmt: skip
+    )
     report.check_content(element, link.part, ELEMENTS + EXTENSIONS, ("name", "type"))
     inertial = report.only(element, "inertial", link.part)
     if inertial is not None:
@@ -112,7 +118,10 @@ def _read_inertial(inertial: Element, link: UrdfLink, fields: Fields) -> None:
     link.inertia = rotate_tensor(frame.rotation, tensor)
     if link.mass < NOTHING and link.inertia.any():
         report.repaired(
-            inertia.line, part, "inertia without mass", f"{np.trace(link.inertia):g} kg m2 (trace)",
+            inertia.line,
+            part,
+            "inertia without mass",
+            f"{np.trace(link.inertia):g} kg m2 (trace)",
             "the inertia is left out",
-        )  # fmt: skip
+        )
         link.inertia = np.zeros((3, 3))

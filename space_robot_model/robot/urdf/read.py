@@ -111,9 +111,10 @@ def with_springs(found: UrdfRobot, springs: Mapping[str, Spring], where: str) ->
         if body.joint and body.joint.name in springs:
             coulomb = body.joint.friction.coulomb
             joint = replace(
-                body.joint, spring=springs[body.joint.name],
+                body.joint,
+                spring=springs[body.joint.name],
                 friction=JointFriction(coulomb, math.nan if math.isnan(coulomb) else 0.0),
-            )  # fmt: skip
+            )
             body = replace(body, joint=joint)
         bodies.append(body)
     return replace(found, bodies=bodies)
@@ -126,9 +127,10 @@ def _robot_name(root: Element, path: Path, report: Report) -> str:
     for element in _all_elements(root):
         if element.tag.startswith("xacro:"):
             raise report.error(
-                element.line, f"<{short_tag(element.tag)}>", "xacro must be expanded first: give "
-                f"the file a name that ends in {XACRO}",
-            )  # fmt: skip
+                element.line,
+                f"<{short_tag(element.tag)}>",
+                f"xacro must be expanded first: give the file a name that ends in {XACRO}",
+            )
     name = root.attributes.get("name", "").strip()
     if name and name.isprintable():
         return name

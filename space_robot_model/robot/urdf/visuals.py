@@ -84,14 +84,18 @@ def _shape(
         size = (fields.number(shape, "radius"),)
     else:
         raise fields.report.error(
-            shape.line, fields.part, "a shape must be box, cylinder, sphere or mesh",
+            shape.line,
+            fields.part,
+            "a shape must be box, cylinder, sphere or mesh",
             short_tag(shape.tag),
-        )  # fmt: skip
+        )
     if min(size) <= 0.0:
         raise fields.report.error(
-            shape.line, fields.part, f"<{shape.tag}> must have sizes above 0",
+            shape.line,
+            fields.part,
+            f"<{shape.tag}> must have sizes above 0",
             " ".join(f"{edge:g}" for edge in size),
-        )  # fmt: skip
+        )
     return Visual(shape.tag, size, frame.rotation, frame.position, "", colour)  # type: ignore[arg-type]
 
 

@@ -41,9 +41,12 @@ class BasiliskGyrostat:
             start.wheels.unit_axes, *map(start.wheels.values, names), strict=True
         ):
             wheel = factory.create(
-                "custom", axis.tolist(), Js=float(inertia), useMaxTorque=False,
+                "custom",
+                axis.tolist(),
+                Js=float(inertia),
+                useMaxTorque=False,
                 RWModel=messaging.BalancedWheels,
-            )  # fmt: skip
+            )
             wheel.gsHat_B = axis[:, np.newaxis].tolist()
             wheel.Omega = float(speed)
         factory.addToSpacecraft("wheels", self._wheels, hub)

@@ -37,9 +37,15 @@ def same_motion(start: Start, peers: Iterable[Peer], steps: int) -> list[Result]
     ours.step(steps)
     flown = f"{start.robot.n} joints, {steps * PERIOD:g} s"
     rows = [
-        Result(f"{flown}: motion", "", (difference(start.x, ours.x),), target=MOTION,
-               better="more", is_condition=True)
-    ]  # fmt: skip
+        Result(
+            f"{flown}: motion",
+            "",
+            (difference(start.x, ours.x),),
+            target=MOTION,
+            better="more",
+            is_condition=True,
+        )
+    ]
     for peer in peers:
         peer.step(steps)
         apart = difference(ours.x, peer.x)

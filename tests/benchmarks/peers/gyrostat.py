@@ -50,12 +50,17 @@ class Gyrostat:
         rng = np.random.default_rng(4)
         wheels = WheelSettings(
             axes=[1.0, 1.0, 1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0, -1.0, 1.0],
-            rotor_inertia=[0.2], initial_speed=[100.0, -60.0, 30.0, -150.0],
-        )  # fmt: skip
+            rotor_inertia=[0.2],
+            initial_speed=[100.0, -60.0, 30.0, -150.0],
+        )
         return cls(
-            robot, rng.uniform(-1.0, 1.0, robot.n), wheels, np.array([0.8, 0.36, -0.48, 0.0]),
-            np.array([0.01, -0.02, 0.015]), rng.uniform(-2.0, 2.0, (seconds, wheels.count)),
-        )  # fmt: skip
+            robot,
+            rng.uniform(-1.0, 1.0, robot.n),
+            wheels,
+            np.array([0.8, 0.36, -0.48, 0.0]),
+            np.array([0.01, -0.02, 0.015]),
+            rng.uniform(-2.0, 2.0, (seconds, wheels.count)),
+        )
 
     @property
     def inertia(self) -> Array:
@@ -84,9 +89,11 @@ class OurGyrostat:
         n = start.robot.n
         settings = PlantSettings(
             initial_quaternion=start.quaternion.tolist(),
-            initial_joints_deg=np.degrees(start.theta).tolist(), friction=LOCKED,
-            base_actuation="hardware", wheels=start.wheels,
-        )  # fmt: skip
+            initial_joints_deg=np.degrees(start.theta).tolist(),
+            friction=LOCKED,
+            base_actuation="hardware",
+            wheels=start.wheels,
+        )
         self._plant = Plant(start.robot, settings, PERIOD)
         memory = self._plant.memory
         memory.x[7 : 7 + n] = start.theta

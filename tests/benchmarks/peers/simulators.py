@@ -58,10 +58,14 @@ class Start:
         rng = np.random.default_rng(n)
         quaternion = np.array([0.8, 0.36, -0.48, 0.0])
         return cls(
-            robot, quaternion, rng.uniform(-1.0, 1.0, n), rng.uniform(-rate, rate, 3),
-            rng.uniform(-rate, rate, 3), rng.uniform(-rate, rate, n),
+            robot,
+            quaternion,
+            rng.uniform(-1.0, 1.0, n),
+            rng.uniform(-rate, rate, 3),
+            rng.uniform(-rate, rate, 3),
+            rng.uniform(-rate, rate, n),
             torque * rng.uniform(-1.0, 1.0, n + 3),
-        )  # fmt: skip
+        )
 
     @property
     def x(self) -> Array:
@@ -95,7 +99,7 @@ class Ours:
             initial_joints_deg=[0.0] * n,
             friction=FRICTION if with_environment else FrictionSettings(coulomb=0.0, viscous=0.0),
             disturbance=DisturbanceSettings(scale=scale),
-        )  # fmt: skip
+        )
         self.plant = Plant(start.robot, settings, PERIOD)
         self._size = start.x.size
         self.plant.block[0].x[: self._size] = start.x
@@ -136,9 +140,14 @@ class MuJoCo:
         model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
         off = mujoco.mjtDisableBit
         for bit in (
-            off.mjDSBL_CONTACT, off.mjDSBL_LIMIT, off.mjDSBL_EQUALITY, off.mjDSBL_SENSOR,
-            off.mjDSBL_ACTUATION, off.mjDSBL_GRAVITY, off.mjDSBL_SPRING,
-        ):  # fmt: skip
+            off.mjDSBL_CONTACT,
+            off.mjDSBL_LIMIT,
+            off.mjDSBL_EQUALITY,
+            off.mjDSBL_SENSOR,
+            off.mjDSBL_ACTUATION,
+            off.mjDSBL_GRAVITY,
+            off.mjDSBL_SPRING,
+        ):
             model.opt.disableflags |= bit
         if not coulomb:
             model.opt.disableflags |= off.mjDSBL_CONSTRAINT

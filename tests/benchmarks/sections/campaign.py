@@ -12,10 +12,7 @@ from typing import Any
 from space_robot.analysis import analyze
 from space_robot.campaign.flown import Campaign
 from space_robot.campaign.study import Study
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot.processes.pool import run_many
 
@@ -118,11 +115,14 @@ def _memory(options: Options) -> list[Result]:
     _campaign(0.2 if options.short else 1.0, number, 2, look)
     quarter = len(looks) // 4
     return [
-        Result(f"largest memory of {who}, flights {first} to {last}", "MB",
-               (max(seen[place] for seen in looks[first:last]),))
+        Result(
+            f"largest memory of {who}, flights {first} to {last}",
+            "MB",
+            (max(seen[place] for seen in looks[first:last]),),
+        )
         for place, who in enumerate(("the parent", "a worker"))
         for first, last in ((quarter, 2 * quarter), (3 * quarter, number))
-    ]  # fmt: skip
+    ]
 
 
 def _children(pid: int) -> list[int]:

@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 
 from ..graph_flights import WARM_UP_TICKS, GraphRun, fly_graph
 from ..measure import Options
@@ -45,9 +42,15 @@ def _rows(name: str, flight: Flight, runs: list[GraphRun], target: Target | None
     answered = tuple(100.0 * _answered_in_time(run, flight) for run in runs)
     lost = sum(sum(run.lost.values()) for run in runs)
     rows = [
-        Result(f"{name}: ticks answered in time", "%", answered, better="more",
-               target=target, note=f"{lost} messages lost"),
-    ]  # fmt: skip
+        Result(
+            f"{name}: ticks answered in time",
+            "%",
+            answered,
+            better="more",
+            target=target,
+            note=f"{lost} messages lost",
+        )
+    ]
     for what, times in (
         ("a tick comes late by", [_lateness_us(run, flight.period) for run in runs]),
         ("answer after", [_answer_us(run) for run in runs]),

@@ -39,19 +39,24 @@ def compile(options: Options) -> list[Result]:
     return [
         Result.timed("first ticks, nothing compiled", "s", [everything]),
         Result.timed(
-            "first ticks, a size never seen", "s", never_seen, (usual, seen),
-            options.asked(ASKED), note,
+            "first ticks, a size never seen",
+            "s",
+            never_seen,
+            (usual, seen),
+            options.asked(ASKED),
+            note,
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _first_ticks_s(joints: int, cache: str) -> float:
     paths = os.pathsep.join([str(TESTS), *filter(None, sys.path)])
     begin = time.perf_counter()
     subprocess.run(
-        [*FLY, str(joints)], check=True,
+        [*FLY, str(joints)],
+        check=True,
         env={**os.environ, "NUMBA_CACHE_DIR": cache, "PYTHONPATH": paths},
-    )  # fmt: skip
+    )
     return time.perf_counter() - begin
 
 

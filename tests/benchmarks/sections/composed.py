@@ -11,10 +11,7 @@ from mcap.reader import make_reader
 from numpy.typing import NDArray
 
 from space_robot.flight.graph.orchestrator import fly
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot_msgs_py import topics
 
 from ..graph_flights import WARM_UP_TICKS
@@ -71,16 +68,30 @@ def composed(options: Options) -> list[Result]:
         four.append(_fly(FlightPlan(duration=lockstep)).ticks_per_s)
         by_clock.append(_fly(FlightPlan(duration=seconds, composed=True, realtime=True)))
     return [
-        Result("composed graph", "ticks/s", tuple(one), target=options.asked(RATE_ASKED),
-               better="more"),
-        Result("composed graph", "ticks/s", tuple(one), Beside("four processes", tuple(four)),
-               better="more"),
-        Result("by the wall clock: ticks answered", "%",
-               tuple(sent.answered for sent in by_clock), better="more",
-               target=options.asked(ANSWERED_ASKED)),
-        Result("by the wall clock: in time to the letter", "%",
-               tuple(sent.punctual for sent in by_clock), better="more"),
-    ]  # fmt: skip
+        Result(
+            "composed graph", "ticks/s", tuple(one), target=options.asked(RATE_ASKED), better="more"
+        ),
+        Result(
+            "composed graph",
+            "ticks/s",
+            tuple(one),
+            Beside("four processes", tuple(four)),
+            better="more",
+        ),
+        Result(
+            "by the wall clock: ticks answered",
+            "%",
+            tuple(sent.answered for sent in by_clock),
+            better="more",
+            target=options.asked(ANSWERED_ASKED),
+        ),
+        Result(
+            "by the wall clock: in time to the letter",
+            "%",
+            tuple(sent.punctual for sent in by_clock),
+            better="more",
+        ),
+    ]
 
 
 def _fly(plan: FlightPlan) -> Sent:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 
 from ..graph_flights import WARM_UP_TICKS, GraphRun, fly_graph, naive_ticks_per_s
 from ..measure import Options
@@ -34,16 +31,33 @@ def graph(options: Options) -> list[Result]:
     lost = sum(sum(run.lost.values()) for run in full + empty)
     beside = Beside("empty graph", rates_empty)
     return [
-        Result("lockstep graph", "ticks/s", rates, target=options.asked(RATE_ASKED), better="more",
-               note=f"{lost} messages lost in {2 * count} flights"),
-        Result("lockstep graph", "ticks/s", rates, beside,
-               options.asked(OF_EMPTY_ASKED), better="more"),
-        Result("lockstep graph", "ticks/s", rates, Beside("two naive nodes", tuple(naive)),
-               better="more", note="naive: message objects, callbacks, SingleThreadedExecutor"),
-        Result("lockstep graph, times real time", "x",
-               tuple(rate * flight.period for rate in rates), better="more"),
+        Result(
+            "lockstep graph",
+            "ticks/s",
+            rates,
+            target=options.asked(RATE_ASKED),
+            better="more",
+            note=f"{lost} messages lost in {2 * count} flights",
+        ),
+        Result(
+            "lockstep graph", "ticks/s", rates, beside, options.asked(OF_EMPTY_ASKED), better="more"
+        ),
+        Result(
+            "lockstep graph",
+            "ticks/s",
+            rates,
+            Beside("two naive nodes", tuple(naive)),
+            better="more",
+            note="naive: message objects, callbacks, SingleThreadedExecutor",
+        ),
+        Result(
+            "lockstep graph, times real time",
+            "x",
+            tuple(rate * flight.period for rate in rates),
+            better="more",
+        ),
         *_breakdown(full),
-    ]  # fmt: skip
+    ]
 
 
 def _breakdown(runs: list[GraphRun]) -> list[Result]:

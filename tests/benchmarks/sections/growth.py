@@ -59,12 +59,13 @@ class Growth:
             if peer in self.samples_us:
                 rows += [
                     Result.timed(
-                        f"{ours}, {n} joints", "us",
+                        f"{ours}, {n} joints",
+                        "us",
                         [1e-6 * t for t in self.samples_us[ours][i]],
                         (peer, [1e-6 * t for t in self.samples_us[peer][i]]),
                     )
                     for i, n in enumerate(self.joints)
-                ]  # fmt: skip
+                ]
         for least, where in ((0, "all sizes"), (LARGE, f"from {LARGE} joints on")):
             for name in self.samples_us:
                 if found := self.exponents(name, least):

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot_msgs_py.samples import MOST_WHEELS, Command
 from space_robot_sim.plant.plant import Plant
 
@@ -45,7 +42,7 @@ def plant(options: Options) -> list[Result]:
         },
         options.batches(),
         batch_s=options.batch_s,
-    )  # fmt: skip
+    )
     step = ("a step, compiled loop", seconds["step"])
     return [
         Result.timed("step, compiled loop", "us", seconds["step"], ("real time", [period])),

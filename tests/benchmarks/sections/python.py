@@ -26,11 +26,9 @@ def python(options: Options) -> list[Result]:
     competitors["save and restore"] = _detours(SCENARIOS["step, fine sensors"])
     seconds = interleave(competitors, options.batches(), batch_s=options.batch_s)
     return [
-        Result.timed(
-            name, "us", times, target=options.asked(STEP_US) if name == "step" else None
-        )
+        Result.timed(name, "us", times, target=options.asked(STEP_US) if name == "step" else None)
         for name, times in seconds.items()
-    ]  # fmt: skip
+    ]
 
 
 def _steps(scenario: Scenario) -> Competitor:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 
 from ..graph_flights import NodeUse, fly_graph
 from ..measure import Options
@@ -27,16 +24,33 @@ def recorder(options: Options) -> list[Result]:
     own = run.use["recorder"]
 
     return [
-        Result("messages lost", "", (lost,), target=options.asked(LOST_ASKED),
-               note=f"of {run.received + lost:.0f} in {duration:g} s"),
+        Result(
+            "messages lost",
+            "",
+            (lost,),
+            target=options.asked(LOST_ASKED),
+            note=f"of {run.received + lost:.0f} in {duration:g} s",
+        ),
         Result("recorder, of a core", "%", (100.0 * own.cores,), target=options.asked(CORE_ASKED)),
-        Result("recorder, memory growth", "MB", (_growth(own),), target=options.asked(GROWTH_ASKED),
-               note="largest of the last half less largest of the first half"),
-        *(Result(f"{name}, memory", "MB", (max(use.memory_mb),), target=options.asked(MEMORY_ASKED))
-          for name, use in run.use.items()),
-        *(Result(f"{name}, of a core", "%", (100.0 * use.cores,))
-          for name, use in run.use.items() if name != "recorder"),
-    ]  # fmt: skip
+        Result(
+            "recorder, memory growth",
+            "MB",
+            (_growth(own),),
+            target=options.asked(GROWTH_ASKED),
+            note="largest of the last half less largest of the first half",
+        ),
+        *(
+            Result(
+                f"{name}, memory", "MB", (max(use.memory_mb),), target=options.asked(MEMORY_ASKED)
+            )
+            for name, use in run.use.items()
+        ),
+        *(
+            Result(f"{name}, of a core", "%", (100.0 * use.cores,))
+            for name, use in run.use.items()
+            if name != "recorder"
+        ),
+    ]
 
 
 def _growth(use: NodeUse) -> float:

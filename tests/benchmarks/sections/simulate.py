@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate as fly
 from space_robot_msgs_py.bag.flight_log import FlightLog
 

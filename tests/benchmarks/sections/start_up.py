@@ -41,11 +41,13 @@ def start_up(options: Options) -> list[Result]:
         options.progress(f"the graph's start, {len(first_ticks) + 1} of {count}")
         first_ticks.append(_first_tick_s())
     return [
-        Result.timed(help_, "s", seconds[help_], (nothing, seconds[nothing]),
-                     options.asked(HELP_ASKED)),
-        Result("fly: first tick after", "s", tuple(first_ticks),
-               target=options.asked(FIRST_TICK_ASKED)),
-    ]  # fmt: skip
+        Result.timed(
+            help_, "s", seconds[help_], (nothing, seconds[nothing]), options.asked(HELP_ASKED)
+        ),
+        Result(
+            "fly: first tick after", "s", tuple(first_ticks), target=options.asked(FIRST_TICK_ASKED)
+        ),
+    ]
 
 
 def _run(command: list[str]) -> None:
@@ -61,9 +63,11 @@ def _first_tick_s() -> float:
         begin = time.monotonic()
         command = [*COMMAND, "fly", "--duration", "1", "--bag", str(Path(folder) / "bag")]
         with child_process(
-            command, env={"ROS_DOMAIN_ID": str(domain)},
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        ) as flight:  # fmt: skip
+            command,
+            env={"ROS_DOMAIN_ID": str(domain)},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        ) as flight:
             while not monitor.has_begun and flight.poll() is None:
                 time.sleep(0.005)
                 monitor.poll()

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot_sim.plant.plant import Plant
 
 from ..kernels import plant_steps
@@ -36,10 +33,13 @@ def wheels(options: Options) -> list[Result]:
     )
     results = [
         Result.timed(
-            "plant step, four wheels", "us", seconds["wheels"], ("ideal", seconds["ideal"]),
+            "plant step, four wheels",
+            "us",
+            seconds["wheels"],
+            ("ideal", seconds["ideal"]),
             options.asked(Target(1.0 / COST, of="ratio")),
         )
-    ]  # fmt: skip
+    ]
     if is_installed("Basilisk"):
         options.progress("a gyrostat beside Basilisk's")
         results += _beside_basilisk(FLOWN_SHORT_S if options.short else FLOWN_S)

@@ -82,12 +82,85 @@ def test_two_failed_wheels_of_four_leave_two_axes() -> None:
 
 
 THRUSTERS = {
-    "positions": [1, 0, 0, 1, 0, 0, -1, 0, 0, -1, 0, 0, 0, 1, 0, 0, 1, 0, 0, -1, 0, 0, -1, 0,
-                  0, 0, 1, 0, 0, 1, 0, 0, -1, 0, 0, -1],
-    "directions": [0, 1, 0, 0, -1, 0, 0, 1, 0, 0, -1, 0, 0, 0, 1, 0, 0, -1, 0, 0, 1, 0, 0, -1,
-                   1, 0, 0, -1, 0, 0, 1, 0, 0, -1, 0, 0],
-    "force": [1.0], "shortest_pulse": [0.01],
-}  # fmt: skip
+    "positions": [
+        1,
+        0,
+        0,
+        1,
+        0,
+        0,
+        -1,
+        0,
+        0,
+        -1,
+        0,
+        0,
+        0,
+        1,
+        0,
+        0,
+        1,
+        0,
+        0,
+        -1,
+        0,
+        0,
+        -1,
+        0,
+        0,
+        0,
+        1,
+        0,
+        0,
+        1,
+        0,
+        0,
+        -1,
+        0,
+        0,
+        -1,
+    ],
+    "directions": [
+        0,
+        1,
+        0,
+        0,
+        -1,
+        0,
+        0,
+        1,
+        0,
+        0,
+        -1,
+        0,
+        0,
+        0,
+        1,
+        0,
+        0,
+        -1,
+        0,
+        0,
+        1,
+        0,
+        0,
+        -1,
+        1,
+        0,
+        0,
+        -1,
+        0,
+        0,
+        1,
+        0,
+        0,
+        -1,
+        0,
+        0,
+    ],
+    "force": [1.0],
+    "shortest_pulse": [0.01],
+}
 
 
 def test_thrusters_take_the_axis_that_wheels_cannot_give() -> None:
@@ -117,9 +190,13 @@ def test_demand_that_is_no_number_is_not_owed(wrong: float) -> None:
 
 def test_thrusters_unload_the_wheels_which_hold_the_base() -> None:
     bench = AllocationBench(
-        thrusters={**THRUSTERS, "force": [0.4]}, momenta=[14.2, 0.0, -14.2, 0.0], unload_above=0.7,
-        unload_to=0.3, unload_time=10.0, null_gain=0.0,
-    )  # fmt: skip
+        thrusters={**THRUSTERS, "force": [0.4]},
+        momenta=[14.2, 0.0, -14.2, 0.0],
+        unload_above=0.7,
+        unload_to=0.3,
+        unload_time=10.0,
+        null_gain=0.0,
+    )
     given = bench.fly(np.zeros(3), 60000)
     np.testing.assert_allclose(given, 0.0, atol=1e-12)
     assert np.abs(bench.momenta).max() < 6.1
@@ -135,9 +212,12 @@ def test_unloading_lasts_from_one_threshold_to_the_other(k: int, side: float) ->
     """Shares of each wheel's own largest momentum; the fullest wheel counts."""
     limits = np.array([40.0, 30.0, 50.0, 20.0])
     bench = AllocationBench(
-        thrusters=THRUSTERS, wheels={"max_momentum": limits.tolist()}, null_gain=0.0,
-        unload_above=0.7, unload_to=0.3,
-    )  # fmt: skip
+        thrusters=THRUSTERS,
+        wheels={"max_momentum": limits.tolist()},
+        null_gain=0.0,
+        unload_above=0.7,
+        unload_to=0.3,
+    )
     for share, is_active in ((0.69, 0.0), (0.71, 1.0), (0.31, 1.0), (0.29, 0.0), (0.69, 0.0)):
         bench.momenta[:] = 0.2 * limits
         bench.momenta[k] = side * share * limits[k]
@@ -153,10 +233,15 @@ def test_unloading_asks_what_half_of_the_wheels_torque_can_hold(count: int) -> N
     for _ in range(20):
         most = rng.uniform(0.3, 2.0, count)
         bench = AllocationBench(
-            rng.normal(size=(count, 3)), THRUSTERS, momenta=rng.uniform(-19.0, 19.0, count),
-            wheels={"max_torque": most.tolist()}, unload_above=0.02, unload_to=0.01,
-            unload_time=40.0, null_gain=0.0,
-        )  # fmt: skip
+            rng.normal(size=(count, 3)),
+            THRUSTERS,
+            momenta=rng.uniform(-19.0, 19.0, count),
+            wheels={"max_torque": most.tolist()},
+            unload_above=0.02,
+            unload_to=0.01,
+            unload_time=40.0,
+            null_gain=0.0,
+        )
         wanted = -bench.axes.T @ bench.momenta / 40.0
         shares = most[:, None] * np.linalg.pinv(bench.axes.T * most)
         excess = max(1.0, np.max(np.abs(shares @ wanted) / (0.5 * most)))
@@ -184,8 +269,11 @@ def test_wheels_hold_against_pulses_when_these_come() -> None:
     delays = np.arange(12) % 5
     bench = AllocationBench(
         thrusters={**THRUSTERS, "force": [0.2], "delay": (delays * PERIOD).tolist()},
-        momenta=[15.0, 0.0, -15.0, 0.0], null_gain=0.0, unload_above=0.1, unload_to=0.05,
-    )  # fmt: skip
+        momenta=[15.0, 0.0, -15.0, 0.0],
+        null_gain=0.0,
+        unload_above=0.1,
+        unload_to=0.05,
+    )
     opened = []
     for tick in range(200):
         bench.step([0.05, -0.02, 0.03])

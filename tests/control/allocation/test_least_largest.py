@@ -26,7 +26,7 @@ LAYOUTS = {
     ),
     "three parallel": np.array([[1, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, 0, 1]]),
     "eight": np.vstack([PYRAMID, CUBE, [[1, 1, 1]]]),
-}  # fmt: skip
+}
 
 
 def loads_of(axes: Array, full: Array, wanted: Array, out: tuple[int, ...] = ()) -> Array:
@@ -41,9 +41,14 @@ def least(axes: Array, full: Array, wanted: Array) -> float:
     columns = np.hstack([unit(axes).T * full, np.zeros((3, 1))])
     bounds = np.vstack([np.hstack([s * np.eye(count), -np.ones((count, 1))]) for s in (1, -1)])
     found = linprog(
-        np.append(np.zeros(count), 1.0), A_ub=bounds, b_ub=np.zeros(2 * count), A_eq=columns,
-        b_eq=wanted, bounds=[(None, None)] * count + [(0, None)], method="highs",
-    )  # fmt: skip
+        np.append(np.zeros(count), 1.0),
+        A_ub=bounds,
+        b_ub=np.zeros(2 * count),
+        A_eq=columns,
+        b_eq=wanted,
+        bounds=[(None, None)] * count + [(0, None)],
+        method="highs",
+    )
     assert found.success
     return float(found.fun)
 

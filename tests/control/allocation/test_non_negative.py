@@ -7,10 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from space_robot_control.allocation.non_negative import (
-    NonNegative,
-    solve,
-)
+from space_robot_control.allocation.non_negative import NonNegative, solve
 from space_robot_msgs_py.samples import MOST_THRUSTERS
 
 Array = NDArray[np.float64]

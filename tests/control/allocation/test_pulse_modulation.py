@@ -9,10 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from space_robot_control.allocation.modulation import (
-    Modulation,
-    modulate,
-)
+from space_robot_control.allocation.modulation import Modulation, modulate
 from space_robot_control.allocation.settings import AllocationSettings
 from space_robot_control.allocation.thrusters import (
     AssumedThrusters,
@@ -50,9 +47,12 @@ class Bench:
     def __init__(self, kind: str, layout: Any = couples, pulse: float = 0.01, **more: Any) -> None:
         positions, directions = layout()
         believed = ThrusterSettings(
-            positions=positions, directions=directions, force=[10.0], shortest_pulse=[pulse],
+            positions=positions,
+            directions=directions,
+            force=[10.0],
+            shortest_pulse=[pulse],
             delay=[more.pop("delay", 0.0)],
-        )  # fmt: skip
+        )
         settings = AllocationSettings(modulation=kind, **more)  # type: ignore[arg-type]
         self.count = believed.count
         self.torques = believed.torques

@@ -10,7 +10,7 @@ from allocation_bench import PERIOD, AllocationBench
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from space_robot_control.allocation.assumed_actuators import believed_actuators
+from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_control.allocation.diagnosis import diagnose
 from space_robot_control.allocation.wheels import FULL
 from space_robot_model.robot import Robot
@@ -22,7 +22,7 @@ SHARINGS = ("pseudo_inverse", "least_largest")
 
 
 def shipped_axes(robot: Robot) -> list[Array]:
-    return [believed_actuators(name, robot).wheels.unit_axes for name in SHIPPED]
+    return [assumed_actuators(name, robot).wheels.unit_axes for name in SHIPPED]
 
 
 def largest_share(axes: Array, most: Array, demand: Array, sharing: str) -> float:
@@ -31,9 +31,12 @@ def largest_share(axes: Array, most: Array, demand: Array, sharing: str) -> floa
         torque = np.diag(most) @ np.linalg.lstsq(axes.T * most, demand)[0]
         return min(1.0, 1.0 / float(np.max(np.abs(torque) / most)))
     found = linprog(
-        [*np.zeros(len(axes)), -1.0], A_eq=np.column_stack([axes.T, demand]), b_eq=np.zeros(3),
-        bounds=[*((-m, m) for m in most), (0.0, 1.0)], method="highs",
-    )  # fmt: skip
+        [*np.zeros(len(axes)), -1.0],
+        A_eq=np.column_stack([axes.T, demand]),
+        b_eq=np.zeros(3),
+        bounds=[*((-m, m) for m in most), (0.0, 1.0)],
+        method="highs",
+    )
     return float(found.x[-1])
 
 
@@ -41,14 +44,19 @@ def largest_share(axes: Array, most: Array, demand: Array, sharing: str) -> floa
 def test_demand_beyond_the_motors_keeps_its_direction(paper_robot: Robot, sharing: str) -> None:
     """No motor is asked for more than it has, one for all of it, and no wheel counts as full."""
     rng = np.random.default_rng(1)
-    same = [(axes, np.full(len(axes), most)) for axes in shipped_axes(paper_robot)[:1]
-            for most in (0.1, 0.2, 0.4, 4.0)]  # fmt: skip
+    same = [
+        (axes, np.full(len(axes), most))
+        for axes in shipped_axes(paper_robot)[:1]
+        for most in (0.1, 0.2, 0.4, 4.0)
+    ]
     other = [(rng.normal(size=(n, 3)), rng.uniform(0.05, 5.0, n)) for n in (3, 4, 5, 8)]
     for axes, most in same + other:
         bench = AllocationBench(
-            axes, wheels={"max_torque": most.tolist(), "max_momentum": [1e6]}, sharing=sharing,
+            axes,
+            wheels={"max_torque": most.tolist(), "max_momentum": [1e6]},
+            sharing=sharing,
             null_gain=0.0,
-        )  # fmt: skip
+        )
         scaled = 0
         for k in range(60):
             demand = rng.normal(size=3) * most.max() * 10.0 ** rng.uniform(-1.0, 5.0)
@@ -119,10 +127,14 @@ def test_others_take_the_rest_of_full_wheels(count: int) -> None:
     for _ in range(40):
         most, holds = rng.uniform(0.5, 2.0, count), rng.uniform(1.0, 5.0, count)
         bench = AllocationBench(
-            rng.normal(size=(count, 3)), null_gain=0.0,
-            wheels={"max_torque": most.tolist(), "max_momentum": holds.tolist(),
-                    "rotor_inertia": rng.uniform(0.01, 0.1, count).tolist()},
-        )  # fmt: skip
+            rng.normal(size=(count, 3)),
+            null_gain=0.0,
+            wheels={
+                "max_torque": most.tolist(),
+                "max_momentum": holds.tolist(),
+                "rotor_inertia": rng.uniform(0.01, 0.1, count).tolist(),
+            },
+        )
         share = rng.choice([0.0, 0.5, FULL - 3e-4 * rng.random(), FULL, 1.0], count)
         momentum = rng.choice([-1.0, 1.0], count) * share * holds
         bench.momenta[:] = momentum

@@ -61,9 +61,11 @@ def test_a_full_wheel_is_not_blamed(share: float, is_judged: bool, side: float) 
     """From 98 % of its largest momentum on a wheel may give nothing; its own limit counts."""
     limits = [100.0, 50.0, 10.0, 100.0]
     bench = AllocationBench(
-        momenta=[0.0, 0.0, side * share * 10.0, 0.0], wheels={"max_momentum": limits},
-        failure_ticks=5, null_gain=0.0,
-    )  # fmt: skip
+        momenta=[0.0, 0.0, side * share * 10.0, 0.0],
+        wheels={"max_momentum": limits},
+        failure_ticks=5,
+        null_gain=0.0,
+    )
     bench.failed = {2}
     bench.fly(DEMAND, 20)
     assert sound(bench) == ([0, 1, 3] if is_judged else [0, 1, 2, 3])

@@ -180,8 +180,11 @@ def test_on_a_turning_base_torque_becomes_force_with_the_attitude_it_began_at(
     assume(min(abs(case.state.quaternion[0]), abs(later[0])) > 0.05)
     torque = rng.normal(size=9)
     reference = Reference.at_rest(6)
-    for ticks, began_at in ((1, case.state.quaternion), (LONGEST_GAP, case.state.quaternion),
-                            (LONGEST_GAP + 1, later)):  # fmt: skip
+    for ticks, began_at in (
+        (1, case.state.quaternion),
+        (LONGEST_GAP, case.state.quaternion),
+        (LONGEST_GAP + 1, later),
+    ):
         controller = Controller(case.robot, law_of("tde_stc"), PERIOD)
         state = measured(case)
         controller.update(state, reference)

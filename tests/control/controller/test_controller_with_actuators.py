@@ -17,25 +17,33 @@ from space_robot_msgs_py.samples import Reference, RobotState
 
 CORNERS = [1.0, 1.0, 1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0, -1.0, 1.0]
 WHEELS: dict[str, Any] = {
-    "axes": CORNERS, "rotor_inertia": [0.05], "max_torque": [50.0], "max_momentum": [100.0],
-}  # fmt: skip
+    "axes": CORNERS,
+    "rotor_inertia": [0.05],
+    "max_torque": [50.0],
+    "max_momentum": [100.0],
+}
 POSITIONS, DIRECTIONS = np.zeros((2, 12, 3))
 for axis in range(3):
     for row, (arm, side) in enumerate(((1, 1), (1, -1), (-1, 1), (-1, -1))):
         POSITIONS[4 * axis + row, (axis + 1) % 3] = arm
         DIRECTIONS[4 * axis + row, (axis + 2) % 3] = side
 THRUSTERS: dict[str, Any] = {
-    "positions": POSITIONS.ravel().tolist(), "directions": DIRECTIONS.ravel().tolist(),
-    "force": [10.0], "shortest_pulse": [0.01],
-}  # fmt: skip
+    "positions": POSITIONS.ravel().tolist(),
+    "directions": DIRECTIONS.ravel().tolist(),
+    "force": [10.0],
+    "shortest_pulse": [0.01],
+}
 
 
 def controller_of(robot: Robot, law: str = "ctc", **hardware: Any) -> Controller:
     actuators = BaseActuatorSettings(base_actuation="hardware", **hardware)
     return Controller(
-        robot, law_of(law), PERIOD, actuators=actuators,
+        robot,
+        law_of(law),
+        PERIOD,
+        actuators=actuators,
         allocation=AllocationSettings(failure_ticks=20, modulation="sigma_delta"),
-    )  # fmt: skip
+    )
 
 
 def state_at(tick: int) -> RobotState:

@@ -85,9 +85,12 @@ def test_no_law_sees_the_base_nor_turns_it(name: str, case: Case, half_turned: b
         command = controller.update(measured(robot, s, given_torque, tick), near(s, rng))
         signals = controller.signals
         for vector in (
-            signals.error, signals.error_rate, signals.acceleration_desired, signals.n_hat,
+            signals.error,
+            signals.error_rate,
+            signals.acceleration_desired,
+            signals.n_hat,
             command.torque,
-        ):  # fmt: skip
+        ):
             assert (vector[:3] == 0.0).all()
             assert np.isfinite(vector).all()
         assert (command.torque[3:] != 0.0).all()

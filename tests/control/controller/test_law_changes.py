@@ -91,10 +91,23 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
     with ros_domain() as domain:
         pass  # a free one, for the flight to take
     process = subprocess.Popen(
-        [*COMMAND, "fly", "--duration", str(SECONDS), "--swap", f"{SWAP_S}:tde_smc",
-         "--bag", str(bag), "--domain", str(domain)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
-    )  # fmt: skip
+        [
+            *COMMAND,
+            "fly",
+            "--duration",
+            str(SECONDS),
+            "--swap",
+            f"{SWAP_S}:tde_smc",
+            "--bag",
+            str(bag),
+            "--domain",
+            str(domain),
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=ros_environment(),
+    )
     try:
         swapped_to = change_laws(domain)
         table, errors = process.communicate(timeout=150)
@@ -111,8 +124,10 @@ def change_laws(domain: int) -> str:
         assert pilot.set(controller="tde_tsmc") == [True]
         pilot.wait_until(pilot.simulated_s + 0.02)
         assert pilot.set(controller="pid", tde_stc__k_1=[0.3], tde_stc__lambda=[-1.0]) == [
-            False, True, False,
-        ]  # fmt: skip
+            False,
+            True,
+            False,
+        ]
         for _ in range(2):
             assert pilot.set(tde_tsmc__k_1=[0.5]) == [True]
             pilot.wait_until(pilot.simulated_s + 0.02)
@@ -156,7 +171,7 @@ def test_a_part_begins_under_the_law_in_force_there(flown: Flown, domain: int) -
         ReplayOptions(
             flown.bag, domain=domain, start_s=(ctc.tick + 1) * period, end_s=until * period
         )
-    )  # fmt: skip
+    )
     assert done.comparison.ticks.tolist() == list(range(ctc.tick + 1, until))
     assert not done.comparison.equal[0]
     assert done.comparison.equal[45:].all(), "the transfer lasts 40 ticks, in flight and now"

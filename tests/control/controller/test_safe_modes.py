@@ -51,11 +51,20 @@ def deaths(tmp_path_factory: pytest.TempPathFactory) -> Story:
     """Controller, mission and recorder killed one after the other; the controller comes back."""
     return Story(
         tmp_path_factory.mktemp("deaths") / "bag",
-        "--duration", "12", "--restart-controller", "--set", "plant.silence_timeout=0.5",
-        "--set", "controller.reference_timeout=0.2",
-        "--fault", "kill_controller@0.3", "--fault", "kill_mission@9.5",
-        "--fault", "kill_recorder@11.5",
-    )  # fmt: skip
+        "--duration",
+        "12",
+        "--restart-controller",
+        "--set",
+        "plant.silence_timeout=0.5",
+        "--set",
+        "controller.reference_timeout=0.2",
+        "--fault",
+        "kill_controller@0.3",
+        "--fault",
+        "kill_mission@9.5",
+        "--fault",
+        "kill_recorder@11.5",
+    )
 
 
 def test_dead_controller_leaves_the_plant_holding_then_without_torque(deaths: Story) -> None:
@@ -116,11 +125,21 @@ def hangs(tmp_path_factory: pytest.TempPathFactory) -> Story:
     """Recorder, controller and mission stopped for a while one after the other."""
     return Story(
         tmp_path_factory.mktemp("hangs") / "bag",
-        "--duration", "8", "--set", "plant.silence_timeout=0.5",
-        "--set", "controller.reference_timeout=1", "--set", "mission.lead_ticks=200",
-        "--fault", "stop_recorder@0.2:1", "--fault", "stop_controller@1.5:2.5",
-        "--fault", "stop_mission@5:2",
-    )  # fmt: skip
+        "--duration",
+        "8",
+        "--set",
+        "plant.silence_timeout=0.5",
+        "--set",
+        "controller.reference_timeout=1",
+        "--set",
+        "mission.lead_ticks=200",
+        "--fault",
+        "stop_recorder@0.2:1",
+        "--fault",
+        "stop_controller@1.5:2.5",
+        "--fault",
+        "stop_mission@5:2",
+    )
 
 
 def test_stopped_recorder_loses_nothing(hangs: Story) -> None:
@@ -143,9 +162,13 @@ def test_stopped_mission_is_waited_for_then_followed_again(hangs: Story) -> None
 
 def test_half_a_turn_is_safe_mode_with_its_reason_and_no_nan(tmp_path: Path) -> None:
     story = Story(
-        tmp_path / "bag", "--duration", "0.5", "--composed",
-        "--set", "plant.initial_quaternion=[0.01, 0.9, 0.3, 0.3]",
-    )  # fmt: skip
+        tmp_path / "bag",
+        "--duration",
+        "0.5",
+        "--composed",
+        "--set",
+        "plant.initial_quaternion=[0.01, 0.9, 0.3, 0.3]",
+    )
     assert story.result.returncode == 0
     story.time_of("controller", "safe: attitude near 180 degrees")
     np.testing.assert_array_equal(story.log.applied_torque, 0.0)
@@ -154,9 +177,14 @@ def test_half_a_turn_is_safe_mode_with_its_reason_and_no_nan(tmp_path: Path) -> 
 
 def test_a_lost_controller_that_nobody_restarts_leaves_a_safe_plant(tmp_path: Path) -> None:
     story = Story(
-        tmp_path / "bag", "--duration", "3", "--set", "plant.silence_timeout=0.3",
-        "--fault", "kill_controller@0.3",
-    )  # fmt: skip
+        tmp_path / "bag",
+        "--duration",
+        "3",
+        "--set",
+        "plant.silence_timeout=0.3",
+        "--fault",
+        "kill_controller@0.3",
+    )
     assert story.result.returncode == 0
     assert story.report["ticks"] == 6000
     np.testing.assert_array_equal(story.log.applied_torque[-500:], 0.0)

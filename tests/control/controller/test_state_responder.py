@@ -14,10 +14,7 @@ from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.law_choice import LawChoice
 from space_robot_control.controller.reference_buffer import ReferenceBuffer
 from space_robot_control.controller.settings import ControllerNodeSettings
-from space_robot_control.controller.state_responder import (
-    StampStatus,
-    StateResponder,
-)
+from space_robot_control.controller.state_responder import StampStatus, StateResponder
 from space_robot_control.laws import ControlLaw
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics

@@ -85,8 +85,15 @@ def test_whatever_is_measured_commands_are_finite_and_it_comes_back(
             x[:4] = np.array(quaternion) / np.linalg.norm(quaternion)
         state = RobotState.allocate(6)
         state.tick = tick
-        parts = (slice(4, 7), slice(4), slice(7, 10), slice(10, 13), slice(13, 19), slice(19, 25),
-                 slice(22, 31))  # fmt: skip
+        parts = (
+            slice(4, 7),
+            slice(4),
+            slice(7, 10),
+            slice(10, 13),
+            slice(13, 19),
+            slice(19, 25),
+            slice(22, 31),
+        )
         for name, part in zip(STATE_FIELDS, parts, strict=True):
             getattr(state, name)[:] = x[part]
         assert_safe(supervisor, state)
@@ -124,7 +131,7 @@ def test_a_bad_state_is_answered_with_the_last_torque_for_a_while(
         (lambda s: s.quaternion.__imul__(1.01), "quaternion not unit"),
         (lambda s: s.quaternion.fill(0.0), "quaternion not unit"),
     ],
-)  # fmt: skip
+)
 def test_what_was_wrong_is_counted_and_held_over(
     paper_robot: Robot, corrupt: Callable[[RobotState], None], kind: str
 ) -> None:

@@ -8,10 +8,7 @@ from numpy.typing import NDArray
 
 from space_robot.analysis.metrics import tracking_error
 from space_robot.flight.closed_loop import close_loop
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import empty_log
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import build_law
@@ -51,9 +48,11 @@ class CommonBeginning:
         """The flight with another controller, as after a restart, from `TAKEOVER` on."""
         self._go_back()
         new = Controller(
-            self.flight.robot, self._law(law), self.flight.period,
-            actuators=self.flight.believed_actuators,
-        )  # fmt: skip
+            self.flight.robot,
+            self._law(law),
+            self.flight.period,
+            actuators=self.flight.assumed_actuators,
+        )
         return self._fly(new, TAKEOVER, STOP)
 
     def _go_back(self) -> None:

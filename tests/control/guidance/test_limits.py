@@ -9,14 +9,8 @@ from hypothesis import strategies as st
 from paths import DATA
 
 from space_robot.tuning.warning import limit_remarks
-from space_robot_control.guidance.limits import (
-    too_fast,
-    too_strong,
-)
-from space_robot_control.guidance.mission import (
-    Mission,
-    MissionSettings,
-)
+from space_robot_control.guidance.limits import too_fast, too_strong
+from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 
@@ -76,8 +70,11 @@ def test_remarks_name_joint_number_and_unit() -> None:
     assert not limit_remarks(ROBOT, mission([30.0, 0.8, -10.0], (0.0, 8.0)))
     said = limit_remarks(ROBOT, mission([60.0, 1.4, -10.0], (0.0, 0.5)))
     assert [tuple(line.split(" ")[2:4]) for line in said] == [
-        ("shoulder", "is"), ("boom", "is"), ("shoulder", "needs"), ("boom", "needs")
-    ]  # fmt: skip
+        ("shoulder", "is"),
+        ("boom", "is"),
+        ("shoulder", "needs"),
+        ("boom", "needs"),
+    ]
     assert said[1] == "warning: mission: boom is to move at 4.5 m/s, its limit is 0.4 m/s"
     assert said[3].endswith("N and more, its limit is 20 N")
 

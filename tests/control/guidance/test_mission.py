@@ -13,10 +13,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from random_robots import random_robot
 
-from space_robot_control.guidance.mission import (
-    Mission,
-    MissionSettings,
-)
+from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
@@ -79,9 +76,7 @@ def test_halfway_through_a_leg_the_arm_is_halfway_at_full_speed(paper: Mission) 
 
 @settings(max_examples=25)
 @given(missions())
-def test_legs_are_the_quintics_of_their_boundary_conditions(
-    mission: tuple[Array, Array],
-) -> None:
+def test_legs_are_the_quintics_of_their_boundary_conditions(mission: tuple[Array, Array]) -> None:
     """Position, velocity and acceleration inside every leg, against a linear solve."""
     times, degrees = mission
     period = 0.05

@@ -14,10 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from paths import ROOT
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import (
     CompiledLaw,
@@ -105,8 +102,12 @@ def tde_stc(h: History, g: Gains) -> Array:
 
 
 EQUATIONS: dict[str, Callable[[History, Gains], Array]] = {
-    "ctc": ctc, "ctc_smc": ctc_smc, "tde_smc": tde_smc, "tde_tsmc": tde_tsmc, "tde_stc": tde_stc,
-}  # fmt: skip
+    "ctc": ctc,
+    "ctc_smc": ctc_smc,
+    "tde_smc": tde_smc,
+    "tde_tsmc": tde_tsmc,
+    "tde_stc": tde_stc,
+}
 
 
 def random_gains(law: type[ControlLaw], axes: int, seed: int) -> Gains:
@@ -225,9 +226,12 @@ def test_model_and_time_delay_estimate_go_to_the_laws_that_say_so() -> None:
     given = {n: (law.uses_model, law.uses_time_delay_estimate()) for n, law in laws().items()}
     model, estimate = (True, False), (False, True)
     assert given == {
-        "ctc": model, "ctc_smc": model, "tde_smc": estimate, "tde_tsmc": estimate,
+        "ctc": model,
+        "ctc_smc": model,
+        "tde_smc": estimate,
+        "tde_tsmc": estimate,
         "tde_stc": estimate,
-    }  # fmt: skip
+    }
 
 
 @given(st.floats(-1e3, 1e3), st.floats(1e-6, 10.0))
@@ -285,7 +289,7 @@ def test_a_law_of_ones_own_is_found_by_module_and_class() -> None:
         (":Law", "cannot be imported"),
         ("space_robot_control.laws:ControlLaw", "is not a ControlLaw"),
     ],
-)  # fmt: skip
+)
 def test_unknown_laws_are_errors_that_name_the_allowed_ones(name: str, why: str) -> None:
     with pytest.raises(InputError, match=why) as caught:
         find_law(name)

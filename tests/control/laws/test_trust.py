@@ -13,10 +13,7 @@ from bags import redescribed
 from command import Run
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import find_law

@@ -57,9 +57,11 @@ def riccati(case: Case, omega: Array) -> Array:
     scale = np.diag([1e5] * 3 + [1e8] * 3)  # rad and rad/s differ by far
     inverse = np.linalg.inv(scale)
     found = solve_discrete_are(
-        (scale @ transition @ inverse).T, np.eye(6, 3), scale @ noise @ scale,
+        (scale @ transition @ inverse).T,
+        np.eye(6, 3),
+        scale @ noise @ scale,
         scale[:3, :3] @ of_tracker @ scale[:3, :3],
-    )  # fmt: skip
+    )
     covariance: Array = inverse @ found @ inverse
     return covariance
 
@@ -137,9 +139,15 @@ def test_the_filter_is_consistent(delay: int) -> None:
     At eight moments, of which one may be beyond; and all together.
     """
     case = Case(
-        across=1e-5, about=6e-5, arw=1e-6, rrw=2e-8, bias=2e-5, period=0.01, interval=10,
+        across=1e-5,
+        about=6e-5,
+        arw=1e-6,
+        rrw=2e-8,
+        bias=2e-5,
+        period=0.01,
+        interval=10,
         delay=delay,
-    )  # fmt: skip
+    )
     ticks, seeds = 5_000, 60
 
     def rate(t: float) -> Array:
@@ -294,9 +302,15 @@ def test_against_a_scale_error_a_walk_of_the_bias_helps_and_its_first_variance_d
     """The numbers of docs/manual/navigation.md: RMS an axis in a turn that comes after a rest."""
     scale, rate, duration = 3e-4, np.radians(1.0), 60.0
     tactical = Case(
-        across=4e-5, about=3e-4, arw=2.9e-6, rrw=8e-8, bias=4.8e-6, period=5e-3, interval=40,
+        across=4e-5,
+        about=3e-4,
+        arw=2.9e-6,
+        rrw=8e-8,
+        bias=4.8e-6,
+        period=5e-3,
+        interval=40,
         delay=30,
-    )  # fmt: skip
+    )
     time = tactical.period * np.arange(round(2.0 * duration / tactical.period))
     omega, turning = rate * np.array([0.6, 0.0, 0.8]), (time > duration)[:, np.newaxis]
     attitudes = exponential(omega * np.maximum(0.0, time - duration)[:, np.newaxis])
@@ -309,15 +323,18 @@ def test_against_a_scale_error_a_walk_of_the_bias_helps_and_its_first_variance_d
         squares = [
             attitude_error(
                 filtered(case, seen._replace(gyro=seen.gyro + scale * rates)).present, attitudes
-            )[late] ** 2
+            )[late]
+            ** 2
             for seen in flights
-        ]  # fmt: skip
+        ]
         return float(np.sqrt(np.mean(squares)))
 
     found = [
-        error(tactical, scale), error(tactical._replace(bias=scale * rate), scale),
-        error(tactical._replace(rrw=scale * rate / duration**0.5), scale), error(tactical, 0.0),
-    ]  # fmt: skip
+        error(tactical, scale),
+        error(tactical._replace(bias=scale * rate), scale),
+        error(tactical._replace(rrw=scale * rate / duration**0.5), scale),
+        error(tactical, 0.0),
+    ]
     text = (ROOT / "docs/manual/navigation.md").read_text("utf-8")
     (paragraph,) = (part for part in text.split("\n\n") if "scale error e is" in part)
     shown = [float(number) for number in re.findall(r"by (\d\.\de-5)", paragraph)]
@@ -401,19 +418,25 @@ def test_only_measurements_in_a_row_make_it_begin_anew() -> None:
 
 @settings(max_examples=60)
 @given(
-    st.integers(0, 2**32 - 1), st.sampled_from([1e-9, 1e-5, 1e-2]),
-    st.sampled_from([0.0, 1.0, 1e3, 1e25]), st.integers(0, 60),
-)  # fmt: skip
+    st.integers(0, 2**32 - 1),
+    st.sampled_from([1e-9, 1e-5, 1e-2]),
+    st.sampled_from([0.0, 1.0, 1e3, 1e25]),
+    st.integers(0, 60),
+)
 def test_attitude_stays_unit_and_covariance_positive_definite(
     seed: int, sigma: float, fastest: float, delay: int
 ) -> None:
     """Whatever the numbers that arrive, so long as they are finite."""
     rng = np.random.default_rng(seed)
     case = Case(
-        across=sigma, about=sigma * 10.0 ** rng.uniform(0, 2), arw=10.0 ** rng.uniform(-9, -3),
-        rrw=10.0 ** rng.uniform(-12, -4), bias=10.0 ** rng.uniform(-8, -2), period=5e-4,
+        across=sigma,
+        about=sigma * 10.0 ** rng.uniform(0, 2),
+        arw=10.0 ** rng.uniform(-9, -3),
+        rrw=10.0 ** rng.uniform(-12, -4),
+        bias=10.0 ** rng.uniform(-8, -2),
+        period=5e-4,
         delay=delay,
-    )  # fmt: skip
+    )
     quaternions = rng.normal(size=(300, 4))
     quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
     gyro = fastest * rng.normal(size=(300, 3))

@@ -15,7 +15,7 @@ from sensor_bench import Bench, a_state
 from space_robot_control.navigation.assumed_sensors import (
     LEAST,
     LEAST_ANGLE,
-    believed_numbers,
+    assumed_numbers,
     completed,
 )
 from space_robot_control.navigation.navigation import Navigation
@@ -87,18 +87,21 @@ def test_what_is_believed_of_sensors_is_what_they_do(period: float) -> None:
             [*turn, *rates[0], *(told.joint_positions - state.joint_positions), *rates[1]]
         )
     found = np.sqrt(np.mean(np.square(errors), axis=0))
-    believed = believed_numbers(SensorSettings.model_validate(settings), period)
+    believed = assumed_numbers(SensorSettings.model_validate(settings), period)
     sample = believed["gyro_angle_walk"] / period**0.5
     expected = [
-        *[believed["tracker_across"]] * 2, believed["tracker_about"], *[sample] * 3,
-        *[believed["joint_angle_noise"]] * 6, *[believed["joint_rate_noise"]] * 6,
-    ]  # fmt: skip
+        *[believed["tracker_across"]] * 2,
+        believed["tracker_about"],
+        *[sample] * 3,
+        *[believed["joint_angle_noise"]] * 6,
+        *[believed["joint_rate_noise"]] * 6,
+    ]
     np.testing.assert_allclose(found, expected, rtol=5.0 * (2.0 * len(errors)) ** -0.5)
 
 
 def test_nothing_is_believed_to_be_perfect() -> None:
     """Ideal sensors make a filter that can be built."""
-    found = believed_numbers(SensorSettings(), PERIOD)
+    found = assumed_numbers(SensorSettings(), PERIOD)
     assert found["tracker_across"] == found["tracker_about"] == LEAST_ANGLE
     assert found["gyro_angle_walk"] == found["joint_angle_noise"] == LEAST
     assert found["joint_rate_noise"] == LEAST

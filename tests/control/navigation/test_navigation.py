@@ -8,11 +8,7 @@ from attitude_sensors import attitude_error, exponential
 from closed_loop import NAVIGATION, PERIOD, Loop, law_of
 from numpy.typing import NDArray
 
-from space_robot_control.navigation.navigation import (
-    LONGEST_BRIDGE,
-    Navigation,
-    navigate,
-)
+from space_robot_control.navigation.navigation import LONGEST_BRIDGE, Navigation, navigate
 from space_robot_control.navigation.settings import NavigationFilterSettings
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError, UnusableStateError

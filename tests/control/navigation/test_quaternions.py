@@ -10,12 +10,7 @@ from oracles import quaternion_of, rotation_of
 from random_robots import random_quaternion
 from scipy.spatial.transform import Rotation
 
-from space_robot_control.navigation.quaternions import (
-    is_same,
-    multiply,
-    small_angle,
-    turn,
-)
+from space_robot_control.navigation.quaternions import is_same, multiply, small_angle, turn
 
 Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)

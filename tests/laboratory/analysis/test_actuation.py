@@ -13,16 +13,8 @@ from hypothesis import strategies as st
 from random_logs import random_log
 
 from space_robot.analysis import analyze
-from space_robot.analysis.actuation import (
-    Latency,
-    MissedDeadlines,
-    Saturation,
-    TorqueLimits,
-)
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.analysis.actuation import Latency, MissedDeadlines, Saturation, TorqueLimits
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
@@ -106,9 +98,11 @@ def test_missed_deadlines_and_saturation_are_those_of_plain_loops(
             saturation.add(log.rows(start, stop), np.empty(0))
     assert (missed_deadlines.differing, missed_deadlines.compared) == (differ, compared)
     assert saturation.result() == {
-        "base_torque_limit_n_m": 2.0, "joint_torque_limit_n_m": 1.5, "ticks": saturated,
+        "base_torque_limit_n_m": 2.0,
+        "joint_torque_limit_n_m": 1.5,
+        "ticks": saturated,
         "share": saturated / 60,
-    }  # fmt: skip
+    }
 
 
 def test_saturation_is_the_plants() -> None:
@@ -123,8 +117,10 @@ def test_saturation_is_the_plants() -> None:
     assert 0 < counted <= flight.plant.saturated_ticks <= counted + 1
     assert differing(log, 0, limits) == (0, 399)
     assert report["missed_deadlines"] == {
-        "unanswered_ticks": 0, "compared_ticks": 399, "differing_ticks": 0,
-    }  # fmt: skip
+        "unanswered_ticks": 0,
+        "compared_ticks": 399,
+        "differing_ticks": 0,
+    }
     assert differing(log, 0, NONE)[0] > 0
     assert report["saturation"]["base_torque_limit_n_m"] == 0.05
     assert report["saturation"]["joint_torque_limit_n_m"] == 0.02
@@ -146,8 +142,11 @@ def test_each_axis_has_its_own_limit() -> None:
 def test_without_limits_the_report_says_so() -> None:
     report = analyze(flown(duration=0.01))["saturation"]
     assert report == {
-        "base_torque_limit_n_m": None, "joint_torque_limit_n_m": None, "ticks": 0, "share": 0.0,
-    }  # fmt: skip
+        "base_torque_limit_n_m": None,
+        "joint_torque_limit_n_m": None,
+        "ticks": 0,
+        "share": 0.0,
+    }
 
 
 def test_percentiles_of_the_latency() -> None:

@@ -13,23 +13,12 @@ from random_logs import random_log
 from scipy.spatial.transform import Rotation
 
 from space_robot.analysis import analyze
-from space_robot.analysis.attitude_drift import (
-    AttitudeDrift,
-    attitude_drift,
-    controls_base,
-)
+from space_robot.analysis.attitude_drift import AttitudeDrift, attitude_drift, controls_base
 from space_robot.analysis.columns import column_names
 from space_robot.analysis.figures.figure_set import FigureSet
 from space_robot.analysis.metrics import of_log
-from space_robot.analysis.report_tables import (
-    comparison_table,
-    lines,
-    rms_table,
-)
-from space_robot.analysis.words import (
-    notes,
-    remarks,
-)
+from space_robot.analysis.report_tables import comparison_table, lines, rms_table
+from space_robot.analysis.words import notes, remarks
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 OF_JOINTS = {"joints_1_3", "joints_4_6"}

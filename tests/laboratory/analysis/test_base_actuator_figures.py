@@ -11,11 +11,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from space_robot.analysis.described import momentum_of
-from space_robot.analysis.figures import (
-    momentum,
-    thrusters,
-    wheels,
-)
+from space_robot.analysis.figures import momentum, thrusters, wheels
 from space_robot.analysis.figures.figure_set import FigureSet
 from space_robot.analysis.figures.style import save_figure
 from space_robot.analysis.momentum import Momentum
@@ -72,8 +68,9 @@ def test_wheels_stand_between_their_limits(paper_robot: Robot) -> None:
     log = lively_log(paper_robot, hardware(wheels=WHEELS))
     above, below = wheels(log, BOTH.wheels).axes
     for axes, values, limit in (
-        (above, log.wheel_velocities * 0.01, 3.0), (below, log.wheel_torques, 0.5),
-    ):  # fmt: skip
+        (above, log.wheel_velocities * 0.01, 3.0),
+        (below, log.wheel_torques, 0.5),
+    ):
         curves = [y for y in drawn(axes) if len(y) == log.ticks]
         assert len(curves) == 4
         for column in values.T:
@@ -120,8 +117,11 @@ def test_each_flight_has_those_of_its_base(
 
 def test_of_several_flights_each_has_its_own(paper_robot: Robot, tmp_path: Path) -> None:
     figures = FigureSet()
-    for name, actuators in (("ideal", BaseActuatorSettings()), ("wheels", hardware(wheels=WHEELS)),
-                            ("free", FREE)):  # fmt: skip
+    for name, actuators in (
+        ("ideal", BaseActuatorSettings()),
+        ("wheels", hardware(wheels=WHEELS)),
+        ("free", FREE),
+    ):
         figures.add(name, lively_log(paper_robot, actuators))
     captions = {figure.svg.stem: figure.caption for figure in figures.save(tmp_path)}
     assert captions["momentum_1"] == "Angular momentum about the common centre of mass of wheels"

@@ -38,12 +38,18 @@ def test_a_pyramid_adds_up_along_all_axes() -> None:
 
 def test_thrusters_help_wheels() -> None:
     """A pair about +x alone: about -x there are the wheels only, so that both ways is theirs."""
-    thrusters = {"positions": [0.0, 1.0, 0.0, 0.0, -1.0, 0.0],
-                 "directions": [0.0, 0.0, 1.0, 0.0, 0.0, -1.0], "force": [5.0]}  # fmt: skip
+    thrusters = {
+        "positions": [0.0, 1.0, 0.0, 0.0, -1.0, 0.0],
+        "directions": [0.0, 0.0, 1.0, 0.0, 0.0, -1.0],
+        "force": [5.0],
+    }
     wheels = {"axes": flat(np.eye(3)), "max_torque": [1.0]}
     assert largest_torque(hardware(wheels=wheels, thrusters=thrusters))[0] == pytest.approx(1.0)
-    both = {**thrusters, "positions": thrusters["positions"] * 2,
-            "directions": [*thrusters["directions"], 0.0, 0.0, -1.0, 0.0, 0.0, 1.0]}  # fmt: skip
+    both = {
+        **thrusters,
+        "positions": thrusters["positions"] * 2,
+        "directions": [*thrusters["directions"], 0.0, 0.0, -1.0, 0.0, 0.0, 1.0],
+    }
     assert largest_torque(hardware(wheels=wheels, thrusters=both))[0] == pytest.approx(11.0)
 
 
@@ -67,8 +73,7 @@ def test_the_least_propellant_is_the_linear_programmes(seed: int, count: int) ->
     thrusters = random_thrusters(rng, count).thrusters
     rates, torques = thrusters.mass_flow, thrusters.torques
     np.testing.assert_allclose(
-        rates,
-        np.array(thrusters.force) / np.array(thrusters.specific_impulse) / 9.80665,
+        rates, np.array(thrusters.force) / np.array(thrusters.specific_impulse) / 9.80665
     )
     wanted = rng.normal(size=(5, 3))
     found = ThrusterTorques.of(thrusters).propellant(wanted)
@@ -80,12 +85,16 @@ def test_the_least_propellant_is_the_linear_programmes(seed: int, count: int) ->
 
 def test_a_torque_at_the_edge_is_the_whole_share() -> None:
     """A pair of 10 N on levers of 1 m gives 20 N m, for 2 / (I_sp g_0) kg/s a newton."""
-    thrusters = hardware(thrusters={
-        "positions": flat([sign * axis for axis in np.eye(3) for sign in (1, -1, 1, -1)]),
-        "directions": flat([sign * np.roll(axis, 1) for axis in np.eye(3)
-                            for sign in (1, -1, -1, 1)]),
-        "force": [10.0], "specific_impulse": [200.0],
-    }).thrusters  # fmt: skip
+    thrusters = hardware(
+        thrusters={
+            "positions": flat([sign * axis for axis in np.eye(3) for sign in (1, -1, 1, -1)]),
+            "directions": flat(
+                [sign * np.roll(axis, 1) for axis in np.eye(3) for sign in (1, -1, -1, 1)]
+            ),
+            "force": [10.0],
+            "specific_impulse": [200.0],
+        }
+    ).thrusters
     found = ThrusterTorques.of(thrusters)
     torque = np.vstack([20.0 * np.eye(3), -10.0 * np.eye(3), 20.0 * np.ones((1, 3))])
     np.testing.assert_allclose(found.share(torque), [1.0, 1.0, 1.0, 0.5, 0.5, 0.5, 1.0])
@@ -104,7 +113,7 @@ def test_wheels_share_as_the_allocation_does(seed: int, count: int) -> None:
         rng.normal(size=(count, 3)), null_gain=0.0, wheels={"max_torque": most.tolist()}
     )
     bench.step(demand)
-    shares = wheel_shares(hardware(wheels={
-        "axes": flat(bench.axes), "max_torque": most.tolist(),
-    }).wheels)  # fmt: skip
+    shares = wheel_shares(
+        hardware(wheels={"axes": flat(bench.axes), "max_torque": most.tolist()}).wheels
+    )
     np.testing.assert_allclose(-shares @ demand, bench.command, rtol=1e-6, atol=1e-12)

@@ -7,14 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from space_robot.analysis import (
-    analyze,
-    excerpt,
-)
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.analysis import analyze, excerpt
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError

@@ -10,26 +10,11 @@ import pyarrow as pa
 import pytest
 from pyarrow import csv, parquet
 
-from space_robot.analysis import (
-    excerpt,
-    tracking_error,
-)
-from space_robot.analysis.columns import (
-    BATCH,
-    batches,
-    column_names,
-)
-from space_robot.analysis.export import (
-    METADATA_KEY,
-    dataframe,
-    write_csv,
-    write_parquet,
-)
+from space_robot.analysis import excerpt, tracking_error
+from space_robot.analysis.columns import BATCH, batches, column_names
+from space_robot.analysis.export import METADATA_KEY, dataframe, write_csv, write_parquet
 from space_robot.console.files import whole_file
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError

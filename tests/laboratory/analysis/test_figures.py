@@ -25,10 +25,7 @@ from PIL import Image
 from random_robots import random_robot
 from scipy import signal
 
-from space_robot.analysis import (
-    excerpt,
-    tracking_error,
-)
+from space_robot.analysis import excerpt, tracking_error
 from space_robot.analysis.figures import (
     chatter,
     control_results,
@@ -36,29 +33,13 @@ from space_robot.analysis.figures import (
     junctions,
     save_figure,
 )
-from space_robot.analysis.figures.base_torque import (
-    common_limits,
-    power_spectral_density,
-)
-from space_robot.analysis.figures.style import (
-    LineStyle,
-    house_style,
-    thinned,
-)
+from space_robot.analysis.figures.base_torque import common_limits, power_spectral_density
+from space_robot.analysis.figures.style import LineStyle, house_style, thinned
 from space_robot.analysis.plot_series import BaseTorque
-from space_robot.analysis.waypoints import (
-    junction_ticks,
-    waypoint_ticks,
-)
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.analysis.waypoints import junction_ticks, waypoint_ticks
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
-from space_robot_control.guidance.mission import (
-    Mission,
-    MissionSettings,
-)
+from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
 
@@ -190,8 +171,7 @@ def hyphened(number: str) -> str:
 
 class TestScales:
     @pytest.mark.parametrize(
-        ("largest", "power"),
-        [(0.8, ""), (3e-8, "1e-8"), (6.77e7, "1e7"), (1e300, "1e300")],
+        ("largest", "power"), [(0.8, ""), (3e-8, "1e-8"), (6.77e7, "1e7"), (1e300, "1e300")]
     )
     def test_a_power_of_ten_stands_once_above_its_axis(self, largest: float, power: str) -> None:
         log = flown(duration=1.0, error=0.0)
@@ -219,9 +199,7 @@ class TestSpectrum:
     )
     def test_is_welchs_without_each_segments_trend(self, samples: int, length: int) -> None:
         values = np.cumsum(np.random.default_rng(1).normal(size=(samples, 3)), axis=0)
-        f, expected = signal.welch(
-            values, 1.0 / PERIOD, nperseg=length, detrend="linear", axis=0
-        )  # fmt: skip
+        f, expected = signal.welch(values, 1.0 / PERIOD, nperseg=length, detrend="linear", axis=0)
         frequency, density = power_spectral_density(values, PERIOD)
         np.testing.assert_allclose(frequency, f[1:], rtol=1e-12)
         np.testing.assert_allclose(density, expected[1:].sum(axis=1), rtol=1e-9)
@@ -263,9 +241,13 @@ class TestControlResults:
         log.applied_torque[41111, 1] = 7.0  # one tick
         figure = control_results(log, "TDE-STC, case 1")
         assert [axes.get_ylabel() for axes in figure.axes] == [
-            "attitude error", "base torque (N m)", "base torque (N m)",
-            "joint error (rad)", "joint torque (N m)", "joint torque (N m)",
-        ]  # fmt: skip
+            "attitude error",
+            "base torque (N m)",
+            "base torque (N m)",
+            "joint error (rad)",
+            "joint torque (N m)",
+            "joint torque (N m)",
+        ]
         assert figure.get_suptitle() == "TDE-STC, case 1"
         assert legend_names(figure) == [["base x", "base y", "base z"], list(log.joint_names)]
         error = tracking_error(log)
@@ -390,9 +372,12 @@ class TestPrint:
         flights = {law: BaseTorque.of(log) for law in laws}
         title = "TDE-STC, case 4-2, gains printed, friction, payload of 20 kg, disturbances " * 2
         for figure in (
-            desired_joints(log), control_results(log, title), junctions(flights), chatter(flights),
+            desired_joints(log),
+            control_results(log, title),
+            junctions(flights),
+            chatter(flights),
             control_results(flown(n, (0.0, 1.0), error=0.0126), title),
-        ):  # fmt: skip
+        ):
             boxes = text_boxes(figure)
             page = figure.bbox
             for text, box in boxes:

@@ -20,13 +20,25 @@ def log() -> FlightLog:
 
     The attitude is nowhere at identity.
     """
-    flight = Scenario(
-        controller="tde_stc", case="3", sensors="fine", navigation="filtered",
-        actuators="small_wheels", swaps=["1.5:tde_smc"], duration=TICKS * 0.0005,
-        events=["capture@1:small_satellite"],
-        mission={"waypoint_times": [0.0, 2.5], "waypoints_deg": [10.0] * 6 + [30.0] * 6,
-                 "base_quaternion": [0.6, 0.48, 0.64, 0.0]},
-    ).fly().check()  # fmt: skip
+    flight = (
+        Scenario(
+            controller="tde_stc",
+            case="3",
+            sensors="fine",
+            navigation="filtered",
+            actuators="small_wheels",
+            swaps=["1.5:tde_smc"],
+            duration=TICKS * 0.0005,
+            events=["capture@1:small_satellite"],
+            mission={
+                "waypoint_times": [0.0, 2.5],
+                "waypoints_deg": [10.0] * 6 + [30.0] * 6,
+                "base_quaternion": [0.6, 0.48, 0.64, 0.0],
+            },
+        )
+        .fly()
+        .check()
+    )
     return flight.log
 
 

@@ -13,10 +13,7 @@ from hypothesis.extra.numpy import arrays
 from random_logs import random_log
 from scipy.signal import periodogram, welch
 
-from space_robot.analysis import (
-    analyze,
-    tracking_error,
-)
+from space_robot.analysis import analyze, tracking_error
 from space_robot.analysis.metrics import (
     AxisMaximum,
     AxisRms,
@@ -28,10 +25,7 @@ from space_robot.analysis.metrics import (
     torque_columns,
 )
 from space_robot.analysis.spectrum import PowerAbove
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
@@ -157,9 +151,12 @@ def test_size_sign_and_order_within_a_group(n: int, seed: int, power: int, turne
     plain = changed(log, 1.0, list(range(n + 3)))
     one, other = (analyze(x) for x in (plain, changed(log, scale, order)))
     for path in (
-        ("rms", "mean_axis"), ("rms", "eq64"), ("maxima",), ("chatter", "total_variation_per_s"),
+        ("rms", "mean_axis"),
+        ("rms", "eq64"),
+        ("maxima",),
+        ("chatter", "total_variation_per_s"),
         ("chatter", "power_above_100_hz"),
-    ):  # fmt: skip
+    ):
         a, b = one, other
         for key in path:
             a, b = a[key], b[key]
@@ -217,9 +214,14 @@ def test_power_of_long_signals_is_scipys_welch(halves: int) -> None:
     segment = 400
     values = np.cumsum(np.random.default_rng(2).normal(size=(halves * 200, 3)), axis=0)
     f, power = welch(
-        values, 1 / PERIOD, window=np.hanning(segment), nperseg=segment, noverlap=segment // 2,
-        detrend=False, axis=0,
-    )  # fmt: skip
+        values,
+        1 / PERIOD,
+        window=np.hanning(segment),
+        nperseg=segment,
+        noverlap=segment // 2,
+        detrend=False,
+        axis=0,
+    )
     share = power[f > 100.0].sum(axis=0) / power.sum(axis=0)
     np.testing.assert_allclose(power_above(values, segment), share, rtol=1e-9)
 
@@ -243,9 +245,13 @@ def test_power_does_not_depend_on_the_parts(rows: int, seed: int, longest: int) 
     high, total = np.zeros(2), np.zeros(2)
     for part in parts:
         f, power = periodogram(
-            part, fs=1 / PERIOD, window=np.hanning(len(part)) + 1e-300, scaling="spectrum",
-            detrend=False, axis=0,
-        )  # fmt: skip
+            part,
+            fs=1 / PERIOD,
+            window=np.hanning(len(part)) + 1e-300,
+            scaling="spectrum",
+            detrend=False,
+            axis=0,
+        )
         high, total = high + power[f > 100.0].sum(axis=0), total + power.sum(axis=0)
     if rows > 2:
         np.testing.assert_allclose(figure.shares(), high / total, rtol=1e-9)

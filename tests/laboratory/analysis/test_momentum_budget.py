@@ -14,16 +14,9 @@ from scipy.integrate import quad, solve_ivp
 
 from space_robot.analysis import analyze
 from space_robot.analysis.described import momentum_of
-from space_robot.analysis.momentum import (
-    MomentumBudget,
-    MomentumSeries,
-    disturbance_impulse,
-)
+from space_robot.analysis.momentum import MomentumBudget, MomentumSeries, disturbance_impulse
 from space_robot.analysis.report_tables import comparison_table
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
@@ -66,8 +59,9 @@ def gyrostat_log(robot: Robot, actuators: BaseActuatorSettings) -> FlightLog:
         q, w, speed = x[:4], x[4:7], x[7 : 7 + wheels.count]
         motors = 0.5 * np.sin(2.0 * t + phases)
         force = thrust(t) @ thrusters.unit_directions
-        torque = np.cross(thrusters.places - com,
-                          thrusters.unit_directions * thrust(t)[:, None]).sum(axis=0)  # fmt: skip
+        torque = np.cross(
+            thrusters.places - com, thrusters.unit_directions * thrust(t)[:, None]
+        ).sum(axis=0)
         h = inertia @ w + axes.T @ (spin * speed)
         bare = inertia - (axes.T * spin) @ axes
         wdot = np.linalg.solve(bare, torque - axes.T @ motors - np.cross(w, h))
@@ -76,10 +70,12 @@ def gyrostat_log(robot: Robot, actuators: BaseActuatorSettings) -> FlightLog:
         return np.concatenate([qdot, wdot, motors / spin - axes @ wdot, x[-3:], pushed])
 
     log = still_log(robot, ROWS, actuators, PERIOD)
-    start = np.concatenate([[1.0, 0.0, 0.0, 0.0], [0.1, -0.2, 0.15],
-                            wheels.values("initial_speed"), com, np.zeros(3)])  # fmt: skip
-    found = solve_ivp(rate, (0.0, log.time[-1]), start, t_eval=log.time, rtol=1e-11, atol=1e-12,
-                      method="DOP853").y.T  # fmt: skip
+    start = np.concatenate(
+        [[1.0, 0.0, 0.0, 0.0], [0.1, -0.2, 0.15], wheels.values("initial_speed"), com, np.zeros(3)]
+    )
+    found = solve_ivp(
+        rate, (0.0, log.time[-1]), start, t_eval=log.time, rtol=1e-11, atol=1e-12, method="DOP853"
+    ).y.T
     log.quaternion[:] = found[:, :4] / np.linalg.norm(found[:, :4], axis=1, keepdims=True)
     log.omega_base[:], log.joint_positions[:] = found[:, 4:7], POSTURE
     log.wheel_velocities[:] = found[:, 7 : 7 + wheels.count]
@@ -121,10 +117,14 @@ def test_inner_torques_alone_move_momentum_but_do_not_change_it(paper_robot: Rob
 def test_what_thrusters_bring_is_accounted_for(paper_robot: Robot) -> None:
     """Their impulse by the mean force of an interval, its axes turned: right to its square."""
     rng = np.random.default_rng(5)
-    actuators = hardware(wheels=WHEELS, thrusters={
-        "positions": flat(rng.uniform(-1.0, 1.0, (5, 3))),
-        "directions": flat(rng.normal(size=(5, 3))), "force": [4.0],
-    })  # fmt: skip
+    actuators = hardware(
+        wheels=WHEELS,
+        thrusters={
+            "positions": flat(rng.uniform(-1.0, 1.0, (5, 3))),
+            "directions": flat(rng.normal(size=(5, 3))),
+            "force": [4.0],
+        },
+    )
     log = gyrostat_log(paper_robot, actuators)
     found = budget(log, paper_robot, actuators)
     assert found["peak_n_m_s"]["outside"] > 1.0
@@ -141,9 +141,9 @@ def test_what_thrusters_bring_is_accounted_for(paper_robot: Robot) -> None:
 
 def test_pushing_is_of_the_centre_of_mass(paper_robot: Robot) -> None:
     """A force of 8 N along x for 2 s on 860 kg that does not turn."""
-    actuators = hardware(thrusters={
-        "positions": [0.0, 0.0, 0.0], "directions": [1.0, 0.0, 0.0], "force": [8.0],
-    })  # fmt: skip
+    actuators = hardware(
+        thrusters={"positions": [0.0, 0.0, 0.0], "directions": [1.0, 0.0, 0.0], "force": [8.0]}
+    )
     log = still_log(paper_robot, ROWS, actuators, PERIOD)
     log.thrusts[1:] = 8.0
     log.base_position[:, 0] = 0.5 * 8.0 / paper_robot.mass.sum() * log.time**2

@@ -7,31 +7,28 @@ import pytest
 from numpy.typing import NDArray
 from random_logs import random_log
 
-from space_robot.analysis import (
-    analyze,
-    tracking_error,
-)
+from space_robot.analysis import analyze, tracking_error
 from space_robot.analysis.estimate_error import EstimateErrors
-from space_robot.analysis.report_tables import (
-    comparison_table,
-    rms_table,
-)
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.analysis.report_tables import comparison_table, rms_table
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 Array = NDArray[np.float64]
 
 FLOWN = simulate(
-    Flight(FlightPlan(
-        faults=["noise_attitude@0:1e-5", "noise_joint_position@0:2e-5", "noise_gyro@0:1e-6",
-                "torque_scale@0:base=0.999"],
-        duration=1.5,
-    ))
-)  # fmt: skip
+    Flight(
+        FlightPlan(
+            faults=[
+                "noise_attitude@0:1e-5",
+                "noise_joint_position@0:2e-5",
+                "noise_gyro@0:1e-6",
+                "torque_scale@0:base=0.999",
+            ],
+            duration=1.5,
+        )
+    )
+)
 EVERY = 20
 """Ticks from one telemetry to the next."""
 
@@ -48,8 +45,10 @@ def test_in_direct_navigation_it_is_measured_less_true() -> None:
     joints = (told.joint_positions - FLOWN.joint_positions)[::EVERY]
     assert found["ticks"] == len(joints) == FLOWN.ticks // EVERY
     for name, error in (
-        ("attitude", attitude), ("joints_1_3", joints[:, :3]), ("joints_4_6", joints[:, 3:])
-    ):  # fmt: skip
+        ("attitude", attitude),
+        ("joints_1_3", joints[:, :3]),
+        ("joints_4_6", joints[:, 3:]),
+    ):
         assert found["rms"][name] == pytest.approx(rms(error), rel=1e-9)
         assert found["max"][name] == pytest.approx(float(np.abs(error).max()), rel=1e-9)
     assert found["rms"]["joints_1_3"] == pytest.approx(2e-5, rel=0.2)
@@ -83,11 +82,17 @@ def test_the_estimate_is_the_laws_own_and_its_error_of_the_true_force() -> None:
     omega = FLOWN.omega_base
     rate = np.hstack([0.5 * (eta * omega + np.cross(eps, omega)), FLOWN.joint_velocities])
     torque = FLOWN.applied_torque[2:]
-    jacobian_inverse = np.array([
-        2.0 * (w * np.eye(3) + np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])
-               + np.outer([x, y, z], [x, y, z]) / w)
-        for w, x, y, z in FLOWN.quaternion[1:-1]
-    ])  # fmt: skip
+    jacobian_inverse = np.array(
+        [
+            2.0
+            * (
+                w * np.eye(3)
+                + np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])
+                + np.outer([x, y, z], [x, y, z]) / w
+            )
+            for w, x, y, z in FLOWN.quaternion[1:-1]
+        ]
+    )
     force = torque.copy()
     force[:, :3] = np.einsum("kji,kj->ki", jacobian_inverse, torque[:, :3])
     true = force - h_bar * np.diff(rate, axis=0)[1:] / 0.0005

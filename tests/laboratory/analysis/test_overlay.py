@@ -6,16 +6,9 @@ import numpy as np
 import pytest
 
 from space_robot.analysis import excerpt
-from space_robot.analysis.figures import (
-    errors_and_torques,
-    latency_histogram,
-    pointing,
-)
+from space_robot.analysis.figures import errors_and_torques, latency_histogram, pointing
 from space_robot.analysis.plot_series import PlotSeries
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 
 

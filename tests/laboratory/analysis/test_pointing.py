@@ -10,11 +10,7 @@ from oracles import quaternion_of, rotation_of
 from random_robots import random_quaternion, random_robot
 from scipy.spatial.transform import Rotation
 
-from space_robot.analysis.pointing import (
-    angle_between,
-    pointing_error,
-    rotation_angle,
-)
+from space_robot.analysis.pointing import angle_between, pointing_error, rotation_angle
 from space_robot_model.robot import Robot
 from space_robot_model.robot.tool import tool_pose
 from space_robot_msgs_py.bag.flight_log import FlightLog

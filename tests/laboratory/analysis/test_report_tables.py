@@ -12,16 +12,9 @@ from random_logs import random_log
 
 from space_robot.analysis import analyze
 from space_robot.analysis.metrics import unit_of
-from space_robot.analysis.report_tables import (
-    DEFINITIONS,
-    Line,
-    lines,
-)
+from space_robot.analysis.report_tables import DEFINITIONS, Line, lines
 from space_robot.console.tables import NONE
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 
 GROUPS = {"base": "base", "1_3": "joints_1_3", "4_6": "joints_4_6"}
@@ -37,9 +30,11 @@ PATHS: dict[str, tuple[str, ...]] = {
 }
 """Groups with a line for every key below."""
 POINTING = {
-    "pointing": "boresight_rad", "rotation": "rotation_rad", "tool position": "tool_position_m",
+    "pointing": "boresight_rad",
+    "rotation": "rotation_rad",
+    "tool position": "tool_position_m",
     "base's drift": "base_drift_m",
-}  # fmt: skip
+}
 
 
 def numbered(value: Any, counter: itertools.count[int]) -> Any:
@@ -108,8 +103,10 @@ def test_every_line_is_its_figure(reports: list[dict[str, Any]]) -> None:
     found = by_label(lines(reports))
     assert {label: line.texts for label, line in found.items()} == expected
     assert {group for group, _ in found} == DEFINITIONS.keys() - {
-        "attitude drift", "momentum", "pushed by thrusters",
-    }  # fmt: skip
+        "attitude drift",
+        "momentum",
+        "pushed by thrusters",
+    }
 
 
 def test_brief_leaves_out_what_another_table_shows(reports: list[dict[str, Any]]) -> None:
@@ -134,9 +131,12 @@ def test_a_figure_that_a_flight_does_not_have_is_a_dash(reports: list[dict[str, 
     other = analyze(log)
     found = by_label(lines([other, reports[0]]))
     for label in (
-        ("saturation", "ticks at a limit"), ("latency", "p99"), ("estimate error", "base max"),
-        ("pointing", "RMS"), ("ripple", "base_torque"),
-    ):  # fmt: skip
+        ("saturation", "ticks at a limit"),
+        ("latency", "p99"),
+        ("estimate error", "base max"),
+        ("pointing", "RMS"),
+        ("ripple", "base_torque"),
+    ):
         assert found[label].texts[0] == NONE
         assert found[label].texts[1] != NONE
     assert found["maximum", "base_torque"].texts[0] != NONE

@@ -12,23 +12,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from space_robot.analysis import (
-    Analysis,
-    analyze,
-)
+from space_robot.analysis import Analysis, analyze
 from space_robot.analysis.described import robot_of
 from space_robot.analysis.figures import ripple
 from space_robot.analysis.figures.style import LineStyle
 from space_robot.analysis.plot_series import PlotSeries
-from space_robot.analysis.ripple import (
-    desired_torque,
-    ripple_spectrum,
-)
+from space_robot.analysis.ripple import desired_torque, ripple_spectrum
 from space_robot.analysis.spectrum import PowerSpectrum
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 

@@ -11,15 +11,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from space_robot.analysis import excerpt
-from space_robot.analysis.settling import (
-    BAND,
-    Settling,
-)
+from space_robot.analysis.settling import BAND, Settling
 from space_robot.analysis.waypoints import Waypoints
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import empty_log
 from space_robot_msgs_py.bag.blocks import blocks_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -55,9 +49,11 @@ def last_waypoint(log: FlightLog) -> int | None:
 
 @given(
     arrays(np.float64, (300, 4), elements=st.floats(-2.0, 2.0)),
-    st.integers(0, 100), st.integers(0, 300), st.sets(st.integers(0, 300), max_size=40),
+    st.integers(0, 100),
+    st.integers(0, 300),
+    st.sets(st.integers(0, 300), max_size=40),
     st.integers(0, 50),
-)  # fmt: skip
+)
 def test_after_it_the_error_stays_in_the_band_and_before_it_does_not(
     error: np.ndarray, start: int, calm_from: int, loud: set[int], first_tick: int
 ) -> None:

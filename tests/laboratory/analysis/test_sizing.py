@@ -15,16 +15,8 @@ from scipy.spatial.transform import Rotation
 
 from space_robot.analysis import analyze
 from space_robot.analysis.base_demand import BaseDemand
-from space_robot.analysis.loads import (
-    LoadRequirement,
-    OtherWheelLoad,
-    ThrusterLoad,
-    WheelLoad,
-)
-from space_robot.analysis.sizing import (
-    ActuatorSet,
-    Sizing,
-)
+from space_robot.analysis.loads import LoadRequirement, OtherWheelLoad, ThrusterLoad, WheelLoad
+from space_robot.analysis.sizing import ActuatorSet, Sizing
 from space_robot.analysis.sizing_table import sizing_table
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
@@ -35,8 +27,9 @@ NOTHING = np.empty(0)
 PAIRS = {
     "positions": flat([sign * axis for axis in np.eye(3) for sign in (1, -1, 1, -1)]),
     "directions": flat([sign * np.roll(axis, 1) for axis in np.eye(3) for sign in (1, -1, -1, 1)]),
-    "force": [2.0], "specific_impulse": [200.0],
-}  # fmt: skip
+    "force": [2.0],
+    "specific_impulse": [200.0],
+}
 """Twelve thrusters, in pairs on levers of 1 m about +z, -z, +x, -x, +y, -y."""
 
 
@@ -142,10 +135,15 @@ def test_axes_have_peak_rms_impulse_and_momentum(paper_robot: Robot) -> None:
 
 class TestWheels:
     def test_those_that_flew_tell_by_their_own_columns(self, paper_robot: Robot) -> None:
-        wheels = hardware(wheels={
-            "axes": PYRAMID, "rotor_inertia": [0.1, 0.2, 0.3, 0.4], "max_torque": [1.0],
-            "max_momentum": [4.0, 5.0, 4.0, 0.0], "initial_speed": [10.0],
-        })  # fmt: skip
+        wheels = hardware(
+            wheels={
+                "axes": PYRAMID,
+                "rotor_inertia": [0.1, 0.2, 0.3, 0.4],
+                "max_torque": [1.0],
+                "max_momentum": [4.0, 5.0, 4.0, 0.0],
+                "initial_speed": [10.0],
+            }
+        )
         log = still_log(paper_robot, 10, wheels)
         log.wheel_velocities[:] = 10.0
         log.wheel_velocities[5] = [20.0, -25.0, 0.0, 11.0]
@@ -153,9 +151,15 @@ class TestWheels:
         found = sized(log, wheels)["requirements"]
         of_wheels = [(r["asked"], r["has"], r["is_met"]) for r in found if "wheel" in r["part"]]
         assert of_wheels == [
-            (0.5, 1.0, True), (2.0, 4.0, True), (1.0, 1.0, False), (5.0, 5.0, False),
-            (0.0, 1.0, True), (3.0, 4.0, True), (0.0, 1.0, True), (pytest.approx(4.4), None, True),
-        ]  # fmt: skip
+            (0.5, 1.0, True),
+            (2.0, 4.0, True),
+            (1.0, 1.0, False),
+            (5.0, 5.0, False),
+            (0.0, 1.0, True),
+            (3.0, 4.0, True),
+            (0.0, 1.0, True),
+            (pytest.approx(4.4), None, True),
+        ]
         held = wheels.wheels.unit_axes.T @ ([0.1, 0.2, 0.3, 0.4] * (log.wheel_velocities[5] - 10.0))
         for i, axis in enumerate(("base_x", "base_y", "base_z")):
             (one,) = [r for r in found if (r["part"], r["quantity"]) == (axis, "stored momentum")]
@@ -163,10 +167,15 @@ class TestWheels:
 
     def test_others_in_their_place_hold_what_was_asked(self, paper_robot: Robot) -> None:
         """Base and stored momentum turn: motors give ``P (dh/dt)``, and what friction takes."""
-        wheels = hardware(wheels={
-            "axes": PYRAMID, "rotor_inertia": [0.1], "initial_speed": [5.0], "coulomb": [0.02],
-            "viscous": [1e-3],
-        }).wheels  # fmt: skip
+        wheels = hardware(
+            wheels={
+                "axes": PYRAMID,
+                "rotor_inertia": [0.1],
+                "initial_speed": [5.0],
+                "coulomb": [0.02],
+                "viscous": [1e-3],
+            }
+        ).wheels
         log = turning_log(paper_robot, 2.0)
         demand = BaseDemand(BaseActuatorSettings()).add(log)
         torque, momentum = OtherWheelLoad(wheels)._series(log, demand)
@@ -207,10 +216,14 @@ class TestThrusters:
         assert used == [0.0, pytest.approx(20 * rate), pytest.approx(25.5 * rate)]
         (tank,) = [r for r in report["sizing"]["requirements"] if r["quantity"] == "propellant"]
         assert tank == {
-            "part": "thrusters", "quantity": "propellant", "unit": "kg", "has": 0.001,
-            "asked": pytest.approx(45.5 * rate), "margin": pytest.approx(1 - 45500 * rate),
+            "part": "thrusters",
+            "quantity": "propellant",
+            "unit": "kg",
+            "has": 0.001,
+            "asked": pytest.approx(45.5 * rate),
+            "margin": pytest.approx(1 - 45500 * rate),
             "is_met": True,
-        }  # fmt: skip
+        }
 
     @given(st.integers(0, 99), st.integers(1, 58))
     def test_pulses_are_those_of_a_plain_loop(
@@ -242,8 +255,14 @@ class TestThrusters:
         both = hardware(thrusters=PAIRS, wheels={"axes": PYRAMID, "max_torque": [1.0]})
         found = analyze(turning_log(paper_robot, 0.0), ActuatorSet("both", both))["sizing"]
         assert {r["part"] for r in found["requirements"]} == {
-            "base_x", "base_y", "base_z", "wheel_1", "wheel_2", "wheel_3", "wheel_4",
-        }  # fmt: skip
+            "base_x",
+            "base_y",
+            "base_z",
+            "wheel_1",
+            "wheel_2",
+            "wheel_3",
+            "wheel_4",
+        }
         assert found["axes"]["base_x"]["propellant_kg"] is None
 
 

@@ -5,14 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from space_robot.analysis.waypoints import (
-    junction_ticks,
-    waypoint_ticks,
-)
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.analysis.waypoints import junction_ticks, waypoint_ticks
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import empty_log
 from space_robot_msgs_py.bag.flight_log import FlightLog
 

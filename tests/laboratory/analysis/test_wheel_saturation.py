@@ -20,9 +20,11 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 LIMITED = {
-    "axes": flat(np.eye(3)), "rotor_inertia": [0.1], "max_torque": [0.5],
+    "axes": flat(np.eye(3)),
+    "rotor_inertia": [0.1],
+    "max_torque": [0.5],
     "max_momentum": [2.0, 0.0, 2.0],
-}  # fmt: skip
+}
 PERIOD = 0.0005
 
 
@@ -43,13 +45,14 @@ def test_ticks_at_limits_by_wheel_and_the_first(paper_robot: Robot) -> None:
     log.wheel_torques[50, 2], log.wheel_velocities[49, 2] = 0.25, (2.0 - 0.25 * PERIOD) / 0.1
     found = saturated(log, actuators)
     assert found == {
-        "ticks": 10 + 21 + 1, "share": 0.32,
+        "ticks": 10 + 21 + 1,
+        "share": 0.32,
         "wheels": {
             "wheel_1": {"torque_limit_ticks": 10, "momentum_limit_ticks": 25, "first_s": 0.005},
             "wheel_2": {"torque_limit_ticks": 0, "momentum_limit_ticks": 0, "first_s": None},
             "wheel_3": {"torque_limit_ticks": 0, "momentum_limit_ticks": 1, "first_s": 0.025},
         },
-    }  # fmt: skip
+    }
 
 
 @given(st.integers(0, 99), st.integers(1, 58))

@@ -18,11 +18,17 @@ Array = NDArray[np.float64]
 
 PLAIN = Scenario(controller=None, duration=0.5)
 RICH = Scenario(
-    controller="tde_stc", case="3", sensors="fine", actuators="wheels", command_latency_ticks=2,
-    swaps=["0.05:tde_smc"], navigation="filtered", duration=0.12,
+    controller="tde_stc",
+    case="3",
+    sensors="fine",
+    actuators="wheels",
+    command_latency_ticks=2,
+    swaps=["0.05:tde_smc"],
+    navigation="filtered",
+    duration=0.12,
     faults=["noise_gyro@0.02-0.06:1e-5", "torque_scale@0.03:base=0.9", "encoder_stuck@0.04-0.05:2"],
     events=["capture@0.02:small_satellite", "release@0.035:0.1"],
-)  # fmt: skip
+)
 """All that has a memory: sensors, wheels, delayed commands, faults, events, a filter, a swap."""
 
 
@@ -82,9 +88,12 @@ def test_its_own_law_flies_the_bits_of_the_whole_flight(rich: Bench) -> None:
 
 @settings(max_examples=10)
 @given(
-    st.integers(0, 100), st.integers(1, 60), st.integers(0, 100), st.integers(0, 2**31 - 1),
+    st.integers(0, 100),
+    st.integers(1, 60),
+    st.integers(0, 100),
+    st.integers(0, 2**31 - 1),
     st.booleans(),
-)  # fmt: skip
+)
 def test_a_restored_flight_goes_on_to_the_same_bits(
     rich: Bench, before: int, after: int, elsewhere: int, seed: int, pickled: bool
 ) -> None:

@@ -14,11 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from space_robot import Scenario
-from space_robot.api.gymnasium_env import (
-    NAME,
-    WORST_COST,
-    SpaceRobotEnv,
-)
+from space_robot.api.gymnasium_env import NAME, WORST_COST, SpaceRobotEnv
 from space_robot_msgs_py.errors import InputError
 
 Array = NDArray[np.float64]
@@ -83,9 +79,11 @@ def test_observation_and_reward_are_as_documented(env: SpaceRobotEnv) -> None:
     omega = truth.omega_base - reference.omega_base
     rate = truth.joint_velocities - reference.joint_velocities
     cost = (
-        4.0 * np.sum(eps**2) + np.sum(theta**2) + 0.1 * (np.sum(omega**2) + np.sum(rate**2))
+        4.0 * np.sum(eps**2)
+        + np.sum(theta**2)
+        + 0.1 * (np.sum(omega**2) + np.sum(rate**2))
         + 0.001 * np.sum(action**2)
-    )  # fmt: skip
+    )
     np.testing.assert_allclose(reward, -cost * 0.01, rtol=1e-12)
 
 

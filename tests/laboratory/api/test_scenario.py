@@ -17,10 +17,7 @@ import space_robot
 from space_robot import FlownFlight, Scenario
 from space_robot.analysis import analyze
 from space_robot.cli.main import cli
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.laws import Signals, find_law
@@ -34,9 +31,13 @@ from space_robot_sim.environment.events import Capture, Release
 from space_robot_sim.environment.target import Target
 
 NAMED: dict[str, Any] = {
-    "controller": "tde_stc", "case": "3", "sensors": "fine", "actuators": "wheels", "seed": 3,
+    "controller": "tde_stc",
+    "case": "3",
+    "sensors": "fine",
+    "actuators": "wheels",
+    "seed": 3,
     "duration": 0.1,
-}  # fmt: skip
+}
 
 
 def file_of(name: str, node: str) -> dict[str, Any]:
@@ -100,8 +101,9 @@ def test_objects_in_the_place_of_names_fly_the_same_bits(
         case=EnvironmentSettings(**file_of("cases/3", "plant")),
         sensors=file_of("sensors/fine", "plant"),
         actuators=file_of("actuators/wheels", "plant"),
-        seed=3, duration=0.1,
-    )  # fmt: skip
+        seed=3,
+        duration=0.1,
+    )
     flight = scenario.fly(tmp_path / "bag")
     assert same_bits(flight.log, named.log)
     recorded = read_flight(tmp_path / "bag")
@@ -215,7 +217,7 @@ def test_scenarios_are_values() -> None:
         ({"controller": lambda signals: 0.0}, "9 numbers were expected, got an array of shape ()"),
         ({"faults": ["kill_recorder@1"]}, "that needs the graph of nodes"),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_flown_is_told_in_one_line(options: dict[str, Any], said: str) -> None:
     with pytest.raises(InputError) as caught:
         Scenario(**options).fly()

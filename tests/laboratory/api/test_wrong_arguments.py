@@ -28,9 +28,20 @@ from space_robot_msgs_py.errors import InputError
 
 UNIT = [1.0, 0.0, 0.0, 0.0]
 JUNK = [
-    None, 3, 1.5, True, float("nan"), [], ["x"], {}, {"a": 1}, b"x", object(), np.zeros(3),
+    None,
+    3,
+    1.5,
+    True,
+    float("nan"),
+    [],
+    ["x"],
+    {},
+    {"a": 1},
+    b"x",
+    object(),
+    np.zeros(3),
     np.array([None]),
-]  # fmt: skip
+]
 NO_NUMBERS = [None, "up", [None] * 9, ["a"] * 9, [1j] * 9, [[1.0], [1.0, 2.0]], {}, b"x", object()]
 SHORT = Scenario(controller=None, duration=0.2)
 
@@ -58,11 +69,20 @@ def refused(call: Callable[..., Any], *arguments: Any, **options: Any) -> str:
 @pytest.mark.parametrize(
     "call",
     [
-        Robot.from_yaml, Robot.from_dict, Robot.from_urdf, find_robot, load_bag, replay, analyze,
-        Campaign, Campaign.load, Campaign.of, FlownCampaign.open,
+        Robot.from_yaml,
+        Robot.from_dict,
+        Robot.from_urdf,
+        find_robot,
+        load_bag,
+        replay,
+        analyze,
+        Campaign,
+        Campaign.load,
+        Campaign.of,
+        FlownCampaign.open,
         lambda junk: mass_matrix(junk, UNIT, np.zeros(6)),
     ],
-)  # fmt: skip
+)
 def test_what_is_no_robot_no_bag_and_no_study(call: Callable[[Any], Any]) -> None:
     for junk in JUNK:
         refused(call, junk)
@@ -123,9 +143,11 @@ def test_what_is_no_snapshot_of_the_bench(bench: Bench) -> None:
     for junk in [*JUNK, (1, 2, 3, 4)]:
         refused(bench.restore, junk)
     for others in (
-        {"command_latency_ticks": 2}, {"actuators": "wheels"}, {"controller": "ctc"},
+        {"command_latency_ticks": 2},
+        {"actuators": "wheels"},
+        {"controller": "ctc"},
         {"robot": "seven_joint"},
-    ):  # fmt: skip
+    ):
         other = SHORT.replace(**others).bench()
         assert refused(bench.restore, other.save()).startswith("the snapshot is of another ")
         refused(other.restore, bench.save())

@@ -13,21 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot.analysis.metrics import axis_groups
-from space_robot.campaign.new_robot.hinges import (
-    DAMPING_RATIO,
-    FREQUENCY_HZ,
-    hinge_remark,
-)
-from space_robot.tuning.method import (
-    Tuned,
-    TuningOptions,
-)
+from space_robot.campaign.new_robot.hinges import DAMPING_RATIO, FREQUENCY_HZ, hinge_remark
+from space_robot.tuning.method import Tuned, TuningOptions
 from space_robot.tuning.warning import estimate_remark
 from space_robot_model.robot import Robot
-from space_robot_model.robot.find import (
-    find_robot,
-    robot_names,
-)
+from space_robot_model.robot.find import find_robot, robot_names
 
 LINK = """<link name="{0}"><inertial><origin xyz="{1} 0 0"/><mass value="{2}"/>
 <inertia ixx="0.1" iyy="0.2" izz="{3}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
@@ -40,9 +30,11 @@ def satellite(tmp_path: Path, panel: str = "revolute") -> Robot:
     links = [("bus", 0, 100, 0.25), ("upper", 0.2, 5, 0.25), ("fore", 0.2, 5, 0.25)]
     links += [("left", 0.5, 3, 0.25), ("right", 0.5, 3, 0.25)]
     joints = [
-        ("left_hinge", "bus", "left", panel), ("a", "bus", "upper", "revolute"),
-        ("b", "upper", "fore", "revolute"), ("right_hinge", "bus", "right", panel),
-    ]  # fmt: skip
+        ("left_hinge", "bus", "left", panel),
+        ("a", "bus", "upper", "revolute"),
+        ("b", "upper", "fore", "revolute"),
+        ("right_hinge", "bus", "right", panel),
+    ]
     text = "".join(LINK.format(*x) for x in links) + "".join(JOINT.format(*x) for x in joints)
     file = tmp_path / "satellite.urdf"
     file.write_text(f'<robot name="satellite">{text}</robot>')

@@ -32,9 +32,19 @@ def bags(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def report(bags: Path) -> dict[str, Any]:
     file = bags.with_name("soak.json")
     result = space_robot(
-        "soak", "--minutes", "0.12", "--seed", str(SEED), "--duration", str(DURATION_S),
-        "--bags", str(bags), "--json", "--output", str(file),
-    )  # fmt: skip
+        "soak",
+        "--minutes",
+        "0.12",
+        "--seed",
+        str(SEED),
+        "--duration",
+        str(DURATION_S),
+        "--bags",
+        str(bags),
+        "--json",
+        "--output",
+        str(file),
+    )
     found: dict[str, Any] = json.loads(result.stdout)
     assert result.returncode == (0 if found["survived"] == found["flights"] else 1), result.stderr
     assert json.loads(file.read_text("utf-8")) == found
@@ -91,8 +101,11 @@ def test_ctrl_c_ends_with_the_table(tmp_path: Path) -> None:
     file = tmp_path / "soak.json"
     soak = subprocess.Popen(
         [*COMMAND, "soak", "--duration", "1000", "--output", str(file)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
-    )  # fmt: skip
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=ros_environment(),
+    )
     until = time.monotonic() + 60.0
     while len(nodes := psutil.Process(soak.pid).children(recursive=True)) < 4:
         assert time.monotonic() < until

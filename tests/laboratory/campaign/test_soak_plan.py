@@ -26,10 +26,7 @@ from space_robot.campaign.soak.sampling import (
 )
 from space_robot.campaign.soak.verdict import unplanned_deaths
 from space_robot.cli.main import cli
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.scenario.faults import KINDS
 from space_robot_control.laws import laws
 from space_robot_msgs_py.errors import InputError
@@ -40,9 +37,14 @@ SEEDS = st.integers(0, 2**63)
 NUMBERS = st.integers(0, 10**9)
 DURATIONS = st.floats(SHORTEST_S, 1e4)
 SAME_AS_FLY = {
-    "gains": "default", "robot": "paper", "mission": "", "friction": True, "realtime": False,
-    "command_latency_ticks": 0, "parameters": {},
-}  # fmt: skip
+    "gains": "default",
+    "robot": "paper",
+    "mission": "",
+    "friction": True,
+    "realtime": False,
+    "command_latency_ticks": 0,
+    "parameters": {},
+}
 MANY = [sample_flight(0, number) for number in range(1000)]
 
 

@@ -9,13 +9,7 @@ import pytest
 import yaml
 
 from space_robot.campaign.draws import Draws
-from space_robot.campaign.study import (
-    Law,
-    Requirement,
-    Study,
-    read_study,
-    short_names,
-)
+from space_robot.campaign.study import Law, Requirement, Study, read_study, short_names
 from space_robot_msgs_py.errors import InputError
 
 MASS = "robot.links[*].mass"
@@ -63,10 +57,12 @@ WRONG_FILES: list[tuple[dict[str, Any], str]] = [
     ({"runs": 0}, "runs: "),
     ({"runs": None}, "runs: missing"),
     ({"runs": 5, "vary": {"scenario.case": {"grid": [1, 3]}}}, "runs: a multiple of 2"),
-    ({"runs": 4, "design": "saltelli", "vary": {MASS: {"normal": 20, "sigma": 1}}},
-     "runs: a multiple of 8"),
+    (
+        {"runs": 4, "design": "saltelli", "vary": {MASS: {"normal": 20, "sigma": 1}}},
+        "runs: a multiple of 8",
+    ),
     ({"design": "saltelli", "vary": {"scenario.case": {"choice": [1, 3]}}}, "continuous"),
-]  # fmt: skip
+]
 WRONG_VARIABLES: list[tuple[str, Any, str]] = [
     ("robot.links[*].mas", 1.0, "unknown number of robot.links[...] 'mas'"),
     ("robot.links[9].mass", 1.0, "no link '9': choose one of joint1"),
@@ -108,7 +104,7 @@ WRONG_VARIABLES: list[tuple[str, Any, str]] = [
     ("faults", {"torque_scale@0:all": {"uniform": [1, 2], "relative": True}}, "no nominal value"),
     ("faults", {"torque_scale@0:joint7": {"uniform": [1, 2]}}, "joint7"),
     ("faults", 3, "a mapping of faults was expected"),
-]  # fmt: skip
+]
 
 
 def test_the_good_one_is_read(tmp_path: Path) -> None:
@@ -139,10 +135,13 @@ def test_nothing_is_varied_twice(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"robot.links\[joint1\].mass is varied by robot"):
         read(tmp_path, vary={MASS: 20.0, "robot.links[1].mass": 20.0})
     with pytest.raises(InputError, match="is of an inertia that is varied as a whole"):
-        read(tmp_path, vary={
-            "robot.links[1].inertia": {"scale": 0.1},
-            "robot.links[*].inertia": {"uniform": [0.9, 1.1], "relative": True},
-        })  # fmt: skip
+        read(
+            tmp_path,
+            vary={
+                "robot.links[1].inertia": {"scale": 0.1},
+                "robot.links[*].inertia": {"uniform": [0.9, 1.1], "relative": True},
+            },
+        )
     with pytest.raises(InputError, match="robots cannot be chosen"):
         read(tmp_path, vary={MASS: 20.0, "scenario.robot": {"choice": ["paper"]}})
 

@@ -12,19 +12,10 @@ import pytest
 from click.testing import CliRunner
 
 from space_robot.campaign.row.fly import RowFlyer
-from space_robot.campaign.row.row import (
-    Row,
-    Task,
-)
+from space_robot.campaign.row.row import Row, Task
 from space_robot.campaign.study import Study
-from space_robot.campaign.sweep import (
-    sweep,
-    sweep_study,
-)
-from space_robot.campaign.sweep.study import (
-    ACTUATORS,
-    SENSORS,
-)
+from space_robot.campaign.sweep import sweep, sweep_study
+from space_robot.campaign.sweep.study import ACTUATORS, SENSORS
 from space_robot.campaign.sweep.summary import (
     as_records,
     cells,
@@ -36,10 +27,7 @@ from space_robot.campaign.sweep.summary import (
     summary_table,
 )
 from space_robot.cli.main import cli
-from space_robot.flight.ending import (
-    COMPLETE,
-    DIVERGED,
-)
+from space_robot.flight.ending import COMPLETE, DIVERGED
 from space_robot.flight.plan import Flight
 from space_robot_msgs_py.errors import InputError
 
@@ -122,8 +110,9 @@ def test_medians_and_spread_leave_failures_out_and_count_them() -> None:
     texts = list(summary_table([good, bad]).texts(summary_table([good, bad]).groups[0]))
     assert [line[-1] for line in texts] == ["0 of 5", "1 of 1"]
     assert [axes.get_ylabel() for axes in figure([good, bad]).axes] == [
-        "attitude, RMS", "ripple, base torque (N m)"
-    ]  # fmt: skip
+        "attitude, RMS",
+        "ripple, base torque (N m)",
+    ]
     assert not figure([bad]).axes
     assert row_record(rows[-1])["failure"] == DIVERGED
     assert row_record(rows[2])["attitude_rms"] == 3.0
@@ -133,15 +122,17 @@ def test_medians_and_spread_leave_failures_out_and_count_them() -> None:
     ("joints", "forces", "last"),
     [
         (
-            ["joints_1_3", "joints_4_6"], ["torque_1_3", "torque_4_6"],
+            ["joints_1_3", "joints_4_6"],
+            ["torque_1_3", "torque_4_6"],
             ["joints_4_6_rms", "ripple_torque_4_6"],
         ),
         (
-            ["joints_revolute", "joints_prismatic"], ["torque_revolute", "force_prismatic"],
+            ["joints_revolute", "joints_prismatic"],
+            ["torque_revolute", "force_prismatic"],
             ["joints_prismatic_rms", "ripple_force_prismatic"],
         ),
     ],
-)  # fmt: skip
+)
 def test_what_is_shown_is_what_the_robot_has(
     joints: list[str], forces: list[str], last: list[str]
 ) -> None:
@@ -198,5 +189,8 @@ def test_the_command_writes_tables_and_a_figure(tmp_path: Path) -> None:
     rows = list(csv.DictReader((out / "table.csv").read_text().splitlines()))
     assert [line["sensors"] for line in rows] == ["ideal", "white_l1"]
     assert {path.name for path in out.iterdir()} == {
-        "table.csv", "summary.md", "sweep.png", "sweep.svg",
-    }  # fmt: skip
+        "table.csv",
+        "summary.md",
+        "sweep.png",
+        "sweep.svg",
+    }

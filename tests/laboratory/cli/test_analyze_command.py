@@ -14,10 +14,7 @@ from PIL import Image
 
 from space_robot.analysis import analyze as report_of
 from space_robot.analysis import excerpt
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight
 
@@ -105,8 +102,11 @@ def test_pictures_are_pngs_and_renewed(
         assert result.code == 0
         pictures = {path.name: path for path in (tmp_path / "figures").glob("*.png")}
         assert set(pictures) == {
-            "desired_joints.png", "control_results.png", "chatter.png", "pointing.png"
-        }  # fmt: skip
+            "desired_joints.png",
+            "control_results.png",
+            "chatter.png",
+            "pointing.png",
+        }
         for path in pictures.values():
             with Image.open(path) as image:
                 assert image.width > 1000
@@ -120,9 +120,16 @@ def test_the_shortest_excerpts_have_what_they_can_have(
     analyze: Run, bags: tuple[Path, Path], tmp_path: Path, from_s: float, to_s: float
 ) -> None:
     result = analyze(
-        *bags, "--from", from_s, "--to", to_s, "--html", tmp_path / "page.html",
-        "--parquet", tmp_path,
-    )  # fmt: skip
+        *bags,
+        "--from",
+        from_s,
+        "--to",
+        to_s,
+        "--html",
+        tmp_path / "page.html",
+        "--parquet",
+        tmp_path,
+    )
     assert result.code == 0
     assert "no settling" in result.out
 

@@ -14,10 +14,7 @@ from click.testing import CliRunner
 
 from space_robot.campaign.flown import FlownCampaign
 from space_robot.campaign.store.manifest import read_manifest
-from space_robot.campaign.store.table import (
-    table_rows,
-    write_table,
-)
+from space_robot.campaign.store.table import table_rows, write_table
 from space_robot.cli.main import cli
 from space_robot.processes.pool import cluster
 from space_robot_msgs_py.errors import InputError
@@ -64,8 +61,7 @@ def test_the_same_line_again_says_that_there_is_nothing_to_fly(file: Path, flown
 
 def test_more_runs_go_on(file: Path, flown: Path) -> None:
     result = CliRunner().invoke(
-        cli,
-        ["campaign", "run", str(file), "--runs", "6", "--out", str(flown), "--workers", "0"],
+        cli, ["campaign", "run", str(file), "--runs", "6", "--out", str(flown), "--workers", "0"]
     )
     assert "4 of 6 flights are there; going on" in result.stderr
     assert len(FlownCampaign.open(flown).table) == 6
@@ -127,9 +123,19 @@ def test_what_cannot_be_is_one_line_and_leaves_nothing(
 
 def test_ctrl_c_says_how_to_go_on(file: Path, tmp_path: Path) -> None:
     command = [
-        sys.executable, "-m", "space_robot.cli.main", "campaign", "run", str(file),
-        "--runs", "5000", "--out", str(tmp_path / "a"), "--workers", "1",
-    ]  # fmt: skip
+        sys.executable,
+        "-m",
+        "space_robot.cli.main",
+        "campaign",
+        "run",
+        str(file),
+        "--runs",
+        "5000",
+        "--out",
+        str(tmp_path / "a"),
+        "--workers",
+        "1",
+    ]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )

@@ -16,8 +16,11 @@ def test_medians_are_those_of_the_report_however_many_flights_failed(failing: fl
     shown = medians(table, {law: law for law in table["law"]}, 1)
     reported = {s.law: s for s in league(table, "metric.attitude_rms").standings}
     assert [column.name for column in shown.columns] == [
-        "law", "complete", "attitude_rms", "ripple_base_torque",
-    ]  # fmt: skip
+        "law",
+        "complete",
+        "attitude_rms",
+        "ripple_base_torque",
+    ]
     (group,) = shown.groups
     for law, complete, median, _ in group.rows:
         assert complete == f"{60 - reported[law].failures} of 60"

@@ -11,10 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from space_robot.cli.main import cli
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import laws

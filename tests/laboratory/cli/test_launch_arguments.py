@@ -11,15 +11,8 @@ import pytest
 from paths import ROOT
 
 from space_robot.cli.fly import fly
-from space_robot.cli.launch_arguments import (
-    launch_arguments,
-    launched_flight,
-    refuse_unknown,
-)
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.cli.launch_arguments import launch_arguments, launched_flight, refuse_unknown
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot_msgs_py.errors import InputError
 
 LAUNCH = sorted((ROOT / "launch").glob("*.launch.py"))
@@ -45,15 +38,30 @@ def test_each_option_of_fly_is_an_argument() -> None:
 
 
 def test_the_flight_is_the_one_of_the_command(tmp_path: Path) -> None:
-    flight, bag = launched_flight({
-        "controller": "tde_tsmc", "case": "4-2", "command_latency_ticks": "2", "friction": "false",
-        "realtime": "true", "namespace": "sat1", "swap": "1:ctc 2:tde_smc", "duration": "3",
-        "fault": "", "bag": str(tmp_path / "bag"),
-    })  # fmt: skip
+    flight, bag = launched_flight(
+        {
+            "controller": "tde_tsmc",
+            "case": "4-2",
+            "command_latency_ticks": "2",
+            "friction": "false",
+            "realtime": "true",
+            "namespace": "sat1",
+            "swap": "1:ctc 2:tde_smc",
+            "duration": "3",
+            "fault": "",
+            "bag": str(tmp_path / "bag"),
+        }
+    )
     plan = FlightPlan(
-        controller="tde_tsmc", case="4-2", command_latency_ticks=2, friction=False, realtime=True,
-        namespace="/sat1", swaps=["1:ctc", "2:tde_smc"], duration=3.0,
-    )  # fmt: skip
+        controller="tde_tsmc",
+        case="4-2",
+        command_latency_ticks=2,
+        friction=False,
+        realtime=True,
+        namespace="/sat1",
+        swaps=["1:ctc", "2:tde_smc"],
+        duration=3.0,
+    )
     assert flight.plan == plan
     assert bag == tmp_path / "bag"
 

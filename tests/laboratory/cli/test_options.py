@@ -12,10 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot.cli import main as cli
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 
@@ -141,17 +138,66 @@ def test_a_folder_of_gains_needs_no_slash(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 _NAMES = st.sampled_from(
-    ["plant.case", "plant.friction", "plant.friction.coulomb", "plant.initial_quaternion",
-     "plant.realtime", "plant.faults", "plant.robot", "controller.swaps", "controller.tde_stc",
-     "controller.tde_stc.k_1", "controller.controller", "controller.gains", "mission.mission",
-     "mission.waypoint_times", "recorder.split_size", "recorder.compression", "recorder", "x.y",
-     "plant..", "plant.period", "plant.a=b", ".", ""]
-)  # fmt: skip
+    [
+        "plant.case",
+        "plant.friction",
+        "plant.friction.coulomb",
+        "plant.initial_quaternion",
+        "plant.realtime",
+        "plant.faults",
+        "plant.robot",
+        "controller.swaps",
+        "controller.tde_stc",
+        "controller.tde_stc.k_1",
+        "controller.controller",
+        "controller.gains",
+        "mission.mission",
+        "mission.waypoint_times",
+        "recorder.split_size",
+        "recorder.compression",
+        "recorder",
+        "x.y",
+        "plant..",
+        "plant.period",
+        "plant.a=b",
+        ".",
+        "",
+    ]
+)
 _TEXTS = st.sampled_from(
-    ["1", "true", "[]", "{}", "[1, 2.5, 0, 0]", "{a: {b: 1}}", "!!int x", "&a [*a]", "2020-13-45",
-     "[[1]]", "{[1]: 2}", ".inf", "-1", "1e400", "~", "'", "[", "\0", "é", "9" * 400, "..", "/",
-     "/dev/null", "/dev/zero.yaml", "x:y", "os:path", "a" * 300, "[a]", "{coulomb: true}", "-0.0"]
-) | st.text(max_size=8)  # fmt: skip
+    [
+        "1",
+        "true",
+        "[]",
+        "{}",
+        "[1, 2.5, 0, 0]",
+        "{a: {b: 1}}",
+        "!!int x",
+        "&a [*a]",
+        "2020-13-45",
+        "[[1]]",
+        "{[1]: 2}",
+        ".inf",
+        "-1",
+        "1e400",
+        "~",
+        "'",
+        "[",
+        "\0",
+        "é",
+        "9" * 400,
+        "..",
+        "/",
+        "/dev/null",
+        "/dev/zero.yaml",
+        "x:y",
+        "os:path",
+        "a" * 300,
+        "[a]",
+        "{coulomb: true}",
+        "-0.0",
+    ]
+) | st.text(max_size=8)
 
 
 @given(st.lists(st.tuples(_NAMES, _TEXTS), min_size=1, max_size=3))

@@ -13,10 +13,7 @@ import pytest
 from command import Run
 
 from space_robot.console.files import whole_file
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.errors import InputError
 
@@ -69,8 +66,11 @@ def test_a_full_standard_output_is_one_line_and_exit_code_1(
     with open("/dev/full", "w") as full:
         result = subprocess.run(
             [*COMMAND, "analyze", str(bag), *options],
-            stdout=full, stderr=subprocess.PIPE, text=True, check=False,
-        )  # fmt: skip
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
     assert "standard output cannot be written (No space left on device)" in one_line(result.stderr)
     assert result.returncode == 1
 
@@ -81,8 +81,11 @@ def test_a_reader_that_has_gone_is_no_error_to_tell(bag: Path) -> None:
     with os.fdopen(writing, "w") as pipe:
         result = subprocess.run(
             [*COMMAND, "analyze", str(bag), "--json"],
-            stdout=pipe, stderr=subprocess.PIPE, text=True, check=False,
-        )  # fmt: skip
+            stdout=pipe,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
     assert (result.returncode, result.stderr) == (1, "")
 
 
@@ -90,8 +93,11 @@ def test_a_full_standard_error_ends_no_flight() -> None:
     with open("/dev/full", "w") as full:
         result = subprocess.run(
             [*COMMAND, "simulate", "--duration", "0.1", "--json"],
-            stdout=subprocess.PIPE, stderr=full, text=True, check=False,
-        )  # fmt: skip
+            stdout=subprocess.PIPE,
+            stderr=full,
+            text=True,
+            check=False,
+        )
     assert result.returncode == 0
     assert json.loads(result.stdout)["ticks"] == 200
 
@@ -161,8 +167,10 @@ def test_letters_that_no_terminal_has_are_shown_somehow(bag: Path, tmp_path: Pat
     strange.symlink_to(bag)
     result = subprocess.run(
         [*COMMAND, "analyze", str(strange), "--plot", str(tmp_path / "figures")],
-        capture_output=True, check=False, env={**os.environ, "PYTHONIOENCODING": "ascii"},
-    )  # fmt: skip
+        capture_output=True,
+        check=False,
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+    )
     assert result.returncode == 0, result.stderr
     assert b"RMS" in result.stdout
     assert b"Traceback" not in result.stderr

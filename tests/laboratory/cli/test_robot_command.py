@@ -13,10 +13,7 @@ from flights import space_robot_here
 from paths import CONFIG, DATA
 from urdf_defects import DEFECTS, GOOD, with_defect
 
-from space_robot.cli.main import (
-    _run,
-    cli,
-)
+from space_robot.cli.main import _run, cli
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.errors import InputError
@@ -46,9 +43,17 @@ def test_tables() -> None:
     result = run(ARM)
     assert result.exit_code == 0
     for words in (
-        "robot arm: 330 kg, 2 joints with a motor", "40, 50, 60", "-57.296 to 114.59 deg",
-        "0 to 0.6 m", "0.05 m/s", "20 N", "0.3, 0.4", "hand", "(not there)", "cylinder",
-    ):  # fmt: skip
+        "robot arm: 330 kg, 2 joints with a motor",
+        "40, 50, 60",
+        "-57.296 to 114.59 deg",
+        "0 to 0.6 m",
+        "0.05 m/s",
+        "20 N",
+        "0.3, 0.4",
+        "hand",
+        "(not there)",
+        "cylinder",
+    ):
         assert words in result.stdout
 
 
@@ -84,9 +89,12 @@ def test_defects_are_listed_and_end_in_an_error(bad: Path) -> None:
     found = report(bad)
     assert [defect["line"] for defect in found["defects"]] == [7, 42]
     assert found["defects"][1] == {
-        "part": "joint 'shoulder'", "line": 42, "value": "'-1 to -2'", "repair": "exchanged",
+        "part": "joint 'shoulder'",
+        "line": 42,
+        "value": "'-1 to -2'",
+        "repair": "exchanged",
         "defect": "the limits lower and upper are upside down",
-    }  # fmt: skip
+    }
 
 
 def test_repaired_and_written(bad: Path, tmp_path: Path) -> None:

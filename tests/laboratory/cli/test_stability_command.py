@@ -13,16 +13,9 @@ from click.testing import CliRunner
 from closed_loop import GAINS
 
 from space_robot.cli.main import cli
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
-from space_robot.paper.stability import (
-    StabilityStudy,
-    report,
-    study,
-)
+from space_robot.paper.stability import StabilityStudy, report, study
 from space_robot.paper.stability.check import Check
 from space_robot.paper.stability.figures import draw
 from space_robot_msgs_py.errors import InputError
@@ -53,8 +46,10 @@ def test_printed_gains_of_case_1(printed: dict[str, Any]) -> None:
     assert lemma_1["spectral_radius_below_1"]["holds"] is True
     assert printed["axes"] == ["base_x", "base_y", "base_z", *(f"joint{i}" for i in range(1, 7))]
     for key, holds in {
-        "beta_below_k_2": False, "4_k_2_below_k_1_squared": True, "circle_criterion": False
-    }.items():  # fmt: skip
+        "beta_below_k_2": False,
+        "4_k_2_below_k_1_squared": True,
+        "circle_criterion": False,
+    }.items():
         assert [check["holds"] for check in twisting[key]] == [holds] * 9
     assert twisting["tolerated_beta"] == twisting["k_2"]
     lmi = twisting["lmi"]
@@ -125,8 +120,11 @@ def test_pictures_are_the_same_bytes_twice(tmp_path: Path) -> None:
     found = studied(duration=0.1)
     first, second = (draw(found, tmp_path / name) for name in ("a", "b"))
     assert [path.name for path in first] == [
-        "nyquist.png", "nyquist.svg", "lyapunov.png", "lyapunov.svg"
-    ]  # fmt: skip
+        "nyquist.png",
+        "nyquist.svg",
+        "lyapunov.png",
+        "lyapunov.svg",
+    ]
     for one, two in zip(first, second, strict=True):
         assert one.read_bytes() == two.read_bytes()
     assert matplotlib.image.imread(first[0]).std() > 0.01

@@ -18,10 +18,7 @@ from scene_pages import Scene, plot_data
 
 from space_robot.analysis.metrics import tracking_error
 from space_robot.cli.main import main
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight
 
@@ -181,11 +178,7 @@ def test_the_page_is_opened_in_the_users_browser(
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(
-    view: Run,
-    bags: tuple[Path, Path],
-    tmp_path: Path,
-    arguments: tuple[str, ...],
-    words: list[str],
+    view: Run, bags: tuple[Path, Path], tmp_path: Path, arguments: tuple[str, ...], words: list[str]
 ) -> None:
     result = view(bags[1], "--no-open", *arguments)
     assert result.code == 2

@@ -74,6 +74,8 @@ def test_a_page_escapes_and_tells_good_from_bad(table: Table) -> None:
     assert "&lt;ctc&gt;" in html
     assert "<ctc>" not in html
     assert re.findall(r'class="(good|bad)">([^<]*)<', html) == [
-        ("good", "1 &lt; 2 holds"), ("bad", "fails"), ("good", "1 &lt; 2 holds"),
-    ]  # fmt: skip
+        ("good", "1 &lt; 2 holds"),
+        ("bad", "fails"),
+        ("good", "1 &lt; 2 holds"),
+    ]
     assert html.count('class="group"') == 2

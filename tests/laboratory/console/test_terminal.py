@@ -11,21 +11,11 @@ from hypothesis import strategies as st
 from rich.table import Table
 
 from space_robot.analysis import analyze
-from space_robot.analysis.report_tables import (
-    metrics_table,
-    rms_table,
-)
+from space_robot.analysis.report_tables import metrics_table, rms_table
 from space_robot.cli.report_display import print_comparison
-from space_robot.console.terminal import (
-    say,
-    show,
-    terminal,
-)
+from space_robot.console.terminal import say, show, terminal
 from space_robot.console.terminal_tables import print_table
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 
 WIDTHS = (1, 10, 20, 33, 40, 60, 80, 100, 200)
@@ -69,9 +59,11 @@ def test_a_narrow_table_becomes_lines_that_name_each_number() -> None:
     lines = shown(20, lambda console: show(table, console)).splitlines()
     assert lines == [
         "torques",
-        "maximum base_torque (N m)", "  one: 0.123456789",
-        "maximum torque_1_3 (N m)", "  one: 0.2",
-    ]  # fmt: skip
+        "maximum base_torque (N m)",
+        "  one: 0.123456789",
+        "maximum torque_1_3 (N m)",
+        "  one: 0.2",
+    ]
 
 
 @given(st.text())
@@ -95,9 +87,7 @@ def test_markup_is_text(text: str) -> None:
     assert shown(80, lambda console: say(console, text)) == text + "\n"
 
 
-def test_a_bag_that_does_not_say_what_flew_has_a_title_without_none(
-    report: dict[str, Any],
-) -> None:
+def test_a_bag_that_does_not_say_what_flew_has_a_title_without_none(report: dict[str, Any]) -> None:
     unknown = dict.fromkeys(("controller", "case", "gains", "robot"))
     foreign = {**report, **unknown, "laws": []}
     text = shown(100, lambda console: print_table(rms_table(foreign), console))

@@ -7,10 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog

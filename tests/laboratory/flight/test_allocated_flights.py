@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
@@ -63,9 +60,8 @@ def test_wheels_stay_away_from_zero() -> None:
 @pytest.mark.parametrize("modulation", ["schmitt", "sigma_delta"])
 def test_thrusters_hold_a_limit_cycle_under_robust_gains(law: str, modulation: str) -> None:
     flight, log = fly(
-        actuators="thrusters", gains="robust", controller=law,
-        allocation={"modulation": modulation},
-    )  # fmt: skip
+        actuators="thrusters", gains="robust", controller=law, allocation={"modulation": modulation}
+    )
     assert np.abs(attitude_error(log)[4000:]).max() < 1e-4
     command = log.actuator_commands
     assert command is not None

@@ -9,10 +9,7 @@ import pytest
 from pydantic import BaseModel
 
 from space_robot.cli.numbers import FiniteRange
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.scenario.faults import KINDS
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.controller.swaps import parse_swaps

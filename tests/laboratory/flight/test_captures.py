@@ -15,10 +15,7 @@ from space_robot import Scenario
 from space_robot.analysis import analyze
 from space_robot.analysis.figures.single_flight import control_results
 from space_robot.analysis.words import remarks
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
@@ -27,8 +24,15 @@ from space_robot_msgs_py.samples import Reference
 
 EVENTS = ["capture@0.1:tumbling_satellite", "release@0.2:0.05", "capture@0.2001:small_satellite"]
 PLAN: dict[str, Any] = {"actuators": "wheels", "events": EVENTS, "duration": 0.3}
-COLUMNS = ("quaternion", "base_velocity", "omega_base", "joint_velocities", "wheel_velocities",
-           "applied_torque", "commanded_torque")  # fmt: skip
+COLUMNS = (
+    "quaternion",
+    "base_velocity",
+    "omega_base",
+    "joint_velocities",
+    "wheel_velocities",
+    "applied_torque",
+    "commanded_torque",
+)
 
 
 @pytest.fixture(scope="module")
@@ -52,8 +56,10 @@ def test_a_bag_tells_the_targets_numbers_and_flies_again(bag: tuple[Path, Flight
     """To the same bits, and without the targets' files."""
     described = read_flight(bag[0]).flight
     assert [text.partition("@")[0] for text in described["events"]] == [
-        "capture", "release", "capture"
-    ]  # fmt: skip
+        "capture",
+        "release",
+        "capture",
+    ]
     assert all("_satellite" not in text.partition("{")[0] for text in described["events"])
     again = Flight(FlightPlan(parameters=described["parameters"], duration=0.3))
     assert again.description["events"] == described["events"]
@@ -98,9 +104,10 @@ def test_the_analysis_counts_what_the_targets_bring(bag: tuple[Path, FlightLog])
         assert report["events"] == EVENTS
         assert f"events: {', '.join(EVENTS)}" in remarks(report)
     upright = [
-        line for line in control_results(bag[1], "").axes[0].get_lines()
+        line
+        for line in control_results(bag[1], "").axes[0].get_lines()
         if list(line.get_xdata()) in ([0.1, 0.1], [0.2, 0.2])
-    ]  # fmt: skip
+    ]
     assert len(upright) == 2
     del log.flight["events"]
     assert analyze(log)["momentum"]["drift"]["relative"] > 0.1

@@ -6,10 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 

@@ -10,10 +10,7 @@ from pathlib import Path
 import numpy as np
 from paths import CONFIG, ROOT
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot.processes import software
 from space_robot.processes.node_modules import MODULES
@@ -25,9 +22,14 @@ from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_sim.plant.settings import PlantNodeSettings
 
 PLAN = FlightPlan(
-    controller="tde_smc", case="3", seed=7, friction=False, robot="seven_joint", duration=0.02,
+    controller="tde_smc",
+    case="3",
+    seed=7,
+    friction=False,
+    robot="seven_joint",
+    duration=0.02,
     parameters={"plant": {"hold_ticks": 40}},
-)  # fmt: skip
+)
 
 
 def test_bag_has_all_to_fly_it_again(tmp_path: Path) -> None:

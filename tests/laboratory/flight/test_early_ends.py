@@ -12,14 +12,8 @@ import pytest
 from flights import space_robot, space_robot_here
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
-from space_robot.flight.simulate import (
-    fly_blocks,
-    simulate,
-)
+from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.simulate import fly_blocks, simulate
 from space_robot_control.laws import ControlLaw, LawGains, Signals, per_axis
 from space_robot_control.laws.checked import LawError
 from space_robot_msgs_py import topics
@@ -31,9 +25,17 @@ from space_robot_msgs_py.samples import Command
 
 AXES = 9
 COLUMNS = (
-    "base_position", "quaternion", "base_velocity", "omega_base", "joint_positions",
-    "joint_velocities", "applied_torque", "commanded_torque", "reference_joints", "reference_base",
-)  # fmt: skip
+    "base_position",
+    "quaternion",
+    "base_velocity",
+    "omega_base",
+    "joint_positions",
+    "joint_velocities",
+    "applied_torque",
+    "commanded_torque",
+    "reference_joints",
+    "reference_base",
+)
 
 
 class NoGains(LawGains):
@@ -73,15 +75,20 @@ FLIGHTS: dict[str, tuple[Callable[[], Flight], int, int, type[Exception]]] = {
     # what is flown, states sent, states answered, how it ends
     "diverged": (lambda: flight_of(controller="ctc", gains="printed"), 11, 11, DivergedError),
     "diverged after a swap": (
-        lambda: flight_of(gains="printed", swaps=["1.2:ctc"]), 2410, 2410, DivergedError,
+        lambda: flight_of(gains="printed", swaps=["1.2:ctc"]),
+        2410,
+        2410,
+        DivergedError,
     ),
     "not finite": (lambda: failing(130, lambda: np.nan), 131, 131, DivergedError),
     "singular attitude": (
         lambda: flight_of(parameters={"plant": {"initial_quaternion": [0.0, 0.0, 1.0, 0.0]}}),
-        1, 0, SingularAttitudeError,
+        1,
+        0,
+        SingularAttitudeError,
     ),
     "a law that fails": (lambda: failing(130, fails), 131, 130, LawError),
-}  # fmt: skip
+}
 
 
 def stepped(flight: Flight) -> list[list[np.ndarray]]:
@@ -143,11 +150,15 @@ def test_every_tick_is_in_the_bag(flown: tuple[str, list[FlightLog], Path]) -> N
     assert (read.unfinished, read.damage, read.unanswered) == ("", (), log.unanswered)
     messages = Counter(topic for topic, _ in open_bag(bag).messages(*topics.ALL))
     counts = {
-        topics.JOINT_STATES: sent, topics.BASE_STATE: sent, topics.COMMAND: answered,
-        topics.REFERENCE_JOINTS: -(-sent // 100), topics.REFERENCE_BASE: -(-sent // 100),
-        topics.CLOCK: -(-sent // 20), topics.TELEMETRY: -(-answered // 20),
+        topics.JOINT_STATES: sent,
+        topics.BASE_STATE: sent,
+        topics.COMMAND: answered,
+        topics.REFERENCE_JOINTS: -(-sent // 100),
+        topics.REFERENCE_BASE: -(-sent // 100),
+        topics.CLOCK: -(-sent // 20),
+        topics.TELEMETRY: -(-answered // 20),
         topics.LAW: 2 if "swap" in name else min(answered, 1),
-    }  # fmt: skip
+    }
     assert messages == {topic.full_name: count for topic, count in counts.items() if count}
 
 

@@ -14,14 +14,8 @@ from numpy.typing import NDArray
 
 from space_robot import load_bag
 from space_robot.flight.closed_loop import close_loop
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
-from space_robot.flight.simulate import (
-    empty_log,
-    simulate,
-)
+from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.simulate import empty_log, simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py.errors import InputError
 
@@ -81,10 +75,8 @@ def test_a_delay_that_is_known_costs_nothing_and_one_that_is_not_does() -> None:
     for given in ({}, {"navigation_filter.tracker_delay": 0.0}):
         parameters = {"plant": {"initial_quaternion": [0.99, 0.14, 0.0, 0.0]}, "controller": given}
         flight = Flight(
-            FlightPlan(
-                sensors="fine", navigation="filtered", duration=1.5, parameters=parameters
-            )
-        )  # fmt: skip
+            FlightPlan(sensors="fine", navigation="filtered", duration=1.5, parameters=parameters)
+        )
         log = empty_log(flight)
         close_loop(flight.plant, flight.controller, log, 0, 2000)
         truth = flight.plant.truth.copy()
@@ -116,8 +108,18 @@ def test_graph_process_and_replay_have_the_same_bits(
     fly: Callable[..., Flown], tmp_path: Path
 ) -> None:
     """Under a law and another, with sensors that are not ideal."""
-    options = ("--sensors", "fine", "--navigation", "filtered", "--duration", "0.8", "--swap",
-               "0.4:tde_smc", "--seed", "3")  # fmt: skip
+    options = (
+        "--sensors",
+        "fine",
+        "--navigation",
+        "filtered",
+        "--duration",
+        "0.8",
+        "--swap",
+        "0.4:tde_smc",
+        "--seed",
+        "3",
+    )
     graph = fly(*options, "--composed")
     plan = FlightPlan(
         sensors="fine", navigation="filtered", duration=0.8, swaps=["0.4:tde_smc"], seed=3

@@ -23,17 +23,11 @@ from space_robot import Robot
 from space_robot.analysis import analyze
 from space_robot.analysis.attitude_drift import attitude_drift
 from space_robot.analysis.metrics import tracking_error
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_model.robot.dynamics import free_inverse_dynamics
-from space_robot_model.robot.momentum import (
-    Motion,
-    robot_momentum,
-)
+from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import DivergedError, SingularAttitudeError
 from space_robot_msgs_py.samples import Command
@@ -44,9 +38,11 @@ Array = NDArray[np.float64]
 PERIOD = 5e-4
 GAINS = "config/gains/paper/tuned"
 CORNERS_DEG = [
-    [10.0, 150.0, -20.0, 5.0, 0.0, -15.0], [160.0, 150.0, 20.0, 15.0, 60.0, 30.0],
-    [150.0, -10.0, 20.0, -45.0, 40.0, 90.0], [10.0, 150.0, -20.0, 5.0, 0.0, -15.0],
-]  # fmt: skip
+    [10.0, 150.0, -20.0, 5.0, 0.0, -15.0],
+    [160.0, 150.0, 20.0, 15.0, 60.0, 30.0],
+    [150.0, -10.0, 20.0, -45.0, 40.0, 90.0],
+    [10.0, 150.0, -20.0, 5.0, 0.0, -15.0],
+]
 """A triangle in joint space, back to where it began."""
 TIMES = [0.0, 5.0, 10.0, 15.0]
 H_BAR = [1.0, 1.0, 1.0, 2.0, 1.0, 1.0, 1.1, 1.2, 1.2]
@@ -64,12 +60,15 @@ def planar_file() -> dict[str, Any]:
 
     links = [
         {
-            "name": f"joint{i + 1}", "alpha_deg": 0.0, "a": float(rng.uniform(0.4, 1.2)), "d": 0.0,
+            "name": f"joint{i + 1}",
+            "alpha_deg": 0.0,
+            "a": float(rng.uniform(0.4, 1.2)),
+            "d": 0.0,
             **body(float(rng.uniform(5.0, 30.0)), float(rng.uniform(0.5, 2.0))),
             "com": [float(rng.uniform(0.2, 0.8)), float(rng.uniform(-0.2, 0.2)), 0.0],
         }
         for i in range(6)
-    ]  # fmt: skip
+    ]
     return {"robot": {"name": "planar", "base": body(120.0, 40.0), "links": links}}
 
 
@@ -118,13 +117,19 @@ def closed_plan(folder: Path, law: str) -> FlightPlan:
     mission = {"waypoint_times": TIMES, "waypoints_deg": np.ravel(CORNERS_DEG).tolist()}
     h_bar = {} if law.startswith("ctc") else {f"{law}.h_bar": H_BAR}
     return FlightPlan(
-        controller=law, robot=str(path), mission="paper", gains=GAINS, friction=False,
-        actuators="none", duration=TIMES[-1] + REST,
+        controller=law,
+        robot=str(path),
+        mission="paper",
+        gains=GAINS,
+        friction=False,
+        actuators="none",
+        duration=TIMES[-1] + REST,
         parameters={
-            "mission": mission, "plant": {"initial_joints_deg": CORNERS_DEG[0]},
+            "mission": mission,
+            "plant": {"initial_joints_deg": CORNERS_DEG[0]},
             "controller": h_bar,
         },
-    )  # fmt: skip
+    )
 
 
 def base_angle(quaternion: Array) -> Array:
@@ -254,10 +259,20 @@ def test_the_margin_is_that_of_the_joints_alone(scale: float, flies: bool) -> No
 @pytest.mark.parametrize("law", sorted(laws()))
 def test_the_base_gets_no_torque_and_the_laws_no_error(law: str) -> None:
     """Sensors, faults and a filter between plant and law make no difference to that."""
-    log = simulate(Flight(FlightPlan(
-        controller=law, actuators="none", gains="robust", sensors="fine", navigation="filtered",
-        duration=0.5, faults=["torque_scale@0.1:base=1.1"], swaps=["0.3:ctc_smc"],
-    )))  # fmt: skip
+    log = simulate(
+        Flight(
+            FlightPlan(
+                controller=law,
+                actuators="none",
+                gains="robust",
+                sensors="fine",
+                navigation="filtered",
+                duration=0.5,
+                faults=["torque_scale@0.1:base=1.1"],
+                swaps=["0.3:ctc_smc"],
+            )
+        )
+    )
     assert log.commanded_torque is not None
     assert log.telemetry is not None
     for values in (log.commanded_torque, log.applied_torque, log.telemetry.swapaxes(0, 1)[:4]):

@@ -13,10 +13,7 @@ import pytest
 from flights import COMMAND, ros_environment, space_robot
 
 from space_robot.flight import disk_space as room
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot.processes import memory
 from space_robot_msgs_py.bag.reader import read_flight
@@ -35,9 +32,13 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 def peak(*arguments: str) -> int:
     done = subprocess.run(
-        [sys.executable, "-c", PEAK, "simulate", *arguments], capture_output=True, text=True,
-        timeout=150, check=True, env=ros_environment(),
-    )  # fmt: skip
+        [sys.executable, "-c", PEAK, "simulate", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=150,
+        check=True,
+        env=ros_environment(),
+    )
     return int(done.stdout.splitlines()[-1])
 
 
@@ -54,9 +55,11 @@ def test_the_longest_flight_flies_and_can_be_interrupted(tmp_path: Path) -> None
     """It ended in a traceback before its first tick."""
     bag = tmp_path / "bag"
     with subprocess.Popen(
-        [*COMMAND, "simulate", "--duration", "1e6", "--bag", str(bag)], stderr=subprocess.PIPE,
-        text=True, env=ros_environment(),
-    ) as process:  # fmt: skip
+        [*COMMAND, "simulate", "--duration", "1e6", "--bag", str(bag)],
+        stderr=subprocess.PIPE,
+        text=True,
+        env=ros_environment(),
+    ) as process:
         while not (bag / "bag_0.mcap").exists() or (bag / "bag_0.mcap").stat().st_size < 1_000_000:
             assert process.poll() is None
         process.send_signal(signal.SIGINT)

@@ -11,14 +11,8 @@ from bags import COLUMNS, messages_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
-from space_robot.flight.simulate import (
-    fly_blocks,
-    simulate,
-)
+from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.simulate import fly_blocks, simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import DivergedError, InputError

@@ -9,10 +9,7 @@ from typing import Any
 import pytest
 from numba.core import event
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py.samples import Reference, RobotState

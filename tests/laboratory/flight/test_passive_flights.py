@@ -12,25 +12,13 @@ from passive_robot import PASSIVE_ROBOT
 from space_robot.analysis import analyze
 from space_robot.analysis.columns import column_names
 from space_robot.analysis.described import robot_of
-from space_robot.analysis.figures.single_flight import (
-    control_results,
-    desired_joints,
-)
+from space_robot.analysis.figures.single_flight import control_results, desired_joints
 from space_robot.analysis.pointing import pointing_error
-from space_robot.analysis.report_tables import (
-    lines,
-    rms_table,
-)
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.analysis.report_tables import lines, rms_table
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
-from space_robot_model.robot.momentum import (
-    Motion,
-    robot_momentum,
-)
+from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_sim.plant.conservation import momentum
@@ -96,9 +84,13 @@ def test_errors_and_forces_are_told_by_kind(log: FlightLog) -> None:
     """No number is of rad and of m, and each has its unit."""
     report = analyze(log)
     columns = [
-        "attitude", "joints_revolute", "joints_prismatic", "base_torque", "torque_revolute",
+        "attitude",
+        "joints_revolute",
+        "joints_prismatic",
+        "base_torque",
+        "torque_revolute",
         "force_prismatic",
-    ]  # fmt: skip
+    ]
     assert list(report["rms"]["mean_axis"]) == columns
     units = [row[:2] for group in rms_table(report).groups for row in group.rows]
     assert [unit for _, unit in units] == ["-", "rad", "m", "N m", "N m", "N"]
@@ -117,12 +109,23 @@ def test_errors_and_forces_are_told_by_kind(log: FlightLog) -> None:
 def test_columns_of_an_export_have_their_units(log: FlightLog) -> None:
     names = column_names(log)
     for name in (
-        "boom_position_m", "boom_velocity_m_s", "wrist_position_rad", "panel_tip_position_rad",
-        "slosh_velocity_m_s", "applied_torque_boom_n", "applied_torque_wrist_n_m",
-        "applied_torque_base_x_n_m", "commanded_torque_boom_n", "reported_torque_boom_n",
-        "measured_position_boom_m", "measured_velocity_shoulder_rad_s", "error_boom_m",
-        "reference_boom_acceleration_m_s2", "reference_wrist_position_rad", "believed_error_boom_m",
-    ):  # fmt: skip
+        "boom_position_m",
+        "boom_velocity_m_s",
+        "wrist_position_rad",
+        "panel_tip_position_rad",
+        "slosh_velocity_m_s",
+        "applied_torque_boom_n",
+        "applied_torque_wrist_n_m",
+        "applied_torque_base_x_n_m",
+        "commanded_torque_boom_n",
+        "reported_torque_boom_n",
+        "measured_position_boom_m",
+        "measured_velocity_shoulder_rad_s",
+        "error_boom_m",
+        "reference_boom_acceleration_m_s2",
+        "reference_wrist_position_rad",
+        "believed_error_boom_m",
+    ):
         assert name in names, name
     assert len(set(names)) == len(names)
 

@@ -17,20 +17,10 @@ from hypothesis import strategies as st
 from space_robot.analysis import analyze
 from space_robot.flight.bag_path import default_bag
 from space_robot.flight.graph.orchestrator import flight_parameters
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
-from space_robot.flight.simulate import (
-    empty_log,
-    simulate,
-)
-from space_robot.scenario.node_settings import (
-    NODES,
-    NOT_TO_BE_SET,
-    SCHEMAS,
-)
-from space_robot_control.allocation.assumed_actuators import believed_actuators
+from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.simulate import empty_log, simulate
+from space_robot.scenario.node_settings import NODES, NOT_TO_BE_SET, SCHEMAS
+from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import build_laws, split_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
@@ -71,12 +61,14 @@ def test_a_parameter_is_the_same_as_its_option() -> None:
         ({"controller": {"swaps": ["0.01:ctc"]}}, {"swaps": ["0.01:ctc"]}),
         ({"plant": {"case": 3}}, {"case": "3"}),
         ({"plant": {"realtime": True}}, {"realtime": True}),
-        ({"plant": {"faults": ["nan_state@0-1"], "fault_seed": 7}},
-         {"faults": ["nan_state@0-1"], "seed": 7}),
+        (
+            {"plant": {"faults": ["nan_state@0-1"], "fault_seed": 7}},
+            {"faults": ["nan_state@0-1"], "seed": 7},
+        ),
         ({"plant": {"friction": {"coulomb": 0.0, "viscous": 0}}}, {"friction": False}),
         ({"plant": {"command_latency_ticks": 2}}, {"command_latency_ticks": 2}),
         ({"recorder": {"compression": "zstd"}}, {"compression": "zstd"}),
-    ]  # fmt: skip
+    ]
     for parameters, options in pairs:
         one, other = flight_of(parameters), flight_of({}, **options)
         assert one.description == other.description, options
@@ -114,14 +106,18 @@ def test_gains_are_parameters_as_at_the_node() -> None:
         ({"controller": {"pid.k_1": [1.0]}}, "unknown law 'pid' in controller parameters"),
         ({"plnt": {"hold_ticks": 5}}, "unknown node 'plnt'"),
         ({"controller": {"period": 0.001}}, "controller.period cannot be set: use --period"),
-        ({"plant": {"robot": "seven_joint", "mission": "seven_joint"}},
-         "the robots of plant and controller must have the same joints"),
-        ({"mission": {"robot": "seven_joint"}},
-         "the robots of plant and mission must have the same joints"),
+        (
+            {"plant": {"robot": "seven_joint", "mission": "seven_joint"}},
+            "the robots of plant and controller must have the same joints",
+        ),
+        (
+            {"mission": {"robot": "seven_joint"}},
+            "the robots of plant and mission must have the same joints",
+        ),
         ({"controller": {"swaps": ["1:pid"]}}, "unknown controller 'pid' of swaps"),
         ({"plant": {"friction": 1.0, "friction.viscous": 1.0}}, "given as a value, and as a group"),
     ],
-)  # fmt: skip
+)
 def test_what_cannot_be_set_is_refused(parameters: Parameters, said: str) -> None:
     with pytest.raises(InputError) as caught:
         flight_of(parameters)
@@ -335,12 +331,16 @@ def test_all_that_is_made_of_a_plan_agrees(parameters: Parameters) -> None:
     assert theirs.block.tobytes() == flight.plant.block.tobytes()
     assert theirs.command_delay_buffer.shape == flight.plant.command_delay_buffer.shape
     robot = Robot.from_yaml(named_file("robots", controller.robot))
-    assert believed_actuators(controller.actuators, robot) == flight.believed_actuators
+    assert assumed_actuators(controller.actuators, robot) == flight.assumed_actuators
     loop = Controller(
-        robot, law, controller.period, controller.acceleration_filter_hz,
-        controller.filter_settings, believed_actuators(controller.actuators, robot),
+        robot,
+        law,
+        controller.period,
+        controller.acceleration_filter_hz,
+        controller.filter_settings,
+        assumed_actuators(controller.actuators, robot),
         controller.allocation,
-    )  # fmt: skip
+    )
     assert loop.block.tobytes() == flight.controller.block.tobytes()
     assert law.gains_block.tobytes() == flight.controller.law.gains_block.tobytes()
     reference = Mission(robot, mission, mission.period).chunk(0, 100)

@@ -9,14 +9,20 @@ from pathlib import Path
 
 FLIGHTS = {
     "wheels, a filter, friction": {
-        "case": "3", "sensors": "fine", "navigation": "filtered", "actuators": "wheels",
+        "case": "3",
+        "sensors": "fine",
+        "navigation": "filtered",
+        "actuators": "wheels",
         "duration": 1.5,
     },
     "slides, thrusters": {
-        "robot": "ets_vii", "mission": "ets_vii", "actuators": "thrusters", "duration": 1.0,
+        "robot": "ets_vii",
+        "mission": "ets_vii",
+        "actuators": "thrusters",
+        "duration": 1.0,
     },
     "two arms": {"robot": "dual_arm", "mission": "dual_arm", "sensors": "coarse", "duration": 1.0},
-}  # fmt: skip
+}
 CODE = f"""
 import hashlib, json
 from space_robot import Scenario
@@ -41,9 +47,13 @@ MASK = {
 def flown(mask: dict[str, str]) -> list[str]:
     """Fly in a process of its own; its lines."""
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", CODE], capture_output=True, text=True, check=False,
-        env={**os.environ, **mask}, cwd=Path(__file__).parents[3],
-    )  # fmt: skip
+        [sys.executable, "-W", "ignore", "-c", CODE],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, **mask},
+        cwd=Path(__file__).parents[3],
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
 

@@ -12,10 +12,7 @@ from numpy.typing import NDArray
 from passive_robot import PASSIVE_ROBOT
 from rosbags.highlevel import AnyReader
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_model.robot import Robot
 from space_robot_model.robot.base_axes import base_axes

@@ -12,10 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
@@ -24,13 +21,24 @@ from space_robot_msgs_py.samples import Command, Reference
 Array = NDArray[np.float64]
 
 FAULTS = [
-    "noise_gyro@0.02-0.1:1e-6", "quantise_joint_velocity@0.1:1e-6", "gyro_bias@0.05:base_x=1e-6",
-    "tracker_blind@0.12-0.13", "encoder_stuck@0.15-0.16:3", "saturate_joints@0.05-0.06:5",
-    "stuck_joint@0.1-0.2:2=1", "torque_scale@0.1:base=1.001",
-]  # fmt: skip
+    "noise_gyro@0.02-0.1:1e-6",
+    "quantise_joint_velocity@0.1:1e-6",
+    "gyro_bias@0.05:base_x=1e-6",
+    "tracker_blind@0.12-0.13",
+    "encoder_stuck@0.15-0.16:3",
+    "saturate_joints@0.05-0.06:5",
+    "stuck_joint@0.1-0.2:2=1",
+    "torque_scale@0.1:base=1.001",
+]
 PLAN: dict[str, Any] = {"sensors": "fine", "faults": FAULTS, "duration": 0.3, "seed": 3}
-COLUMNS = ("quaternion", "angular_velocity", "joint_positions", "joint_velocities",
-           "applied_torque", "commanded_torque")  # fmt: skip
+COLUMNS = (
+    "quaternion",
+    "angular_velocity",
+    "joint_positions",
+    "joint_velocities",
+    "applied_torque",
+    "commanded_torque",
+)
 
 
 def flown(**options: Any) -> FlightLog:
@@ -54,9 +62,12 @@ def test_another_process_flies_the_same_bits() -> None:
         "print(hashlib.sha256(t.numbers(t.flown()).tobytes()).hexdigest())"
     )
     found = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True,
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
         cwd=Path(__file__).parent,
-    )  # fmt: skip
+    )
     assert found.stdout.strip() == hashlib.sha256(numbers(flown()).tobytes()).hexdigest()
 
 

@@ -11,10 +11,7 @@ from paths import CONFIG
 
 from space_robot.analysis import analyze
 from space_robot.cli.main import cli
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_model.robot.find import robot_names

@@ -11,10 +11,7 @@ from flights import space_robot, space_robot_here
 from paths import DOCS
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py.bag.reader import read_flight
@@ -110,9 +107,16 @@ def test_a_law_of_ones_own_is_one_class_and_one_yaml(tmp_path: Path) -> None:
     (tmp_path / "gains").mkdir()
     (tmp_path / "gains" / "tde.yaml").write_text(gains)
     result = space_robot(
-        "simulate", "--controller", "my_laws:TimeDelayControl", "--gains", f"{tmp_path}/gains",
-        "--duration", "1", "--json", python_path=tmp_path,
-    )  # fmt: skip
+        "simulate",
+        "--controller",
+        "my_laws:TimeDelayControl",
+        "--gains",
+        f"{tmp_path}/gains",
+        "--duration",
+        "1",
+        "--json",
+        python_path=tmp_path,
+    )
     assert result.returncode == 0, result.stderr
     report = json.loads(result.stdout)
     assert report["controller"] == "tde"

@@ -66,12 +66,14 @@ def test_the_plausible_torque_is_the_missions_own() -> None:
 @pytest.mark.parametrize(
     "options",
     [
-        {}, {"quaternion": [-1.0, 0.0, 0.0, 0.0]}, {"quaternion": [2.0, 0.0, 0.0, 0.0]},
+        {},
+        {"quaternion": [-1.0, 0.0, 0.0, 0.0]},
+        {"quaternion": [2.0, 0.0, 0.0, 0.0]},
         {"quaternion": [0.9, 0.1, 0.0, 0.0], "actuators": "none"},
         {"joints": [*JOINTS[:5], 1e-5], "controller": "tde_stc"},
         {"quaternion": [0.9, 0.1, 0.0, 0.0], "controller": None},
     ],
-)  # fmt: skip
+)
 def test_where_there_is_no_step_nothing_is_said(options: Any) -> None:
     """Also of a base that nothing turns, and of a flight that no law flies."""
     flight = scenario(**options).check()
@@ -86,9 +88,16 @@ def test_where_there_is_no_step_nothing_is_said(options: Any) -> None:
 def test_simulate_and_analyze_tell_the_same(space_robot: Run, tmp_path: Any) -> None:
     joints = ",".join(map(str, [*JOINTS[:5], 5.0]))
     words = (
-        "simulate", "--controller", "ctc", "--duration", "0.2", "--bag", str(tmp_path / "bag"),
-        "--set", f"plant.initial_joints_deg=[{joints}]",
-    )  # fmt: skip
+        "simulate",
+        "--controller",
+        "ctc",
+        "--duration",
+        "0.2",
+        "--bag",
+        str(tmp_path / "bag"),
+        "--set",
+        f"plant.initial_joints_deg=[{joints}]",
+    )
     flown = space_robot(*words, "--json")
     told = json.loads(flown.out)["start_step"]
     assert f"warning: {sentence(told)}" in flown.err.splitlines()

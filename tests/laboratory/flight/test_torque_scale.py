@@ -12,10 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.errors import FlightError
 
@@ -32,10 +29,12 @@ def flown(law: str, *faults: str, h_bar: bool = False, **plant: Any) -> tuple[in
     values = {k: [v] if isinstance(v, float) else v for k, v in plant.items()}
     flight = Flight(
         FlightPlan(
-            controller=law, gains=LAWS[law], faults=list(faults),
+            controller=law,
+            gains=LAWS[law],
+            faults=list(faults),
             parameters={"plant": values, "controller": own},
         )
-    )  # fmt: skip
+    )
     try:
         log = simulate(flight)
     except FlightError:

@@ -5,10 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 
 PERIOD = 5e-4

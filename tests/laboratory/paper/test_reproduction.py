@@ -25,15 +25,9 @@ from space_robot.paper.reproduction.flights import (
     fly,
     plan,
 )
-from space_robot.paper.reproduction.reproduce import (
-    check_folder,
-    reproduce,
-)
+from space_robot.paper.reproduction.reproduce import check_folder, reproduce
 from space_robot.paper.reproduction.table import cells
-from space_robot.paper.reproduction.table_v import (
-    COLUMNS,
-    printed,
-)
+from space_robot.paper.reproduction.table_v import COLUMNS, printed
 from space_robot_msgs_py.errors import InputError
 
 SHORT = 0.4
@@ -236,9 +230,11 @@ def test_report_is_one_page_by_itself(twice: tuple[Path, Path, dict[str, Any]]) 
 def test_parameters_of_every_flight_are_told(twice: tuple[Path, Path, dict[str, Any]]) -> None:
     told = twice[2]["parameters"]
     assert set(told) == {
-        "ctc, case 1, printed gains", "ctc, case 1, tuned gains",
-        "tde_stc, case 4-2, printed gains", "tde_stc, case 4-2, tuned gains",
-    }  # fmt: skip
+        "ctc, case 1, printed gains",
+        "ctc, case 1, tuned gains",
+        "tde_stc, case 4-2, printed gains",
+        "tde_stc, case 4-2, tuned gains",
+    }
     flown = told["tde_stc, case 4-2, printed gains"]
     assert flown["plant"]["payload"]["mass"] == 20.0
     assert flown["gains"]["h_bar"] == [50.0] * 3 + [5.0] * 3 + [0.5] * 3

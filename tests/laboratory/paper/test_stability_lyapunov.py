@@ -181,13 +181,21 @@ def certificate_of(k_1: float, k_2: float, share: float) -> Certificate:
 
 @settings(max_examples=40)
 @given(
-    gains(), st.floats(0.05, 0.95), st.floats(-3.0, 3.0), st.floats(-1.0, 1.0),
-    st.floats(0.0, 20.0), st.floats(0.0, 6.0),
-)  # fmt: skip
+    gains(),
+    st.floats(0.05, 0.95),
+    st.floats(-3.0, 3.0),
+    st.floats(-1.0, 1.0),
+    st.floats(0.0, 20.0),
+    st.floats(0.0, 6.0),
+)
 def test_any_disturbance_within_beta_dies_out_within_56(
-    pair: tuple[float, float], share: float, angle: float, push: float, frequency: float,
+    pair: tuple[float, float],
+    share: float,
+    angle: float,
+    push: float,
+    frequency: float,
     phase: float,
-) -> None:  # fmt: skip
+) -> None:
     """(46) in the time of (50), ``dt = |eta_1| dtau``, smooth even where s crosses zero."""
     k_1, k_2 = pair
     certificate = certificate_of(k_1, k_2, share)

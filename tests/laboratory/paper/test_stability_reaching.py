@@ -5,17 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
-from space_robot.paper.stability.reaching import (
-    arrival,
-    lyapunov_state,
-    off_mission_plan,
-    ripple,
-)
+from space_robot.paper.stability.reaching import arrival, lyapunov_state, off_mission_plan, ripple
 
 PERIOD = 0.01
 

@@ -13,16 +13,10 @@ from oracles import rho_space_inertia
 from random_robots import Case, cases
 
 from space_robot.analysis.generalised_motion import mean_acceleration
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot.paper.stability.lemma_1 import contraction
-from space_robot.paper.stability.time_delay_error import (
-    error_derivative,
-    time_delay_error,
-)
+from space_robot.paper.stability.time_delay_error import error_derivative, time_delay_error
 from space_robot.tuning.spectrum import contraction_matrix
 from space_robot_msgs_py.bag.flight_log import FlightLog
 

@@ -14,11 +14,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from space_robot.processes.interruption import (
-    Interrupted,
-    handled_signals,
-    raising_signals,
-)
+from space_robot.processes.interruption import Interrupted, handled_signals, raising_signals
 
 COMMAND = [sys.executable, "-m", "space_robot.cli.main"]
 LONG = ["--duration", "60", "--jobs", "2"]
@@ -44,11 +40,14 @@ def _processor_s(process: psutil.Process) -> float:
 def _reproducing(folder: Path) -> Iterator[tuple[subprocess.Popen[str], list[psutil.Process]]]:
     """A reproduction at work, and its two workers."""
     process = subprocess.Popen(
-        [*COMMAND, "reproduce", *LONG, "--out", str(folder / "out")], stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, text=True, start_new_session=True,
+        [*COMMAND, "reproduce", *LONG, "--out", str(folder / "out")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
         env={**os.environ, "TMPDIR": str(folder)},
         preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # as not under nohup
-    )  # fmt: skip
+    )
     workers: list[psutil.Process] = []
     try:
         until = time.monotonic() + 120.0

@@ -12,11 +12,7 @@ from typing import Any
 
 import pytest
 
-from space_robot.processes.scratch_folder import (
-    NEW_S,
-    PREFIX,
-    ScratchFolder,
-)
+from space_robot.processes.scratch_folder import NEW_S, PREFIX, ScratchFolder
 
 
 @pytest.fixture(autouse=True)

@@ -10,10 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from paths import DOCS
 
-from space_robot.scenario.faults import (
-    KINDS,
-    PROCESS_KINDS,
-)
+from space_robot.scenario.faults import KINDS, PROCESS_KINDS
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.faults.grammar import (
     Fault,

@@ -9,15 +9,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.tuning.demand import demand
-from space_robot.tuning.inertia import (
-    SAMPLING,
-    sampled_reference,
-)
+from space_robot.tuning.inertia import SAMPLING, sampled_reference
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_model.robot import Robot
 from space_robot_sim.environment.environment import EnvironmentSettings
@@ -48,8 +42,9 @@ def force_of_torque(turned: Rotation, torque: Array) -> Array:
     step = 1e-6
     moved = [
         ((Rotation.from_rotvec(side * step * axis) * turned).as_quat()[:3])
-        for axis in np.eye(3) for side in (1.0, -1.0)
-    ]  # fmt: skip
+        for axis in np.eye(3)
+        for side in (1.0, -1.0)
+    ]
     slopes = [(moved[2 * i] - moved[2 * i + 1]) / (2.0 * step) for i in range(3)]
     return np.asarray(np.linalg.solve(np.array(slopes), torque))
 
@@ -79,8 +74,10 @@ def test_friction_is_asked_of_the_joints_by_their_rates(paper_robot: Robot) -> N
     )
     friction = np.max(np.abs(0.3 * np.sign(rates) + 0.7 * rates), axis=0)
     np.testing.assert_allclose(found.unknown, [0.0, 0.0, 0.0, *friction], atol=1e-12)
-    smooth, rough = (demand(paper_robot, mission(), [one]) for one in (
-        case(), case(friction={"coulomb": 5.0, "viscous": 0.0})))  # fmt: skip
+    smooth, rough = (
+        demand(paper_robot, mission(), [one])
+        for one in (case(), case(friction={"coulomb": 5.0, "viscous": 0.0}))
+    )
     np.testing.assert_array_equal(rough.slope, smooth.slope)  # its jumps left out
     assert np.all(rough.peak[3:] > smooth.peak[3:])
     np.testing.assert_array_equal(rough.nominal, smooth.peak)

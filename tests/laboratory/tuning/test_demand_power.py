@@ -38,13 +38,16 @@ def test_disturbances_about_inertial_axes_are_turned_to_the_bases(vector: list[f
     torque = attitude.inv().apply(np.full(3, 0.010))
     step = 1e-6
     rates = [
-        (eps(attitude * Rotation.from_rotvec(step * axis))
-         - eps(attitude * Rotation.from_rotvec(-step * axis))) / (2.0 * step)
+        (
+            eps(attitude * Rotation.from_rotvec(step * axis))
+            - eps(attitude * Rotation.from_rotvec(-step * axis))
+        )
+        / (2.0 * step)
         for axis in np.eye(3)
-    ]  # fmt: skip
+    ]
     force = np.linalg.solve(np.array(rates), torque)  # F . epsdot = torque . omega, of any omega
     np.testing.assert_allclose(found.peak[:3], np.abs(force) * np.abs(wave).max(), rtol=1e-5)
     np.testing.assert_array_equal(found.nominal, 0.0)
-    assert found.peak[3] == pytest.approx(0.005 * np.abs(
-        np.sin(2 * np.pi * 0.25 * time) + np.sin(2 * np.pi * 0.5 * time)
-    ).max())  # fmt: skip
+    assert found.peak[3] == pytest.approx(
+        0.005 * np.abs(np.sin(2 * np.pi * 0.25 * time) + np.sin(2 * np.pi * 0.5 * time)).max()
+    )

@@ -10,10 +10,7 @@ from oracles import pinocchio_mass_matrix, rho_space_inertia
 from passive_robot import PASSIVE_ROBOT
 from random_robots import State, random_quaternion, random_robot
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.tuning.inertia import (
     free_inertia,
     inertia_along,
@@ -115,6 +112,7 @@ def test_loose_joints_give_way_and_locked_ones_do_not() -> None:
     quaternion = np.array([1.0, 0.0, 0.0, 0.0])
     start = robot.from_degrees(flight.mission_settings.waypoints_deg[:6])[np.newaxis]
     for row, inertia in (
-        (0, semi_floating_inertia(robot.nominal, start)), (5, loose_inertia(robot, start))
-    ):  # fmt: skip
+        (0, semi_floating_inertia(robot.nominal, start)),
+        (5, loose_inertia(robot, start)),
+    ):
         np.testing.assert_allclose(both[row], inertia_in_rho(quaternion, inertia)[0], rtol=1e-12)

@@ -9,21 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
-from space_robot.tuning.demand import (
-    ForceDemand,
-    demand,
-)
+from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.tuning.demand import ForceDemand, demand
 from space_robot.tuning.inertia import inertia_along
-from space_robot.tuning.method import (
-    Tuned,
-    TuningOptions,
-    axis_inertia,
-    tune,
-)
+from space_robot.tuning.method import Tuned, TuningOptions, axis_inertia, tune
 from space_robot.tuning.noise import Noise
 from space_robot.tuning.spectrum import eigenvalues
 from space_robot_control.laws import laws
@@ -93,9 +82,7 @@ def test_a_lag_of_the_navigation_makes_it_slower_not_weaker() -> None:
     quick, slow = (tuned(TuningOptions(0.05, 0.2), lag=lag) for lag in (0.0, 0.02))
     assert slow.delay == pytest.approx(quick.delay + 0.02)
     assert slow.bandwidth < quick.bandwidth / 5.0
-    np.testing.assert_array_equal(
-        slow.gains["tde_stc"]["h_bar"], quick.gains["tde_stc"]["h_bar"]
-    )  # fmt: skip
+    np.testing.assert_array_equal(slow.gains["tde_stc"]["h_bar"], quick.gains["tde_stc"]["h_bar"])
 
 
 def test_a_bandwidth_beyond_the_estimates_is_refused() -> None:
@@ -182,8 +169,9 @@ def test_axes_that_nothing_is_asked_of_have_gains_as_well() -> None:
     idle = [0, 2]
     factor = np.ones(len(asked.peak))
     factor[idle] = 0.0, 1e-17
-    planar = ForceDemand(asked.peak * factor, asked.slope * factor, asked.unknown * factor,
-                    asked.nominal * factor)  # fmt: skip
+    planar = ForceDemand(
+        asked.peak * factor, asked.slope * factor, asked.unknown * factor, asked.nominal * factor
+    )
     found = tune(inertia, planar, TuningOptions(0.05, 0.2), PERIOD)
     usual = tuned(TuningOptions(0.05, 0.2))
     for law, gains in found.gains.items():

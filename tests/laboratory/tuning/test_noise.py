@@ -9,14 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
-from space_robot.tuning.noise import (
-    Noise,
-    listen,
-)
+from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.tuning.noise import Noise, listen
 
 PERIOD = 5e-4
 
@@ -29,9 +23,12 @@ def heard(sensors: str, navigation: Any = "direct", corner: float = 100.0) -> No
     )
     flight = Flight(plan)
     return listen(
-        flight.robot, flight.plant_settings, flight.controller_settings.filter_settings,
-        flight.mission_settings, flight.period,
-    )  # fmt: skip
+        flight.robot,
+        flight.plant_settings,
+        flight.controller_settings.filter_settings,
+        flight.mission_settings,
+        flight.period,
+    )
 
 
 def test_ideal_sensors_have_none() -> None:

@@ -9,10 +9,7 @@ import pytest
 from click.testing import CliRunner
 from paths import CONFIG
 
-from space_robot.campaign.sweep import (
-    sweep,
-    sweep_study,
-)
+from space_robot.campaign.sweep import sweep, sweep_study
 from space_robot.cli.main import cli
 from space_robot_control.laws import laws
 
@@ -52,9 +49,11 @@ def test_all_laws_fly_all_cases_with_what_reality_brings(law: str, case: str) ->
     """Fine sensors, filtered navigation, masses within 20 %, 2 % too much or too little torque."""
     for seed, echo in ((1, 1.02), (2, 0.98)):
         common = {
-            "case": case, "navigation": "filtered", "duration": 10.0,
+            "case": case,
+            "navigation": "filtered",
+            "duration": 10.0,
             "parameters": {"plant": {"echo_scale": [echo]}},
-        }  # fmt: skip
+        }
         (row,) = sweep(sweep_study([f"{law}=robust"], ["fine"], spread=0.2, common=common), seed)
         assert row.is_complete
         assert row.metrics["attitude_rms"] < 1e-3

@@ -11,20 +11,10 @@ from closed_loop import H_BAR
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
-from space_robot.tuning.inertia import (
-    inertia_along,
-    semi_floating_inertia,
-)
-from space_robot.tuning.spectrum import (
-    Spectrum,
-    eigenvalues,
-    spectrum,
-)
+from space_robot.tuning.inertia import inertia_along, semi_floating_inertia
+from space_robot.tuning.spectrum import Spectrum, eigenvalues, spectrum
 from space_robot_msgs_py.errors import DivergedError
 
 
@@ -61,10 +51,12 @@ def test_an_error_of_the_estimate_grows_as_the_formula_says(
     def tick(memory: np.ndarray) -> np.ndarray:
         force, acceleration = memory[:m], memory[m:]
         command = force - h_bar * acceleration  # u and c are left out: they add, no more
-        return np.concatenate([
-            force + weight * (reported * command - force),
-            acceleration + weight * (given_torque * inverse @ command - acceleration),
-        ])  # fmt: skip
+        return np.concatenate(
+            [
+                force + weight * (reported * command - force),
+                acceleration + weight * (given_torque * inverse @ command - acceleration),
+            ]
+        )
 
     matrix = np.column_stack([tick(column) for column in np.eye(2 * m)])
     expected = 1.0 + weight * (reported - 1.0 - given_torque * eigenvalues(inertia, h_bar))
@@ -92,9 +84,10 @@ def test_wrong_masses_move_eigenvalues_no_further_than_said(seed: int, share: fl
     robot = Flight(FlightPlan()).robot
     factors = 1.0 + rng.uniform(-share, share, (2, robot.n + 1))
     wrong = replace(
-        robot, mass=robot.mass * factors[0],
+        robot,
+        mass=robot.mass * factors[0],
         inertia=robot.inertia * factors[1][:, np.newaxis, np.newaxis],
-    )  # fmt: skip
+    )
     theta, h_bar = rng.uniform(-np.pi, np.pi, (1, robot.n)), np.array(H_BAR)
     nominal = eigenvalues(semi_floating_inertia(robot, theta), h_bar)
     found = eigenvalues(semi_floating_inertia(wrong, theta), h_bar)

@@ -7,10 +7,7 @@ import time
 import pytest
 
 from space_robot.cli.options import remarks_on
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.tuning.gain_check import pair_corner
 from space_robot.tuning.warning import margin_remarks
 from space_robot_control.controller.settings import ControllerNodeSettings

@@ -11,10 +11,7 @@ import numpy as np
 import pytest
 from flights import space_robot_here
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot.view import animation
 from space_robot.view.browser import NAMES

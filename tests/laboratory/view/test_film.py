@@ -13,20 +13,10 @@ from random_trees import random_bodies
 from scene_pages import Scene, plot_data
 from tree_oracle import pinocchio_tree
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
-from space_robot.view.film import (
-    FilmedFlight,
-    film,
-)
-from space_robot.view.flights import (
-    ViewOptions,
-    flights_page,
-    shown_robot,
-)
+from space_robot.view.film import FilmedFlight, film
+from space_robot.view.flights import ViewOptions, flights_page, shown_robot
 from space_robot.view.frames import shown_times
 from space_robot_model.robot import Robot
 from space_robot_model.robot.frame_names import frame_names

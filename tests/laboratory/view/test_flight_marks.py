@@ -9,16 +9,9 @@ from pathlib import Path
 import pytest
 
 from space_robot.analysis import excerpt
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
-from space_robot.view.marks import (
-    Mark,
-    marks_of,
-    shared_marks,
-)
+from space_robot.view.marks import Mark, marks_of, shared_marks
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
 
@@ -33,9 +26,11 @@ RELEASE = Mark(0.28, 0.28, "release", "event")
 def log(tmp_path_factory: pytest.TempPathFactory) -> FlightLog:
     bag = tmp_path_factory.mktemp("bags") / "marked"
     plan = FlightPlan(
-        duration=0.3, swaps=["0.25:ctc"], events=["capture@0.1:small_satellite", "release@0.28"],
+        duration=0.3,
+        swaps=["0.25:ctc"],
+        events=["capture@0.1:small_satellite", "release@0.28"],
         faults=["stuck_joint@0.18:3=20", "drive_scale@0.15-0.2:all=0.9", "noise_gyro@2:1e-6"],
-    )  # fmt: skip
+    )
     simulate(Flight(plan), bag)
     return read_flight(bag)
 
@@ -59,8 +54,12 @@ def test_what_not_all_flights_had_says_which(log: FlightLog) -> None:
     other = replace(log, flight={**log.flight, "faults": []})
     found = shared_marks({"one": log, "two": other})
     assert [mark.text for mark in found] == [
-        CAPTURE.text, f"one: {SCALE.text}", f"one: {STICK.text}", SWAP.text, RELEASE.text,
-    ]  # fmt: skip
+        CAPTURE.text,
+        f"one: {SCALE.text}",
+        f"one: {STICK.text}",
+        SWAP.text,
+        RELEASE.text,
+    ]
 
 
 def test_a_flight_of_others_has_no_marks(log: FlightLog, tmp_path: Path) -> None:

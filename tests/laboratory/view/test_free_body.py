@@ -12,11 +12,7 @@ from moving_logs import moving_log
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from space_robot.view.free_body import (
-    FreeBody,
-    before_capture,
-    held_poses,
-)
+from space_robot.view.free_body import FreeBody, before_capture, held_poses
 from space_robot_model.robot import Robot
 from space_robot_sim.environment.events import Capture
 from space_robot_sim.environment.grasp import Grasp
@@ -38,9 +34,12 @@ def test_nothing_acts_on_it(seed: int) -> None:
     turned = Rotation.random(rng=rng).as_matrix()
     inertia = turned @ np.diag([2.0, 3.0, 4.5]) @ turned.T
     body = FreeBody(
-        rng.normal(size=3), Rotation.random(rng=rng).as_matrix(), rng.normal(size=3),
-        rng.normal(size=3), inertia,
-    )  # fmt: skip
+        rng.normal(size=3),
+        Rotation.random(rng=rng).as_matrix(),
+        rng.normal(size=3),
+        rng.normal(size=3),
+        inertia,
+    )
     step = 1e-3
     times = np.array([-6.0, -3.0 - step, -3.0, -3.0 + step, 0.0])
     positions, quaternions = body.poses(times)
@@ -59,10 +58,12 @@ def test_nothing_acts_on_it(seed: int) -> None:
 
 def capture(relative_to: str, velocity: list[float], rate: list[float]) -> Capture:
     content = {
-        "name": "box", "mass": 3.0, "inertia": [1.0, 2.0, 2.5, 0.1, 0.0, -0.2],
+        "name": "box",
+        "mass": 3.0,
+        "inertia": [1.0, 2.0, 2.5, 0.1, 0.0, -0.2],
         "place": {"position": [0.1, -0.2, 0.3], "quaternion": [0.6, 0.0, 0.8, 0.0]},
         "motion": {"relative_to": relative_to, "velocity": velocity, "angular_velocity": rate},
-    }  # fmt: skip
+    }
     return Capture(0.0051, Target.from_dict({"target": content}))
 
 
@@ -87,9 +88,11 @@ def test_what_moves_in_the_tools_axes_and_in_inertial_ones(paper_robot: Robot) -
     still, moved, inertial = (
         before_capture(capture(*motion), log, robot)
         for motion in (
-            ("tool", [0.0] * 3, [0.0] * 3), ("tool", velocity, rate), ("inertial", velocity, rate),
+            ("tool", [0.0] * 3, [0.0] * 3),
+            ("tool", velocity, rate),
+            ("inertial", velocity, rate),
         )
-    )  # fmt: skip
+    )
     assert still
     assert moved
     assert inertial

@@ -21,9 +21,13 @@ from space_robot.view.local_server import is_own, local_server  # noqa: E402
 
 LOCAL = ("127.0.0.1:8080", "localhost:9000", "[::1]:8080", "localhost")
 FOREIGN = (
-    "evil.example:8080", "127.0.0.1.evil.example", "localhost@evil.example:8080", "192.168.1.7",
-    "localhost:80:80", "",
-)  # fmt: skip
+    "evil.example:8080",
+    "127.0.0.1.evil.example",
+    "localhost@evil.example:8080",
+    "192.168.1.7",
+    "localhost:80:80",
+    "",
+)
 ADDRESSES = st.lists(st.sampled_from(LOCAL + FOREIGN), max_size=2)
 
 

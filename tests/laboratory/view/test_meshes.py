@@ -14,22 +14,11 @@ import pytest
 import trimesh
 from scene_pages import Scene
 
-from space_robot.view import (
-    mesh_process,
-    meshes,
-)
+from space_robot.view import mesh_process, meshes
 from space_robot.view.local_server import local_server
 from space_robot.view.mesh import simplify
-from space_robot.view.mesh_process import (
-    MOST_BYTES,
-    TOO_MUCH,
-    UnreadableMeshError,
-    read_mesh,
-)
-from space_robot.view.meshes import (
-    read_meshes,
-    shown_shapes,
-)
+from space_robot.view.mesh_process import MOST_BYTES, TOO_MUCH, UnreadableMeshError, read_mesh
+from space_robot.view.meshes import read_meshes, shown_shapes
 from space_robot.view.scene import RobotScene
 from space_robot_model.robot import Robot
 from space_robot_model.robot.tree import Visual
@@ -78,22 +67,26 @@ def test_a_body_whose_meshes_cannot_be_read_is_drawn_from_its_numbers(
     assert {shape.body for shape in found.shapes[1:]} == {3}
     assert all(shape.shape == "cylinder" for shape in found.shapes[1:])
     assert [remark.split(": cannot be drawn")[0] for remark in found.remarks[-2:]] == [
-        f"mesh {broken}", f"mesh {lacking}",
-    ]  # fmt: skip
+        f"mesh {broken}",
+        f"mesh {lacking}",
+    ]
     assert all("\n" not in remark for remark in found.remarks)
 
 
 def gltf_of(count: int) -> bytes:
     """A mesh of so many vertices that are not stored: all are zero."""
     content = {
-        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
         "bufferViews": [],
         "accessors": [
             {"componentType": 5126, "count": count, "type": "VEC3"},
             {"componentType": 5125, "count": count, "type": "SCALAR"},
         ],
-    }  # fmt: skip
+    }
     return json.dumps(content).encode()
 
 

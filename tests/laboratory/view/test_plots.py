@@ -15,19 +15,10 @@ from moving_logs import moving_log
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from space_robot.view.page import (
-    Shown,
-    render,
-)
-from space_robot.view.plots import (
-    STRETCHES,
-    Plot,
-    Series,
-    extremes,
-    plots_of,
-)
+from space_robot.view.page import Shown, render
+from space_robot.view.plots import STRETCHES, Plot, Series, extremes, plots_of
 from space_robot.view.quantities import quantities_of
-from space_robot_control.allocation.assumed_actuators import believed_actuators
+from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
@@ -62,7 +53,7 @@ def test_each_stretch_has_its_lowest_and_highest_known_value(
 
 def flight(robot: Robot, actuators: str) -> FlightLog:
     """A log of 30 rows with the actuators of a name, its numbers at random."""
-    hardware = believed_actuators(actuators, robot) if actuators else BaseActuatorSettings()
+    hardware = assumed_actuators(actuators, robot) if actuators else BaseActuatorSettings()
     log, rng = moving_log(robot, 30), np.random.default_rng(7)
     log.wheel_velocities = rng.normal(size=(30, hardware.wheel_count))
     log.thrusts = rng.uniform(size=(30, hardware.thruster_count))
@@ -90,7 +81,7 @@ def test_drift_is_counted_from_the_first_known_row(paper_robot: Robot) -> None:
 
 def test_actuators_are_plotted_in_their_units(paper_robot: Robot) -> None:
     log = flight(paper_robot, "wheels_and_thrusters")
-    hardware = believed_actuators("wheels_and_thrusters", paper_robot)
+    hardware = assumed_actuators("wheels_and_thrusters", paper_robot)
     shown = {quantity.title: quantity for quantity in quantities_of(log, paper_robot)}
     inertia = np.broadcast_to(hardware.wheels.rotor_inertia, hardware.wheel_count)
     np.testing.assert_allclose(shown["wheel momentum"].values, log.wheel_velocities * inertia)
@@ -109,8 +100,7 @@ def test_passive_joints_are_counted_from_their_rest() -> None:
     robot = find_robot("flexible_panels")
     rest = 0.1 * (1 + np.arange(len(robot.springs)))
     bent = replace(
-        robot,
-        springs=tuple(s._replace(rest=r) for s, r in zip(robot.springs, rest, strict=True)),
+        robot, springs=tuple(s._replace(rest=r) for s, r in zip(robot.springs, rest, strict=True))
     )
     log = flight(robot, "")
     log.flight = {"prismatic_joints": [robot.passive_names[1]]}

@@ -12,15 +12,8 @@ from hypothesis import strategies as st
 from moving_logs import moving_log
 from numpy.typing import NDArray
 
-from space_robot.view.frames import (
-    MOST_FRAMES,
-    Frames,
-    shown_times,
-)
-from space_robot.view.trails import (
-    PIECES,
-    trails,
-)
+from space_robot.view.frames import MOST_FRAMES, Frames, shown_times
+from space_robot.view.trails import PIECES, trails
 from space_robot_model.robot import Robot
 from space_robot_model.robot.tool import tool_pose
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -32,9 +25,12 @@ Array = NDArray[np.float64]
 
 @settings(max_examples=50)
 @given(
-    st.integers(0, 50), st.integers(2, 40), st.integers(1, 7),
-    st.lists(st.integers(0, 39), max_size=25), st.data(),
-)  # fmt: skip
+    st.integers(0, 50),
+    st.integers(2, 40),
+    st.integers(1, 7),
+    st.lists(st.integers(0, 39), max_size=25),
+    st.data(),
+)
 def test_a_frame_shows_the_last_known_row_that_has_begun(
     paper_robot: Robot, first: int, ticks: int, milliseconds: int, gaps: list[int], data: Any
 ) -> None:
@@ -58,9 +54,7 @@ def test_a_frame_shows_the_last_known_row_that_has_begun(
     _, place = tool_pose(paper_robot, log.quaternion[rows], log.joint_positions[rows])
     (shown,) = frames.tools.values()
     np.testing.assert_allclose(shown, log.base_position[rows] + place, atol=1e-12)
-    _, place = tool_pose(
-        paper_robot, log.reference_base[rows, :4], log.reference_joints[rows, 0]
-    )  # fmt: skip
+    _, place = tool_pose(paper_robot, log.reference_base[rows, :4], log.reference_joints[rows, 0])
     assert frames.desired is not None
     np.testing.assert_allclose(frames.desired, log.base_position[rows] + place, atol=1e-12)
 

@@ -23,10 +23,7 @@ from space_robot_model.dynamics.branches import (
     kept_frame,
     kept_motion,
 )
-from space_robot_model.dynamics.kinematics import (
-    forward_kinematics,
-    spatial_velocities,
-)
+from space_robot_model.dynamics.kinematics import forward_kinematics, spatial_velocities
 from space_robot_model.dynamics.model import Data
 from space_robot_model.robot import Robot
 from space_robot_model.robot.tree import Body
@@ -41,17 +38,22 @@ def sum_of_branches(parts: Array, row: Array, out: Array) -> None:
     for b in range(1, parts.shape[0]):
         p = parts[b]
         accumulate(
-            row, (p[0], p[1], p[2], p[3], p[4], p[5]),
+            row,
+            (p[0], p[1], p[2], p[3], p[4], p[5]),
             (p[6], p[7], p[8], p[9], p[10], p[11], p[12], p[13], p[14]),
-            (p[15], p[16], p[17], p[18], p[19], p[20]), (p[21], p[22], p[23]),
+            (p[15], p[16], p[17], p[18], p[19], p[20]),
+            (p[21], p[22], p[23]),
             (p[24], p[25], p[26]),
-        )  # fmt: skip
+        )
     p = parts[0]
     j, g, m, moment, force = collect_children(
-        row, (p[0], p[1], p[2], p[3], p[4], p[5]),
+        row,
+        (p[0], p[1], p[2], p[3], p[4], p[5]),
         (p[6], p[7], p[8], p[9], p[10], p[11], p[12], p[13], p[14]),
-        (p[15], p[16], p[17], p[18], p[19], p[20]), (p[21], p[22], p[23]), (p[24], p[25], p[26]),
-    )  # fmt: skip
+        (p[15], p[16], p[17], p[18], p[19], p[20]),
+        (p[21], p[22], p[23]),
+        (p[24], p[25], p[26]),
+    )
     for k in range(6):
         out[k], out[15 + k] = j[k], m[k]
     for k in range(9):

@@ -129,9 +129,7 @@ def test_bias_force_does_half_the_work_of_the_changing_inertia(case: Case) -> No
 
 @FEW
 @given(cases())
-def test_bias_force_on_the_base_is_the_momentum_that_the_changing_inertia_moves(
-    case: Case,
-) -> None:
+def test_bias_force_on_the_base_is_the_momentum_that_the_changing_inertia_moves(case: Case) -> None:
     """``c1 = Hdot1 qdot``; about the moving base CoM ``c2 = Hdot2 qdot + v0 x p``."""
     velocity = case.state.velocity
     rate = inertia_rate(case.robot, case.state)[:6] @ velocity

@@ -10,10 +10,7 @@ from oracles import pinocchio_bias_force, pinocchio_mass_matrix, rotation_of
 from random_robots import State, random_quaternion, random_robot
 
 from space_robot_model.dynamics.aba import aba
-from space_robot_model.dynamics.kinematics import (
-    forward_kinematics,
-    spatial_velocities,
-)
+from space_robot_model.dynamics.kinematics import forward_kinematics, spatial_velocities
 from space_robot_model.dynamics.model import Data
 from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.samples import MOST_WHEELS
@@ -29,9 +26,12 @@ def test_wheels_accelerate_as_the_dense_equations_say(n: int, wheels: int, seed:
     axes /= np.linalg.norm(axes, axis=1)[:, np.newaxis]
     inertia = rng.uniform(0.1, 1.0, wheels) * np.linalg.eigvalsh(robot.inertia[0])[0] / wheels
     state = State(
-        random_quaternion(rng), rng.normal(size=n), np.zeros(3), rng.normal(size=3),
+        random_quaternion(rng),
         rng.normal(size=n),
-    )  # fmt: skip
+        np.zeros(3),
+        rng.normal(size=3),
+        rng.normal(size=n),
+    )
     stands = rng.integers(0, 2, wheels).astype(bool)
     speeds = np.where(stands, 0.0, rng.normal(size=wheels) * 50.0)
     force = rng.normal(size=6 + n + wheels)

@@ -9,10 +9,7 @@ from numpy.typing import NDArray
 from oracles import attitude_jacobian_inertial, rotation_of, skew, turned
 from random_robots import Case, State, branched_cases, cases, random_state
 
-from space_robot_model.dynamics.rho_space import (
-    RhoSpaceModel,
-    rho_space_into,
-)
+from space_robot_model.dynamics.rho_space import RhoSpaceModel, rho_space_into
 from space_robot_model.robot import Robot
 from space_robot_model.robot.dynamics import bias_force, forward_dynamics, mass_matrix
 

@@ -8,19 +8,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import mujoco_acceleration, pinocchio_acceleration
 from random_robots import State, random_robot, random_state
-from wheel_oracles import (
-    Rotor,
-    mount,
-    mujoco_with_wheels,
-    pinocchio_with_wheels,
-    random_rotors,
-)
+from wheel_oracles import Rotor, mount, mujoco_with_wheels, pinocchio_with_wheels, random_rotors
 
 from space_robot_model.dynamics.aba import aba
-from space_robot_model.dynamics.kinematics import (
-    forward_kinematics,
-    spatial_velocities,
-)
+from space_robot_model.dynamics.kinematics import forward_kinematics, spatial_velocities
 from space_robot_model.dynamics.model import Data
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import MOST_WHEELS

@@ -11,20 +11,10 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import norm
 
-from space_robot_model.elementary.exponential import (
-    exp,
-    log,
-)
-from space_robot_model.elementary.normal import (
-    normal_cdf,
-    normal_numbers,
-    normal_quantile,
-)
+from space_robot_model.elementary.exponential import exp, log
+from space_robot_model.elementary.normal import normal_cdf, normal_numbers, normal_quantile
 from space_robot_model.elementary.series import plain_sin_cos
-from space_robot_model.elementary.sine import (
-    sin_cos,
-    sines_cosines,
-)
+from space_robot_model.elementary.sine import sin_cos, sines_cosines
 
 RNG = np.random.default_rng(5)
 

@@ -13,10 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from space_robot_model.elementary.arctangent import (
-    angle_of,
-    arctan2,
-)
+from space_robot_model.elementary.arctangent import angle_of, arctan2
 from space_robot_model.elementary.fourier import squared_spectrum
 from space_robot_model.elementary.matrices import (
     norm,

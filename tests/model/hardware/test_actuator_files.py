@@ -99,13 +99,21 @@ def test_single_numbers_come_over_those_of_the_file() -> None:
     ("text", "why"),
     [
         ("wheel: {}", "wheel: unknown key, got {}: did you mean wheels"),
-        ("wheels: {axis: [1]}", r"wheels.axis: unknown key, got \[1\]: choose one of axes, coulomb,"
-         " initial_speed, max_momentum, max_torque, rotor_inertia, viscous "),
+        (
+            "wheels: {axis: [1]}",
+            r"wheels.axis: unknown key, got \[1\]: choose one of axes, coulomb,"
+            " initial_speed, max_momentum, max_torque, rotor_inertia, viscous ",
+        ),
         ("base_actuation: wheels", "base_actuation: Input should be 'ideal', 'hardware' or 'none'"),
-        ("wheels: {axes: [1, 0, 0, 0]}", r"wheels.axes: x, y, z of at most 8 vectors were expected,"
-         r" or \[0.0\] for none: 4 numbers, got \[1, 0, 0, 0\]$"),
-        ("wheels: {axes: [1, 0, 0, 0, 0, 0]}", "wheels.axes: the norm of each must be near 1, that "
-         "of number 2 is 0, got"),
+        (
+            "wheels: {axes: [1, 0, 0, 0]}",
+            r"wheels.axes: x, y, z of at most 8 vectors were expected,"
+            r" or \[0.0\] for none: 4 numbers, got \[1, 0, 0, 0\]$",
+        ),
+        (
+            "wheels: {axes: [1, 0, 0, 0, 0, 0]}",
+            "wheels.axes: the norm of each must be near 1, that of number 2 is 0, got",
+        ),
         ("wheels: {rotor_inertia: [-1]}", "wheels.rotor_inertia.0: Input should be greater than 0"),
         ("wheels: {rotor_inertia: []}", "wheels.rotor_inertia: List should have at least 1 item"),
         ("wheels: {max_torque: [.nan]}", "wheels.max_torque.0: Input should be "),
@@ -116,7 +124,7 @@ def test_single_numbers_come_over_those_of_the_file() -> None:
         ("thrusters: {propellant: -1}", "thrusters.propellant: Input should be greater than or"),
         ("thrusters: {force: [1], force: [1]}", "line 1: not YAML .the key 'force' occurs twice"),
     ],
-)  # fmt: skip
+)
 def test_a_bad_number_is_one_line_with_file_and_key(tmp_path: Path, text: str, why: str) -> None:
     refuses(tmp_path, text, f"^{{path}}: {why}")
 
@@ -127,30 +135,50 @@ def test_a_bad_number_is_one_line_with_file_and_key(tmp_path: Path, text: str, w
         (HARDWARE, "base_actuation is hardware: wheels.axes or thrusters.positions lack$"),
         ("wheels: {axes: [1, 0, 0]}", "wheels are for base_actuation hardware, got 'ideal'$"),
         ("base_actuation: none, thrusters: {positions: [1, 0, 0]}", "thrusters are for base_actu"),
-        (HARDWARE + "wheels: {axes: [1, 0, 0, 0, 1, 0, 1, 1, 0]}",
-         "wheels.axes must span all directions: there are torques that they cannot give$"),
-        (HARDWARE + f"wheels: {{axes: {CROSS}, max_torque: [1, 2]}}",
-         "wheels.max_torque has 2 values, one for all or 3 are allowed: one a wheel$"),
-        (HARDWARE + f"wheels: {{axes: {CROSS}, rotor_inertia: [1, 201, 1]}}",
-         "wheels.rotor_inertia: the base's inertia must be larger than its rotors', without them "
-         "its smallest principal moment is -1 kg m2$"),
-        (HARDWARE + f"wheels: {{axes: {CROSS}, rotor_inertia: [0.1], max_momentum: [1], "
-         "initial_speed: [5, -20, 5]}", "wheels.initial_speed stores 2 N m s in wheel_2, "
-         "max_momentum is 1$"),
-        (HARDWARE + f"wheels: {{axes: {CROSS}, rotor_inertia: [0.1, 0.1, 0.3], max_momentum: "
-         "[0, 1, 2], initial_speed: [99, -10, 8]}", "wheels.initial_speed stores 2.4 N m s in "
-         "wheel_3, max_momentum is 2$"),
-        (HARDWARE + "thrusters: {positions: [1, 0, 0], directions: [1, 0, 0, 0, 1, 0]}",
-         "thrusters.directions are those of 2 thrusters, thrusters.positions of 1$"),
-        (HARDWARE + "thrusters: {positions: [1, 0, 0], directions: [1, 0, 0]}",
-         "thrusters.directions: no positive torque about x can be had of the thrusters$"),
-        (HARDWARE + "thrusters: {positions: [0, 1, 0], directions: [0, 0, 1], delay: [0, 0]}",
-         "thrusters.delay has 2 values, one for all or 1 are allowed: one a thruster$"),
-        (HARDWARE + "wheels: {axes: [1, 0, 0, 0, 1, 0]}, "
-         "thrusters: {positions: [1, 0, 0], directions: [0, 1, 0]}",
-         "thrusters.directions: no negative torque about z can be had of the thrusters and wheels"),
+        (
+            HARDWARE + "wheels: {axes: [1, 0, 0, 0, 1, 0, 1, 1, 0]}",
+            "wheels.axes must span all directions: there are torques that they cannot give$",
+        ),
+        (
+            HARDWARE + f"wheels: {{axes: {CROSS}, max_torque: [1, 2]}}",
+            "wheels.max_torque has 2 values, one for all or 3 are allowed: one a wheel$",
+        ),
+        (
+            HARDWARE + f"wheels: {{axes: {CROSS}, rotor_inertia: [1, 201, 1]}}",
+            "wheels.rotor_inertia: the base's inertia must be larger than its rotors', without "
+            "them "
+            "its smallest principal moment is -1 kg m2$",
+        ),
+        (
+            HARDWARE + f"wheels: {{axes: {CROSS}, rotor_inertia: [0.1], max_momentum: [1], "
+            "initial_speed: [5, -20, 5]}",
+            "wheels.initial_speed stores 2 N m s in wheel_2, max_momentum is 1$",
+        ),
+        (
+            HARDWARE + f"wheels: {{axes: {CROSS}, rotor_inertia: [0.1, 0.1, 0.3], max_momentum: "
+            "[0, 1, 2], initial_speed: [99, -10, 8]}",
+            "wheels.initial_speed stores 2.4 N m s in wheel_3, max_momentum is 2$",
+        ),
+        (
+            HARDWARE + "thrusters: {positions: [1, 0, 0], directions: [1, 0, 0, 0, 1, 0]}",
+            "thrusters.directions are those of 2 thrusters, thrusters.positions of 1$",
+        ),
+        (
+            HARDWARE + "thrusters: {positions: [1, 0, 0], directions: [1, 0, 0]}",
+            "thrusters.directions: no positive torque about x can be had of the thrusters$",
+        ),
+        (
+            HARDWARE + "thrusters: {positions: [0, 1, 0], directions: [0, 0, 1], delay: [0, 0]}",
+            "thrusters.delay has 2 values, one for all or 1 are allowed: one a thruster$",
+        ),
+        (
+            HARDWARE + "wheels: {axes: [1, 0, 0, 0, 1, 0]}, "
+            "thrusters: {positions: [1, 0, 0], directions: [0, 1, 0]}",
+            "thrusters.directions: no negative torque about z can be had of the thrusters and "
+            "wheels",
+        ),
     ],
-)  # fmt: skip
+)
 def test_numbers_that_do_not_fit_are_one_line_with_file_and_key(
     tmp_path: Path, text: str, why: str
 ) -> None:
@@ -192,9 +220,10 @@ def test_wheels_and_thrusters_may_span_together() -> None:
     flat = settings.thrusters.model_dump()
     about_z = {key: flat[key][24:] for key in ("positions", "directions")}
     given_settings = {
-        "base_actuation": "hardware", "wheels": settings.wheels.model_dump(),
+        "base_actuation": "hardware",
+        "wheels": settings.wheels.model_dump(),
         "thrusters": {**flat, **about_z},
-    }  # fmt: skip
+    }
     BaseActuatorSettings.model_validate(given_settings).check(PAPER, "mine")
 
 

@@ -7,17 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from paths import DATA
 
-from space_robot_model.robot.choice import (
-    RobotChoice,
-    split_choice,
-    with_choice,
-)
-from space_robot_model.robot.find import (
-    find_robot,
-    new_command,
-    robot_as_path,
-    robot_files,
-)
+from space_robot_model.robot.choice import RobotChoice, split_choice, with_choice
+from space_robot_model.robot.find import find_robot, new_command, robot_as_path, robot_files
 
 ARM = str(DATA / "arm.urdf")
 LINKS = st.one_of(st.none(), st.text(min_size=1).filter(lambda text: text.isprintable()))

@@ -8,10 +8,7 @@ from pathlib import Path
 import pytest
 from paths import CONFIG
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot_control.controller.gains import gain_files
 from space_robot_control.controller.settings import ControllerNodeSettings, set_file
 from space_robot_model.robot.find import (
@@ -106,6 +103,10 @@ def test_gains_need_no_sets(folder: Path) -> None:
     shutil.rmtree(folder / "gains")
     (folder / "flat").rename(folder / "gains")
     assert set(gain_files(f"{folder}/", "default")) == {
-        "ctc", "ctc_smc", "tde_smc", "tde_tsmc", "tde_stc"
-    }  # fmt: skip
+        "ctc",
+        "ctc_smc",
+        "tde_smc",
+        "tde_tsmc",
+        "tde_stc",
+    }
     assert set_file(f"{folder}/", "default") == [folder / "gains/controller.yaml"]

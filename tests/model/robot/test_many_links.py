@@ -13,10 +13,7 @@ import pytest
 from space_robot_model.robot import Robot
 from space_robot_model.robot.file import MOST_LINKS
 from space_robot_model.robot.tree import first_repeated
-from space_robot_model.robot.urdf.read import (
-    MOST_MOVING,
-    parse_urdf,
-)
+from space_robot_model.robot.urdf.read import MOST_MOVING, parse_urdf
 from space_robot_msgs_py.errors import InputError
 
 MATTER = (

@@ -19,10 +19,7 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.markers import RobotMarkers
 from space_robot_model.robot.poses import RobotPoses
-from space_robot_model.robot.shapes import (
-    LINK_COLOUR,
-    shapes_of,
-)
+from space_robot_model.robot.shapes import LINK_COLOUR, shapes_of
 from space_robot_model.robot.tree import Visual
 from space_robot_model.robot.urdf_text import urdf_text
 from space_robot_msgs_py import topics
@@ -95,9 +92,16 @@ SHAPES = (
     Visual("sphere", (0.5,), np.eye(3), np.ones(3), body=1),
     Visual("cylinder", (0.25, 2.0), np.eye(3), np.zeros(3), body=1),
     Visual("mesh", (1.0, 1.0, 2.0), np.eye(3), np.zeros(3), mesh="/a b.stl", body=1),
-    Visual("mesh", (1.0, 1.0, 1.0), np.eye(3), np.zeros(3), mesh="package://a/b.dae",
-           colour=(1.0, 0.0, 0.0, 1.0), body=2),
-)  # fmt: skip
+    Visual(
+        "mesh",
+        (1.0, 1.0, 1.0),
+        np.eye(3),
+        np.zeros(3),
+        mesh="package://a/b.dae",
+        colour=(1.0, 0.0, 0.0, 1.0),
+        body=2,
+    ),
+)
 
 
 def test_fields() -> None:
@@ -110,9 +114,12 @@ def test_fields() -> None:
     found = decode(data, topics.MARKERS.type).markers
     names = [(marker.ns, marker.id) for marker in found]
     assert names == [
-        ("sat1/base_link", 0), ("sat1/link1", 0), ("sat1/link1", 1), ("sat1/link1", 2),
+        ("sat1/base_link", 0),
+        ("sat1/link1", 0),
+        ("sat1/link1", 1),
+        ("sat1/link1", 2),
         ("sat1/link2", 0),
-    ]  # fmt: skip
+    ]
     assert [marker.type for marker in found] == [1, 2, 3, 10, 10]
     sizes = [[marker.scale.x, marker.scale.y, marker.scale.z] for marker in found]
     assert sizes == [[1, 2, 3], [1, 1, 1], [0.5, 0.5, 2], [1, 1, 2], [1, 1, 1]]
@@ -148,7 +155,8 @@ def test_rclpy_reads_it() -> None:
     turn = rotation_of(state.quaternion)
     base = message.markers[0].pose.orientation
     np.testing.assert_allclose(
-        Rotation.from_quat([base.x, base.y, base.z, base.w]).as_matrix(), turn.as_matrix(),
+        Rotation.from_quat([base.x, base.y, base.z, base.w]).as_matrix(),
+        turn.as_matrix(),
         atol=1e-14,
-    )  # fmt: skip
+    )
     assert serialization.deserialize_message(no_markers(), messages.MarkerArray).markers

@@ -11,10 +11,7 @@ from oracles import pinocchio_model, pinocchio_state, rotation_of
 from random_robots import random_robot, random_state
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.momentum import (
-    Motion,
-    robot_momentum,
-)
+from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_msgs_py.samples import RobotState
 from space_robot_sim.plant.conservation import momentum
 
@@ -25,9 +22,11 @@ def motion_of(states: list) -> Motion:
     """Random states as a flight; their velocities are on inertial axes, a flight's in the base."""
     omega = [rotation_of(state.quaternion).as_matrix().T @ state.w0 for state in states]
     return Motion(
-        np.array([state.quaternion for state in states]), np.array(omega),
-        np.array([state.theta for state in states]), np.array([state.rate for state in states]),
-    )  # fmt: skip
+        np.array([state.quaternion for state in states]),
+        np.array(omega),
+        np.array([state.theta for state in states]),
+        np.array([state.rate for state in states]),
+    )
 
 
 @given(SEEDS, st.integers(1, 8))
@@ -47,17 +46,20 @@ def test_of_a_rigid_body_it_is_inertia_times_rate(paper_robot: Robot) -> None:
     """An arm that stands in one posture: the momentum is linear in the rate, and symmetric."""
     rows, theta = 3, np.array([0.3, -0.8, 1.1, 0.2, -0.5, 0.9])
     still = Motion(
-        np.tile([1.0, 0.0, 0.0, 0.0], (rows, 1)), np.eye(3), np.tile(theta, (rows, 1)),
+        np.tile([1.0, 0.0, 0.0, 0.0], (rows, 1)),
+        np.eye(3),
+        np.tile(theta, (rows, 1)),
         np.zeros((rows, 6)),
-    )  # fmt: skip
+    )
     inertia = robot_momentum(paper_robot, still).angular
     np.testing.assert_allclose(inertia, inertia.T, atol=1e-10)
     assert np.linalg.eigvalsh(inertia).min() > 0.0
     base = robot_momentum(paper_robot, still).base
     np.testing.assert_allclose(base, base.T, atol=1e-10)
     lever = robot_momentum(paper_robot, still).centre_of_mass[0]
-    alone = paper_robot.inertia[0] + paper_robot.mass[0] * (lever @ lever * np.eye(3)
-                                                            - np.outer(lever, lever))  # fmt: skip
+    alone = paper_robot.inertia[0] + paper_robot.mass[0] * (
+        lever @ lever * np.eye(3) - np.outer(lever, lever)
+    )
     np.testing.assert_allclose(base, alone, rtol=1e-12, atol=1e-10)
     faster = robot_momentum(paper_robot, still._replace(omega_base=2.0 * np.eye(3))).angular
     np.testing.assert_allclose(faster, 2.0 * inertia, rtol=1e-13)

@@ -15,10 +15,7 @@ from random_trees import BASE, KINDS, random_bodies
 from tree_oracle import TreeOracle, pinocchio_tree
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.poses import (
-    RobotPoses,
-    tool_poses,
-)
+from space_robot_model.robot.poses import RobotPoses, tool_poses
 from space_robot_msgs_py.samples import RobotState
 from space_robot_msgs_py.topics import INERTIAL_FRAME
 

@@ -49,11 +49,7 @@ def test_the_shipped_robot(paper_robot: Robot) -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "said"),
-    [
-        ("weight", 1.0, "weight: unknown key"),
-        ("bodies", [], "bodies"),
-    ],
+    ("key", "value", "said"), [("weight", 1.0, "weight: unknown key"), ("bodies", [], "bodies")]
 )
 def test_wrong_numbers_are_refused(paper_robot: Robot, key: str, value: Any, said: str) -> None:
     content = paper_robot.content

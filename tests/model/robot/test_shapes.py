@@ -12,16 +12,9 @@ from random_robots import random_inertia
 from random_trees import random_bodies, random_rotation
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.find import (
-    find_robot,
-    robot_names,
-)
+from space_robot_model.robot.find import find_robot, robot_names
 from space_robot_model.robot.inertia import inertia_tensor
-from space_robot_model.robot.shapes import (
-    BASE_COLOUR,
-    even_box,
-    shapes_of,
-)
+from space_robot_model.robot.shapes import BASE_COLOUR, even_box, shapes_of
 from space_robot_model.robot.tree import Visual
 
 

@@ -10,11 +10,7 @@ from scipy.spatial.transform import Rotation
 from space_robot_model.robot import Robot
 from space_robot_model.robot.frame_names import frame_names
 from space_robot_model.robot.poses import RobotPoses
-from space_robot_model.robot.transforms import (
-    joint_transforms,
-    tool_transforms,
-    wxyz,
-)
+from space_robot_model.robot.transforms import joint_transforms, tool_transforms, wxyz
 from space_robot_msgs_py.samples import RobotState
 
 

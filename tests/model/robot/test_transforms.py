@@ -12,11 +12,7 @@ from tree_oracle import pinocchio_tree
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.frame_names import frame_names
-from space_robot_model.robot.transforms import (
-    joint_transforms,
-    tool_transforms,
-    wxyz,
-)
+from space_robot_model.robot.transforms import joint_transforms, tool_transforms, wxyz
 
 kinds = st.lists(st.sampled_from(KINDS), max_size=8).map(lambda some: ["revolute", *some])
 

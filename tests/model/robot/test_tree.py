@@ -15,13 +15,7 @@ from scipy.spatial.transform import Rotation
 from tree_oracle import TreeOracle, assert_same_dynamics, pinocchio_tree
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.tree import (
-    Body,
-    Joint,
-    Spring,
-    Tool,
-    flatten,
-)
+from space_robot_model.robot.tree import Body, Joint, Spring, Tool, flatten
 from space_robot_model.robot.tree.flatten import axes_with_z
 from space_robot_msgs_py.errors import InputError
 
@@ -124,11 +118,15 @@ def test_two_bodies_become_one_about_their_common_com() -> None:
         Body("hull", 2.0, point, np.zeros(3)),
         Body("arm", 1.0, np.diag([1.0, 2.0, 3.0]), np.zeros(3), "hull", Joint("j")),
         Body(
-            "tip", 3.0, np.diag([1.0, 2.0, 3.0]), np.zeros(3), "arm",
+            "tip",
+            3.0,
+            np.diag([1.0, 2.0, 3.0]),
+            np.zeros(3),
+            "arm",
             Joint("glue", "fixed", turn, turn.T @ np.array([4.0, 0.0, 0.0])),
             (Tool("hand", np.eye(3), np.array([0.0, 1.0, 0.0])),),
         ),
-    ]  # fmt: skip
+    ]
     robot = Robot.of_tree("glued", arm)
     assert robot.body_names == ("hull", "arm")
     np.testing.assert_allclose(robot.com[1], [3.0, 0.0, 0.0])
@@ -191,7 +189,8 @@ BAD: dict[str, tuple[Callable[[], list[Body]], str]] = {
     ),
     "too many passive ones": (
         lambda: [
-            HULL, ARM,
+            HULL,
+            ARM,
             *(
                 replace(ARM, name=f"a{k}", joint=Joint(f"j{k}", spring=Spring(1.0, 0.0)))
                 for k in range(25)
@@ -199,7 +198,7 @@ BAD: dict[str, tuple[Callable[[], list[Body]], str]] = {
         ],
         "at most 24 passive joints can be flown, here are 25",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", BAD)
@@ -214,10 +213,14 @@ def test_what_is_no_tree_is_said_in_one_line(name: str) -> None:
 
 def test_many_bodies_in_a_row_are_walked_without_recursion() -> None:
     chain = [
-        replace(ARM, name=f"b{k}", parent=f"b{k - 1}" if k else "hull",
-                joint=Joint(f"j{k}", "revolute" if k == 0 else "fixed"))
+        replace(
+            ARM,
+            name=f"b{k}",
+            parent=f"b{k - 1}" if k else "hull",
+            joint=Joint(f"j{k}", "revolute" if k == 0 else "fixed"),
+        )
         for k in range(3000)
-    ]  # fmt: skip
+    ]
     walked = flatten([HULL, *chain[::-1]])
     assert len(walked) == 2
     assert walked[1].body.mass == 3000.0

@@ -20,29 +20,13 @@ from random_trees import KINDS, random_bodies
 from scipy.spatial.transform import Rotation
 from tree_oracle import TreeOracle, assert_same_dynamics
 
-from space_robot_model.elementary.rotations import (
-    rotation_of_rpy,
-    rpy_of_rotation,
-)
+from space_robot_model.elementary.rotations import rotation_of_rpy, rpy_of_rotation
 from space_robot_model.robot import Robot
-from space_robot_model.robot.find import (
-    find_robot,
-    robot_names,
-)
+from space_robot_model.robot.find import find_robot, robot_names
 from space_robot_model.robot.frame_names import frame_names
 from space_robot_model.robot.shapes import shapes_of
-from space_robot_model.robot.transforms import (
-    joint_transforms,
-    tool_transforms,
-)
-from space_robot_model.robot.tree import (
-    Body,
-    Joint,
-    JointFriction,
-    JointLimits,
-    Tool,
-    Visual,
-)
+from space_robot_model.robot.transforms import joint_transforms, tool_transforms
+from space_robot_model.robot.tree import Body, Joint, JointFriction, JointLimits, Tool, Visual
 from space_robot_model.robot.urdf_text import urdf_text
 from space_robot_msgs_py.topics import INERTIAL_FRAME
 
@@ -72,9 +56,10 @@ def read_back(robot: Robot) -> Robot:
     for number, (name, spring) in enumerate(zip(robot.passive_names, robot.springs, strict=True)):
         slides = robot.is_prismatic[robot.n + number]
         passive[name] = {
-            "stiffness": spring.stiffness, "damping": spring.damping,
+            "stiffness": spring.stiffness,
+            "damping": spring.damping,
             "rest_deg": spring.rest if slides else float(np.degrees(spring.rest)),
-        }  # fmt: skip
+        }
     content = {
         "urdf_text": urdf_text(robot),
         "passive": passive,
@@ -169,8 +154,11 @@ def test_shapes(name: str, tmp_path: Path) -> None:
     assert len(found.visuals) == len(expected) > 0
     for shape, given_shape in zip(found.visuals, expected, strict=True):
         assert (shape.shape, shape.size, shape.mesh, shape.colour) == (
-            given_shape.shape, given_shape.size, given_shape.mesh, given_shape.colour,
-        )  # fmt: skip
+            given_shape.shape,
+            given_shape.size,
+            given_shape.mesh,
+            given_shape.colour,
+        )
         assert found.body_names[shape.body] == frame_names(robot).bodies[given_shape.body]
         np.testing.assert_allclose(shape.position, given_shape.position, atol=1e-14)
         np.testing.assert_allclose(shape.rotation, given_shape.rotation, atol=1e-14)
@@ -186,9 +174,23 @@ def robot_of(base: str, link: str, tool: str, **more: Any) -> Robot:
 
 
 NAMES = st.sampled_from(
-    ["base", "base_link", "joint1", "link1", "link1_body", "tool", "tool_joint", "a", "a_link",
-     INERTIAL_FRAME, "/a\nb", "a_b", "--", "<&\"'"]
-)  # fmt: skip
+    [
+        "base",
+        "base_link",
+        "joint1",
+        "link1",
+        "link1_body",
+        "tool",
+        "tool_joint",
+        "a",
+        "a_link",
+        INERTIAL_FRAME,
+        "/a\nb",
+        "a_b",
+        "--",
+        "<&\"'",
+    ]
+)
 
 
 @given(
@@ -224,10 +226,13 @@ def test_every_name_of_a_urdf_is_there_once(
 @pytest.mark.parametrize(
     ("body", "joint", "link"),
     [
-        ("joint1", "joint1", "link1"), ("LeftJoint_2", "LeftJoint_2", "LeftLink_2"),
-        ("elbow", "elbow", "elbow_link"), ("arm", "shoulder", "arm"), ("link1", "joint1", "link1"),
+        ("joint1", "joint1", "link1"),
+        ("LeftJoint_2", "LeftJoint_2", "LeftLink_2"),
+        ("elbow", "elbow", "elbow_link"),
+        ("arm", "shoulder", "arm"),
+        ("link1", "joint1", "link1"),
     ],
-)  # fmt: skip
+)
 @pytest.mark.parametrize(("base", "root"), [("base", "base_link"), ("hull", "hull")])
 def test_frames_are_named_as_ros_does(
     body: str, joint: str, link: str, base: str, root: str

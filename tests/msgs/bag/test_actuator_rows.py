@@ -41,9 +41,13 @@ def flown(names: RobotNames = NAMES) -> FlightLog:
 
 
 def recorded(
-    log: FlightLog, folder: Path, names: RobotNames = NAMES, keep: Keep = lambda topic, tick: True,
-    commanded: tuple[str, ...] = (), faults: list[str] | None = None,
-) -> FlightLog:  # fmt: skip
+    log: FlightLog,
+    folder: Path,
+    names: RobotNames = NAMES,
+    keep: Keep = lambda topic, tick: True,
+    commanded: tuple[str, ...] = (),
+    faults: list[str] | None = None,
+) -> FlightLog:
     """The flight read from a bag of the messages that are kept."""
     recorder = BagRecorder(folder, {**FLIGHT, "faults": faults or []}, TIMEBASE)
     states, order = StateCodec(names, TIMEBASE), commanded or names.commanded
@@ -109,9 +113,10 @@ def test_a_command_of_another_order_is_read_by_name(tmp_path: Path) -> None:
 def test_lost_states_of_wheels_are_counted_and_leave_gaps(tmp_path: Path) -> None:
     log = flown()
     read = recorded(
-        log, tmp_path / "bag",
+        log,
+        tmp_path / "bag",
         keep=lambda topic, tick: topic is not topics.WHEELS_STATE or tick not in (7, 8, 200),
-    )  # fmt: skip
+    )
     assert read.lost[topics.WHEELS_STATE.full_name] == 3
     gaps = np.flatnonzero(np.isnan(read.wheel_velocities).any(axis=1))
     assert gaps.tolist() == [7, 8, 200]
@@ -122,9 +127,11 @@ def test_states_that_a_fault_kept_back_have_the_wheels_of_before(tmp_path: Path)
     """All parts of a state are kept back as one, and filled as one; none is called lost."""
     log = flown()
     read = recorded(
-        log, tmp_path / "bag", keep=lambda topic, tick: topic not in topics.STATES or tick != 50,
+        log,
+        tmp_path / "bag",
+        keep=lambda topic, tick: topic not in topics.STATES or tick != 50,
         faults=["drop_state@0"],
-    )  # fmt: skip
+    )
     assert read.filled == 1
     assert not any(read.lost[topic.full_name] for topic in topics.STATES)
     for name in (*ACTUATOR_FIELDS, "quaternion"):

@@ -11,10 +11,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import get_types_from_msg
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -44,8 +41,15 @@ def _mcap(bag: Path) -> Path:
 def test_flight_read_back_is_the_flight_flown(flown: tuple[Path, FlightLog]) -> None:
     bag, log = flown
     read = read_flight(bag)
-    for column in ("quaternion", "omega_base", "joint_positions", "joint_velocities",
-                   "applied_torque", "reference_joints", "reference_base"):  # fmt: skip
+    for column in (
+        "quaternion",
+        "omega_base",
+        "joint_positions",
+        "joint_velocities",
+        "applied_torque",
+        "reference_joints",
+        "reference_base",
+    ):
         np.testing.assert_array_equal(getattr(read, column), getattr(log, column))
     assert read.flight == log.flight
     assert read.lost == log.lost

@@ -72,9 +72,15 @@ def _zero(content: bytearray, a: int, b: int, number: int, some: bytes) -> None:
 
 
 KINDS: dict[str, Callable[[bytearray, int, int, int, bytes], None]] = {
-    "flip": _flip, "put": _put, "insert": _insert, "cut": _cut, "end": _end, "swap": _swap,
-    "repeat": _repeat, "zero": _zero,
-}  # fmt: skip
+    "flip": _flip,
+    "put": _put,
+    "insert": _insert,
+    "cut": _cut,
+    "end": _end,
+    "swap": _swap,
+    "repeat": _repeat,
+    "zero": _zero,
+}
 
 places = st.floats(0.0, 1.0, exclude_max=True) | st.floats(1.0, 200.0)
 changes = st.tuples(

@@ -71,13 +71,16 @@ def test_bag_of_rosbags_is_the_same_flight(
 @pytest.mark.parametrize(
     "options",
     [
-        {"compression": CompressionType.NONE}, {"compression": CompressionType.ZSTD},
-        {"compression": CompressionType.LZ4, "chunk_size": 3000}, {"use_chunking": False},
-        {"enable_crcs": False}, {"use_statistics": False},
+        {"compression": CompressionType.NONE},
+        {"compression": CompressionType.ZSTD},
+        {"compression": CompressionType.LZ4, "chunk_size": 3000},
+        {"use_chunking": False},
+        {"enable_crcs": False},
+        {"use_statistics": False},
         {"repeat_channels": False, "repeat_schemas": False},
     ],
     ids=str,
-)  # fmt: skip
+)
 def test_mcap_file_alone_is_the_same_flight_however_it_is_written(
     recorded: Recorded, entries: list[Entry], tmp_path: Path, options: dict[str, Any]
 ) -> None:

@@ -12,18 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_logs import random_log
 
-from space_robot.analysis import (
-    Analysis,
-    analyze,
-)
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
-from space_robot.flight.simulate import (
-    fly_blocks,
-    simulate,
-)
+from space_robot.analysis import Analysis, analyze
+from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.simulate import fly_blocks, simulate
 from space_robot_msgs_py.bag import blocks
 from space_robot_msgs_py.bag.blocks import BLOCK_TICKS, block_bounds, blocks_of, joined, last_rows
 from space_robot_msgs_py.bag.flight_log import REFERENCE, FlightLog

@@ -271,10 +271,7 @@ def test_a_broken_db3_is_told_in_a_line(tmp_path: Path) -> None:
         ("UPDATE topics SET name = x'00ff' WHERE name = '/clock'", "messages that are none"),
         ("UPDATE messages SET data = 999999999999 WHERE id = 5", "1 messages that are none"),
         ("UPDATE messages SET timestamp = 'noon' WHERE id = 7", "cannot be read to its end"),
-        (
-            "UPDATE topics SET type = 'a\nb' WHERE name = '/clock'",
-            "left out: of type a?b",
-        ),
+        ("UPDATE topics SET type = 'a\nb' WHERE name = '/clock'", "left out: of type a?b"),
     ],
 )
 def test_anything_in_any_place_of_a_db3_is_left_out(

@@ -22,17 +22,11 @@ from hypothesis import strategies as st
 
 from space_robot.analysis import analyze
 from space_robot.analysis.figures.figure_set import FigureSet
-from space_robot.analysis.report_tables import (
-    metrics_table,
-    rms_table,
-)
+from space_robot.analysis.report_tables import metrics_table, rms_table
 from space_robot.cli.report_display import print_comparison
 from space_robot.console.terminal import terminal
 from space_robot.console.terminal_tables import print_table
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.replay.recording import Recording
 from space_robot.flight.simulate import simulate
@@ -52,14 +46,47 @@ MODULE = "this"
 PLAN = FlightPlan(duration=0.02, swaps=["0.005:ctc"], case="3", actuators="wheels")
 
 scalars = st.one_of(
-    st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=12),
-    st.sampled_from([
-        0, -1, 1e300, 1e-300, 10**400, float("nan"), float("inf"), -0.0, 2**64,
-        "", "[/red]", "[bold", r"$\frac$", ":smile:", "_x", "a" * 400, "\x1b[31m", "\ud800", "\x00",
-        "<script>", f"{MODULE}:X", "0.1:this:X", "/etc/passwd", "../../x.yaml", "..", "ctc",
-        "tde_stc", "seven_joint", "nan", "0.01:ctc", "default",
-    ]),
-)  # fmt: skip
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.floats(),
+    st.text(max_size=12),
+    st.sampled_from(
+        [
+            0,
+            -1,
+            1e300,
+            1e-300,
+            10**400,
+            float("nan"),
+            float("inf"),
+            -0.0,
+            2**64,
+            "",
+            "[/red]",
+            "[bold",
+            r"$\frac$",
+            ":smile:",
+            "_x",
+            "a" * 400,
+            "\x1b[31m",
+            "\ud800",
+            "\x00",
+            "<script>",
+            f"{MODULE}:X",
+            "0.1:this:X",
+            "/etc/passwd",
+            "../../x.yaml",
+            "..",
+            "ctc",
+            "tde_stc",
+            "seven_joint",
+            "nan",
+            "0.01:ctc",
+            "default",
+        ]
+    ),
+)
 values = st.recursive(
     scalars,
     lambda inner: st.one_of(
@@ -68,9 +95,11 @@ values = st.recursive(
     max_leaves=9,
 )
 edits = st.tuples(
-    st.sampled_from(["put", "put", "put", "delete", "add"]), st.floats(0, 1, exclude_max=True),
-    st.integers(0, 2**20), values,
-)  # fmt: skip
+    st.sampled_from(["put", "put", "put", "delete", "add"]),
+    st.floats(0, 1, exclude_max=True),
+    st.integers(0, 2**20),
+    values,
+)
 
 
 @pytest.fixture(scope="module")
@@ -160,13 +189,27 @@ def test_what_is_no_json_is_told(bag: Path, text: str) -> None:
 @pytest.mark.parametrize(
     "changes",
     [
-        {"period": 0}, {"period": float("nan")}, {"period": "abc"}, {"period": 1e300},
-        {"period": True}, {"parameters": None}, {"parameters": []}, {"parameters": {"plant": 3}},
-        {"gains_used": None}, {"gains_used": {"h_bar": "x"}}, {"gains_used": {"h_bar": [[1]]}},
-        {"robot_file": []}, {"swaps": "0.1:ctc"}, {"swaps": [1]}, {"faults": None}, {"case": 3},
-        {"controller": ["tde_stc"]}, {"command_latency_ticks": "2"}, {"realtime": "no"},
+        {"period": 0},
+        {"period": float("nan")},
+        {"period": "abc"},
+        {"period": 1e300},
+        {"period": True},
+        {"parameters": None},
+        {"parameters": []},
+        {"parameters": {"plant": 3}},
+        {"gains_used": None},
+        {"gains_used": {"h_bar": "x"}},
+        {"gains_used": {"h_bar": [[1]]}},
+        {"robot_file": []},
+        {"swaps": "0.1:ctc"},
+        {"swaps": [1]},
+        {"faults": None},
+        {"case": 3},
+        {"controller": ["tde_stc"]},
+        {"command_latency_ticks": "2"},
+        {"realtime": "no"},
     ],
-)  # fmt: skip
+)
 def test_each_wrong_key_is_named_in_a_line(bag: Path, changes: dict[str, Any]) -> None:
     """Once tracebacks of `replay`, and of `analyze`."""
     described = {**json.loads(description()), **changes}

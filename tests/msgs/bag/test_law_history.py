@@ -9,15 +9,9 @@ import pytest
 
 from space_robot.analysis import analyze
 from space_robot.analysis.described import estimator
-from space_robot.analysis.estimate_error import (
-    EstimateErrors,
-    HBar,
-)
+from space_robot.analysis.estimate_error import EstimateErrors, HBar
 from space_robot.analysis.excerpt import excerpt
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.replay.laws import RecordedLaws
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -87,7 +81,7 @@ def test_same_is_to_the_last_bit() -> None:
         ([6001], ["tde_stc"]),
         ([1, 5999], ["tde_stc", "tde_stc"]),
     ],
-)  # fmt: skip
+)
 def test_laws_are_put_in_force_before_their_states(states: list[int], done: list[str]) -> None:
     """Of several between two states the last; a controller that began again begins again."""
     told: list[str] = []
@@ -106,8 +100,10 @@ def swapped() -> FlightLog:
 def test_the_report_has_all_laws_that_flew(swapped: FlightLog) -> None:
     report = analyze(swapped)
     assert [(law["tick"], law["t_s"], law["controller"]) for law in report["laws"]] == [
-        (0, 0.0, "tde_stc"), (200, 0.1, "ctc"), (400, 0.2, "tde_smc"),
-    ]  # fmt: skip
+        (0, 0.0, "tde_stc"),
+        (200, 0.1, "ctc"),
+        (400, 0.2, "tde_smc"),
+    ]
     assert set(report["laws"][1]["gains"]) == {"k_p", "k_d"}
     part = analyze(excerpt(swapped, 0.15, 0.25))
     assert part["controller"] == "ctc"

@@ -12,10 +12,7 @@ import pytest
 from paths import DOCS
 
 from space_robot import load_bag
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
@@ -35,11 +32,17 @@ def test_arrays_have_the_shapes_they_say(bag: Path) -> None:
     assert log.description["controller"] == "tde_stc"
     np.testing.assert_allclose(log.time, np.arange(400) * 0.0005)
     for array, shape in (
-        (log.quaternion, (4,)), (log.angular_velocity, (3,)), (log.base_position, (3,)),
-        (log.base_velocity, (3,)), (log.joint_positions, (n,)), (log.joint_velocities, (n,)),
-        (log.applied_torque, (n + 3,)), (log.commanded_torque, (n + 3,)),
-        (log.reference_joints, (3, n)), (log.reference_base, (10,)),
-    ):  # fmt: skip
+        (log.quaternion, (4,)),
+        (log.angular_velocity, (3,)),
+        (log.base_position, (3,)),
+        (log.base_velocity, (3,)),
+        (log.joint_positions, (n,)),
+        (log.joint_velocities, (n,)),
+        (log.applied_torque, (n + 3,)),
+        (log.commanded_torque, (n + 3,)),
+        (log.reference_joints, (3, n)),
+        (log.reference_base, (10,)),
+    ):
         assert array is not None
         assert array.shape == (400, *shape)
         assert array.dtype == np.float64

@@ -18,10 +18,7 @@ from mcap.records import MessageIndex
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.chunk import OpenChunk
@@ -93,15 +90,16 @@ def split(messages: Messages, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 MESSAGE = st.tuples(
-    st.integers(1, 9), st.integers(0, 2**63), st.integers(0, 2**63), st.integers(0, 2**32 - 1),
+    st.integers(1, 9),
+    st.integers(0, 2**63),
+    st.integers(0, 2**63),
+    st.integers(0, 2**32 - 1),
     st.binary(max_size=50),
-)  # fmt: skip
+)
 
 
 @given(st.lists(MESSAGE, min_size=1))
-def test_chunk_is_packed_as_mcap_packs_it(
-    messages: list[tuple[int, int, int, int, bytes]],
-) -> None:
+def test_chunk_is_packed_as_mcap_packs_it(messages: list[tuple[int, int, int, int, bytes]]) -> None:
     chunk, builder = OpenChunk(b"before"), RecordBuilder()
     starts: dict[int, list[tuple[int, int]]] = {}
     for channel, log, publish, sequence, data in messages:

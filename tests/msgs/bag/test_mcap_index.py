@@ -14,10 +14,7 @@ import pytest
 from mcap.opcode import Opcode
 from mcap.stream_reader import StreamReader
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.samples import Timebase

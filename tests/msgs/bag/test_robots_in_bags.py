@@ -127,8 +127,11 @@ def test_topics_alike_do_not_make_a_robot(
 
 def test_namespaces_are_names_of_ros() -> None:
     assert [full_namespace(text) for text in ("", "/", "sat1", "/a/b_2/")] == [
-        "/", "/", "/sat1", "/a/b_2",
-    ]  # fmt: skip
+        "/",
+        "/",
+        "/sat1",
+        "/a/b_2",
+    ]
     for text in ("1sat", "a b", "sat-1", "a//b", "a__b", "~x", "{node}"):
         with pytest.raises(InputError, match="no digit first"):
             full_namespace(text)

@@ -46,9 +46,8 @@ def graph() -> Graph:
 
 
 @given(
-    st.integers(0, 40), st.integers(0, 40), st.sets(st.integers(1, 40)), st.randoms(),
-    st.booleans(),
-)  # fmt: skip
+    st.integers(0, 40), st.integers(0, 40), st.sets(st.integers(1, 40)), st.randoms(), st.booleans()
+)
 def test_lost_is_what_was_sent_and_did_not_come(
     ours: int, foreign: int, dropped: set[int], order: random.Random, is_told: bool
 ) -> None:

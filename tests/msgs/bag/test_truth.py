@@ -13,19 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sensor_bench import Bench
 
-from space_robot.analysis import (
-    Analysis,
-    analyze,
-    excerpt,
-)
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
-from space_robot.flight.simulate import (
-    fly_blocks,
-    simulate,
-)
+from space_robot.analysis import Analysis, analyze, excerpt
+from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.simulate import fly_blocks, simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag import blocks
 from space_robot_msgs_py.bag.blocks import joined, last_rows

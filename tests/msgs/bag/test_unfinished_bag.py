@@ -23,10 +23,7 @@ from rich.console import Console
 from space_robot.analysis import analyze
 from space_robot.analysis.report_tables import rms_table
 from space_robot.console.terminal_tables import print_table
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog

@@ -33,8 +33,9 @@ def top(x: float) -> float:
 def test_kernels_are_counted_through_subroutines_once_each() -> None:
     files = index_files([top, leaf])
     assert sorted(Path(file).name.split("-")[0] for file in files) == [
-        "test_call_graph.leaf", "test_call_graph.top"
-    ]  # fmt: skip
+        "test_call_graph.leaf",
+        "test_call_graph.top",
+    ]
     assert index_files([within]) == index_files([leaf])
     assert not files & index_files([unused])
 

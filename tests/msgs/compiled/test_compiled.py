@@ -32,9 +32,12 @@ def run(tmp_path: Path, cache: Path) -> subprocess.CompletedProcess[str]:
     program = PROGRAM.format(file=str(tmp_path / "some_kernel.py"))
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache), "TMPDIR": str(tmp_path)}
     return subprocess.run(
-        [sys.executable, "-c", program], env=environment, capture_output=True, text=True,
+        [sys.executable, "-c", program],
+        env=environment,
+        capture_output=True,
+        text=True,
         check=False,
-    )  # fmt: skip
+    )
 
 
 def check_elsewhere(tmp_path: Path, cache: Path, why: str) -> None:

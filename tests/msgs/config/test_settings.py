@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot_control.controller.gains import build_law, gain_files, read_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.guidance.settings import MissionNodeSettings

@@ -36,13 +36,22 @@ MERGED_BOMB = "a: &a {x: 1}\n" + "".join(
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ("1e3", 1000.0), ("-1.5E3", -1500.0), (".5e-2", 0.005), ("1E+2", 100.0), ("1", 1),
-        ("2020-01-02", "2020-01-02"), ("2020-13-45", "2020-13-45"), ("e3", "e3"), ("1e", "1e"),
-        ("[a, {b: c}]", ["a", {"b": "c"}]), ("", None), ("&a [1, *b]".replace("*b", "2"), [1, 2]),
+        ("1e3", 1000.0),
+        ("-1.5E3", -1500.0),
+        (".5e-2", 0.005),
+        ("1E+2", 100.0),
+        ("1", 1),
+        ("2020-01-02", "2020-01-02"),
+        ("2020-13-45", "2020-13-45"),
+        ("e3", "e3"),
+        ("1e", "1e"),
+        ("[a, {b: c}]", ["a", {"b": "c"}]),
+        ("", None),
+        ("&a [1, *b]".replace("*b", "2"), [1, 2]),
         ("{a: &a [1], b: *a}", {"a": [1], "b": [1]}),
         ("{a: &a {x: 1}, b: {<<: *a, y: 2}}", {"a": {"x": 1}, "b": {"x": 1, "y": 2}}),
     ],
-)  # fmt: skip
+)
 def test_values(text: str, value: Any) -> None:
     read = parse_yaml(text)
     assert read == value
@@ -92,11 +101,55 @@ def test_no_more_than_aliases_is_repeated() -> None:
 
 
 _WORDS = st.sampled_from(
-    ["a", "b:", "- ", "[", "]", "{", "}", ",", ": ", "&a ", "*a", "!!int ", "!!map ", "!!set ",
-     "!!float ", "!!binary ", "!x ", "<<: ", "? ", "|", ">", "\n", "\n  ", "'", '"', "#", "%", "@",
-     "1", "1e9999", ".nan", "-.inf", "0x", "1:30", "2020-13-45", "~", "---\n", "...", "\t", "é",
-     "\0", "\x7f", "true", "yes", "=", "9" * 30]
-)  # fmt: skip
+    [
+        "a",
+        "b:",
+        "- ",
+        "[",
+        "]",
+        "{",
+        "}",
+        ",",
+        ": ",
+        "&a ",
+        "*a",
+        "!!int ",
+        "!!map ",
+        "!!set ",
+        "!!float ",
+        "!!binary ",
+        "!x ",
+        "<<: ",
+        "? ",
+        "|",
+        ">",
+        "\n",
+        "\n  ",
+        "'",
+        '"',
+        "#",
+        "%",
+        "@",
+        "1",
+        "1e9999",
+        ".nan",
+        "-.inf",
+        "0x",
+        "1:30",
+        "2020-13-45",
+        "~",
+        "---\n",
+        "...",
+        "\t",
+        "é",
+        "\0",
+        "\x7f",
+        "true",
+        "yes",
+        "=",
+        "9" * 30,
+    ]
+)
 
 
 @given(st.lists(_WORDS, max_size=30).map("".join) | st.text(max_size=50))
@@ -108,12 +161,17 @@ def test_any_text_is_read_or_refused_in_one_line(text: str) -> None:
 
 
 _PLAIN = st.recursive(
-    st.none() | st.booleans() | st.integers(-(2**63), 2**63) | st.floats(allow_nan=False)
+    st.none()
+    | st.booleans()
+    | st.integers(-(2**63), 2**63)
+    | st.floats(allow_nan=False)
     | st.text("abcäöü -_:/#[]{}'\"\\n1e5", max_size=12),
-    lambda inner: st.lists(inner, max_size=4)
-    | st.dictionaries(st.text("abc é", min_size=1, max_size=5), inner, max_size=4),
+    lambda inner: (
+        st.lists(inner, max_size=4)
+        | st.dictionaries(st.text("abc é", min_size=1, max_size=5), inner, max_size=4)
+    ),
     max_leaves=20,
-)  # fmt: skip
+)
 
 
 @given(_PLAIN)
@@ -123,9 +181,9 @@ def test_what_was_written_is_read(value: Any) -> None:
 
 @pytest.mark.parametrize("kind", ["missing", "folder", "pipe", "device", "long", "nul", "bytes"])
 def test_what_is_no_readable_file(tmp_path: Path, kind: str) -> None:
-    path = {
-        "device": Path("/dev/zero"), "long": Path("a" * 300), "nul": Path("a\0b"),
-    }.get(kind, tmp_path / "it.yaml")  # fmt: skip
+    path = {"device": Path("/dev/zero"), "long": Path("a" * 300), "nul": Path("a\0b")}.get(
+        kind, tmp_path / "it.yaml"
+    )
     if kind == "folder":
         path.mkdir()
     elif kind == "pipe":

@@ -52,12 +52,14 @@ def test_every_change_of_mode_or_level_is_reported_and_nothing_else_at_once() ->
     node: Any = Node()
     diagnostics, timebase = Diagnostics(node), Timebase(500_000)
     reports = [
-        Health("nominal"), Health("nominal", values={"tick": 3}), Health("nominal", Level.WARN),
-        Health("holding", Level.WARN), Health("holding", Level.WARN), Health("nominal"),
-    ]  # fmt: skip
+        Health("nominal"),
+        Health("nominal", values={"tick": 3}),
+        Health("nominal", Level.WARN),
+        Health("holding", Level.WARN),
+        Health("holding", Level.WARN),
+        Health("nominal"),
+    ]
     for health in reports:
         diagnostics.report(health, timebase)
     told = [(array.status[0].message, array.status[0].level) for array in node.sent]
-    assert told == [
-        ("nominal", b"\0"), ("nominal", b"\1"), ("holding", b"\1"), ("nominal", b"\0")
-    ]  # fmt: skip
+    assert told == [("nominal", b"\0"), ("nominal", b"\1"), ("holding", b"\1"), ("nominal", b"\0")]

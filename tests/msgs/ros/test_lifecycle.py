@@ -137,9 +137,11 @@ def test_bad_commands_are_refused_counted_and_change_nothing(
     start: Start, ground: Ground, tmp_path: Any
 ) -> None:
     nodes: list[subprocess.Popen[str]] = [
-        start("recorder", bag=tmp_path / "bag"), start("mission"), start("controller"),
+        start("recorder", bag=tmp_path / "bag"),
+        start("mission"),
+        start("controller"),
         start("plant"),
-    ]  # fmt: skip
+    ]
     ground.until(lambda: ground.monitor.simulated_s > 0.1, "a flight")
     axes = Robot.from_yaml("config/robots/paper.yaml").axis_names
     rogue = Rogue(ground, axes)

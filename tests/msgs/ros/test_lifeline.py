@@ -84,9 +84,12 @@ def test_standard_input_is_left_alone_unless_it_is_a_lifeline(tmp_path: Path) ->
     """A node by hand reads /dev/null or a terminal; its end means nothing."""
     environment = {key: value for key, value in os.environ.items() if key != lifeline.VARIABLE}
     process = subprocess.Popen(
-        [sys.executable, "-c", HOLDING, "good"], stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE, text=True, env=environment,
-    )  # fmt: skip
+        [sys.executable, "-c", HOLDING, "good"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=environment,
+    )
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
     with pytest.raises(subprocess.TimeoutExpired):

@@ -64,9 +64,11 @@ def test_notes_of_earlier_holders_are_found_the_newest_last() -> None:
 def test_killed_holder_is_named_and_leaves_the_lock_at_once() -> None:
     path = node_lock(42, "/plant_node")
     process = subprocess.Popen(
-        [sys.executable, "-c", HOLDER, str(path)], stdout=subprocess.PIPE, text=True,
+        [sys.executable, "-c", HOLDER, str(path)],
+        stdout=subprocess.PIPE,
+        text=True,
         env={**os.environ, lifeline.VARIABLE: "1234"},
-    )  # fmt: skip
+    )
     assert process.stdout is not None
     assert process.stdout.readline() == "ready\n"
     holder = Holder(f"plant_node (pid {process.pid})", starter=1234)

@@ -31,7 +31,10 @@ def test_ros_starts_without_a_home(home: str | None) -> None:
         f"TemporaryNode('nobody', {os.getpid() % 100}).leave()"
     )
     result = subprocess.run(
-        [sys.executable, "-c", program], check=False, capture_output=True, text=True,
+        [sys.executable, "-c", program],
+        check=False,
+        capture_output=True,
+        text=True,
         env={**environment, **({} if home is None else {"HOME": home})},
-    )  # fmt: skip
+    )
     assert result.returncode == 0, result.stderr

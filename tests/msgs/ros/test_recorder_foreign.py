@@ -15,10 +15,7 @@ from bags import COLUMNS, messages_of, read_accounts
 from flights import Start, ros_environment
 from paths import TESTS
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.reader import read_flight
@@ -90,9 +87,11 @@ class Player:
 
 
 @pytest.mark.parametrize(
-    "flood", [("malformed", 100), ("echo", 300), ("future", 10)], indirect=True,
+    "flood",
+    [("malformed", 100), ("echo", 300), ("future", 10)],
+    indirect=True,
     ids=lambda given: given[0],
-)  # fmt: skip
+)
 def test_the_bag_is_the_flight_and_nothing_else(
     start: Start, ground: Ground, tmp_path: Path, flood: subprocess.Popen[bytes]
 ) -> None:

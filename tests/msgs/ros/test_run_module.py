@@ -17,9 +17,13 @@ SHOW = 'import json, sys; print(json.dumps({"argv": sys.argv[1:], "path": sys.pa
 
 def _run(command: list[str], folder: Path, **environment: str) -> dict[str, list[str]]:
     done = subprocess.run(
-        command, cwd=folder, env={**os.environ, **environment}, capture_output=True, text=True,
+        command,
+        cwd=folder,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
         check=True,
-    )  # fmt: skip
+    )
     found: dict[str, list[str]] = json.loads(done.stdout)
     return found
 

@@ -123,9 +123,13 @@ def test_the_rclpy_here_tells_publishers(fresh: None) -> None:
     ids=["another version", "no version", "no library", "no function"],
 )
 def test_where_rcl_is_not_as_expected_rclpy_takes(
-    node: rclpy.node.Node, monkeypatch: pytest.MonkeyPatch, fresh: None, where: Any, what: str,
+    node: rclpy.node.Node,
+    monkeypatch: pytest.MonkeyPatch,
+    fresh: None,
+    where: Any,
+    what: str,
     instead: Any,
-) -> None:  # fmt: skip
+) -> None:
     with monkeypatch.context() as patch:
         patch.setattr(where, what, instead)
         assert serialized_take() is take_by_rclpy

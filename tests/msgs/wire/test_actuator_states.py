@@ -46,9 +46,12 @@ def state_of(names: RobotNames, seed: int, tick: int) -> RobotState:
 
 
 @given(
-    st.integers(1, 7), st.integers(0, MOST_WHEELS), st.integers(0, MOST_THRUSTERS),
-    st.integers(0, 2**32 - 1), st.integers(0, 4 * 10**9),
-)  # fmt: skip
+    st.integers(1, 7),
+    st.integers(0, MOST_WHEELS),
+    st.integers(0, MOST_THRUSTERS),
+    st.integers(0, 2**32 - 1),
+    st.integers(0, 4 * 10**9),
+)
 def test_a_state_comes_back_whole_whatever_actuators_it_has(
     joints: int, wheels: int, thrusters: int, seed: int, tick: int
 ) -> None:
@@ -56,10 +59,11 @@ def test_a_state_comes_back_whole_whatever_actuators_it_has(
     state, back = state_of(names, seed, tick), RobotState.allocate(joints)
     writer, reader = StateCodec(names, TIMEBASE), StateCodec(names, TIMEBASE)
     assert set(writer.topics) == {
-        topics.JOINT_STATES, topics.BASE_STATE,
+        topics.JOINT_STATES,
+        topics.BASE_STATE,
         *([topics.WHEELS_STATE] if wheels else []),
         *([topics.THRUSTERS_STATE] if thrusters else []),
-    }  # fmt: skip
+    }
     for topic, data in zip(writer.topics, writer.encode(state), strict=True):
         assert reader.decode(topic, data, back) == tick
     assert_same(back, state)
@@ -110,8 +114,14 @@ def test_a_command_asks_every_wheel_and_thruster_by_name() -> None:
     data = CommandCodec(names.commanded, TIMEBASE).encode(Command(3, torque))
     read = STORE.deserialize_cdr(data, topics.COMMAND.type)
     assert read.name == [
-        "base_x", "base_y", "base_z", *names.joints, "wheel_1", "wheel_2", "thruster_1",
-    ]  # fmt: skip
+        "base_x",
+        "base_y",
+        "base_z",
+        *names.joints,
+        "wheel_1",
+        "wheel_2",
+        "thruster_1",
+    ]
     np.testing.assert_array_equal(read.effort, torque)
     back = Command(-1, np.zeros(8))
     CommandCodec(names.commanded, TIMEBASE).decode(data, back)

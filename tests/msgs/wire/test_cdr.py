@@ -93,19 +93,29 @@ def test_layout_is_plain_cdr_little_endian() -> None:
         "sensor_msgs/msg/JointState",
         {
             "header": {"stamp": {"sec": 3, "nanosec": 4}, "frame_id": "abcd"},
-            "name": ["x"], "position": [1.5], "effort": [-2.5],
+            "name": ["x"],
+            "position": [1.5],
+            "effort": [-2.5],
         },
-    )  # fmt: skip
+    )
     assert layout.data == ENCAPSULATION + b"".join(
         [
             struct.pack("<iI", 3, 4),
-            struct.pack("<I", 5), b"abcd\0", b"\0" * 3,
-            struct.pack("<I", 1), struct.pack("<I", 2), b"x\0", b"\0\0",
-            struct.pack("<I", 1), b"\0" * 4, struct.pack("<d", 1.5),
+            struct.pack("<I", 5),
+            b"abcd\0",
+            b"\0" * 3,
+            struct.pack("<I", 1),
+            struct.pack("<I", 2),
+            b"x\0",
+            b"\0\0",
+            struct.pack("<I", 1),
+            b"\0" * 4,
+            struct.pack("<d", 1.5),
             struct.pack("<I", 0),
-            struct.pack("<I", 1), struct.pack("<d", -2.5),
+            struct.pack("<I", 1),
+            struct.pack("<d", -2.5),
         ]
-    )  # fmt: skip
+    )
     stands = [slot for slot in layout.slots.values() if slot.length]
     assert [numbers(layout.data, slot).tolist() for slot in stands] == [[1.5], [-2.5]]
 

@@ -41,11 +41,12 @@ def test_joints_are_taken_by_name_whatever_order_and_frame(order: list[int], fra
     for seed in (1, 2):  # the second message of one layout may take another way
         state, back = random_sample(5, seed), RobotState.allocate(5)
         data = foreign_joint_state(
-            [names[i] for i in order], frame,
+            [names[i] for i in order],
+            frame,
             position=state.joint_positions[order].tolist(),
             velocity=state.joint_velocities[order].tolist(),
             effort=state.applied_torque[3:][order].tolist(),
-        )  # fmt: skip
+        )
         assert reader.decode(JOINTS, data, back) == 4001
         np.testing.assert_array_equal(back.joint_positions, state.joint_positions)
         np.testing.assert_array_equal(back.joint_velocities, state.joint_velocities)
@@ -62,10 +63,12 @@ def foreign_base_state(state: RobotState, frame: str) -> bytes:
         ros_type(f"geometry_msgs/msg/{name}")() for name in ("Transform", "Twist", "Wrench")
     )
     for part, values in (
-        (transform.translation, state.base_position), (twist.linear, state.base_velocity),
-        (transform.rotation, state.quaternion[1:]), (twist.angular, state.omega_base),
+        (transform.translation, state.base_position),
+        (twist.linear, state.base_velocity),
+        (transform.rotation, state.quaternion[1:]),
+        (twist.angular, state.omega_base),
         (wrench.torque, state.applied_torque[:3]),
-    ):  # fmt: skip
+    ):
         part.x, part.y, part.z = values.tolist()
     transform.rotation.w = float(state.quaternion[0])
     message.transforms, message.twist, message.wrench = [transform], [twist], [wrench]

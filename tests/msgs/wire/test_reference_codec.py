@@ -85,9 +85,11 @@ def test_chunk_is_read_as_trajectories(n: int, length: int, reader: str) -> None
         (acceleration,), q = point.accelerations, transform.rotation
         assert [q.w, q.x, q.y, q.z] == row[:4].tolist()
         for vector, expected in (
-            (velocity.angular, row[4:7]), (acceleration.angular, row[7:]),
-            (velocity.linear, [0.0] * 3), (transform.translation, [0.0] * 3),
-        ):  # fmt: skip
+            (velocity.angular, row[4:7]),
+            (acceleration.angular, row[7:]),
+            (velocity.linear, [0.0] * 3),
+            (transform.translation, [0.0] * 3),
+        ):
             assert [vector.x, vector.y, vector.z] == list(expected)
 
 
@@ -96,8 +98,11 @@ def test_points_more_than_a_second_apart_carry_into_the_seconds() -> None:
     data = ReferenceCodec(joint_names(2), Timebase(600_000_000)).encode(chunk)
     after = [p.time_from_start for p in STORE.deserialize_cdr(data[0], JOINTS).points]
     assert [(t.sec, t.nanosec) for t in after] == [
-        (0, 0), (0, 600_000_000), (1, 200_000_000), (1, 800_000_000)
-    ]  # fmt: skip
+        (0, 0),
+        (0, 600_000_000),
+        (1, 200_000_000),
+        (1, 800_000_000),
+    ]
 
 
 # Written by others

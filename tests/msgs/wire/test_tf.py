@@ -41,9 +41,10 @@ def rosbags_bytes(frames: Sequence[Frame], stamp_ns: int, poses: np.ndarray) -> 
 
 
 @given(
-    st.lists(st.builds(Frame, NAMES, NAMES), max_size=6), st.integers(0, 10**9),
+    st.lists(st.builds(Frame, NAMES, NAMES), max_size=6),
+    st.integers(0, 10**9),
     st.integers(0, 2**32),
-)  # fmt: skip
+)
 def test_transforms_are_the_bytes_of_rosbags(frames: list[Frame], tick: int, seed: int) -> None:
     """Of a codec that has written another message before."""
     rng, codec = np.random.default_rng(seed), TransformsCodec(frames, TIMEBASE)

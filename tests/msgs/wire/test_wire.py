@@ -114,10 +114,12 @@ def expect_reference_joints(data: bytes) -> Read:
     message = general(data, topics.REFERENCE_JOINTS.type)
     check_spacing(message.points)
     rows = [
-        [in_order(column, message.joint_names, NAMES)
-         for column in (point.positions, point.velocities, point.accelerations)]
+        [
+            in_order(column, message.joint_names, NAMES)
+            for column in (point.positions, point.velocities, point.accelerations)
+        ]
         for point in message.points
-    ]  # fmt: skip
+    ]
     return tick_of(message.header.stamp), numbers(rows)
 
 
@@ -133,8 +135,14 @@ def expect_reference_base(data: bytes) -> Read:
     rows = []
     for point in message.points:
         q, rate, acceleration = point.transforms[0], point.velocities[0], point.accelerations[0]
-        rows.append([q.rotation.w, *vector(q.rotation), *vector(rate.angular),
-                     *vector(acceleration.angular)])  # fmt: skip
+        rows.append(
+            [
+                q.rotation.w,
+                *vector(q.rotation),
+                *vector(rate.angular),
+                *vector(acceleration.angular),
+            ]
+        )
     return tick_of(message.header.stamp), numbers(rows)
 
 
@@ -170,15 +178,23 @@ TOPICS: dict[str, tuple[bytes, Callable[[], Any], Any, Any]] = {
     "base": (STATE[1], make_state_codec, read_base, expect_base),
     "command": (
         make_command_codec().encode(Command(7, np.arange(5.0) - 2.5)),
-        make_command_codec, read_command, expect_command,
+        make_command_codec,
+        read_command,
+        expect_command,
     ),
     "reference joints": (
-        REFERENCE[0], make_reference_codec, read_reference_joints, expect_reference_joints,
+        REFERENCE[0],
+        make_reference_codec,
+        read_reference_joints,
+        expect_reference_joints,
     ),
     "reference base": (
-        REFERENCE[1], make_reference_codec, read_reference_base, expect_reference_base,
+        REFERENCE[1],
+        make_reference_codec,
+        read_reference_base,
+        expect_reference_base,
     ),
-}  # fmt: skip
+}
 EVERY = pytest.mark.parametrize("topic", list(TOPICS))
 
 
@@ -237,9 +253,12 @@ def test_a_message_of_another_encapsulation_is_not_taken_for_ours(topic: str) ->
 def test_a_message_written_big_endian_is_read(topic: str) -> None:
     data, make, read, _ = TOPICS[topic]
     types = {
-        "joints": topics.JOINT_STATES, "base": topics.BASE_STATE, "command": topics.COMMAND,
-        "reference joints": topics.REFERENCE_JOINTS, "reference base": topics.REFERENCE_BASE,
-    }  # fmt: skip
+        "joints": topics.JOINT_STATES,
+        "base": topics.BASE_STATE,
+        "command": topics.COMMAND,
+        "reference joints": topics.REFERENCE_JOINTS,
+        "reference base": topics.REFERENCE_BASE,
+    }
     type_name = types[topic].type
     turned = STORE.serialize_cdr(general(data, type_name), type_name, little_endian=False)
     assert bytes(turned[:2]) == b"\0\0"

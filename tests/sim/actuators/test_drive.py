@@ -93,10 +93,14 @@ def test_effects_come_in_their_order_on_each_axis_by_itself(seed: int) -> None:
     lag, scale = np.array(per_axis(seed + 2, 0.0, 0.01)), np.array(per_axis(seed + 3, 0.5, 1.5))
     bias, limit = np.array(per_axis(seed + 4, -1.0, 1.0)), 9.0
     drives = Bench(
-        drive_step=step.tolist(), drive_dead_band=band.tolist(), drive_lag=lag.tolist(),
-        drive_scale=scale.tolist(), drive_bias=bias.tolist(), base_torque_limit=limit,
+        drive_step=step.tolist(),
+        drive_dead_band=band.tolist(),
+        drive_lag=lag.tolist(),
+        drive_scale=scale.tolist(),
+        drive_bias=bias.tolist(),
+        base_torque_limit=limit,
         joint_torque_limit=limit,
-    )  # fmt: skip
+    )
     lagging, ratio = np.zeros(N + 3), PERIOD / lag
     for torque in torques(seed + 5):
         limited = np.clip(torque, -limit, limit)
@@ -118,9 +122,11 @@ def test_faults_are_wrong_in_their_time_on_their_axes_and_leave_no_trace() -> No
     drives = Bench(drive_scale=[1.1], drive_bias=per_axis(4, -1.0, 1.0))
     sound = drives.block.copy()
     wrong = faults(
-        "drive_scale@0.005-0.015:base=0.5", "drive_scale@0.01-0.015:all=2",
-        "drive_bias@0.005-0.01:joint3=-2", "drive_bias@0.005-0.01:joints=1",
-    )  # fmt: skip
+        "drive_scale@0.005-0.015:base=0.5",
+        "drive_scale@0.01-0.015:all=2",
+        "drive_bias@0.005-0.01:joint3=-2",
+        "drive_bias@0.005-0.01:joints=1",
+    )
     bias = sound[0].drive.bias
     for tick, torque in enumerate(torques(5)):
         wrong.apply(tick, drives.block[0].drive)

@@ -62,9 +62,10 @@ def test_valves_open_late_and_not_for_less_than_their_pulse(
     wants: list[bool], shortest: int, delay: int, latency: int
 ) -> None:
     found = bench(
-        shortest_pulse=[shortest * PERIOD], delay=[delay * PERIOD],
+        shortest_pulse=[shortest * PERIOD],
+        delay=[delay * PERIOD],
         more={"command_latency_ticks": latency},
-    )  # fmt: skip
+    )
     asked = [10.0 if want else 0.0 for want in wants]
     expected = valve(wants, max(1, shortest), delay + latency)
     assert opened(found, asked) == expected
@@ -76,9 +77,12 @@ SPANS = st.tuples(st.integers(0, 30), st.integers(1, 20)).map(lambda s: range(s[
 
 
 @given(
-    st.lists(st.booleans(), min_size=40, max_size=40), st.integers(0, 12), SPANS, SPANS,
+    st.lists(st.booleans(), min_size=40, max_size=40),
+    st.integers(0, 12),
+    SPANS,
+    SPANS,
     st.integers(0, 1),
-)  # fmt: skip
+)
 def test_valves_that_stick_and_are_free_again(
     wants: list[bool], shortest: int, on: range, off: range, k: int
 ) -> None:

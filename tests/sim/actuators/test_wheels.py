@@ -15,15 +15,16 @@ Array = NDArray[np.float64]
 
 PYRAMID = [1.0, 1.0, 1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0, -1.0, 1.0]
 WHEELS: dict[str, Any] = {
-    "axes": PYRAMID, "rotor_inertia": [0.1], "max_torque": [0.4], "max_momentum": [8.0],
-}  # fmt: skip
+    "axes": PYRAMID,
+    "rotor_inertia": [0.1],
+    "max_torque": [0.4],
+    "max_momentum": [8.0],
+}
 SEEDS = st.integers(0, 2**31 - 1)
 
 
 def bench(*faults: str, more: Any = None, **wheels: Any) -> Bench:
-    return Bench(
-        *faults, base_actuation="hardware", wheels={**WHEELS, **wheels}, **(more or {})
-    )  # fmt: skip
+    return Bench(*faults, base_actuation="hardware", wheels={**WHEELS, **wheels}, **(more or {}))
 
 
 def axes(found: Bench) -> Array:
@@ -102,9 +103,13 @@ def test_a_dead_motor_gives_nothing_for_its_time() -> None:
         given_torques.append(found.truth.wheel_torques[:4].tolist())
     full = [0.1, 0.2, 0.3, 0.4]
     assert given_torques == [
-        full, full, [0.1, 0.0, 0.3, 0.4], [0.1, 0.0, 0.0, 0.4],
-        [0.1, 0.2, 0.0, 0.4], [0.1, 0.2, 0.0, 0.4],
-    ]  # fmt: skip
+        full,
+        full,
+        [0.1, 0.0, 0.3, 0.4],
+        [0.1, 0.0, 0.0, 0.4],
+        [0.1, 0.2, 0.0, 0.4],
+        [0.1, 0.2, 0.0, 0.4],
+    ]
 
 
 def test_commands_to_wheels_are_late_as_all_others() -> None:
@@ -118,10 +123,7 @@ def test_commands_to_wheels_are_late_as_all_others() -> None:
 
 def test_the_echo_of_a_base_with_wheels_is_of_what_they_gave() -> None:
     """Drives of base axes have nothing to act on; joints keep theirs."""
-    more = {
-        "drive_scale": [0.5], "drive_bias": [0.1], "echo_scale": [2.0],
-        "echo_bias": [0.25],
-    }  # fmt: skip
+    more = {"drive_scale": [0.5], "drive_bias": [0.1], "echo_scale": [2.0], "echo_bias": [0.25]}
     found = bench(more=more)
     reported, torque = found.act(np.array([9.0, 9.0, 9.0, *np.full(N, 4.0), 0.3, 0, 0, 0]))
     np.testing.assert_allclose(torque[:3], -0.3 / np.sqrt(3.0), rtol=1e-15)

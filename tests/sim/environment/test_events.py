@@ -30,9 +30,13 @@ def write(folder: Path, **changed: Any) -> Path:
 
 
 @given(
-    st.floats(0.0, 1e6), st.integers(0, 2**32 - 1), THREE, THREE, THREE,
+    st.floats(0.0, 1e6),
+    st.integers(0, 2**32 - 1),
+    THREE,
+    THREE,
+    THREE,
     st.sampled_from(["tool", "inertial"]),
-)  # fmt: skip
+)
 def test_the_text_of_a_capture_has_all_its_numbers(
     time: float, seed: int, place: list[float], v: list[float], w: list[float], to: str
 ) -> None:

@@ -12,13 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import pinocchio_model, pinocchio_state, rotation_of, visited
-from random_robots import (
-    State,
-    random_inertia,
-    random_quaternion,
-    random_robot,
-    random_state,
-)
+from random_robots import State, random_inertia, random_quaternion, random_robot, random_state
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.dynamics import mass_matrix
@@ -73,26 +67,33 @@ def random_tree(rng: np.random.Generator, n: int) -> Robot:
     rotation = rotation_of(random_quaternion(rng)).as_matrix()
     tool = Tool("hand", rotation, rng.normal(size=3), int(rng.integers(0, n + 1)))
     return replace(
-        random_robot(rng, n), parent=parents, order=tuple(order), tools=(tool,),
+        random_robot(rng, n),
+        parent=parents,
+        order=tuple(order),
+        tools=(tool,),
         is_prismatic=rng.random(n) < 0.3,
-    )  # fmt: skip
+    )
 
 
 def random_target(rng: np.random.Generator, relative_to: str) -> Target:
     mass = float(10.0 ** rng.uniform(-1.0, 3.5))
-    return Target.from_dict({"target": {
-        "mass": mass,
-        "inertia": random_inertia(rng, 0.1 * mass),
-        "place": {
-            "position": rng.normal(size=3).tolist(),
-            "quaternion": random_quaternion(rng).tolist(),
-        },
-        "motion": {
-            "relative_to": relative_to,
-            "velocity": rng.normal(size=3).tolist(),
-            "angular_velocity": rng.normal(size=3).tolist(),
-        },
-    }})  # fmt: skip
+    return Target.from_dict(
+        {
+            "target": {
+                "mass": mass,
+                "inertia": random_inertia(rng, 0.1 * mass),
+                "place": {
+                    "position": rng.normal(size=3).tolist(),
+                    "quaternion": random_quaternion(rng).tolist(),
+                },
+                "motion": {
+                    "relative_to": relative_to,
+                    "velocity": rng.normal(size=3).tolist(),
+                    "angular_velocity": rng.normal(size=3).tolist(),
+                },
+            }
+        }
+    )
 
 
 @st.composite
@@ -103,10 +104,13 @@ def cases(draw: st.DrawFn) -> Case:
     robot, relative_to = random_tree(rng, n), draw(st.sampled_from(["tool", "inertial"]))
     axes = rng.normal(size=(wheels, 3))
     return Case(
-        robot, random_state(rng, n), random_target(rng, relative_to),
-        axes / np.linalg.norm(axes, axis=1, keepdims=True), rng.uniform(0.01, 0.1, wheels),
+        robot,
+        random_state(rng, n),
+        random_target(rng, relative_to),
+        axes / np.linalg.norm(axes, axis=1, keepdims=True),
+        rng.uniform(0.01, 0.1, wheels),
         100.0 * rng.normal(size=wheels),
-    )  # fmt: skip
+    )
 
 
 def tensor_of(target: Target) -> Array:
@@ -142,9 +146,7 @@ def target_motion(case: Case) -> tuple[Array, Array, Array, Array]:
 def momentum(robot_model: pin.Model, case: Case, velocity: Array) -> Array:
     """Linear, then angular about the place of the base's CoM, of robot and wheels."""
     n = case.robot.joint_count
-    state = case.state._replace(
-        v0=velocity[:3], w0=velocity[3:6], rate=velocity[6 : 6 + n]
-    )  # fmt: skip
+    state = case.state._replace(v0=velocity[:3], w0=velocity[3:6], rate=velocity[6 : 6 + n])
     data = robot_model.createData()
     found = pin.computeCentroidalMomentum(
         robot_model, data, *pinocchio_state(visited(case.robot, state))
@@ -302,20 +304,29 @@ def test_two_masses_on_a_line() -> None:
     The slide's body goes on with the target at 2/3 m/s, the base stays where it is.
     """
     robot = replace(
-        random_robot(np.random.default_rng(1), 1), mass=np.array([3.0, 1.0]),
-        com=np.zeros((2, 3)), rotation=np.eye(3)[np.newaxis], offset=np.zeros((1, 3)),
-        is_prismatic=np.array([True]), tools=(Tool("hand", np.eye(3), np.zeros(3), 1),),
-    )  # fmt: skip
+        random_robot(np.random.default_rng(1), 1),
+        mass=np.array([3.0, 1.0]),
+        com=np.zeros((2, 3)),
+        rotation=np.eye(3)[np.newaxis],
+        offset=np.zeros((1, 3)),
+        is_prismatic=np.array([True]),
+        tools=(Tool("hand", np.eye(3), np.zeros(3), 1),),
+    )
     content = {
-        "mass": 2.0, "inertia": [1.0, 1.0, 1.0, 0.0, 0.0, 0.0],
+        "mass": 2.0,
+        "inertia": [1.0, 1.0, 1.0, 0.0, 0.0, 0.0],
         "motion": {"relative_to": "inertial", "velocity": [0.0, 0.0, 1.0]},
-    }  # fmt: skip
+    }
     target = Target.from_dict({"target": content})
     grasp = Grasp.of(robot, target)
     impact = Impact(
-        grasp.holding(robot), grasp, np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(1),
-        np.zeros((0, 3)), np.zeros(0),
-    )  # fmt: skip
+        grasp.holding(robot),
+        grasp,
+        np.array([1.0, 0.0, 0.0, 0.0]),
+        np.zeros(1),
+        np.zeros((0, 3)),
+        np.zeros(0),
+    )
     found = impact.capture(target.motion, np.zeros(7))
     np.testing.assert_allclose(found, [0, 0, 0, 0, 0, 0, 2 / 3], atol=1e-15)
 
@@ -330,5 +341,8 @@ def test_robots_follow_one_another_and_the_bare_one_comes_back_exactly() -> None
     assert masses == [bare, bare + target.mass, bare + target.mass, bare, bare + target.mass]
     assert captures.robot_at(4000) is robot
     assert [captures.next_tick(tick) for tick in (0, 1999, 2000, 6000)] == [
-        2000, 2000, 4000, np.inf
-    ]  # fmt: skip
+        2000,
+        2000,
+        4000,
+        np.inf,
+    ]

@@ -29,10 +29,15 @@ def test_every_name_is_its_own_axis(joints: list[str]) -> None:
 @pytest.mark.parametrize(
     ("name", "axes"),
     [
-        ("base_y", (1,)), ("joint_3", (5,)), ("3", (5,)), ("6", (8,)), ("base", (0, 1, 2)),
-        ("joints", (3, 4, 5, 6, 7, 8)), ("all", tuple(range(9))),
+        ("base_y", (1,)),
+        ("joint_3", (5,)),
+        ("3", (5,)),
+        ("6", (8,)),
+        ("base", (0, 1, 2)),
+        ("joints", (3, 4, 5, 6, 7, 8)),
+        ("all", tuple(range(9))),
     ],
-)  # fmt: skip
+)
 def test_names_numbers_and_groups(name: str, axes: tuple[int, ...]) -> None:
     assert axes_of(name, About.AXIS, PAPER) == axes
     if axes[0] >= 3:

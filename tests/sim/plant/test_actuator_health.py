@@ -43,8 +43,9 @@ def test_wheels_tell_saturation_momentum_and_failure(paper_robot: Robot) -> None
     assert watched.health.values == {
         "momentum_percent: wheel_1": pytest.approx(share),
         "momentum_percent: wheel_2": pytest.approx(-0.5 * share),
-        "momentum_percent: wheel_3": 0.0, "momentum_percent: wheel_4": 0.0,
-    }  # fmt: skip
+        "momentum_percent: wheel_3": 0.0,
+        "momentum_percent: wheel_4": 0.0,
+    }
     for _ in range(3):
         watched.ask(0.1, 0.3, -0.19, 0.2)
     values = watched.health.values
@@ -65,8 +66,10 @@ def test_thrusters_tell_pulses_and_propellant(paper_robot: Robot) -> None:
     watched.ask(*[4.5, 0.0, 4.5, *np.zeros(9)])
     used = PERIOD * 4.5 / (226.1 * 9.80665)
     assert watched.health.values == {
-        "pulses": 1, "propellant_used_kg": pytest.approx(used),
-        "propellant_left_kg": pytest.approx(20.0 - used), "stuck_off": "thruster_3",
-    }  # fmt: skip
+        "pulses": 1,
+        "propellant_used_kg": pytest.approx(used),
+        "propellant_left_kg": pytest.approx(20.0 - used),
+        "stuck_off": "thruster_3",
+    }
     without_end = Watched(paper_robot, "thrusters", **{"thrusters.propellant": 0.0})
     assert "propellant_left_kg" not in without_end.health.values

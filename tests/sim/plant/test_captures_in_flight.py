@@ -37,20 +37,24 @@ class Captured(TreeFlight):
         bodies = tree(seed, lossless=True)
         carrier = next(body for body in bodies if body.name == hand)
         self.tool = carrier.tools[0]
-        self.target = Target.from_dict({"target": {
-            "mass": 30.0,
-            "inertia": random_inertia(rng, 3.0),
-            "tool": self.tool.name,
-            "place": {
-                "position": rng.normal(size=3).tolist(),
-                "quaternion": random_quaternion(rng).tolist(),
-            },
-            "motion": {
-                "relative_to": "inertial",
-                "velocity": rng.normal(size=3).tolist(),
-                "angular_velocity": rng.normal(size=3).tolist(),
-            },
-        }})  # fmt: skip
+        self.target = Target.from_dict(
+            {
+                "target": {
+                    "mass": 30.0,
+                    "inertia": random_inertia(rng, 3.0),
+                    "tool": self.tool.name,
+                    "place": {
+                        "position": rng.normal(size=3).tolist(),
+                        "quaternion": random_quaternion(rng).tolist(),
+                    },
+                    "motion": {
+                        "relative_to": "inertial",
+                        "velocity": rng.normal(size=3).tolist(),
+                        "angular_velocity": rng.normal(size=3).tolist(),
+                    },
+                }
+            }
+        )
         events = [
             f"capture@{CAPTURE * PERIOD}:{self.target.inline}",
             f"release@{RELEASE * PERIOD}:{SPEED}",
@@ -125,9 +129,10 @@ def test_robot_and_target_keep_their_momenta(seed: int, hand: str) -> None:
     own = flight.with_target(motion.velocity, motion.angular_velocity)
     bare = flight.alone()
     own = Whole(
-        alone.linear + own.linear - bare.linear, alone.angular + own.angular - bare.angular,
+        alone.linear + own.linear - bare.linear,
+        alone.angular + own.angular - bare.angular,
         alone.energy + own.energy - bare.energy,
-    )  # fmt: skip
+    )
     assert_kept(held, own, 1e-11)
     assert held.energy < own.energy
     assert flight.plant.robot.mass.sum() == pytest.approx(flight.robot.mass.sum() + 30.0)

@@ -76,9 +76,14 @@ def test_a_late_command_acts_only_for_what_is_left_of_its_time() -> None:
 
 @pytest.mark.parametrize(
     ("stamp", "torque", "reason"),
-    [(5, 1.0, "stamp"), (4, 1.0, "stamp"), (7, 1.0, "stamp"), (6, np.nan, "not finite"),
-     (6, -np.inf, "not finite")],
-)  # fmt: skip
+    [
+        (5, 1.0, "stamp"),
+        (4, 1.0, "stamp"),
+        (7, 1.0, "stamp"),
+        (6, np.nan, "not finite"),
+        (6, -np.inf, "not finite"),
+    ],
+)
 def test_a_refused_command_is_counted_and_changes_nothing(
     stamp: int, torque: float, reason: str
 ) -> None:

@@ -47,7 +47,7 @@ def test_momentum_and_kinetic_energy_agree_with_pinocchio(case: Case, count: int
     moving = state._replace(
         theta=np.concatenate([state.theta, rng.normal(size=count)]),
         rate=np.concatenate([state.rate, speeds]),
-    )  # fmt: skip
+    )
     configuration, velocity = pinocchio_state(moving, position)
     about_com = pin.computeCentroidalMomentum(model, data, configuration, velocity)
     com = pin.centerOfMass(model, data, configuration)

@@ -53,9 +53,8 @@ def flown_eigenvalues(robot: Robot) -> Array:
 
     def after(number: int, value: float) -> Array:
         settings = PlantSettings(
-            initial_joints_deg=[0.0] * robot.n,
-            friction=FrictionSettings(coulomb=0.0, viscous=0.0),
-        )  # fmt: skip
+            initial_joints_deg=[0.0] * robot.n, friction=FrictionSettings(coulomb=0.0, viscous=0.0)
+        )
         plant = Plant(robot, settings, PERIOD)
         plant.memory.x[start[number]] = value
         for tick in range(TICKS):
@@ -89,10 +88,12 @@ def chain_eigenvalues(is_free: bool) -> Array:
     stiffness = bend.T @ np.diag(np.tile(STIFFNESS, 2)) @ bend
     damping = bend.T @ np.diag(np.tile(DAMPING, 2)) @ bend
     size = len(kept)
-    system = np.block([
-        [np.zeros((size, size)), np.eye(size)],
-        [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)],
-    ])  # fmt: skip
+    system = np.block(
+        [
+            [np.zeros((size, size)), np.eye(size)],
+            [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)],
+        ]
+    )
     return _upper(np.linalg.eigvals(system))
 
 

@@ -93,10 +93,15 @@ class Bench:
         patch.setattr(loop, "FollowedSubscription", Topic)
         patch.setattr(loop, "PausedOutput", lambda node: Topic(node, topics.SIMULATION_PAUSED))
         patch.setattr(scene_output, "find_spec", lambda name: None)
-        self.settings = PlantNodeSettings.resolve({
-            "hold_ticks": HOLD, "clock_decimation": DECIMATION, "silence_timeout": SILENCE_S,
-            "ticks": 100, **settings,
-        })  # fmt: skip
+        self.settings = PlantNodeSettings.resolve(
+            {
+                "hold_ticks": HOLD,
+                "clock_decimation": DECIMATION,
+                "silence_timeout": SILENCE_S,
+                "ticks": 100,
+                **settings,
+            }
+        )
         names = Plant(robot, self.settings, PERIOD).names
         self._states = StateCodec(names, self.settings.timebase)
         self._commands = CommandCodec(names.commanded, self.settings.timebase)

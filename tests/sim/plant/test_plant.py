@@ -48,10 +48,14 @@ def state_vector(state: RobotState) -> Array:
     omega = rotation_of(state.quaternion).apply(state.omega_base)
     return np.concatenate(
         [
-            state.base_position, state.quaternion, state.joint_positions, state.base_velocity,
-            omega, state.joint_velocities,
+            state.base_position,
+            state.quaternion,
+            state.joint_positions,
+            state.base_velocity,
+            omega,
+            state.joint_velocities,
         ]
-    )  # fmt: skip
+    )
 
 
 def integrate_independently(
@@ -76,10 +80,13 @@ def integrate_independently(
         eps_rate = 0.5 * (q[0] * state.w0 + np.cross(state.w0, q[1:]))
         return np.concatenate(
             [
-                state.v0, [-0.5 * q[1:] @ state.w0], eps_rate, rate,
+                state.v0,
+                [-0.5 * q[1:] @ state.w0],
+                eps_rate,
+                rate,
                 pinocchio_acceleration(model, data, state, force),
             ]
-        )  # fmt: skip
+        )
 
     solution = solve_ivp(derivative, (begin, end), x, method="DOP853", rtol=1e-12, atol=1e-12)
     return solution.y[:, -1]
@@ -272,12 +279,16 @@ def test_a_plant_that_goes_back_flies_the_same_bits_again(
     """Over blocks of noise, faults that begin and end, late commands and a capture."""
     target = '{"mass": 9.0, "inertia": [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]}'
     plant = plant_of(
-        paper_robot, friction=FrictionSettings(), command_latency_ticks=3, fault_seed=4,
-        gyro={"angle_random_walk": 1e-3, "rate_random_walk": 1e-2}, encoders={"noise": 1e-3},
+        paper_robot,
+        friction=FrictionSettings(),
+        command_latency_ticks=3,
+        fault_seed=4,
+        gyro={"angle_random_walk": 1e-3, "rate_random_walk": 1e-2},
+        encoders={"noise": 1e-3},
         star_tracker={"noise_across": 1e-3, "rate": 100.0, "delay": 0.02},
         faults=["stuck_joint@0.1-0.135:2=9", "noise_gyro@0.14-0.16:1", "saturate_joints@0.13:0.3"],
         events=[f"capture@0.14:{target}"],
-    )  # fmt: skip
+    )
     torques = np.random.default_rng(1).normal(size=(600, 9))
 
     def flown(begin: int, end: int) -> Array:

@@ -79,9 +79,12 @@ def memory_of(plant: Plant) -> tuple[list[float], list[float]]:
 def test_actuators_fail_in_time_and_are_restored_exactly(paper_robot: Robot) -> None:
     """Overlapping faults too: the lower limit and the higher friction count."""
     texts = [
-        "saturate_base@0.005-0.01:2", "saturate_base@0.0075-0.015:1", "saturate_joints@0.01:3",
-        "stuck_joint@0.005-0.01:2=20", "stuck_joint@0.005-0.0075:6=0.001",
-    ]  # fmt: skip
+        "saturate_base@0.005-0.01:2",
+        "saturate_base@0.0075-0.015:1",
+        "saturate_joints@0.01:3",
+        "stuck_joint@0.005-0.01:2=20",
+        "stuck_joint@0.005-0.0075:6=0.001",
+    ]
     plant = plant_of(paper_robot, *texts, joint_torque_limit=7.0)
     sound, coulomb = memory_of(plant)
     assert sound == [math.inf] * 3 + [7.0] * 6
@@ -157,11 +160,21 @@ def flight(robot: Robot, *texts: str, seed: int = 0, ticks: int = 400) -> list[l
 
 
 MANY = (
-    "drop_state@0:0.2", "repeat_state@0.01:0.2", "delay_state@0.02-0.1:2", "jitter_state@0.05:3",
-    "drop_command@0:0.2", "jitter_command@0.1:2", "noise_gyro@0:1e-3", "noise_attitude@0:1e-3",
-    "quantise_joint_velocity@0.1:1e-4", "stamp_back@0:0.1", "stamp_jump@0:0.1", "nan_command@0:0.1",
-    "saturate_joints@0.1-0.15:0.05", "stuck_joint@0.1:2=5",
-)  # fmt: skip
+    "drop_state@0:0.2",
+    "repeat_state@0.01:0.2",
+    "delay_state@0.02-0.1:2",
+    "jitter_state@0.05:3",
+    "drop_command@0:0.2",
+    "jitter_command@0.1:2",
+    "noise_gyro@0:1e-3",
+    "noise_attitude@0:1e-3",
+    "quantise_joint_velocity@0.1:1e-4",
+    "stamp_back@0:0.1",
+    "stamp_jump@0:0.1",
+    "nan_command@0:0.1",
+    "saturate_joints@0.1-0.15:0.05",
+    "stuck_joint@0.1:2=5",
+)
 
 
 def test_a_flight_with_many_faults_repeats_exactly(paper_robot: Robot) -> None:
@@ -174,9 +187,16 @@ def test_a_flight_with_many_faults_repeats_exactly(paper_robot: Robot) -> None:
 def test_faults_that_do_nothing_change_nothing(paper_robot: Robot) -> None:
     """Nor does a fault before its time."""
     still = [
-        text.format(0) for text in ("drop_state@0:{}", "jitter_command@0:{}", "noise_gyro@0:{}",
-        "stamp_jump@0:{}", "nan_command@0:{}", "stuck_joint@0:2={}")
-    ]  # fmt: skip
+        text.format(0)
+        for text in (
+            "drop_state@0:{}",
+            "jitter_command@0:{}",
+            "noise_gyro@0:{}",
+            "stamp_jump@0:{}",
+            "nan_command@0:{}",
+            "stuck_joint@0:2={}",
+        )
+    ]
     plain = flight(paper_robot)
     assert flight(paper_robot, *still, "nan_state@1", "saturate_joints@1:0") == plain
 

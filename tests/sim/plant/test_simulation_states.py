@@ -29,9 +29,11 @@ class Loop(PlantLoop):
 @pytest.fixture
 def simulation(monkeypatch: pytest.MonkeyPatch) -> Simulation:
     node = SimpleNamespace(
-        is_active=True, loop=Loop(), settings=SimpleNamespace(reset_with=[], period=5e-4),
+        is_active=True,
+        loop=Loop(),
+        settings=SimpleNamespace(reset_with=[], period=5e-4),
         log=lambda text: None,
-    )  # fmt: skip
+    )
 
     async def restart(node: Any, others: list[str]) -> None:
         node.loop = Loop()

@@ -26,11 +26,16 @@ MSG = Record(
     SimulationState=Record(STATE_STOPPED=0, STATE_PLAYING=1, STATE_PAUSED=2),
     Result=Record(RESULT_FEATURE_UNSUPPORTED=0, RESULT_OK=1, RESULT_OPERATION_FAILED=4),
     SimulatorFeatures=Record(
-        SIMULATION_RESET=20, SIMULATION_RESET_TIME=21, SIMULATION_RESET_STATE=22,
-        SIMULATION_STATE_GETTING=24, SIMULATION_STATE_SETTING=25, SIMULATION_STATE_PAUSE=26,
-        STEP_SIMULATION_SINGLE=31, STEP_SIMULATION_MULTIPLE=32,
+        SIMULATION_RESET=20,
+        SIMULATION_RESET_TIME=21,
+        SIMULATION_RESET_STATE=22,
+        SIMULATION_STATE_GETTING=24,
+        SIMULATION_STATE_SETTING=25,
+        SIMULATION_STATE_PAUSE=26,
+        STEP_SIMULATION_SINGLE=31,
+        STEP_SIMULATION_MULTIPLE=32,
     ),
-)  # fmt: skip
+)
 SRV = Record(
     SetSimulationState=Record(
         Response=Record(ALREADY_IN_TARGET_STATE=101, STATE_TRANSITION_ERROR=102)
@@ -84,9 +89,10 @@ class Caller:
     @staticmethod
     def _response() -> Record:
         return Record(
-            result=Record(result=None, error_message=None), state=Record(state=None),
+            result=Record(result=None, error_message=None),
+            state=Record(state=None),
             features=Record(features=[], custom_info=""),
-        )  # fmt: skip
+        )
 
     def get_state(self) -> int:
         return int(self.services.get_state(Record(), self._response()).state.state)

@@ -179,9 +179,12 @@ def balls(count: int = 6, **disturbance: float) -> Plant:
     links = [{"name": f"ball{k}", **ball} for k in range(count)]
     robot = Robot.from_dict({"robot": {"name": "balls", "base": base, "links": links}})
     settings = DisturbanceSettings(
-        scale=1.0, base_amplitude=0.0, outer_amplitude=0.0, inner_frequencies=[5.0, 0.0],
+        scale=1.0,
+        base_amplitude=0.0,
+        outer_amplitude=0.0,
+        inner_frequencies=[5.0, 0.0],
         **disturbance,
-    )  # fmt: skip
+    )
     plant = plant_of(robot, 0.0, initial_joints_deg=[0.0] * count, disturbance=settings)
     plant.memory.x[7 + count] = 2.0
     return plant

@@ -21,9 +21,12 @@ def test_step_agrees_with_an_adaptive_integrator(seed: int) -> None:
     Base and motors are disturbed, each by a sine of its own.
     """
     disturbance = DisturbanceSettings(
-        scale=1.0, base_amplitude=30.0, inner_amplitude=3.0, base_frequencies=[1.5, 0.0],
+        scale=1.0,
+        base_amplitude=30.0,
+        inner_amplitude=3.0,
+        base_frequencies=[1.5, 0.0],
         inner_frequencies=[3.0, 0.0],
-    )  # fmt: skip
+    )
     flight = TreeFlight(tree(seed), viscous=0.2, disturbance=disturbance)
     x = np.concatenate(flight.configuration())
     nq, hold = flight.model.nq, 300 * PERIOD
@@ -35,8 +38,12 @@ def test_step_agrees_with_an_adaptive_integrator(seed: int) -> None:
     for begin, torque in ((0.0, TORQUE), (hold, -0.5 * TORQUE[::-1])):
         solution = solve_ivp(
             lambda t, x, torque=torque: flight.derivative(torque, x[:nq], x[nq:], disturbed(t)),
-            (begin, begin + hold), x, method="DOP853", rtol=1e-12, atol=1e-12,
-        )  # fmt: skip
+            (begin, begin + hold),
+            x,
+            method="DOP853",
+            rtol=1e-12,
+            atol=1e-12,
+        )
         x = solution.y[:, -1]
         flight.fly(torque, 300)
         actual = np.concatenate(flight.configuration())

@@ -47,15 +47,19 @@ class Flight:
         self, robot: Robot, rotors: list[Rotor], friction: FrictionSettings, **wheels: Any
     ) -> None:
         settings = PlantSettings(
-            initial_joints_deg=[10.0 * (i + 1) for i in range(robot.n)], friction=friction,
-            base_actuation="hardware", wheels=settings_of(rotors, **wheels),
-        )  # fmt: skip
+            initial_joints_deg=[10.0 * (i + 1) for i in range(robot.n)],
+            friction=friction,
+            base_actuation="hardware",
+            wheels=settings_of(rotors, **wheels),
+        )
         self._plant = Plant(robot, settings, PERIOD)
         memory = self._plant.memory
         self.n, self.count, self.x = robot.n, len(rotors), memory.x
         self._model, self._environment, self._stages = (
-            memory.model, memory.environment, memory.stages,
-        )  # fmt: skip
+            memory.model,
+            memory.environment,
+            memory.stages,
+        )
         self._actuation = self._stages.actuation
         self._tick = 0
 
@@ -176,15 +180,23 @@ def test_wheels_of_a_robot_with_passive_joints_get_what_is_asked_of_them() -> No
     rotors = [rotor._replace(spin=0.05) for rotor in random_rotors(rng, robot, 4)]
     wheels = settings_of(rotors, initial_speed=[20.0, -30.0, 40.0, 10.0])
     axes, spins = np.array([rotor.axis for rotor in rotors]), np.array([r.spin for r in rotors])
-    target = Target.from_dict({"target": {
-        "mass": 20.0, "inertia": [2.0, 3.0, 4.0, 0.0, 0.0, 0.0],
-        "motion": {"velocity": [0.3, -0.2, 0.1], "angular_velocity": [0.2, 0.4, -0.3]},
-    }})  # fmt: skip
+    target = Target.from_dict(
+        {
+            "target": {
+                "mass": 20.0,
+                "inertia": [2.0, 3.0, 4.0, 0.0, 0.0, 0.0],
+                "motion": {"velocity": [0.3, -0.2, 0.1], "angular_velocity": [0.2, 0.4, -0.3]},
+            }
+        }
+    )
     settings = PlantSettings(
-        initial_joints_deg=[10.0, 0.3, 20.0, 0.0, 30.0, 0.0], friction=SMOOTH, wheels=wheels,
-        base_actuation="hardware", initial_quaternion=[0.5, -0.5, 0.1, 0.7],
+        initial_joints_deg=[10.0, 0.3, 20.0, 0.0, 30.0, 0.0],
+        friction=SMOOTH,
+        wheels=wheels,
+        base_actuation="hardware",
+        initial_quaternion=[0.5, -0.5, 0.1, 0.7],
         events=[f"capture@{100 * PERIOD}:{target.inline}"],
-    )  # fmt: skip
+    )
     plant = Plant(robot, settings, PERIOD)
 
     def own() -> Array:

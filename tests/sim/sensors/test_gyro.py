@@ -56,9 +56,7 @@ def test_each_sample_is_the_exact_discretisation_of_both_walks(period: float, sh
     """
     sigma_v, ticks = 1e-4, 3000
     sigma_u = np.sqrt(3.0 * share) * sigma_v / period
-    bench = Bench(
-        period=period, gyro={"angle_random_walk": sigma_v, "rate_random_walk": sigma_u}
-    )  # fmt: skip
+    bench = Bench(period=period, gyro={"angle_random_walk": sigma_v, "rate_random_walk": sigma_u})
     state, angles, biases = RobotState.allocate(N), np.empty((ticks, 3)), np.empty((ticks, 3))
     for state.tick in range(ticks):
         angles[state.tick] = period * bench.measure(state).omega_base
@@ -79,9 +77,11 @@ def test_at_tick_0_there_is_the_initial_bias_and_white_noise() -> None:
     sigma_v, sigma_u, period, bias = 1e-4, 1e-2, 0.05, np.array([1.0, -2.0, 3.0])
     sigma = 5e-4
     settings = {
-        "angle_random_walk": sigma_v, "rate_random_walk": sigma_u, "initial_bias": bias.tolist(),
+        "angle_random_walk": sigma_v,
+        "rate_random_walk": sigma_u,
+        "initial_bias": bias.tolist(),
         "noise": sigma,
-    }  # fmt: skip
+    }
     bench, state = Bench(period=period, gyro=settings), RobotState.allocate(N)
     rates = np.empty((1000, 3))
     for seed in range(len(rates)):
@@ -109,9 +109,10 @@ def test_scale_bias_and_steps() -> None:
 def test_a_bias_comes_and_goes() -> None:
     """On the axes named, beside the one there is, and without a trace."""
     bench = Bench(
-        "gyro_bias@0.005-0.01:base_y=0.25", "gyro_bias@0.0075-0.0125:base=-0.5",
+        "gyro_bias@0.005-0.01:base_y=0.25",
+        "gyro_bias@0.0075-0.0125:base=-0.5",
         gyro={"initial_bias": [1.0, 0.0, 0.0]},
-    )  # fmt: skip
+    )
     state = RobotState.allocate(N)
     for state.tick in range(30):
         late = -0.5 * (15 <= state.tick < 25)

@@ -54,11 +54,19 @@ def test_grades_get_worse_in_every_number() -> None:
         tracker, gyro, encoders = (getattr(bench.block[0], part) for part in PARTS)
         lag = float(encoders.difference_ticks) * 5e-4
         differenced = 2.0**0.5 * encoders.sigma[0] / lag if lag else 0.0
-        grades.append([
-            *tracker.sigma, float(tracker.interval), float(tracker.delay),
-            float(gyro.angle_random_walk), abs(gyro.offset[0]), abs(gyro.scale[0] - 1.0),
-            encoders.sigma[0], encoders.step[0], max(encoders.velocity_sigma[0], differenced),
-        ])  # fmt: skip
+        grades.append(
+            [
+                *tracker.sigma,
+                float(tracker.interval),
+                float(tracker.delay),
+                float(gyro.angle_random_walk),
+                abs(gyro.offset[0]),
+                abs(gyro.scale[0] - 1.0),
+                encoders.sigma[0],
+                encoders.step[0],
+                max(encoders.velocity_sigma[0], differenced),
+            ]
+        )
     for better, worse in itertools.pairwise(grades):
         assert all(one < other for one, other in zip(better, worse, strict=True))
 
@@ -83,8 +91,11 @@ def test_single_numbers_come_over_those_of_the_file() -> None:
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("star_tracker: {noise_acros: 1e-5}", "star_tracker.noise_acros: unknown key, got 1e-05: "
-         "choose one of boresight, delay, noise_about, noise_across, rate, step "),
+        (
+            "star_tracker: {noise_acros: 1e-5}",
+            "star_tracker.noise_acros: unknown key, got 1e-05: "
+            "choose one of boresight, delay, noise_about, noise_across, rate, step ",
+        ),
         ("gyro: {noise: -1}", "gyro.noise: Input should be greater than or equal to 0, got -1$"),
         ("gyro: {initial_bias: 0}", "gyro.initial_bias: Input should be a valid list, got 0$"),
         ("gyro: {initial_bias: [0, 0]}", "gyro.initial_bias: List should have at least 3 items"),
@@ -95,7 +106,7 @@ def test_single_numbers_come_over_those_of_the_file() -> None:
         ("gyro: {noise: .nan}", "gyro.noise: Input should be "),
         ("gyro: {noise: 1, noise: 2}", "line 1: not YAML .the key 'noise' occurs twice"),
     ],
-)  # fmt: skip
+)
 def test_a_bad_file_is_one_line_with_file_and_key(tmp_path: Path, text: str, why: str) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text("plant_node: {ros__parameters: {" + text + "}}")

@@ -11,12 +11,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from space_robot.campaign.draws.distributions import read_distribution
-from space_robot.campaign.draws.keys import (
-    bits,
-    noise_seed,
-    permutation,
-    uniform,
-)
+from space_robot.campaign.draws.keys import bits, noise_seed, permutation, uniform
 
 GOLDEN_BITS = [1788990827981690842, 15618775813144590017]
 GOLDEN_UNIFORM = "0x1.1c18746dcd574p-3"
@@ -66,9 +61,13 @@ def test_bounds_hold(u: float) -> None:
 
 
 @given(
-    st.floats(-5.0, 5.0), st.floats(0.1, 3.0), st.none() | st.floats(-2.0, 0.0),
-    st.none() | st.floats(0.5, 2.0), st.floats(-2.0, 0.4), st.floats(0.001, 0.999),
-)  # fmt: skip
+    st.floats(-5.0, 5.0),
+    st.floats(0.1, 3.0),
+    st.none() | st.floats(-2.0, 0.0),
+    st.none() | st.floats(0.5, 2.0),
+    st.floats(-2.0, 0.4),
+    st.floats(0.001, 0.999),
+)
 def test_what_must_stay_above_a_number_is_truncated_there_too(
     mean: float, sigma: float, low: float | None, high: float | None, least: float, u: float
 ) -> None:

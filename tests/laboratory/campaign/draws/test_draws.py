@@ -16,11 +16,7 @@ from scipy.stats import qmc, truncnorm
 from space_robot.api import Scenario
 from space_robot.campaign.draws import Draws
 from space_robot.campaign.draws.designs import shifted
-from space_robot.campaign.draws.principal import (
-    principal,
-    rotation,
-    spread,
-)
+from space_robot.campaign.draws.principal import principal, rotation, spread
 from space_robot.campaign.study import Study
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
@@ -113,11 +109,13 @@ def test_faults_of_each_axis_and_times() -> None:
         f"faults.torque_scale@0:{axis}": 2
         for axis in ("base_x", "base_y", "base_z", *(f"joint{k}" for k in range(1, 7)))
     }
-    vary = {"faults": {
-        "torque_scale@0:[*]": {"uniform": [0.9, 1.1]},
-        "stuck_joint@T:joint1=5": {"uniform": [1, 9]},
-        "drop_state@2-3": {"uniform": [0, 0.5]},
-    }}  # fmt: skip
+    vary = {
+        "faults": {
+            "torque_scale@0:[*]": {"uniform": [0.9, 1.1]},
+            "stuck_joint@T:joint1=5": {"uniform": [1, 9]},
+            "drop_state@2-3": {"uniform": [0, 0.5]},
+        }
+    }
     draws = Draws(study(vary), 0, 1)
     assert draws.names[0] == "faults.torque_scale@0:base_x"
     faults = draws.scenario(0, "ctc").faults

@@ -13,24 +13,14 @@ from typing import Any
 import pytest
 
 from space_robot import load_bag
-from space_robot.campaign.flown import (
-    Campaign,
-    FlownCampaign,
-    bags,
-    flights,
-    precision,
-)
+from space_robot.campaign.flown import Campaign, FlownCampaign, bags, flights, precision
 from space_robot.campaign.flown.flights import Progress
 from space_robot.campaign.report.findings import Findings
 from space_robot.campaign.report.subject import subject_of
 from space_robot.campaign.row.row import Task
 from space_robot.campaign.study import Study
 from space_robot.flight.compilation import compile_kernels
-from space_robot.processes.pool import (
-    Done,
-    WorkerDiedError,
-    run_many,
-)
+from space_robot.processes.pool import Done, WorkerDiedError, run_many
 from space_robot_msgs_py.errors import InputError
 
 pytest.importorskip("pyarrow")

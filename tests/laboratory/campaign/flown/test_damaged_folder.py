@@ -14,10 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot.campaign.flown import (
-    Campaign,
-    FlownCampaign,
-)
+from space_robot.campaign.flown import Campaign, FlownCampaign
 from space_robot.campaign.flown.preparation import Preparation
 from space_robot.campaign.report.findings import Findings
 from space_robot.campaign.report.subject import subject_of
@@ -224,9 +221,11 @@ def test_another_study_judges_the_same_rows(whole: Path, reported: str) -> None:
     for other, said in (
         ({"laws": ["ctc"]}, "other.yaml: laws: .* was flown"),
         ({"scenario": {"case": "1", "duration": 0.01}}, "scenario.case: '3' was flown, '1'"),
-        ({"require": {"p": {**CONTENT["require"]["late"], "from_s": 0.006}}},
-         r"other.yaml: require.p: attitude_rms in that window is not in the rows"),
-    ):  # fmt: skip
+        (
+            {"require": {"p": {**CONTENT["require"]["late"], "from_s": 0.006}}},
+            r"other.yaml: require.p: attitude_rms in that window is not in the rows",
+        ),
+    ):
         with pytest.raises(InputError, match=said):
             subject_of(FlownCampaign.open(whole), asked(**other))
 
@@ -248,14 +247,21 @@ def test_a_folder_imports_and_opens_nothing_unless_it_is_trusted(
     (tmp_path / "law_of_somebody.py").write_text(LAW)
     case = tmp_path / "case.yaml"
     monkeypatch.syspath_prepend(tmp_path)
-    for number, other in enumerate((
-        {"laws": ["ctc", "law_of_somebody:Free"]},
-        {"laws": ["ctc"], "scenario": {"duration": 0.01, "parameters": {
-            "controller": {"controller": "law_of_somebody:Free"}}}},
-        {"laws": [f"ctc={tmp_path}/gains"]},
-        {"vary": {"scenario.case": {"choice": ["1", str(case)]}}},
-        {"scenario": {"duration": 0.01, "events": [f"capture@0.001:{tmp_path}/target.yaml"]}},
-    )):  # fmt: skip
+    for number, other in enumerate(
+        (
+            {"laws": ["ctc", "law_of_somebody:Free"]},
+            {
+                "laws": ["ctc"],
+                "scenario": {
+                    "duration": 0.01,
+                    "parameters": {"controller": {"controller": "law_of_somebody:Free"}},
+                },
+            },
+            {"laws": [f"ctc={tmp_path}/gains"]},
+            {"vary": {"scenario.case": {"choice": ["1", str(case)]}}},
+            {"scenario": {"duration": 0.01, "events": [f"capture@0.001:{tmp_path}/target.yaml"]}},
+        )
+    ):
         folder = tmp_path / str(number)
         folder.mkdir()
         study = Study.model_validate({**CONTENT, "require": {}, **other})

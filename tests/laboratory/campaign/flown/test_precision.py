@@ -6,14 +6,8 @@ import numpy as np
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from space_robot.campaign.flown.precision import (
-    CHECKED_EVERY,
-    Precision,
-)
-from space_robot.campaign.row.row import (
-    Row,
-    Task,
-)
+from space_robot.campaign.flown.precision import CHECKED_EVERY, Precision
+from space_robot.campaign.row.row import Row, Task
 from space_robot.campaign.study import Study
 from space_robot.campaign.verdicts.share_test import Sequential
 
@@ -23,22 +17,26 @@ BOUNDS = {"p": 1.0, "q": 2.0}
 
 
 def study(half_width: float, points: int) -> Study:
-    return Study.model_validate({
-        "laws": LAWS,
-        "vary": {"scenario.sensors": {"grid": SENSORS[:points]}},
-        "require": {
-            name: {"metric": "attitude_max", "below": bound, "in": 0.9}
-            for name, bound in BOUNDS.items()
-        },
-        "until": {"half_width": half_width, "runs": points * DRAWS},
-    })  # fmt: skip
+    return Study.model_validate(
+        {
+            "laws": LAWS,
+            "vary": {"scenario.sensors": {"grid": SENSORS[:points]}},
+            "require": {
+                name: {"metric": "attitude_max", "below": bound, "in": 0.9}
+                for name, bound in BOUNDS.items()
+            },
+            "until": {"half_width": half_width, "runs": points * DRAWS},
+        }
+    )
 
 
 @settings(max_examples=12, deadline=None)
 @given(
-    st.integers(1, 3), st.sampled_from([0.07, 0.1, 0.13]), st.integers(0, 2**32 - 1),
+    st.integers(1, 3),
+    st.sampled_from([0.07, 0.1, 0.13]),
+    st.integers(0, 2**32 - 1),
     st.lists(st.sampled_from([0.5, 0.9, 1.0]), min_size=6, max_size=6),
-)  # fmt: skip
+)
 @example(3, 0.1, 0, [0.5, 0.5, 1.0, 1.0, 1.0, 1.0])
 @example(3, 0.1, 0, [1.0, 1.0, 1.0, 0.5, 1.0, 1.0])
 @example(3, 0.1, 0, [1.0, 1.0, 1.0, 1.0, 0.5, 1.0])

@@ -15,25 +15,13 @@ from pandas import DataFrame
 from rich.console import Console
 
 from space_robot.campaign.report import page as page_module
-from space_robot.campaign.report.console import (
-    markdown,
-    print_report,
-)
-from space_robot.campaign.report.figures import (
-    drawings,
-    summary_figure,
-)
+from space_robot.campaign.report.console import markdown, print_report
+from space_robot.campaign.report.figures import drawings, summary_figure
 from space_robot.campaign.report.findings import Findings
-from space_robot.campaign.report.page import (
-    lean,
-    render,
-)
+from space_robot.campaign.report.page import lean, render
 from space_robot.campaign.report.record import record
 from space_robot.campaign.report.subject import Subject
-from space_robot.campaign.report.verdict_tables import (
-    command,
-    verdict_table,
-)
+from space_robot.campaign.report.verdict_tables import command, verdict_table
 from space_robot.campaign.study import Study
 from space_robot_msgs_py.errors import InputError
 
@@ -42,15 +30,15 @@ UNIFORM = {"uniform": [0.8, 1.2], "relative": True}
 
 
 def found(
-    table: DataFrame,
-    metrics: tuple[str, ...] = ("attitude_rms",),
-    runs: int = 0,
-    **changes: Any,
+    table: DataFrame, metrics: tuple[str, ...] = ("attitude_rms",), runs: int = 0, **changes: Any
 ) -> Findings:
     study = {
-        "scenario": {"case": "3"}, "laws": list(table["law"].unique()), "require": REQUIRE,
-        "vary": {"robot.base.mass": UNIFORM}, **changes,
-    }  # fmt: skip
+        "scenario": {"case": "3"},
+        "laws": list(table["law"].unique()),
+        "require": REQUIRE,
+        "vary": {"robot.base.mass": UNIFORM},
+        **changes,
+    }
     grid = [name for name, value in study["vary"].items() if "grid" in value]
     asked = runs or table["run"].nunique()
     return Findings(

@@ -34,9 +34,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_it_prints_and_writes(folder: Path, tmp_path: Path, report: Run) -> None:
     html, markdown = tmp_path / "a.html", tmp_path / "a.md"
     code, out, err = report(
-        str(folder), "--html", str(html), "--markdown", str(markdown), "--metric",
-        "attitude_rms",
-    )  # fmt: skip
+        str(folder), "--html", str(html), "--markdown", str(markdown), "--metric", "attitude_rms"
+    )
     assert code == 0, err
     assert "pointing: attitude, largest below 0.001" in out
     assert "undecided" in out

@@ -11,10 +11,7 @@ import pytest
 from space_robot import Scenario
 from space_robot.campaign.row import fly
 from space_robot.campaign.row.fly import RowFlyer
-from space_robot.campaign.row.row import (
-    Row,
-    Task,
-)
+from space_robot.campaign.row.row import Row, Task
 from space_robot.campaign.study import Study
 from space_robot_msgs_py.bag.blocks import blocks_of
 from space_robot_msgs_py.errors import InputError
@@ -81,10 +78,15 @@ def test_a_digest_covers_every_number() -> None:
     band = np.arange(3, dtype=np.float32)
     row = Row(TASK, "complete", "", 1.0, {"a": 1.0, "b": "x"}, {"m": 2.0}, {"r": 3.0}, {"s": band})
     parts: list[dict[str, Any]] = [
-        {"outcome": "diverged"}, {"reason": "why"}, {"ended_at_s": 1.5}, {"vary": {"a": 1.0}},
-        {"vary": {"a": 1.0, "b": "y"}}, {"metrics": {"m": np.nextafter(2.0, 3.0)}},
-        {"require": {"r": -3.0}}, {"bands": {"s": np.nextafter(band, np.float32(9))}},
-    ]  # fmt: skip
+        {"outcome": "diverged"},
+        {"reason": "why"},
+        {"ended_at_s": 1.5},
+        {"vary": {"a": 1.0}},
+        {"vary": {"a": 1.0, "b": "y"}},
+        {"metrics": {"m": np.nextafter(2.0, 3.0)}},
+        {"require": {"r": -3.0}},
+        {"bands": {"s": np.nextafter(band, np.float32(9))}},
+    ]
     digests = {Row(**{**row.__dict__, **part}).digested().digest for part in parts}
     digests |= {row.digested().digest, row.digested(b"state").digest}
     assert len(digests) == len(parts) + 2

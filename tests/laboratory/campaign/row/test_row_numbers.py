@@ -14,18 +14,9 @@ from hypothesis import strategies as st
 from space_robot import FlownFlight, Scenario
 from space_robot.analysis import tracking_error
 from space_robot.campaign.row.bands import Bands
-from space_robot.campaign.row.columns import (
-    Columns,
-    missing_for_ripple,
-)
-from space_robot.campaign.row.measure import (
-    Measure,
-    check_requirements,
-)
-from space_robot.campaign.row.window import (
-    Window,
-    WindowMetrics,
-)
+from space_robot.campaign.row.columns import Columns, missing_for_ripple
+from space_robot.campaign.row.measure import Measure, check_requirements
+from space_robot.campaign.row.window import Window, WindowMetrics
 from space_robot.campaign.study import Requirement
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Timebase
@@ -136,9 +127,12 @@ def test_what_no_flight_has_cannot_be_required(
 
 
 @given(
-    st.integers(1, 3000), st.floats(0.0, 2.0), st.none() | st.floats(0.0, 2.0),
-    st.sampled_from([0.0005, 0.001, 0.0125]), st.lists(st.integers(1, 3000), max_size=3),
-)  # fmt: skip
+    st.integers(1, 3000),
+    st.floats(0.0, 2.0),
+    st.none() | st.floats(0.0, 2.0),
+    st.sampled_from([0.0005, 0.001, 0.0125]),
+    st.lists(st.integers(1, 3000), max_size=3),
+)
 def test_the_ticks_of_a_window_are_those_of_its_rows(
     ticks: int, from_s: float, to_s: float | None, period: float, cuts: list[int]
 ) -> None:

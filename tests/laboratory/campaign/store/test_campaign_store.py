@@ -14,33 +14,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot.campaign.row.row import (
-    Row,
-    Task,
-)
-from space_robot.campaign.store.folder import (
-    begin_or_resume,
-    held_folder,
-)
+from space_robot.campaign.row.row import Row, Task
+from space_robot.campaign.store.folder import begin_or_resume, held_folder
 from space_robot.campaign.store.journal import Journal
 from space_robot.campaign.store.journal_codec import JournalCodec
-from space_robot.campaign.store.journal_file import (
-    damage_of,
-    whole_rows,
-    write_journal,
-)
-from space_robot.campaign.store.manifest import (
-    Manifest,
-    read_manifest,
-)
+from space_robot.campaign.store.journal_file import damage_of, whole_rows, write_journal
+from space_robot.campaign.store.manifest import Manifest, read_manifest
 from space_robot.campaign.store.schema import Schema
 from space_robot.campaign.store.software import source_digest
-from space_robot.campaign.store.table import (
-    file_digest,
-    read_table,
-    table_rows,
-    write_table,
-)
+from space_robot.campaign.store.table import file_digest, read_table, table_rows, write_table
 from space_robot.campaign.study import Study
 from space_robot_msgs_py.errors import InputError
 
@@ -65,9 +47,15 @@ def rows(draw: st.DrawFn) -> Row:
         return Row(task, "diverged", draw(st.text(max_size=5)), draw(FLOATS), vary).digested()
     band = np.array(draw(st.lists(st.floats(width=32), min_size=3, max_size=3)), np.float32)
     return Row(
-        task, "complete", "", draw(FLOATS), vary, {"m": draw(FLOATS)}, {"r": draw(FLOATS)},
+        task,
+        "complete",
+        "",
+        draw(FLOATS),
+        vary,
+        {"m": draw(FLOATS)},
+        {"r": draw(FLOATS)},
         {"s": band},
-    ).digested()  # fmt: skip
+    ).digested()
 
 
 CODEC = JournalCodec("campaign", LAWS)
@@ -113,9 +101,11 @@ def test_a_stored_row_decodes_as_itself_or_not_at_all(row: Row, data: st.DataObj
     assert decoded.digested().digest == row.digest == decoded.digest
     assert decoded.task == row.task
     place = data.draw(st.integers(0, 5))
-    other = data.draw(st.one_of(
-        st.none(), st.integers(-2, 30), st.floats(), st.text(max_size=3), st.binary(max_size=9)
-    ))  # fmt: skip
+    other = data.draw(
+        st.one_of(
+            st.none(), st.integers(-2, 30), st.floats(), st.text(max_size=3), st.binary(max_size=9)
+        )
+    )
     if other != stored[place]:
         assert CODEC.decode((*stored[:place], other, *stored[place + 1 :])) is None
     for text in (stored[3], stored[5]):
@@ -129,16 +119,32 @@ def test_a_stored_row_decodes_as_itself_or_not_at_all(row: Row, data: st.DataObj
 def test_a_table_has_every_column_and_nulls_for_what_is_not_there(tmp_path: Path) -> None:
     band = np.array([1.0, 2.0, 3.0], np.float32)
     ended = Row(
-        Task(0, "tde_stc"), "complete", "", 1.5, {"mass": 0.1, "word": "a"}, {"m": 1e-300},
-        {"r": 2.0}, {"s": band}, "d",
-    )  # fmt: skip
+        Task(0, "tde_stc"),
+        "complete",
+        "",
+        1.5,
+        {"mass": 0.1, "word": "a"},
+        {"m": 1e-300},
+        {"r": 2.0},
+        {"s": band},
+        "d",
+    )
     early = Row(Task(0, "ctc=tuned"), "killed", "its process died", vary={"mass": 0.2, "word": "b"})
     write_table(tmp_path / "t", SCHEMA, "c", [ended, early])
     table = read_table(tmp_path / "t", SCHEMA)
     assert list(table) == [
-        "run", "law", "outcome", "reason", "ended_at_s", "vary.mass", "vary.word", "metric.m",
-        "require.r", "band.s", "digest",
-    ]  # fmt: skip
+        "run",
+        "law",
+        "outcome",
+        "reason",
+        "ended_at_s",
+        "vary.mass",
+        "vary.word",
+        "metric.m",
+        "require.r",
+        "band.s",
+        "digest",
+    ]
     assert table["metric.m"].tolist()[0] == 1e-300
     assert table["metric.m"].isna().tolist() == [False, True]
     assert table["vary.word"].tolist() == ["a", "b"]
@@ -249,10 +255,15 @@ STUDY = "laws: [tde_stc, ctc=tuned]\nvary: {a: {normal: 1.0}}\n"
 
 def manifest(**other: object) -> Manifest:
     content = {
-        "seed": 7, "runs": 20, "study": content_of({"laws": LAWS, "vary": {"a": {"normal": 1.0}}}),
-        "software": {"numpy": "2.0"}, "commit": None, "files": {}, "flights": {"tde_stc": "f"},
+        "seed": 7,
+        "runs": 20,
+        "study": content_of({"laws": LAWS, "vary": {"a": {"normal": 1.0}}}),
+        "software": {"numpy": "2.0"},
+        "commit": None,
+        "files": {},
+        "flights": {"tde_stc": "f"},
         "table": SCHEMA.model_dump(),
-    }  # fmt: skip
+    }
     return Manifest.model_validate({**content, **other})
 
 

@@ -10,11 +10,7 @@ from hypothesis import strategies as st
 from scipy.stats import binom, binomtest, false_discovery_control, wilcoxon
 
 from space_robot.campaign.verdicts.league import league
-from space_robot.campaign.verdicts.paired import (
-    compare,
-    compare_all,
-    holm,
-)
+from space_robot.campaign.verdicts.paired import compare, compare_all, holm
 from space_robot.campaign.verdicts.quantiles import quantile
 
 numbers = st.one_of(st.floats(1e-6, 1e3), st.just(np.inf))
@@ -115,8 +111,10 @@ def test_holm_of_a_textbook() -> None:
 def test_the_league_ranks_what_is_shown() -> None:
     found = league(made_table(200, failing=0.0), "metric.attitude_rms")
     assert [(s.law, s.rank) for s in found.standings] == [
-        ("ctc", 1), ("tde_stc", 2), ("tde_tsmc=robust", 3),
-    ]  # fmt: skip
+        ("ctc", 1),
+        ("tde_stc", 2),
+        ("tde_tsmc=robust", 3),
+    ]
     (first, *_) = found.comparisons
     assert first.ratio.low < 1 / 1.5 < first.ratio.high
 

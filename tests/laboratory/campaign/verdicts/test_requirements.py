@@ -9,21 +9,9 @@ from campaign_tables import made_table
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot.campaign.study import (
-    Requirement,
-    Study,
-)
-from space_robot.campaign.verdicts.requirements import (
-    Verdict,
-    family_error,
-    verdict,
-    verdicts,
-)
-from space_robot.campaign.verdicts.share_test import (
-    FixedSample,
-    Sequential,
-    ShareTest,
-)
+from space_robot.campaign.study import Requirement, Study
+from space_robot.campaign.verdicts.requirements import Verdict, family_error, verdict, verdicts
+from space_robot.campaign.verdicts.share_test import FixedSample, Sequential, ShareTest
 
 
 def demand_of(
@@ -40,10 +28,14 @@ def demand_of(
 def rows(values: list[float], failed: int = 0, outcome: str = "diverged") -> pd.DataFrame:
     """Flights with these numbers, and so many more that did not come to their end."""
     outcomes = ["complete"] * len(values) + [outcome] * failed
-    return pd.DataFrame({
-        "run": range(len(outcomes)), "law": "ctc", "outcome": outcomes,
-        "require.x": [*values, *[0.0] * failed],
-    })  # fmt: skip
+    return pd.DataFrame(
+        {
+            "run": range(len(outcomes)),
+            "law": "ctc",
+            "outcome": outcomes,
+            "require.x": [*values, *[0.0] * failed],
+        }
+    )
 
 
 def judge(
@@ -56,8 +48,10 @@ def test_one_look_at_767_runs_without_failure_meets_997_at_90() -> None:
     assert judge(demand_of(1.0), rows([0.5] * 767)).word == "met"
     found = judge(demand_of(1.0), rows([0.5] * 766))
     assert (found.word, found.needed_without_failure, found.projected_decision) == (
-        "undecided", None, None,
-    )  # fmt: skip
+        "undecided",
+        None,
+        None,
+    )
     assert judge(demand_of(1.0), rows([0.5] * 950 + [2.0] * 50)).word == "not met"
 
 
@@ -89,8 +83,11 @@ def test_what_is_not_measured_speaks_against_every_verdict() -> None:
     for kind in (FixedSample, Sequential):
         found = judge(demand, rows([np.nan] * 50), kind)
         assert (found.word, found.failures, found.not_measured, found.met) == (
-            "not measured", 0, 50, 0,
-        )  # fmt: skip
+            "not measured",
+            0,
+            50,
+            0,
+        )
         assert found.limits == (0.0, 1.0)
         assert found.projected_decision is None
         assert judge(demand, rows([0.5] * 200 + [np.nan] * 2), kind).word == "met"
@@ -104,10 +101,12 @@ def test_what_is_not_measured_speaks_against_every_verdict() -> None:
 
 def test_the_error_of_all_verdicts_is_the_sum_of_theirs() -> None:
     requirement = {"metric": "attitude_max", "below": 1e-4, "in": 0.9}
-    study = Study.model_validate({
-        "laws": ["ctc"],
-        "require": {"pointing": requirement, "other": {**requirement, "confidence": 0.99}},
-    })  # fmt: skip
+    study = Study.model_validate(
+        {
+            "laws": ["ctc"],
+            "require": {"pointing": requirement, "other": {**requirement, "confidence": 0.99}},
+        }
+    )
     table = made_table(20).assign(**{"require.other": 1.0})
     found = verdicts(table, study, 20)
     assert len(found) == 6
@@ -156,9 +155,12 @@ def test_no_runs_decide_nothing() -> None:
 
 @settings(max_examples=40)
 @given(
-    st.lists(st.floats(0.0, 2.0), min_size=1, max_size=200), st.integers(0, 5),
-    st.floats(0.5, 0.98), st.floats(0.55, 0.95), st.sampled_from([FixedSample, Sequential]),
-)  # fmt: skip
+    st.lists(st.floats(0.0, 2.0), min_size=1, max_size=200),
+    st.integers(0, 5),
+    st.floats(0.5, 0.98),
+    st.floats(0.55, 0.95),
+    st.sampled_from([FixedSample, Sequential]),
+)
 def test_bound_limits_and_verdict_say_the_same(
     values: list[float], failed: int, share: float, confidence: float, kind: type[ShareTest]
 ) -> None:
@@ -173,10 +175,13 @@ def test_bound_limits_and_verdict_say_the_same(
 
 def test_every_law_at_every_point_of_the_grid_has_its_verdict() -> None:
     table = made_table(120, grid=("fine", "coarse"))
-    study = Study.model_validate({
-        "laws": ["ctc"], "vary": {"scenario.sensors": {"grid": ["fine", "coarse"]}},
-        "require": {"pointing": {"metric": "attitude_max", "below": 1e-4, "in": 0.9}},
-    })  # fmt: skip
+    study = Study.model_validate(
+        {
+            "laws": ["ctc"],
+            "vary": {"scenario.sensors": {"grid": ["fine", "coarse"]}},
+            "require": {"pointing": {"metric": "attitude_max", "below": 1e-4, "in": 0.9}},
+        }
+    )
     found = verdicts(table, study, 120, ["scenario.sensors"])
     assert [(v.point, v.law) for v in found] == [
         (f"sensors = {point}", law)

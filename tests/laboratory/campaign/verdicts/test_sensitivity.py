@@ -9,25 +9,21 @@ from campaign_tables import made_table
 from scipy.stats import kruskal, norm, qmc, rankdata, spearmanr
 from scipy.stats import sobol_indices as scipy_sobol
 
-from space_robot.campaign.verdicts.design import (
-    independent_rows,
-    saltelli_values,
-)
-from space_robot.campaign.verdicts.sensitivity import (
-    rank_correlations,
-    sensitivity,
-)
-from space_robot.campaign.verdicts.sobol import (
-    indices,
-    sobol_indices,
-)
+from space_robot.campaign.verdicts.design import independent_rows, saltelli_values
+from space_robot.campaign.verdicts.sensitivity import rank_correlations, sensitivity
+from space_robot.campaign.verdicts.sobol import indices, sobol_indices
 
 
 def table_of(variables: dict[str, object], metric: np.ndarray) -> pd.DataFrame:
-    return pd.DataFrame({
-        "run": range(len(metric)), "law": "ctc", "outcome": "complete",
-        **{f"vary.{name}": values for name, values in variables.items()}, "metric.x": metric,
-    })  # fmt: skip
+    return pd.DataFrame(
+        {
+            "run": range(len(metric)),
+            "law": "ctc",
+            "outcome": "complete",
+            **{f"vary.{name}": values for name, values in variables.items()},
+            "metric.x": metric,
+        }
+    )
 
 
 def test_partial_correlations_are_those_of_residuals_for_every_variable() -> None:
@@ -181,10 +177,17 @@ def test_rows_with_a_failed_flight_are_left_out_and_counted() -> None:
 
 def test_a_table_of_the_design_becomes_its_rows() -> None:
     """Runs in any order; one is missing, one failed."""
-    table = pd.DataFrame({
-        "run": range(10), "law": "ctc", "outcome": "complete", "vary.a": 0.0, "vary.b": 0.0,
-        "vary.c": 0.0, "metric.x": np.arange(10.0),
-    })  # fmt: skip
+    table = pd.DataFrame(
+        {
+            "run": range(10),
+            "law": "ctc",
+            "outcome": "complete",
+            "vary.a": 0.0,
+            "vary.b": 0.0,
+            "vary.c": 0.0,
+            "metric.x": np.arange(10.0),
+        }
+    )
     table.loc[3, "outcome"] = "diverged"
     table = table.drop(index=7).sample(frac=1.0, random_state=1)
     found = saltelli_values(table, "ctc", "metric.x")

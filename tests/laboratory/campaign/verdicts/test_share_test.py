@@ -178,9 +178,11 @@ def test_the_two_sided_interval_has_half_the_error_on_either_side() -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(
-    st.sampled_from([0.5, 0.8, 0.95, 0.99, 0.997]), st.sampled_from([0.6, 0.9, 0.99]),
-    st.integers(1, 400), st.floats(0.0, 2.5),
-)  # fmt: skip
+    st.sampled_from([0.5, 0.8, 0.95, 0.99, 0.997]),
+    st.sampled_from([0.6, 0.9, 0.99]),
+    st.integers(1, 400),
+    st.floats(0.0, 2.5),
+)
 def test_the_projected_decision_is_the_first_of_all(
     share: float, confidence: float, runs: int, frequency: float
 ) -> None:

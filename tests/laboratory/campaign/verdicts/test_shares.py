@@ -7,10 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import beta
 
-from space_robot.campaign.verdicts.shares import (
-    share_interval,
-    share_limits,
-)
+from space_robot.campaign.verdicts.shares import share_interval, share_limits
 
 
 @given(

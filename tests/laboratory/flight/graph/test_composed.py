@@ -18,10 +18,7 @@ import numpy as np
 import pytest
 from flights import COMMAND, Flown, ros_environment, space_robot, space_robot_here
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -35,9 +32,16 @@ SHORT = ("--duration", "0.5")
 SWAP = ("--swap", "0.1:ctc", "--swap", "0.3:tde_smc")
 STATES_AND_COMMANDS = (topics.JOINT_STATES, topics.BASE_STATE, topics.COMMAND)
 COLUMNS = (
-    "base_position", "quaternion", "base_velocity", "omega_base", "joint_positions",
-    "joint_velocities", "applied_torque", "reference_joints", "reference_base",
-)  # fmt: skip
+    "base_position",
+    "quaternion",
+    "base_velocity",
+    "omega_base",
+    "joint_positions",
+    "joint_velocities",
+    "applied_torque",
+    "reference_joints",
+    "reference_base",
+)
 NODES = {"recorder_node", "mission_node", "controller_node", "plant_node"}
 
 

@@ -21,7 +21,7 @@ from flights import Flown
 from paths import CONFIG
 
 from space_robot.scenario.faults import KINDS
-from space_robot_control.allocation.assumed_actuators import believed_actuators
+from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -39,43 +39,70 @@ Fly = Callable[..., Flown]
 
 FLIGHTS: dict[str, tuple[str, ...]] = {
     "bad messages": (
-        "nan_state@0.1-0.2:0.05", "inf_state@0.2-0.3:0.05", "scaled_quaternion@0.3-0.4:0.05",
-        "stamp_back@0.4-0.45:0.1", "stamp_jump@0.5-0.55:0.1", "nan_command@0.6-0.7:0.05",
+        "nan_state@0.1-0.2:0.05",
+        "inf_state@0.2-0.3:0.05",
+        "scaled_quaternion@0.3-0.4:0.05",
+        "stamp_back@0.4-0.45:0.1",
+        "stamp_jump@0.5-0.55:0.1",
+        "nan_command@0.6-0.7:0.05",
         "inf_command@0.7-0.8:0.05",
     ),
     "bad links": (
-        "drop_state@0.05-0.1:0.1", "repeat_state@0.1-0.15:0.1", "drop_command@0.2-0.25:0.1",
-        "repeat_command@0.3-0.35:0.1", "delay_state@0.4-0.45:2", "jitter_state@0.5-0.55:3",
-        "delay_command@0.6-0.65:2", "jitter_command@0.7-0.75:3", "noise_gyro@0.8-0.85:1e-6",
+        "drop_state@0.05-0.1:0.1",
+        "repeat_state@0.1-0.15:0.1",
+        "drop_command@0.2-0.25:0.1",
+        "repeat_command@0.3-0.35:0.1",
+        "delay_state@0.4-0.45:2",
+        "jitter_state@0.5-0.55:3",
+        "delay_command@0.6-0.65:2",
+        "jitter_command@0.7-0.75:3",
+        "noise_gyro@0.8-0.85:1e-6",
     ),
     "bad sensors": (
-        "noise_attitude@0.05-0.1:1e-6", "noise_gyro@0.15-0.2:1e-6",
-        "noise_joint_position@0.25-0.3:1e-6", "noise_joint_velocity@0.35-0.4:1e-6",
-        "quantise_attitude@0.45-0.5:1e-5", "quantise_gyro@0.55-0.6:1e-6",
-        "quantise_joint_position@0.65-0.7:1e-5", "quantise_joint_velocity@0.75-0.8:1e-6",
-        "gyro_bias@0.81-0.83:base_x=1e-6", "tracker_blind@0.84-0.85", "encoder_stuck@0.86-0.865:3",
+        "noise_attitude@0.05-0.1:1e-6",
+        "noise_gyro@0.15-0.2:1e-6",
+        "noise_joint_position@0.25-0.3:1e-6",
+        "noise_joint_velocity@0.35-0.4:1e-6",
+        "quantise_attitude@0.45-0.5:1e-5",
+        "quantise_gyro@0.55-0.6:1e-6",
+        "quantise_joint_position@0.65-0.7:1e-5",
+        "quantise_joint_velocity@0.75-0.8:1e-6",
+        "gyro_bias@0.81-0.83:base_x=1e-6",
+        "tracker_blind@0.84-0.85",
+        "encoder_stuck@0.86-0.865:3",
     ),
     "bad actuators": (
-        "saturate_base@0.1-0.2:0.001", "saturate_joints@0.3-0.4:0.01", "stuck_joint@0.6-0.9:3=15",
-        "drive_scale@0.42-0.45:all=0.9", "drive_bias@0.46-0.49:base_x=0.01",
-        "torque_scale@0.5-0.53:all=1.001", "torque_bias@0.54-0.57:base_x=0.001",
-        "torque_scale@0.45-0.5:all=0.99", "torque_bias@0.52-0.57:joint2=0.01",
-        "drive_scale@0.91-0.94:joints=1.02", "drive_bias@0.95-0.98:base_x=0.01",
+        "saturate_base@0.1-0.2:0.001",
+        "saturate_joints@0.3-0.4:0.01",
+        "stuck_joint@0.6-0.9:3=15",
+        "drive_scale@0.42-0.45:all=0.9",
+        "drive_bias@0.46-0.49:base_x=0.01",
+        "torque_scale@0.5-0.53:all=1.001",
+        "torque_bias@0.54-0.57:base_x=0.001",
+        "torque_scale@0.45-0.5:all=0.99",
+        "torque_bias@0.52-0.57:joint2=0.01",
+        "drive_scale@0.91-0.94:joints=1.02",
+        "drive_bias@0.95-0.98:base_x=0.01",
     ),
     "bad hardware": (
-        "thruster_stuck_on@0.1-0.2:3", "wheel_fail@0.3-0.6:2",
+        "thruster_stuck_on@0.1-0.2:3",
+        "wheel_fail@0.3-0.6:2",
         "thruster_stuck_off@0.7-0.9:thrusters",
     ),
-    "long silences": (
-        "scaled_quaternion@0.1-0.25", "drop_command@0.4-0.55", "drop_state@0.7-0.85",
-    ),
-}  # fmt: skip
+    "long silences": ("scaled_quaternion@0.1-0.25", "drop_command@0.4-0.55", "drop_state@0.7-0.85"),
+}
 """Flights of a second by their name; the silences last beyond `HOLD_TICKS`."""
 HOLD_TICKS = 100
 OPTIONS = (
-    "--duration", "1", "--seed", str(SEED), "--set", f"plant.hold_ticks={HOLD_TICKS}",
-    "--set", f"controller.hold_ticks={HOLD_TICKS}",
-)  # fmt: skip
+    "--duration",
+    "1",
+    "--seed",
+    str(SEED),
+    "--set",
+    f"plant.hold_ticks={HOLD_TICKS}",
+    "--set",
+    f"controller.hold_ticks={HOLD_TICKS}",
+)
 ACTUATORS = {"bad hardware": "wheels_and_thrusters"}
 """Of the flights that need others than ideal ones."""
 IN_PROCESSES = {"long silences"}
@@ -145,7 +172,7 @@ def seen(fly: Fly) -> Callable[[str], Seen]:
             parse_faults(texts, PLANT_KINDS),
             SEED,
             PERIOD,
-            believed_actuators(actuators, robot).robot_names(robot),
+            assumed_actuators(actuators, robot).robot_names(robot),
         )
         expected = {
             fault.kind.name: sum(
@@ -182,25 +209,45 @@ def counts(node: str, key: str, *kinds: str) -> Check:
 
 MATRIX: list[tuple[str, str, str, Check]] = [
     # fault, flight, reaction, how it shows
-    ("nan_state", "bad messages", "not used, counted",
-     counts("controller", "rejected: state not finite", "nan_state", "inf_state")),
+    (
+        "nan_state",
+        "bad messages",
+        "not used, counted",
+        counts("controller", "rejected: state not finite", "nan_state", "inf_state"),
+    ),
     ("nan_state", "bad messages", "last torque repeated", tracks(0.1, 0.2, 1e-5)),
     ("inf_state", "bad messages", "last torque repeated", tracks(0.2, 0.3, 1e-5)),
-    ("scaled_quaternion", "bad messages", "not used, counted",
-     counts("controller", "rejected: quaternion not unit", "scaled_quaternion")),
+    (
+        "scaled_quaternion",
+        "bad messages",
+        "not used, counted",
+        counts("controller", "rejected: quaternion not unit", "scaled_quaternion"),
+    ),
     ("stamp_back", "bad messages", "not used", tracks(0.4, 0.45, 1e-5)),
     ("stamp_jump", "bad messages", "not used", tracks(0.5, 0.55, 1e-5)),
-    ("stamp_jump", "bad messages", "counted",
-     lambda seen: seen.count("controller", "rejected: stamp") > 0),
-    ("nan_command", "bad messages", "refused, counted",
-     counts("plant", "refused: not finite", "nan_command", "inf_command")),
+    (
+        "stamp_jump",
+        "bad messages",
+        "counted",
+        lambda seen: seen.count("controller", "rejected: stamp") > 0,
+    ),
+    (
+        "nan_command",
+        "bad messages",
+        "refused, counted",
+        counts("plant", "refused: not finite", "nan_command", "inf_command"),
+    ),
     ("nan_command", "bad messages", "last good held", tracks(0.6, 0.7, 1e-5)),
     ("inf_command", "bad messages", "last good held", tracks(0.7, 0.8, 1e-5)),
     ("drop_state", "bad links", "command held", tracks(0.05, 0.1, 1e-5)),
     ("repeat_state", "bad links", "answered once", tracks(0.1, 0.15, 1e-5)),
     ("drop_command", "bad links", "last good held", tracks(0.2, 0.25, 1e-5)),
-    ("repeat_command", "bad links", "refused as old, counted",
-     lambda seen: seen.count("plant", "refused: stamp") >= seen.expected["repeat_command"] > 0),
+    (
+        "repeat_command",
+        "bad links",
+        "refused as old, counted",
+        lambda seen: seen.count("plant", "refused: stamp") >= seen.expected["repeat_command"] > 0,
+    ),
     ("delay_state", "bad links", "estimate from the echo", tracks(0.4, 0.45, 1e-4)),
     ("jitter_state", "bad links", "estimate from the echo", tracks(0.5, 0.55, 1e-4)),
     ("delay_command", "bad links", "estimate from the echo", tracks(0.6, 0.65, 1e-4)),
@@ -215,14 +262,28 @@ MATRIX: list[tuple[str, str, str, Check]] = [
     ("quantise_joint_velocity", "bad sensors", "flown through", tracks(0.75, 0.8, 1e-3)),
     ("gyro_bias", "bad sensors", "flown through", tracks(0.81, 0.83, 1e-3)),
     ("tracker_blind", "bad sensors", "the last attitude held", tracks(0.84, 0.85, 1e-3)),
-    ("tracker_blind", "bad sensors", "the last attitude held",
-     lambda seen: not np.diff(seen.log.as_measured().quaternion[1680:1700], axis=0).any()),
+    (
+        "tracker_blind",
+        "bad sensors",
+        "the last attitude held",
+        lambda seen: not np.diff(seen.log.as_measured().quaternion[1680:1700], axis=0).any(),
+    ),
     ("encoder_stuck", "bad sensors", "flown through", tracks(0.86, 0.865, 1e-2)),
-    ("saturate_base", "bad actuators", "clipped, echoed",
-     lambda seen: bool(np.abs(seen.torque(0.1, 0.2)[:, :3]).max() == 0.001)),
-    ("saturate_joints", "bad actuators", "clipped, counted",
-     lambda seen: bool(np.abs(seen.torque(0.3, 0.4)[:, 3:]).max() == 0.01)
-     and seen.count("plant", "saturated_ticks") > 100),
+    (
+        "saturate_base",
+        "bad actuators",
+        "clipped, echoed",
+        lambda seen: bool(np.abs(seen.torque(0.1, 0.2)[:, :3]).max() == 0.001),
+    ),
+    (
+        "saturate_joints",
+        "bad actuators",
+        "clipped, counted",
+        lambda seen: (
+            bool(np.abs(seen.torque(0.3, 0.4)[:, 3:]).max() == 0.01)
+            and seen.count("plant", "saturated_ticks") > 100
+        ),
+    ),
     ("drive_scale", "bad actuators", "flown through", tracks(0.42, 0.45, 1e-2)),
     ("drive_bias", "bad actuators", "flown through", tracks(0.46, 0.49, 1e-2)),
     ("torque_scale", "bad actuators", "flown through", tracks(0.5, 0.53, 1e-2)),
@@ -232,32 +293,76 @@ MATRIX: list[tuple[str, str, str, Check]] = [
     ("torque_bias", "bad actuators", "flown through", tracks(0.52, 0.57, 1e-2)),
     ("drive_scale", "bad actuators", "the estimate has it", tracks(0.91, 0.94, 1e-2)),
     ("drive_bias", "bad actuators", "the estimate has it", tracks(0.95, 0.98, 1e-2)),
-    ("wheel_fail", "bad hardware", "a dead motor, three wheels go on",
-     lambda seen: not seen.log.wheel_torques[stretch(0.3, 0.6), 1].any()
-     and seen.error(0.3, 1.0) < 1e-2),
-    ("thruster_stuck_on", "bad hardware", "it burns, wheels hold against it",
-     lambda seen: bool(np.all(seen.log.thrusts[stretch(0.1, 0.2), 2] == 0.9))
-     and seen.error(0.1, 0.3) < 1e-2),
-    ("thruster_stuck_off", "bad hardware", "no thrust",
-     lambda seen: not seen.log.thrusts[stretch(0.7, 0.9)].any()),
-    ("scaled_quaternion", "long silences", "the controller goes safe, then back",
-     lambda seen: "safe: quaternion not unit" in " ".join(seen.modes("controller"))
-     and seen.modes("controller")[-1] == "nominal"),
-    ("scaled_quaternion", "long silences", "told with the time of its tick",
-     lambda seen: seen.tells("controller", "safe: quaternion not unit", 0.1 + HOLD_TICKS * PERIOD)
-     and seen.tells("controller", "nominal", 0.25)),
+    (
+        "wheel_fail",
+        "bad hardware",
+        "a dead motor, three wheels go on",
+        lambda seen: (
+            not seen.log.wheel_torques[stretch(0.3, 0.6), 1].any() and seen.error(0.3, 1.0) < 1e-2
+        ),
+    ),
+    (
+        "thruster_stuck_on",
+        "bad hardware",
+        "it burns, wheels hold against it",
+        lambda seen: (
+            bool(np.all(seen.log.thrusts[stretch(0.1, 0.2), 2] == 0.9))
+            and seen.error(0.1, 0.3) < 1e-2
+        ),
+    ),
+    (
+        "thruster_stuck_off",
+        "bad hardware",
+        "no thrust",
+        lambda seen: not seen.log.thrusts[stretch(0.7, 0.9)].any(),
+    ),
+    (
+        "scaled_quaternion",
+        "long silences",
+        "the controller goes safe, then back",
+        lambda seen: (
+            "safe: quaternion not unit" in " ".join(seen.modes("controller"))
+            and seen.modes("controller")[-1] == "nominal"
+        ),
+    ),
+    (
+        "scaled_quaternion",
+        "long silences",
+        "told with the time of its tick",
+        lambda seen: (
+            seen.tells("controller", "safe: quaternion not unit", 0.1 + HOLD_TICKS * PERIOD)
+            and seen.tells("controller", "nominal", 0.25)
+        ),
+    ),
     ("scaled_quaternion", "long silences", "no torque after hold_ticks", no_torque(0.1, 0.25)),
-    ("drop_command", "long silences", "the plant goes safe, then back",
-     lambda seen: "safe: no good command, the torque is zero" in seen.modes("plant")
-     and seen.modes("plant")[-1] == "nominal"),
-    ("drop_command", "long silences", "told with the time of its tick",
-     lambda seen: seen.tells(
-         "plant", "safe: no good command, the torque is zero", 0.4 + HOLD_TICKS * PERIOD
-     ) and seen.tells("plant", "nominal", 0.55)),
+    (
+        "drop_command",
+        "long silences",
+        "the plant goes safe, then back",
+        lambda seen: (
+            "safe: no good command, the torque is zero" in seen.modes("plant")
+            and seen.modes("plant")[-1] == "nominal"
+        ),
+    ),
+    (
+        "drop_command",
+        "long silences",
+        "told with the time of its tick",
+        lambda seen: (
+            seen.tells(
+                "plant", "safe: no good command, the torque is zero", 0.4 + HOLD_TICKS * PERIOD
+            )
+            and seen.tells("plant", "nominal", 0.55)
+        ),
+    ),
     ("drop_command", "long silences", "no torque after hold_ticks", no_torque(0.4, 0.55)),
-    ("drop_state", "long silences", "no torque when states come again",
-     lambda seen: bool(np.all(seen.log.applied_torque[round(0.85 / PERIOD)] == 0.0))),
-]  # fmt: skip
+    (
+        "drop_state",
+        "long silences",
+        "no torque when states come again",
+        lambda seen: bool(np.all(seen.log.applied_torque[round(0.85 / PERIOD)] == 0.0)),
+    ),
+]
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 from flights import Start
 
 from space_robot.flight.graph.listeners import wait_for
-from space_robot_control.allocation.assumed_actuators import believed_actuators
+from space_robot_control.allocation.assumed_actuators import assumed_actuators
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.ros.process_environment import set_defaults
@@ -65,9 +65,11 @@ def junk(robot: Robot, names: RobotNames) -> dict[topics.Topic, list[bytes]]:
     sent = [
         dict(zip(codec.topics, codec.encode(state), strict=True))
         for codec, state in (
-            (states, future), (states, none), (foreign, RobotState.allocate(other.n)),
+            (states, future),
+            (states, none),
+            (foreign, RobotState.allocate(other.n)),
         )
-    ]  # fmt: skip
+    ]
     commands = CommandCodec(names.commanded, TIMEBASE)
     torque = np.full(len(names.commanded), np.nan)
     chunks = [
@@ -81,12 +83,14 @@ def junk(robot: Robot, names: RobotNames) -> dict[topics.Topic, list[bytes]]:
     return {
         **{topic: [state[topic] for state in sent] + [b"\0\1\0\0junk"] for topic in states.topics},
         topics.COMMAND: [
-            commands.encode(Command(10**7, torque)), commands.encode(Command(1, torque)), b"\0\1",
+            commands.encode(Command(10**7, torque)),
+            commands.encode(Command(1, torque)),
+            b"\0\1",
         ],
         topics.REFERENCE_JOINTS: [joints for joints, _ in chunks] + [b"\0\1\0\0junk"],
         topics.REFERENCE_BASE: [base for _, base in chunks] + [b"\0\1\0\0junk"],
         topics.CLOCK: [ClockCodec().encode(k) for k in (10**15, 7, 0)],
-    }  # fmt: skip
+    }
 
 
 @pytest.mark.parametrize("actuators", ["ideal", "wheels_and_thrusters"])
@@ -99,7 +103,7 @@ def test_a_flood_of_junk_on_every_topic_changes_nothing(
     others = [name for name in wait_for("plant") if not name.startswith("recorder")]
     plant = start("plant", wait_for=others, actuators=actuators)
     until(monitor, lambda: monitor.simulated_s > 0.0, pause)
-    names = believed_actuators(actuators, paper_robot).robot_names(paper_robot)
+    names = assumed_actuators(actuators, paper_robot).robot_names(paper_robot)
     bursts = junk(paper_robot, names)
     outs = {topic: RawPublisher(monitor.node, topic) for topic in bursts}
     heard = [out for topic, out in outs.items() if topic is not topics.THRUSTERS_STATE]
@@ -173,10 +177,12 @@ def test_late_listeners_are_told_what_is_needed_and_of_no_lost_message(
     for _ in range(3):
         joined_at = tick
         subscription = monitor.node.create_subscription(
-            message_type(topic.type), topic.full_name,
-            lambda message: heard.append(message.header.stamp), qos(topic),
+            message_type(topic.type),
+            topic.full_name,
+            lambda message: heard.append(message.header.stamp),
+            qos(topic),
             event_callbacks=SubscriptionEventCallbacks(message_lost=lost.append),
-        )  # fmt: skip
+        )
         until(monitor, lambda: len(heard) > 40, go_on)
         starts = {TIMEBASE.tick(stamp.sec * 10**9 + stamp.nanosec) for stamp in heard}
         assert min(starts) > joined_at - 2000, "nothing of what is long over"

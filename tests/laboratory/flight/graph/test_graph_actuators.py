@@ -12,10 +12,7 @@ import numpy as np
 import pytest
 from flights import Flown
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.replay.outcome import ReplayOptions
 from space_robot.flight.replay.run import replay
 from space_robot.flight.simulate import simulate

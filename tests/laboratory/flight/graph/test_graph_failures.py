@@ -34,8 +34,11 @@ def _start(bag: Path, *options: str) -> tuple[subprocess.Popen[str], dict[str, i
     """A long flight in progress, and the pids of its nodes by name."""
     process = subprocess.Popen(
         [*COMMAND, "fly", "--bag", str(bag), *options],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
-    )  # fmt: skip
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=ros_environment(),
+    )
     file = bag / f"{bag.name}_0.mcap"
     until = time.monotonic() + 90.0
     while time.monotonic() < until and process.poll() is None:

@@ -18,10 +18,7 @@ from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_model.dynamics.attitude import rotation_matrix
 from space_robot_msgs_py import topics
@@ -35,9 +32,16 @@ SHORT = ("--duration", "0.5")
 LONG = ("--duration", "3")
 COMPOSED = "--composed"
 STATE_COLUMNS = (
-    "base_position", "quaternion", "base_velocity", "omega_base", "joint_positions",
-    "joint_velocities", "applied_torque", "reference_joints", "reference_base",
-)  # fmt: skip
+    "base_position",
+    "quaternion",
+    "base_velocity",
+    "omega_base",
+    "joint_positions",
+    "joint_velocities",
+    "applied_torque",
+    "reference_joints",
+    "reference_base",
+)
 
 
 @pytest.mark.parametrize(("law", "how"), [("ctc", (COMPOSED,)), ("tde_stc", ())])
@@ -184,10 +188,15 @@ def test_analyze_prints_the_same_report(fly: Callable[..., Flown]) -> None:
 def test_seven_joint_robot_flies_in_the_graph(fly: Callable[..., Flown]) -> None:
     flown = fly(
         *SHORT, "--robot", "seven_joint", "--split-size", "200K", "--compression", "zstd", COMPOSED
-    )  # fmt: skip
+    )
     report = flown.report
     assert len(list(flown.bag.glob("*.mcap"))) > 1
     assert set(report["rms"]["eq64"]) == {
-        "attitude", "joints_1_3", "joints_4_7", "base_torque", "torque_1_3", "torque_4_7",
-    }  # fmt: skip
+        "attitude",
+        "joints_1_3",
+        "joints_4_7",
+        "base_torque",
+        "torque_1_3",
+        "torque_4_7",
+    }
     assert report["rms"]["mean_axis"]["attitude"] < 1e-6

@@ -10,19 +10,21 @@ import pytest
 from flights import Flown
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")
 
 COLUMNS = (
-    "base_position", "quaternion", "omega_base", "joint_positions", "joint_velocities",
-    "applied_torque", "commanded_torque",
-)  # fmt: skip
+    "base_position",
+    "quaternion",
+    "omega_base",
+    "joint_positions",
+    "joint_velocities",
+    "applied_torque",
+    "commanded_torque",
+)
 
 
 def test_a_free_base_drifts_in_the_graph_as_in_one_process(fly: Callable[..., Flown]) -> None:

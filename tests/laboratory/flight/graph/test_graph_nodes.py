@@ -29,11 +29,7 @@ def _end(process: subprocess.Popen[str], number: int = signal.SIGINT) -> int:
 
 def test_start_up_in_any_order(start: Start, tmp_path: Path) -> None:
     """Plant first and recorder last: nothing moves until all are there, nothing is lost."""
-    plant = start(
-        "plant",
-        ticks=300,
-        wait_for=wait_for("plant"),
-    )
+    plant = start("plant", ticks=300, wait_for=wait_for("plant"))
     time.sleep(2.0)
     controller = start("controller", wait_for=wait_for("controller"))
     time.sleep(1.0)
@@ -163,8 +159,12 @@ def test_arguments_that_are_not_of_ros_are_refused(arguments: list[str]) -> None
     pytest.importorskip("rclpy")
     result = subprocess.run(
         [*COMMAND, "plant_node", *arguments],
-        capture_output=True, text=True, timeout=60, check=False, env=ros_environment(),
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        env=ros_environment(),
+    )
     assert result.returncode == 2
     (line,) = result.stderr.splitlines()
     assert line.startswith("plant_node: error: unknown argument '--case'")

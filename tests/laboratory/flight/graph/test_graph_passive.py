@@ -9,10 +9,7 @@ import pytest
 from flights import Flown
 from passive_robot import PASSIVE_ROBOT
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.replay.outcome import ReplayOptions
 from space_robot.flight.replay.run import replay
 from space_robot.flight.simulate import simulate
@@ -21,9 +18,14 @@ from space_robot_msgs_py.bag.reader import read_flight
 pytest.importorskip("rclpy")
 
 COLUMNS = (
-    "quaternion", "joint_positions", "joint_velocities", "passive_positions", "passive_velocities",
-    "applied_torque", "commanded_torque",
-)  # fmt: skip
+    "quaternion",
+    "joint_positions",
+    "joint_velocities",
+    "passive_positions",
+    "passive_velocities",
+    "applied_torque",
+    "commanded_torque",
+)
 
 
 def test_passive_joints_swing_in_the_graph_as_in_one_process(

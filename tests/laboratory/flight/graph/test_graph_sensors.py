@@ -11,23 +11,28 @@ import numpy as np
 import pytest
 from flights import Flown
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight
 
 pytest.importorskip("rclpy")
 
 FAULTS = (
-    "noise_gyro@0.1-0.3:1e-6", "gyro_bias@0.2:base_y=1e-7", "tracker_blind@0.25-0.27",
-    "encoder_stuck@0.3-0.305:6", "saturate_joints@0.35-0.36:5", "torque_scale@0.1:all=1.001",
-)  # fmt: skip
+    "noise_gyro@0.1-0.3:1e-6",
+    "gyro_bias@0.2:base_y=1e-7",
+    "tracker_blind@0.25-0.27",
+    "encoder_stuck@0.3-0.305:6",
+    "saturate_joints@0.35-0.36:5",
+    "torque_scale@0.1:all=1.001",
+)
 COLUMNS = (
-    "quaternion", "angular_velocity", "joint_positions", "joint_velocities", "applied_torque",
+    "quaternion",
+    "angular_velocity",
+    "joint_positions",
+    "joint_velocities",
+    "applied_torque",
     "commanded_torque",
-)  # fmt: skip
+)
 
 
 def test_sensors_and_failing_parts_fly_in_the_graph_as_in_one_process(

@@ -22,15 +22,18 @@ TIMEOUT_S = 90.0
 def _start(bag: Path, domain: int, *options: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
         [*COMMAND, "fly", "--bag", str(bag), "--domain", str(domain), *options],
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=ros_environment(),
-    )  # fmt: skip
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=ros_environment(),
+    )
 
 
 def _nodes(flight: subprocess.Popen[bytes]) -> list[psutil.Process]:
     return [
-        child for child in psutil.Process(flight.pid).children(recursive=True)
+        child
+        for child in psutil.Process(flight.pid).children(recursive=True)
         if any(word.endswith("_node") for word in _words(child))
-    ]  # fmt: skip
+    ]
 
 
 def _words(process: psutil.Process) -> list[str]:

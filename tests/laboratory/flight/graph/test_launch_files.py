@@ -65,13 +65,19 @@ def launch(prefix: Path, free_domain: int) -> Callable[..., subprocess.Popen[str
     def start(*words: str) -> subprocess.Popen[str]:
         found = [str(prefix), *filter(None, [os.environ.get("AMENT_PREFIX_PATH", "")])]
         environment = {
-            **ros_environment(), "ROS_DOMAIN_ID": str(free_domain),
-            "AMENT_PREFIX_PATH": os.pathsep.join(found), "ROS_LOG_DIR": str(prefix / "log"),
-        }  # fmt: skip
+            **ros_environment(),
+            "ROS_DOMAIN_ID": str(free_domain),
+            "AMENT_PREFIX_PATH": os.pathsep.join(found),
+            "ROS_LOG_DIR": str(prefix / "log"),
+        }
         return subprocess.Popen(
-            [sys.executable, "-c", RUN, str(ROOT / "launch/fly.launch.py"), *words], text=True,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=environment, cwd=prefix,
-        )  # fmt: skip
+            [sys.executable, "-c", RUN, str(ROOT / "launch/fly.launch.py"), *words],
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            env=environment,
+            cwd=prefix,
+        )
 
     return start
 

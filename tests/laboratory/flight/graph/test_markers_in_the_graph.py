@@ -7,10 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 from flights import Start
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_model.robot import Robot
 from space_robot_model.robot.markers import RobotMarkers

@@ -13,10 +13,7 @@ import pytest
 from bags import messages_of
 from flights import Flown
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_sim.plant.faults import MESSAGE_KINDS
@@ -27,25 +24,42 @@ SEED = 5
 SWAP = "0.31:tde_smc"
 FLIGHTS: dict[str, tuple[str, ...]] = {
     "spoilt": (
-        "nan_state@0.05-0.2:0.05", "inf_state@0.1-0.2:0.05", "scaled_quaternion@0.1-0.3:0.05",
-        "stamp_back@0.2-0.45:0.1", "stamp_jump@0.3-0.45:0.1", "nan_command@0.1-0.4:0.05",
+        "nan_state@0.05-0.2:0.05",
+        "inf_state@0.1-0.2:0.05",
+        "scaled_quaternion@0.1-0.3:0.05",
+        "stamp_back@0.2-0.45:0.1",
+        "stamp_jump@0.3-0.45:0.1",
+        "nan_command@0.1-0.4:0.05",
         "inf_command@0.1-0.45:0.05",
     ),
     "late and lost": (
-        "drop_state@0.05-0.45:0.1", "repeat_state@0.1-0.45:0.2", "delay_state@0.2-0.25:2",
-        "jitter_state@0.22-0.4:3", "drop_command@0.05-0.3:0.1", "repeat_command@0.1-0.4:0.3",
-        "delay_command@0.15-0.2:2", "jitter_command@0.3-0.45:3",
+        "drop_state@0.05-0.45:0.1",
+        "repeat_state@0.1-0.45:0.2",
+        "delay_state@0.2-0.25:2",
+        "jitter_state@0.22-0.4:3",
+        "drop_command@0.05-0.3:0.1",
+        "repeat_command@0.1-0.4:0.3",
+        "delay_command@0.15-0.2:2",
+        "jitter_command@0.3-0.45:3",
     ),
     "long silences, and parts": (
-        "scaled_quaternion@0.05-0.12", "drop_command@0.2-0.27", "drop_state@0.3-0.37",
-        "noise_gyro@0:1e-6", "saturate_joints@0.1-0.2:0.5", "torque_scale@0.1:joints=0.999",
+        "scaled_quaternion@0.05-0.12",
+        "drop_command@0.2-0.27",
+        "drop_state@0.3-0.37",
+        "noise_gyro@0:1e-6",
+        "saturate_joints@0.1-0.2:0.5",
+        "torque_scale@0.1:joints=0.999",
         "drive_bias@0.2:base_y=0.001",
     ),
     "all that is new": (
-        "drop_state@0.1-0.3:0.1", "jitter_command@0.2-0.4:2", "stamp_back@0.1-0.4:0.05",
-        "tracker_blind@0.2-0.3", "gyro_bias@0.1:base_z=1e-6", "torque_bias@0.3:joint2=0.01",
+        "drop_state@0.1-0.3:0.1",
+        "jitter_command@0.2-0.4:2",
+        "stamp_back@0.1-0.4:0.05",
+        "tracker_blind@0.2-0.3",
+        "gyro_bias@0.1:base_z=1e-6",
+        "torque_bias@0.3:joint2=0.01",
     ),
-}  # fmt: skip
+}
 """Flights of half a second."""
 OPTIONS: dict[str, dict[str, str]] = {
     "all that is new": {"sensors": "tactical", "navigation": "filtered"}
@@ -71,10 +85,16 @@ def test_one_process_sends_what_the_graph_sends(
     faults = list(FLIGHTS[name])
     hold = {"plant": {"hold_ticks": 100}, "controller": {"hold_ticks": 100}}
     given = OPTIONS.get(name, {})
-    plan = FlightPlan.model_validate({
-        "duration": 0.5, "seed": SEED, "faults": faults, "swaps": [SWAP], "parameters": hold,
-        **given,
-    })  # fmt: skip
+    plan = FlightPlan.model_validate(
+        {
+            "duration": 0.5,
+            "seed": SEED,
+            "faults": faults,
+            "swaps": [SWAP],
+            "parameters": hold,
+            **given,
+        }
+    )
     simulate(Flight(plan), tmp_path / "bag")
     words = [word for fault in faults for word in ("--fault", fault)]
     for node in hold:

@@ -32,8 +32,9 @@ class Server:
         self.node = self._visitor.node
         self.answers = self.triggers = 0
         for kind, name, callback in (
-            (GetState, "get_state", self._get_state), (Trigger, "go", self._go),
-        ):  # fmt: skip
+            (GetState, "get_state", self._get_state),
+            (Trigger, "go", self._go),
+        ):
             service = self.node.create_service(kind, f"{self.node.get_name()}/{name}", callback)
             service.send_response = self._dropping(service.send_response)
         self._executor = SingleThreadedExecutor(context=self.node.context)

@@ -15,10 +15,7 @@ from flights import COMMAND, ros_environment, space_robot_here
 from space_robot.analysis import analyze
 from space_robot.flight.bag_path import check_bag_path
 from space_robot.flight.graph import orchestrator
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.processes.node_modules import MODULES
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import InputError
@@ -43,9 +40,11 @@ def process(domain: int, *command: str) -> Iterator[subprocess.Popen[str]]:
     """A process of others in a domain, until the context ends."""
     with subprocess.Popen(
         [sys.executable, *command],
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
         env={**ros_environment(), "ROS_DOMAIN_ID": str(domain)},
-    ) as it:  # fmt: skip
+    ) as it:
         try:
             yield it
         finally:
@@ -68,10 +67,13 @@ def test_of_two_at_the_same_moment_one_flies(tmp_path: Path, free_domain: int) -
     flights = [
         subprocess.Popen(
             [*COMMAND, "fly", "--duration", "0.2", "--domain", str(free_domain), "--bag", str(bag)],
-            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=ros_environment(),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=ros_environment(),
         )
         for bag in bags
-    ]  # fmt: skip
+    ]
     words = [flight.communicate(timeout=150)[1] for flight in flights]
     codes = [flight.returncode for flight in flights]
     assert sorted(codes) == [0, 2], words

@@ -35,16 +35,24 @@ from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscripti
 
 SHORT = ("--duration", "0.2")
 IMPATIENT = (
-    "--set", "plant.silence_timeout=0.5", "--set", "controller.state_timeout=0.5",
-    "--set", "controller.reference_timeout=0.5",
-)  # fmt: skip
+    "--set",
+    "plant.silence_timeout=0.5",
+    "--set",
+    "controller.state_timeout=0.5",
+    "--set",
+    "controller.reference_timeout=0.5",
+)
 LONGER_THAN_ANY_WATCHDOG_S = 3.0
 """Also than the one of a controller that is started again when it seems to hang."""
 TIMEOUT_S = 60.0
 SAME = (
-    topics.JOINT_STATES, topics.BASE_STATE, topics.COMMAND, topics.CLOCK, topics.TELEMETRY,
+    topics.JOINT_STATES,
+    topics.BASE_STATE,
+    topics.COMMAND,
+    topics.CLOCK,
+    topics.TELEMETRY,
     topics.LAW,
-)  # fmt: skip
+)
 
 
 def assert_same_messages(bag: Path, other: Path) -> None:

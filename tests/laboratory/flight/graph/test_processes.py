@@ -5,10 +5,7 @@ from __future__ import annotations
 import os
 import sys
 
-from space_robot.flight.graph.processes import (
-    TAIL_LINES,
-    NodeProcess,
-)
+from space_robot.flight.graph.processes import TAIL_LINES, NodeProcess
 
 
 def test_an_error_is_told_though_much_was_said_after_it() -> None:

@@ -11,18 +11,17 @@ import pytest
 from flights import Flown, space_robot_here
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.reader import read_flight
 
 FAULTS = [
-    "noise_gyro@0.1-0.4:1e-6", "noise_attitude@0:1e-5", "quantise_joint_position@0.2:1e-5",
+    "noise_gyro@0.1-0.4:1e-6",
+    "noise_attitude@0:1e-5",
+    "quantise_joint_position@0.2:1e-5",
     "torque_scale@0.3:joints=0.998",
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("lost", "how"), [([], ()), (["drop_state@0-0.5:0.02"], ("--composed",))])

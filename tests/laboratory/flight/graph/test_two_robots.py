@@ -15,10 +15,7 @@ from flights import COMMAND, ros_environment, space_robot_here
 from paths import CONFIG
 
 from space_robot.flight.graph.domain import ros_domain
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
@@ -31,15 +28,27 @@ pytest.importorskip("rclpy")
 
 NODES = {"recorder_node", "mission_node", "controller_node", "plant_node"}
 COLUMNS = (
-    "base_position", "quaternion", "base_velocity", "omega_base", "joint_positions",
-    "joint_velocities", "passive_positions", "passive_velocities", "applied_torque",
-    "reference_joints", "reference_base",
-)  # fmt: skip
+    "base_position",
+    "quaternion",
+    "base_velocity",
+    "omega_base",
+    "joint_positions",
+    "joint_velocities",
+    "passive_positions",
+    "passive_velocities",
+    "applied_torque",
+    "reference_joints",
+    "reference_base",
+)
 PANEL = {
-    "name": "panel", "parent": "base", "mass": 8.0, "inertia": [1.0, 0.5, 1.2, 0.0, 0.0, 0.0],
-    "com": [0.8, 0.0, 0.0], "passive": {"stiffness": 30.0, "damping": 0.1},
+    "name": "panel",
+    "parent": "base",
+    "mass": 8.0,
+    "inertia": [1.0, 0.5, 1.2, 0.0, 0.0, 0.0],
+    "com": [0.8, 0.0, 0.0],
+    "passive": {"stiffness": 30.0, "damping": 0.1},
     "origin": {"xyz": [1.0, 0.0, 0.0]},
-}  # fmt: skip
+}
 
 
 def with_a_panel(folder: Path) -> Path:
@@ -59,14 +68,28 @@ def test_both_fly_at_once_and_each_as_simulated(tmp_path: Path, free_domain: int
     flights = {
         namespace: subprocess.Popen(
             [
-                *COMMAND, "fly", "--namespace", namespace, "--domain", str(free_domain), "--bag",
-                str(bags[namespace]), "--duration", "0.3", "--robot", robot, "--json",
+                *COMMAND,
+                "fly",
+                "--namespace",
+                namespace,
+                "--domain",
+                str(free_domain),
+                "--bag",
+                str(bags[namespace]),
+                "--duration",
+                "0.3",
+                "--robot",
+                robot,
+                "--json",
                 *(["--composed"] if namespace == "/fleet/sat2" else ["--controller", "ctc"]),
             ],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=ros_environment(),
         )
         for namespace, robot in robots.items()
-    }  # fmt: skip
+    }
     told = {namespace: flight.communicate(timeout=300) for namespace, flight in flights.items()}
     assert {flight.returncode for flight in flights.values()} == {0}, told
     for namespace, (output, words) in told.items():
@@ -133,9 +156,7 @@ def test_one_namespace_has_one_robot(free_domain: int) -> None:
     node.release()
 
 
-def test_a_free_domain_has_no_robot_in_whatever_namespace(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_free_domain_has_no_robot_in_whatever_namespace(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
     with ros_domain(namespace="/sat1") as first, ros_domain() as second:
         assert first != second

@@ -14,19 +14,10 @@ from flights import space_robot_here
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
-from space_robot.flight.replay.commands import (
-    Form,
-    ReplayedCommands,
-)
+from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.replay.commands import Form, ReplayedCommands
 from space_robot.flight.replay.comparison import Comparison
-from space_robot.flight.replay.recording import (
-    COMPARED,
-    Recording,
-)
+from space_robot.flight.replay.recording import COMPARED, Recording
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
@@ -64,10 +55,7 @@ def test_a_whole_bag_is_whole(bag: Path) -> None:
 
 
 @settings(max_examples=8, deadline=None)
-@given(
-    st.lists(st.floats(0.01, 1.0), max_size=4),
-    st.one_of(st.just(1.0), st.floats(0.3, 1.0)),
-)
+@given(st.lists(st.floats(0.01, 1.0), max_size=4), st.one_of(st.just(1.0), st.floats(0.3, 1.0)))
 def test_what_is_damaged_is_told_as_analyze_does_and_what_is_whole_is_sent(
     bag: Path, flips: list[float], cut: float
 ) -> None:
@@ -111,9 +99,12 @@ def test_stretches_are_runs_of_ticks(
     def commands(ticks: set[int], are_other: bool) -> ReplayedCommands:
         torque = np.array([[float(are_other and tick in other)] for tick in sorted(ticks)])
         return ReplayedCommands(
-            np.array(sorted(ticks), dtype=np.int64), torque.reshape(-1, 1),
-            np.zeros(len(ticks), dtype=np.intp), [Form("", "")], 0,
-        )  # fmt: skip
+            np.array(sorted(ticks), dtype=np.int64),
+            torque.reshape(-1, 1),
+            np.zeros(len(ticks), dtype=np.intp),
+            [Form("", "")],
+            0,
+        )
 
     compared = Comparison(
         ("base_x",), np.arange(61), commands(recorded, False), commands(replayed, True)

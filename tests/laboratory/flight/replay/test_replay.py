@@ -17,14 +17,8 @@ import pytest
 from command import Run
 from flights import COMMAND, Flown, ros_environment, space_robot_here
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
-from space_robot.flight.replay.outcome import (
-    Replay,
-    ReplayOptions,
-)
+from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.replay.outcome import Replay, ReplayOptions
 from space_robot.flight.replay.run import replay
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
@@ -123,10 +117,14 @@ def test_faulty_states_are_answered_as_in_flight(
 ) -> None:
     """Lost, late, noisy, not finite, wrongly stamped: bytes that the graph's controller got."""
     faults = [
-        "noise_gyro@0:1e-5", "drop_state@0.05-0.15:0.2", "nan_state@0.1-0.2:0.2",
-        "jitter_state@0.2-0.25:2", "stamp_back@0.25:0.1", "stamp_jump@0.25:0.05",
+        "noise_gyro@0:1e-5",
+        "drop_state@0.05-0.15:0.2",
+        "nan_state@0.1-0.2:0.2",
+        "jitter_state@0.2-0.25:2",
+        "stamp_back@0.25:0.1",
+        "stamp_jump@0.25:0.05",
         "delay_command@0.1-0.2:2",
-    ]  # fmt: skip
+    ]
     words = (word for fault in faults for word in ("--fault", fault))
     flown = fly("--duration", "0.4", "--composed", *words)
     done = play(flown.bag)
@@ -256,8 +254,11 @@ def test_a_replay_that_is_cut_short_tells_what_it_has_and_leaves_no_process(
     """By the clock so slowly that there is time: it would take 15 s."""
     process = subprocess.Popen(
         [*COMMAND, "replay", str(recorded()), "--rate", "0.01", "--json"],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
-    )  # fmt: skip
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=ros_environment(),
+    )
     replaying = psutil.Process(process.pid)
     until = time.monotonic() + 60.0
     while time.monotonic() < until and not (children := replaying.children()):

@@ -11,10 +11,7 @@ import pytest
 import yaml
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from space_robot.flight.plan import (
-    Flight,
-    FlightPlan,
-)
+from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.replay.recording import Recording
 from space_robot.flight.simulate import simulate
@@ -141,10 +138,14 @@ def test_a_bag_from_elsewhere_needs_no_files_of_its_names(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("controller", "gains", "is_as_flown"),
     [
-        ("", "", True), ("tde_stc", "", True), ("", "default", True), ("", "printed", True),
-        ("", "tuned", False), ("ctc", "", False),
+        ("", "", True),
+        ("tde_stc", "", True),
+        ("", "default", True),
+        ("", "printed", True),
+        ("", "tuned", False),
+        ("ctc", "", False),
     ],
-)  # fmt: skip
+)
 def test_law_and_gains_that_flew_are_recognised(
     tmp_path: Path, controller: str, gains: str, is_as_flown: bool
 ) -> None:
@@ -155,9 +156,10 @@ def test_law_and_gains_that_flew_are_recognised(
 
 def test_older_bags_have_names_only(tmp_path: Path) -> None:
     flight = {
-        key: value for key, value in described(gains="tuned").items()
+        key: value
+        for key, value in described(gains="tuned").items()
         if key not in ("parameters", "gains_used", "robot_file")
-    }  # fmt: skip
+    }
     parameters = ControllerChoice(json.loads(json.dumps(flight)), tmp_path).parameters
     assert parameters["gains"] == "tuned"
     assert parameters["robot"] == "paper"

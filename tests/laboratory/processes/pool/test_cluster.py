@@ -61,8 +61,10 @@ def test_it_is_as_in_processes(dask: Any) -> None:
     there = told(run_many(behave, items, scheduler=dask.scheduler_address, **options))
     assert there == told(run_many(behave, items, workers=2, **options))
     assert [type(eval(error)) for _, _, error in there[1:4]] == [
-        ZeroDivisionError, WorkerDiedError, OutOfTimeError,
-    ]  # fmt: skip
+        ZeroDivisionError,
+        WorkerDiedError,
+        OutOfTimeError,
+    ]
 
 
 def test_workers_may_be_killed_and_nothing_is_left(dask: Any) -> None:
@@ -108,7 +110,7 @@ def test_a_scheduler_that_goes_is_noticed(
     monkeypatch.setattr(cluster, "CONNECT_S", 2.0)
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", **QUIET
-    ) as local:  # fmt: skip
+    ) as local:
         running = run_many(behave, [("", 1), ("sleep", 2)], scheduler=local.scheduler_address)
         assert next(running).result == 1
         for logger in loggers:

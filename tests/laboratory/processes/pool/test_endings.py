@@ -14,10 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from space_robot.processes.pool import (
-    run_many,
-    worker,
-)
+from space_robot.processes.pool import run_many, worker
 
 STARTER = """
 import os, time
@@ -75,9 +72,12 @@ def test_an_iterator_that_never_began_leaves_nothing() -> None:
 def starter() -> Iterator[tuple[subprocess.Popen[str], set[int]]]:
     """A process in whose two workers an item is, and the pids of these and of their server."""
     process = subprocess.Popen(
-        [sys.executable, "-c", STARTER], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        [sys.executable, "-c", STARTER],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
         start_new_session=True,
-    )  # fmt: skip
+    )
     assert process.stdout is not None
     pids = {int(word) for _ in range(2) for word in process.stdout.readline().split()}
     assert len(pids) == 3
@@ -107,9 +107,7 @@ def test_a_worker_whose_answer_nobody_wants_ends_in_silence() -> None:
     assert child.exitcode == 0
 
 
-def test_ctrl_c_is_for_the_starter_alone(
-    starter: tuple[subprocess.Popen[str], set[int]],
-) -> None:
+def test_ctrl_c_is_for_the_starter_alone(starter: tuple[subprocess.Popen[str], set[int]]) -> None:
     """The terminal sends it to all; only one of them says so."""
     process, pids = starter
     os.killpg(process.pid, signal.SIGINT)
@@ -118,9 +116,7 @@ def test_ctrl_c_is_for_the_starter_alone(
     wait_until_gone(pids)
 
 
-def test_workers_end_with_their_server(
-    starter: tuple[subprocess.Popen[str], set[int]],
-) -> None:
+def test_workers_end_with_their_server(starter: tuple[subprocess.Popen[str], set[int]]) -> None:
     """Others take their place."""
     process, pids = starter
     (server,) = (pid for pid in pids if parent(pid) == process.pid)

@@ -17,12 +17,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot.processes.pool import (
-    OutOfTimeError,
-    WorkerDiedError,
-    processes,
-    run_many,
-)
+from space_robot.processes.pool import OutOfTimeError, WorkerDiedError, processes, run_many
 from space_robot_msgs_py.errors import DivergedError, InputError
 
 WORKERS = pytest.mark.parametrize("workers", [0, 1, 3])
@@ -147,9 +142,10 @@ def test_workers_that_die_are_replaced() -> None:
     assert done.keys() == set(items)
     before = "its process died in each of 2 attempts, the last time "
     assert {item: str(d.error) for item, d in done.items() if d.error} == {
-        "exit": before + "with exit code 0", "kill": before + "by SIGKILL",
+        "exit": before + "with exit code 0",
+        "kill": before + "by SIGKILL",
         "segfault": before + "by SIGSEGV",
-    }  # fmt: skip
+    }
     assert all(d.result == item for item, d in done.items() if not d.error)
     assert all(isinstance(d.error, (WorkerDiedError, type(None))) for d in done.values())
 
@@ -245,9 +241,15 @@ def test_workers_are_replaced_while_threads_hold_locks() -> None:
 
 
 @pytest.mark.parametrize(
-    "options", [{"workers": -1}, {"attempts": 0}, {"timeout_s": 0.0}, {"timeout_s": float("nan")},
-                {"workers": 0, "timeout_s": 1.0}],
-)  # fmt: skip
+    "options",
+    [
+        {"workers": -1},
+        {"attempts": 0},
+        {"timeout_s": 0.0},
+        {"timeout_s": float("nan")},
+        {"workers": 0, "timeout_s": 1.0},
+    ],
+)
 def test_arguments_that_cannot_be(options: dict[str, int]) -> None:
     with pytest.raises(InputError):
         run_many(reciprocal, [1], **options)  # type: ignore[arg-type]

@@ -16,10 +16,7 @@ from flights import COMMAND, ros_environment, space_robot_here
 from numpy.typing import NDArray
 
 from space_robot.view.live import serve as serving
-from space_robot.view.live.serve import (
-    LiveOptions,
-    serve,
-)
+from space_robot.view.live.serve import LiveOptions, serve
 from space_robot_model.robot.find import find_robot
 from space_robot_model.robot.transforms import joint_transforms
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -38,10 +35,17 @@ CLOSE = 3e-5
 ORIGIN, UNTURNED = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 """Of a frame whose position or attitude nobody has sent."""
 CAMERA = {
-    "type": "ViewerCameraMessage", "wxyz": (1.0, 0.0, 0.0, 0.0), "position": (5.0, 5.0, 5.0),
-    "fov": 1.0, "near": 0.1, "far": 100.0, "image_height": 100, "image_width": 100,
-    "look_at": (0.0, 0.0, 0.0), "up_direction": (0.0, 0.0, 1.0),
-}  # fmt: skip
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (5.0, 5.0, 5.0),
+    "fov": 1.0,
+    "near": 0.1,
+    "far": 100.0,
+    "image_height": 100,
+    "image_width": 100,
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 0.0, 1.0),
+}
 
 
 class EndedError(Exception):
@@ -83,9 +87,10 @@ def frames(server: Server) -> Iterator[Poses]:
 
     poses: Poses = {}
     with websockets.connect(
-        server.address.replace("http", "ws"), subprotocols=[f"viser-v{viser.__version__}"],
+        server.address.replace("http", "ws"),
+        subprotocols=[f"viser-v{viser.__version__}"],
         max_size=None,
-    ) as socket:  # fmt: skip
+    ) as socket:
         socket.send(msgspec.msgpack.encode(CAMERA))  # a browser without one is none yet
         while server.is_alive():
             try:
@@ -122,11 +127,23 @@ def fly(domain: int, bag: Path, shown: list[Poses], *options: str) -> FlightLog:
 
     with subprocess.Popen(
         [
-            *COMMAND, "fly", "--paused", "--realtime", "--duration", "3", "--domain", str(domain),
-            "--bag", str(bag), *options,
+            *COMMAND,
+            "fly",
+            "--paused",
+            "--realtime",
+            "--duration",
+            "3",
+            "--domain",
+            str(domain),
+            "--bag",
+            str(bag),
+            *options,
         ],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ros_environment(),
-    ) as process:  # fmt: skip
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=ros_environment(),
+    ) as process:
         until = time.monotonic() + TIMEOUT_S
         while not (sim("step", "--ticks", "50") and any(is_robot_in(poses) for poses in shown)):
             assert time.monotonic() < until
@@ -191,15 +208,19 @@ def test_two_flights_one_after_the_other(tmp_path: Path, free_domain: int) -> No
     once = [serving.WAITING, following, robot, showing, serving.OVER]
     lines = [line for line in server.lines if not line.startswith("still ")]
     assert [showing if line.startswith(showing) else line for line in lines] == [
-        *once, *once, serving.WAITING,
-    ]  # fmt: skip
+        *once,
+        *once,
+        serving.WAITING,
+    ]
 
 
 def test_ctrl_c_ends_it(free_domain: int) -> None:
     with subprocess.Popen(
         [*COMMAND, "view", "--live", "--no-open", "--port", "0", "--domain", str(free_domain)],
-        stderr=subprocess.PIPE, text=True, env=ros_environment(),
-    ) as process:  # fmt: skip
+        stderr=subprocess.PIPE,
+        text=True,
+        env=ros_environment(),
+    ) as process:
         assert process.stderr is not None
         assert process.stderr.readline().strip() == "starting the scene ..."
         address, waiting = process.stderr.readline(), process.stderr.readline()

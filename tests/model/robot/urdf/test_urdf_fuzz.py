@@ -24,10 +24,38 @@ from space_robot_msgs_py.errors import InputError
 
 GOOD = (DATA / "arm.urdf").read_text()
 VALUES = (
-    "", "0", "-1", "1e-300", "1e-12", "1e11", "1e400", "nan", "inf", "-inf", "0x1", "1_000", "٣",
-    "0 0 0", "0 0 1e-9", "1 2 3 4", "0 0 nan", "hull", "upper", "fore", "hand", "shoulder", "fixed",
-    "floating", "continuous", "prismatic", "&#10;", "&lt;", "💥", "x" * 300, "base_x",
-)  # fmt: skip
+    "",
+    "0",
+    "-1",
+    "1e-300",
+    "1e-12",
+    "1e11",
+    "1e400",
+    "nan",
+    "inf",
+    "-inf",
+    "0x1",
+    "1_000",
+    "٣",
+    "0 0 0",
+    "0 0 1e-9",
+    "1 2 3 4",
+    "0 0 nan",
+    "hull",
+    "upper",
+    "fore",
+    "hand",
+    "shoulder",
+    "fixed",
+    "floating",
+    "continuous",
+    "prismatic",
+    "&#10;",
+    "&lt;",
+    "💥",
+    "x" * 300,
+    "base_x",
+)
 PIECES = ("<", ">", "/>", "\0", "&", '"', "<!--", "]]>", "<link/>", "<?xml?>", "\ud800", "\n", "é")
 
 
@@ -106,8 +134,11 @@ def attributes(draw: st.DrawFn) -> str:
 @st.composite
 def elements(draw: st.DrawFn) -> str:
     """Elements are lost, doubled, moved into others, or get others' names."""
-    root = ET.fromstring(GOOD if draw(st.booleans()) else random_urdf(
-        np.random.default_rng(draw(st.integers(0, 99))), 6))  # fmt: skip
+    root = ET.fromstring(
+        GOOD
+        if draw(st.booleans())
+        else random_urdf(np.random.default_rng(draw(st.integers(0, 99))), 6)
+    )
     for _ in range(draw(st.integers(1, 4))):
         parents = [parent for parent in root.iter() if len(parent)]
         parent = draw(st.sampled_from(parents))

@@ -19,14 +19,8 @@ from random_urdf import random_origin, random_urdf, words
 from space_robot_model.robot import Robot
 from space_robot_model.robot.inertia import inertia_tensor
 from space_robot_model.robot.tree import Visual
-from space_robot_model.robot.urdf.inertia import (
-    SLENDER,
-    solid_inertia,
-)
-from space_robot_model.robot.urdf.read import (
-    UrdfRobot,
-    parse_urdf,
-)
+from space_robot_model.robot.urdf.inertia import SLENDER, solid_inertia
+from space_robot_model.robot.urdf.read import UrdfRobot, parse_urdf
 
 Array = NDArray[np.float64]
 SEEDS = st.integers(0, 2**32 - 2)
@@ -69,9 +63,10 @@ def assert_same_places(ours: list[pin.SE3], theirs: list[pin.SE3]) -> None:
     """Each seen from the first one, so that it does not matter what the base's frame is."""
     for one, other in zip(ours, theirs, strict=True):
         np.testing.assert_allclose(
-            (ours[0].inverse() * one).homogeneous, (theirs[0].inverse() * other).homogeneous,
+            (ours[0].inverse() * one).homogeneous,
+            (theirs[0].inverse() * other).homogeneous,
             atol=1e-12,
-        )  # fmt: skip
+        )
 
 
 @settings(max_examples=40)
@@ -132,8 +127,11 @@ def test_limits_and_friction_are_those_that_pinocchio_reads(seed: int, count: in
                 assert limits[:2] == (-np.inf, np.inf)
                 continue
             given = (model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q])
-            assert limits == (*given, model.velocityLimit[joint.idx_v],
-                              model.effortLimit[joint.idx_v])  # fmt: skip
+            assert limits == (
+                *given,
+                model.velocityLimit[joint.idx_v],
+                model.effortLimit[joint.idx_v],
+            )
             assert friction.viscous == pytest.approx(model.damping[joint.idx_v], rel=1e-15)
             assert friction.coulomb == pytest.approx(
                 float(re.search(rf'name="{name}".*?friction="([^"]+)"', text)[1])  # type: ignore[index]
@@ -170,7 +168,7 @@ INF = np.inf
         ('lower="-inf" upper="inf" velocity="inf" effort="1e12"', (-INF, INF, INF, INF), 0),
         ('lower="-inf" upper="-1" velocity="3" effort="inf"', (-INF, -1.0, 3.0, INF), 0),
     ],
-)  # fmt: skip
+)
 def test_the_numbers_of_limits(given: str, limits: tuple[float, ...], findings: int) -> None:
     found = one_joint(f"<limit {given}/>")
     (joint,) = (body.joint for body in found.bodies if body.name == "arm")
@@ -243,10 +241,14 @@ def nearest(inertia: Array) -> Array:
 def with_inertia(mass: float, tensor: Array) -> str:
     i = tensor
     return (
-        f'<inertial><origin xyz="0.1 0.2 0.3"/><mass value="{mass!r}"/><inertia '
-        f'ixx="{i[0, 0]!r}" iyy="{i[1, 1]!r}" izz="{i[2, 2]!r}" ixy="{i[0, 1]!r}" '
-        f'ixz="{i[0, 2]!r}" iyz="{i[1, 2]!r}"/></inertial>'
-    ).replace("np.float64(", "").replace(")", "")  # fmt: skip
+        (
+            f'<inertial><origin xyz="0.1 0.2 0.3"/><mass value="{mass!r}"/><inertia '
+            f'ixx="{i[0, 0]!r}" iyy="{i[1, 1]!r}" izz="{i[2, 2]!r}" ixy="{i[0, 1]!r}" '
+            f'ixz="{i[0, 2]!r}" iyz="{i[1, 2]!r}"/></inertial>'
+        )
+        .replace("np.float64(", "")
+        .replace(")", "")
+    )
 
 
 LIMIT = '<limit lower="-1" upper="1" velocity="1" effort="1"/>'

@@ -37,9 +37,15 @@ def test_where_a_mesh_is(name: str, found: str, urdf_folder: Path, tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    "name", ["package://leg/x.stl", "package://arm/x.stl", "package://", "http://x/y.stl",
-             "package://arm/a\0b"],
-)  # fmt: skip
+    "name",
+    [
+        "package://leg/x.stl",
+        "package://arm/x.stl",
+        "package://",
+        "http://x/y.stl",
+        "package://arm/a\0b",
+    ],
+)
 def test_what_nobody_knows_keeps_its_name(name: str, urdf_folder: Path) -> None:
     assert mesh_path(name, urdf_folder) == name
 

@@ -13,17 +13,9 @@ from numpy.testing import assert_allclose
 from paths import DATA
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.tree import (
-    JointFriction,
-    JointLimits,
-    Spring,
-)
+from space_robot_model.robot.tree import JointFriction, JointLimits, Spring
 from space_robot_model.robot.urdf import read_urdf
-from space_robot_model.robot.urdf.inertia import (
-    inertia_defect,
-    nearest_inertia,
-    solid_inertia,
-)
+from space_robot_model.robot.urdf.inertia import inertia_defect, nearest_inertia, solid_inertia
 from space_robot_model.robot.urdf_file import complete_content
 from space_robot_msgs_py.errors import InputError
 
