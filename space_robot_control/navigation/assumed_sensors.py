@@ -54,7 +54,7 @@ def completed(
     if not lacking:
         return settings
     assumed = assumed_numbers(read_sensors(sensors), period)
-    return settings.model_copy(update={name: believed[name] for name in lacking})
+    return settings.model_copy(update={name: assumed[name] for name in lacking})
 
 
 def read_sensors(name: str) -> SensorSettings:
