@@ -7,18 +7,11 @@ from typing import Any
 
 import click
 
-from .options import GRAPH_OPTIONS, OPTIONS, flight_options, plan_flight, remarks_on
+from .options import ON_A_GRAPH, flight_options, plan_flight, remarks_on
 
 
 @click.command()
-@flight_options(*OPTIONS, *GRAPH_OPTIONS)
-@click.option(
-    "--composed",
-    is_flag=True,
-    help="All nodes in one process: faster, and no node can be killed or stopped alone.",
-)
-@click.option("--restart-controller", is_flag=True, help="Start a dead or hung controller again.")
-@click.option("--domain", type=int, help="ROS domain [default: ROS_DOMAIN_ID, or a free one].")
+@flight_options(*ON_A_GRAPH)
 def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     """Fly a mission on a ROS 2 graph, record it, and print the RMS table.
 

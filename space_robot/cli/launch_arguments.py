@@ -18,10 +18,9 @@ from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.errors import InputError
 
 from ..flight.plan import Flight
-from .options import GRAPH_OPTIONS, OPTIONS, flight_options, plan_flight
+from ..scenario.option_table import OPTIONS
+from .options import flight_options, plan_flight
 
-NOT_LAUNCHED = ("json",)
-"""Options of `fly` that are about its report."""
 PARAMS_FILE = "params_file"
 """Not an option of `fly`, but what launch files call a ROS parameter file."""
 _TRUTH = {"true": True, "false": False}
@@ -44,7 +43,7 @@ class LaunchedFlight(NamedTuple):
 
 
 @click.command()
-@flight_options(*(name for name in OPTIONS if name not in NOT_LAUNCHED), *GRAPH_OPTIONS)
+@flight_options(*(o.name for o in OPTIONS if o.is_launched), "bag", "set", "scenario")
 def _plan(bag: Path | None, **options: Any) -> LaunchedFlight:
     from ..flight.bag_path import default_bag
 
@@ -62,7 +61,7 @@ def launch_arguments() -> list[LaunchArgument]:
 def _argument(option: click.Option) -> LaunchArgument:
     help_ = " ".join((option.help or "").split())
     if option.multiple:
-        help_ += " Several are parted by blanks."
+        help_ += " Separate several with spaces."
     if option.show_default:
         help_ += f" [default: {str(option.default).lower() if option.is_flag else option.default}]"
     choices = tuple(option.type.choices) if isinstance(option.type, click.Choice) else ()
@@ -144,7 +143,7 @@ def _words_of_file(file: Path) -> list[str]:
     from space_robot_msgs_py.config.files import node_parameters
     from space_robot_msgs_py.config.trees import flatten
 
-    from .options import NODES
+    from .scenario_option import NODES
 
     return [
         f"--set={node}.{name}={json.dumps(value)}"

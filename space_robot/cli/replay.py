@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from .numbers import FiniteRange
-from .options import NAMESPACE, OPTIONS, REMAP, TRUST, file_option
+from .options import NAMESPACE, REMAP, TRUST, file_option, flight_option
 
 
 @click.command()
@@ -17,7 +17,7 @@ from .options import NAMESPACE, OPTIONS, REMAP, TRUST, file_option
     "--controller", default="", help="Law to answer, or file.py:Class [default: the one that flew]."
 )
 @click.option("--gains", default="", help="Its gains [default: those flown].")
-@OPTIONS["set"]
+@flight_option("set")
 @click.option(
     "--rate",
     type=FiniteRange(0.0, 1e3, min_open=True),
@@ -47,7 +47,7 @@ from .options import NAMESPACE, OPTIONS, REMAP, TRUST, file_option
     type=click.IntRange(0, 232),
     help="ROS domain [default: ROS_DOMAIN_ID, or a free one].",
 )
-@OPTIONS["json"]
+@flight_option("json")
 def replay(
     bag: Path,
     parameters: dict[str, dict[str, Any]],

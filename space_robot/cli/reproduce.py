@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from .numbers import FiniteRange
-from .options import OPTIONS
+from .options import flight_option
 
 if TYPE_CHECKING:
     from space_robot_control.navigation.settings import Mode
@@ -39,9 +39,9 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Only the gains each law flies by default, and figures as SVG only: half the time.",
 )
-@OPTIONS["sensors"]
-@OPTIONS["navigation"]
-@OPTIONS["actuators"]
+@flight_option("sensors")
+@flight_option("navigation")
+@flight_option("actuators")
 @click.option("--jobs", type=click.IntRange(1, 256), help="Processes [default: one a core].")
 @click.option("--json", "as_json", is_flag=True, help="Print table_v.json.")
 def reproduce(

@@ -8,11 +8,11 @@ from typing import Any
 
 import click
 
-from .options import OPTIONS, flight_options, plan_flight, remarks_on
+from .options import ON_A_FLIGHT, flight_options, plan_flight, remarks_on
 
 
 @click.command()
-@flight_options(*OPTIONS)
+@flight_options(*ON_A_FLIGHT)
 def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
     """Fly the same mission in this process, without ROS; the numbers are those of `fly`.
 

@@ -59,9 +59,9 @@ GRADES = ("ideal", "fine", "tactical", "coarse")
     "mission",
     "duration",
     "navigation",
-    "latency",
+    "command_latency_ticks",
     "friction",
-    "event",
+    "events",
     "set",
     "json",
 )

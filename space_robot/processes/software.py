@@ -8,7 +8,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from space_robot_msgs_py.config.files import config_directory
+from space_robot_msgs_py.config.directory import config_directory
 
 PACKAGES = ("space_robot", "numpy", "scipy", "numba", "llvmlite", "matplotlib", "mcap", "rosbags")
 

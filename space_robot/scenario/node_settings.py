@@ -12,7 +12,8 @@ from space_robot_control.laws import ControlLaw
 from space_robot_control.navigation.assumed_sensors import assumed_numbers
 from space_robot_model.robot.find import mission_layers
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
-from space_robot_msgs_py.config.files import GIVEN, config_directory, named_layers, node_parameters
+from space_robot_msgs_py.config.directory import config_directory
+from space_robot_msgs_py.config.files import GIVEN, named_layers, node_parameters
 from space_robot_msgs_py.config.settings import NodeSettings
 from space_robot_msgs_py.config.trees import Tree, flatten, merge, nest
 from space_robot_msgs_py.config.validation import one_of

@@ -17,6 +17,7 @@ from pydantic import BaseModel, BeforeValidator, PlainValidator
 from space_robot_control.controller.plain_laws import law_of
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.laws import ControlLaw, find_law, importable_name, laws
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.sensors import SensorSettings
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import ROBOTS, robot_as_path
@@ -107,6 +108,7 @@ MissionGiven = Annotated[Any, PlainValidator(_settings(MissionSettings, OF_PLANT
 Case = Annotated[Any, PlainValidator(_settings(EnvironmentSettings))]
 Sensors = Annotated[Any, PlainValidator(_settings(SensorSettings))]
 Actuators = Annotated[Any, PlainValidator(_settings(ActuatorSettings))]
+AssumedActuators = Annotated[Any, PlainValidator(_settings(BaseActuatorSettings))]
 EventText = Annotated[str, BeforeValidator(_plain)]
 
 

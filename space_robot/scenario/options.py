@@ -10,13 +10,13 @@ from space_robot_control.navigation.settings import Mode
 from space_robot_msgs_py.bag.mcap_file import Compression
 from space_robot_msgs_py.config.namespace import full_namespace
 from space_robot_msgs_py.config.validation import StrictModel
-from space_robot_msgs_py.topics import ROOT
 from space_robot_sim.faults.grammar import Kinds, parse_faults
 from space_robot_sim.plant.faults import PLANT_KINDS
 
 from .faults import KINDS
 from .objects import (
     Actuators,
+    AssumedActuators,
     Case,
     EventText,
     Gains,
@@ -31,61 +31,56 @@ from .objects import (
     resolve_law,
     robot_setting,
 )
+from .option_table import option
 
 NO_FRICTION = {"friction.coulomb": 0.0, "friction.viscous": 0.0}
+
+
+def of(name: str) -> Any:
+    """Return the pydantic field of an option of the table."""
+    entry = option(name)
+    if entry.kind == "texts":
+        return Field(default_factory=list, description=entry.help_text)
+    return Field(**entry.field)
 
 
 class FlightPlan(StrictModel):
     """The options of ``fly`` and ``simulate``."""
 
-    controller: LawGiven = "tde_stc"
-    """Its name, file.py:Class or module:Class; a `ControlLaw` class or object; a function, see
+    controller: LawGiven = of("controller")
+    """Also a `ControlLaw` class or object; a function, see
     `space_robot_control.controller.plain_laws`; None: none, on the bench."""
-    case: Case = "1"
-    gains: Gains = "default"
-    """Name or path of the set; or numbers by gain (or by law, then gain), over the default set."""
-    sensors: Sensors = "ideal"
-    actuators: Actuators = "ideal"
+    case: Case = of("case")
+    gains: Gains = of("gains")
+    """Also numbers by gain (or by law, then gain), over the default set."""
+    sensors: Sensors = of("sensors")
+    actuators: Actuators = of("actuators")
     """Of the base."""
-    robot: RobotGiven = "paper"
+    assumed_actuators: AssumedActuators | None = None
+    """What the flight software assumes of them (None: what their file says)."""
+    robot: RobotGiven = of("robot")
     plant_robot: RobotGiven | None = None
     """What the plant is in truth; controller and mission know ``robot`` (None: that it is)."""
-    mission: MissionGiven = ""
-    """Empty: the robot's own."""
-    duration: Annotated[float | None, Field(gt=0.0, le=1e6)] = None
-    period: float | None = None
-    """Length of a tick of every node, s (None: that of the files)."""
-    substeps: int | None = None
-    """Integration steps of the plant in a tick (None: that of the files)."""
-    navigation: Mode | None = None
-    """What the laws see (None: what the files say)."""
-    command_latency_ticks: int = 0
-    friction: bool = True
-    realtime: bool = False
-    paused: bool = False
-    """Begin paused, until a service call lets the plant go on."""
-    fifo_priority: int = 0
-    faults: list[str] = Field(default_factory=list)
-    """The faults, each as ``KIND@T[-END][:ARGUMENT]``, see `space_robot.scenario.faults`."""
-    events: list[EventText] = Field(default_factory=list)
-    """What is captured and released, see `space_robot_sim.environment.events`; none: what the
-    mission says."""
-    seed: Annotated[int, Field(ge=0)] = 0
-    """Seed of the random numbers of faults and sensors."""
-    swaps: list[str] = Field(default_factory=list)
-    """Laws to swap to in flight, each as ``T:LAW``."""
-    restart_controller: bool = False
-    """Start a controller again that died or hangs."""
-    composed: bool = False
-    """Put all nodes into one process, stepped in turn."""
-    domain: Annotated[int | None, Field(ge=0, le=232)] = None
-    """ROS domain to fly in (None: ROS_DOMAIN_ID, or a free one)."""
-    namespace: Annotated[str, AfterValidator(full_namespace)] = ROOT
-    """ROS namespace of the nodes and their topics."""
-    compression: Compression | None = None
-    """Compression of the bag (None: the recorder's own)."""
-    split_size: ByteSize | None = None
-    """Bytes after which the bag goes on in another file (None: the recorder's own)."""
+    mission: MissionGiven = of("mission")
+    duration: float | None = of("duration")
+    period: float | None = of("period")
+    substeps: int | None = of("substeps")
+    navigation: Mode | None = of("navigation")
+    command_latency_ticks: int = of("command_latency_ticks")
+    friction: bool = of("friction")
+    realtime: bool = of("realtime")
+    paused: bool = of("paused")
+    fifo_priority: int = of("fifo_priority")
+    faults: list[str] = of("faults")
+    events: list[EventText] = of("events")
+    seed: int = of("seed")
+    swaps: list[str] = of("swaps")
+    restart_controller: bool = of("restart_controller")
+    composed: bool = of("composed")
+    domain: int | None = of("domain")
+    namespace: Annotated[str, AfterValidator(full_namespace)] = of("namespace")
+    compression: Compression | None = of("compression")
+    split_size: ByteSize | None = of("split_size")
     parameters: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """Further parameters by node, dotted names."""
 

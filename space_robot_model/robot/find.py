@@ -21,7 +21,8 @@ from pathlib import Path
 
 from space_robot_msgs_py.config.arguments import path_text
 from space_robot_msgs_py.config.choices import choices
-from space_robot_msgs_py.config.files import GIVEN, config_directory, is_named, named_file
+from space_robot_msgs_py.config.directory import config_directory
+from space_robot_msgs_py.config.files import GIVEN, is_named, named_file
 from space_robot_msgs_py.config.validation import short
 from space_robot_msgs_py.config.yaml_text import check_file, is_folder
 from space_robot_msgs_py.errors import InputError

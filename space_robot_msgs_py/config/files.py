@@ -3,34 +3,17 @@
 from __future__ import annotations
 
 import os.path
-from functools import cache
 from pathlib import Path
 
 from ..errors import InputError
 from .choices import choices
+from .directory import config_directory
 from .trees import Tree, merge, nest
 from .validation import read_yaml, short
 from .yaml_text import check_file
 
-GRAPH_FILE = "space_robot.yaml"
-"""The file of the graph's defaults in the config folder."""
-
 GIVEN = "given"
 """In the place of a file's name: there is no file, all numbers are given beside it."""
-
-
-@cache
-def config_directory() -> Path:
-    """Return the ``config/`` folder: the source tree's, or the one installed under ``share/``.
-
-    Raises:
-        InputError: the installation is incomplete.
-    """
-    for parent in Path(__file__).resolve().parents:
-        for folder in (parent / "config", parent / "share/space_robot/config"):
-            if (folder / GRAPH_FILE).is_file():
-                return folder
-    raise InputError("the package's config folder is not installed: reinstall space_robot")
 
 
 def named_file(kind: str, name: str) -> Path:

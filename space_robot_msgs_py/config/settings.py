@@ -17,7 +17,8 @@ from typing_extensions import Self
 
 from ..samples import Timebase
 from ..topics import Topic
-from .files import GRAPH_FILE, config_directory, node_parameters
+from .directory import GRAPH_FILE, config_directory
+from .files import node_parameters
 from .trees import Tree, merge, nest
 from .validation import StrictModel, short, validate
 

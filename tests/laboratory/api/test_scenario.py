@@ -24,7 +24,7 @@ from space_robot_control.laws import Signals, find_law
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_msgs_py.config.files import config_directory
+from space_robot_msgs_py.config.directory import config_directory
 from space_robot_msgs_py.errors import DivergedError, InputError
 from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.events import Capture, Release

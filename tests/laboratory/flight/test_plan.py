@@ -29,7 +29,8 @@ from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_model.robot import Robot
 from space_robot_msgs_py.bag.message_accounting import topics_with_allowed_gaps
-from space_robot_msgs_py.config.files import config_directory, named_file
+from space_robot_msgs_py.config.directory import config_directory
+from space_robot_msgs_py.config.files import named_file
 from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.plant.plant import Plant
