@@ -31,6 +31,7 @@ from ..scenario.faults import KINDS, PROCESS_KINDS
 from ..scenario.node_settings import FlightSettings
 from ..scenario.objects import resolve_law
 from ..scenario.options import NO_FRICTION, FlightPlan
+from ..scenario.resolved import ROBOTS, resolved_options
 from ..scenario.robots import Robots
 from .start_step import start_step
 
@@ -89,6 +90,11 @@ class Flight:
 
     def _assumed_actuators(self) -> BaseActuatorSettings:
         name, robot = self.controller_settings.actuators, self._robots.controller
+        if self.plan.assumed_actuators is not None:
+            own = self.plan.assumed_actuators
+            assumed = validate(BaseActuatorSettings, own, "assumed_actuators")
+            assumed.check(robot, GIVEN)
+            return assumed
         if name != GIVEN:
             return assumed_actuators(name, robot)
         given = self.plan.actuators if isinstance(self.plan.actuators, dict) else {}
@@ -220,6 +226,26 @@ class Flight:
         )
         return step and step._asdict()
 
+    @cached_property
+    def resolved(self) -> dict[str, Any]:
+        """The options of this flight with every number, and no file left to read."""
+        return resolved_options(
+            self.plan,
+            FlightSettings(
+                self.plant_settings,
+                self.controller_settings,
+                self.mission_settings,
+                self.recorder_settings,
+                {},
+                {},
+            ),
+            self._robots,
+            self.laws,
+            self.assumed_actuators,
+            self.ticks,
+            self.faults,
+        )
+
     @property
     def description(self) -> dict[str, Any]:
         """The flight as a bag tells it; enough to fly it again.
@@ -241,6 +267,7 @@ class Flight:
             **({"swaps": swaps} if swaps else {}),
             **({"restart_controller": True} if self.plan.restart_controller else {}),
             "parameters": self.parameters,
+            "scenario": {k: v for k, v in self.resolved.items() if k not in ROBOTS},
             "gains_used": self.gains_used,
             **({"start_step": self.start_step} if self.start_step else {}),
             **robots,

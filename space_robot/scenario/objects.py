@@ -69,8 +69,14 @@ def _settings(schema: type[StrictModel], more: tuple[str, ...] = ()) -> Callable
     return check
 
 
-def _robot(value: Any) -> str | Robot:
-    return value if isinstance(value, Robot) else _name(value, "a Robot")
+def _robot(value: Any) -> str | Robot | Tree:
+    if isinstance(value, Robot):
+        return value
+    if isinstance(value, Mapping):
+        content: Tree = _plain(value)
+        Robot.from_dict(content)
+        return content
+    return _name(value, "a Robot (an object or a mapping)")
 
 
 def _law(value: Any) -> Any:
@@ -112,13 +118,16 @@ AssumedActuators = Annotated[Any, PlainValidator(_settings(BaseActuatorSettings)
 EventText = Annotated[str, BeforeValidator(_plain)]
 
 
-def robot_setting(robot: str | Robot) -> str:
+def robot_setting(robot: str | Robot | Tree) -> str:
     """Return what the parameter ``robot`` says.
 
-    A robot in memory has the mission and gains of the shipped one of its name, if there is one.
+    A robot in memory has the mission and gains of the shipped one of its name, if there is one;
+    one that is told by its numbers has none.
     """
     if isinstance(robot, str):
         return robot_as_path(robot)
+    if isinstance(robot, dict):
+        return GIVEN
     return robot.name if is_named(ROBOTS, robot.name) else GIVEN
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import robot_source
-from space_robot_model.robot.source import RobotSource
+from space_robot_msgs_py.config.trees import Tree
 from space_robot_msgs_py.errors import InputError
 
 from .node_settings import FlightSettings
@@ -22,52 +21,64 @@ class Robots:
     """
 
     def __init__(
-        self, settings: FlightSettings, given: str | Robot, of_plant: str | Robot | None = None
+        self,
+        settings: FlightSettings,
+        robot: str | Robot | Tree,
+        plant_robot: str | Robot | Tree | None = None,
     ) -> None:
         """Read them.
 
         Args:
-            settings: they name the robots.
-            given: by the flight's options.
-            of_plant: what the plant is, whatever its settings say.
+            settings: of the nodes, which name the robots.
+            robot: option of the flight.
+            plant_robot: option of the flight; what the plant is, whatever its settings say.
         """
-        self._given = {} if isinstance(given, str) else {robot_setting(given): given}
-        self._sources: dict[str, RobotSource] = {}
-        self._of_plant = settings.plant.robot if of_plant is None else of_plant
-        self._of_controller = settings.controller.robot
-        self.plant, self.controller, mission = (
-            self._robot(robot)
-            for robot in (self._of_plant, self._of_controller, settings.mission.robot)
-        )
-        for node, robot in (("controller", self.controller), ("mission", mission)):
-            if _names(robot) != _names(self.plant):
+        sources = {} if isinstance(robot, str) else {robot_setting(robot): _source(robot)}
+
+        def source(name: str) -> _Source:
+            if name not in sources:
+                sources[name] = _source(name)
+            return sources[name]
+
+        plant = source(settings.plant.robot) if plant_robot is None else _source(plant_robot)
+        controller, mission = source(settings.controller.robot), source(settings.mission.robot)
+        for node, other in (("controller", controller.robot), ("mission", mission.robot)):
+            if _names(other) != _names(plant.robot):
                 raise InputError(
                     f"the robots of plant and {node} must have the same joints, got "
-                    f"{self.plant.name!r} with {', '.join(self.plant.all_joint_names)} and "
-                    f"{robot.name!r} with {', '.join(robot.all_joint_names)}"
+                    f"{plant.robot.name!r} with {', '.join(plant.robot.all_joint_names)} and "
+                    f"{other.name!r} with {', '.join(other.all_joint_names)}"
                 )
+        self.plant, self.controller = plant.robot, controller.robot
+        self._plant_content, self._controller_content = plant.content, controller.content
 
-    def _robot(self, robot: str | Robot) -> Robot:
-        if isinstance(robot, Robot):
-            return robot
-        return self._given[robot] if robot in self._given else self._source(robot).robot
-
-    def _source(self, name: str) -> RobotSource:
-        if name not in self._sources:
-            self._sources[name] = robot_source(name)
-        return self._sources[name]
-
-    def _content(self, robot: str | Robot) -> dict[str, Any]:
-        """The numbers as their file has them; a robot in memory tells its own."""
-        is_of_file = isinstance(robot, str) and robot not in self._given
-        return self._source(str(robot)).content if is_of_file else self._robot(robot).content
-
-    @cached_property
+    @property
     def description(self) -> dict[str, Any]:
         """The numbers of the plant's robot, and of the controller's where that is another."""
-        plant, controller = self._content(self._of_plant), self._content(self._of_controller)
+        plant, controller = self._plant_content, self._controller_content
         own = {"controller_robot": self.controller.name, "controller_robot_file": controller}
         return {"robot_file": plant, **({} if controller == plant else own)}
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The robots' numbers as options of a flight."""
+        plant, controller = self._plant_content, self._controller_content
+        return {"robot": controller, **({} if controller == plant else {"plant_robot": plant})}
+
+
+class _Source(NamedTuple):
+    robot: Robot
+    content: dict[str, Any]
+    """The numbers as its file has them."""
+
+
+def _source(robot: str | Robot | Tree) -> _Source:
+    if isinstance(robot, str):
+        file = robot_source(robot)
+        return _Source(file.robot, file.content)
+    if isinstance(robot, Robot):
+        return _Source(robot, robot.content)
+    return _Source(Robot.from_dict(robot), robot)
 
 
 def _names(robot: Robot) -> tuple[tuple[str, ...], ...]:

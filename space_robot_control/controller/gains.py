@@ -216,7 +216,8 @@ def build_laws(
     first = own if not isinstance(own, str) else find_law(settings.controller)
     wanted: dict[str, str | type[ControlLaw] | ControlLaw] = {first.name: first}
     brings_gains = isinstance(first, ControlLaw) or not first.gain_descriptions()
-    for name in available_laws(settings, brings_gains or first.name in given):
+    available = available_laws(settings, brings_gains or first.name in given)
+    for name in available or given:  # without a gain set, the gains given are all there are
         wanted.setdefault(name, name)
     for name in given:
         one_of(name, wanted, "law", f" in {PARAMETERS} (gains are <law>.<gain>)")

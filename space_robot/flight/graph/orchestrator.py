@@ -28,6 +28,7 @@ from .composed import NAME, composed_command
 from .domain import ros_domain
 from .following import follow
 from .listeners import RESET_WITH, wait_for
+from .node_files import with_files
 from .processes import Graph, node_command, node_environment
 
 COMPOSED_DRAIN_S = 0.002
@@ -69,13 +70,12 @@ def fly(
             for remark in remarks:
                 _say(remark)
             parameters = flight_parameters(flight, bag)
-            with (
-                ScratchFolder() as folder,
-                Graph(
-                    _commands(flight, parameters, Path(folder)), node_environment(domain)
-                ) as graph,
-            ):
-                what_happened = follow(graph, flight, parameters, domain, stopped)
+            with ScratchFolder() as scratch:
+                folder = Path(scratch)
+                parameters = with_files(parameters, flight, folder)
+                commands = _commands(flight, parameters, folder)
+                with Graph(commands, node_environment(domain)) as graph:
+                    what_happened = follow(graph, flight, parameters, domain, stopped)
         except BaseException as error:
             if not _has_states(bag, namespace):
                 shutil.rmtree(bag, ignore_errors=True)
