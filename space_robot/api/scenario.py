@@ -40,7 +40,8 @@ class Scenario(FlightPlan):
 
     An option that names a file may be the object itself, or its numbers:
 
-    - ``robot``: a `Robot`; with the mission and gains of the shipped one of its name, if any
+    - ``robot``: a `Robot`, with the mission and gains of the shipped one of its name, if any; or
+      the mapping that its file holds
     - ``plant_robot``: what the plant is in truth, where controller and mission know another one
     - ``controller``: a `ControlLaw` class or object; None: none, for `bench`
     - ``gains``: numbers by gain, over the default set: ``{"k_1": 3.0, "h_bar": [...]}``, one for
@@ -49,6 +50,7 @@ class Scenario(FlightPlan):
       degrees, or m of prismatic joints), ``base_quaternion`` ``[w, x, y, z]``,
       ``initial_joints_deg`` (else the first waypoint), ``events``
     - ``case``, ``sensors``, ``actuators``: their settings, objects or mappings
+    - ``assumed_actuators``: what the flight software assumes of the base's actuators
     - ``parameters``: any parameter of a node, ``{"plant": {"friction.coulomb": 0.0}}``
 
     The other options: ``duration`` s, ``period`` s, ``substeps``, ``navigation`` ("direct" or
@@ -93,6 +95,17 @@ class Scenario(FlightPlan):
         flight = Flight(self)
         flight.check_in_process()
         return flight
+
+    def resolved(self) -> dict[str, Any]:
+        """Return the same scenario with every number in it, and no file left to read.
+
+        As plain mappings, lists, numbers and texts: ``Scenario(**resolved)`` flies the same bits,
+        and so does ``space-robot simulate --scenario`` with the mapping as a YAML file.
+
+        Raises:
+            InputError: see `check`.
+        """
+        return self.check().resolved
 
     def fly(
         self,

@@ -82,10 +82,8 @@ def _node_module(word: str) -> str | None:
 def _run(arguments: Sequence[str] | None) -> int:
     """Run a command; return its exit code."""
     try:
-        cli.main(args=arguments, prog_name="space-robot", standalone_mode=False)
+        code = cli.main(args=arguments, prog_name="space-robot", standalone_mode=False)
         sys.stdout.flush()
-    except click.exceptions.Exit as exit_:
-        return exit_.exit_code
     except click.Abort as abort:  # click's word for KeyboardInterrupt, and for the input's end
         interrupted = abort.__cause__
         click.echo(f"space-robot: {interrupted}", err=True)
@@ -98,7 +96,7 @@ def _run(arguments: Sequence[str] | None) -> int:
         return error.exit_code
     except OSError as error:
         return _lost(error)
-    return 0
+    return code if isinstance(code, int) else 0
 
 
 def _lost(error: OSError) -> int:

@@ -1,0 +1,62 @@
+"""``space-robot diff``: the numbers in which two flights differ."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .options import flight_option
+
+LONGEST = 60
+"""Letters of a value that are shown on a terminal; --json has all."""
+
+
+@click.command()
+@click.argument("first", type=click.Path(path_type=Path))
+@click.argument("second", type=click.Path(path_type=Path))
+@flight_option("json")
+def diff(first: Path, second: Path, as_json: bool) -> None:
+    """Say in which numbers two flights differ.
+
+    FIRST and SECOND are bags, or scenario files as `space-robot scenario` prints them; names of
+    files in a scenario are looked up here. Exit code 0 if all numbers are the same, 1 if not.
+
+    \b
+    Examples:
+      space-robot diff flights/monday flights/tuesday
+      space-robot diff flights/monday mine.yaml --json
+    """
+    from rich.console import Console
+
+    from ..console.tables import Column, Table
+    from ..console.terminal import echo_json, say
+    from ..console.terminal_tables import print_table
+    from ..scenario.comparison import differences
+
+    changes = differences(_scenario_of(first), _scenario_of(second))
+    if as_json:
+        echo_json([difference._asdict() for difference in changes])
+    elif not changes:
+        say(Console(), "the same numbers")
+    else:
+        columns = (Column("key", is_label=True), Column(first.name), Column(second.name))
+        rows = [(d.key, _short(d.first), _short(d.second)) for d in changes]
+        print_table(Table.of("", columns, rows), Console())
+    if changes:
+        click.get_current_context().exit(1)
+
+
+def _scenario_of(path: Path) -> dict[str, Any]:
+    from ..flight.plan import Flight
+    from ..scenario.comparison import recorded_scenario, written_options
+
+    if path.suffix in (".yaml", ".yml"):
+        return Flight(written_options(path)).resolved
+    return recorded_scenario(path)
+
+
+def _short(value: Any) -> str:
+    text = "-" if value is None else str(value)
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."

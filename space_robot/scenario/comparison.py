@@ -1,0 +1,77 @@
+"""The numbers in which two flights differ."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from space_robot_msgs_py.bag.description import read_description
+from space_robot_msgs_py.bag.folder import open_bag
+from space_robot_msgs_py.config.trees import flatten, nest
+from space_robot_msgs_py.config.validation import read_yaml, validate
+from space_robot_msgs_py.errors import InputError
+
+from .options import FlightPlan
+
+
+class Difference(NamedTuple):
+    """A number, or a text, that two flights do not share."""
+
+    key: str
+    """Its path in the resolved scenario, with dots."""
+    first: Any
+    """Its value in the first flight; None if it is missing there."""
+    second: Any
+
+
+def recorded_scenario(bag: Path) -> dict[str, Any]:
+    """Return the resolved scenario of a recorded flight.
+
+    Raises:
+        InputError: If there is no bag, or it was recorded by a version that kept no scenario.
+    """
+    flight = read_description(open_bag(bag).custom_data())
+    if not isinstance(numbers := flight.get("scenario"), Mapping) or "robot_file" not in flight:
+        raise InputError(f"{bag}: this bag does not hold its scenario: record the flight anew")
+    plant = flight["robot_file"]
+    assumed = flight.get("controller_robot_file", plant)
+    robots = {"robot": assumed, **({} if assumed == plant else {"plant_robot": plant})}
+    return {**numbers, **robots}
+
+
+def written_options(file: Path) -> FlightPlan:
+    """Return the options in a scenario file.
+
+    Raises:
+        InputError: If the file cannot be read, or an option in it is wrong.
+    """
+    content = read_yaml(file)
+    if isinstance(parameters := content.get("parameters"), Mapping):
+        content["parameters"] = {
+            str(node): dict(flatten(nest(values))) if isinstance(values, Mapping) else values
+            for node, values in parameters.items()
+        }
+    return validate(FlightPlan, content, str(file))
+
+
+def differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[Difference]:
+    """Return where two resolved scenarios differ, in the order of the first one's keys."""
+    return list(_compared("", first, second))
+
+
+def _compared(path: str, first: Any, second: Any) -> Iterator[Difference]:
+    if isinstance(first, Mapping) and isinstance(second, Mapping):
+        for key in dict.fromkeys((*first, *second)):
+            inner = f"{path}.{key}" if path else str(key)
+            yield from _compared(inner, first.get(key), second.get(key))
+    elif _are_records(first) and _are_records(second) and len(first) == len(second):
+        for number, (one, other) in enumerate(zip(first, second, strict=True)):
+            name = one.get("name", number) if one.get("name") == other.get("name") else number
+            yield from _compared(f"{path}.{name}", one, other)
+    elif first != second:
+        yield Difference(path, first, second)
+
+
+def _are_records(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(entry, Mapping) for entry in value)
