@@ -309,3 +309,19 @@ def test_report_has_the_documented_keys() -> None:
     assert (report["controller"], report["case"]) == ("tde_stc", "1")
     assert (report["ticks"], report["duration_s"]) == (200, 0.1)
     assert (report["from_s"], report["to_s"]) == (0.0, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("branches", "expected"),
+    [
+        ((3, 2), {"base": [0, 1, 2], "1_3": [3, 4, 5], "4_5": [6, 7]}),
+        ((1, 2, 1), {"base": [0, 1, 2], "1": [3], "2_3": [4, 5], "4": [6]}),
+    ],
+)
+def test_each_branch_of_several_is_a_group(
+    branches: tuple[int, ...], expected: dict[str, list[int]]
+) -> None:
+    n = sum(branches)
+    groups = axis_groups(n, branches=branches)
+    assert {key: list(range(n + 3))[axes] for key, axes in groups.items()} == expected
+    assert "base" not in axis_groups(n, controls_base=False, branches=branches)

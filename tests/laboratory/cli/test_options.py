@@ -73,7 +73,7 @@ def test_parameters_of_a_scenario_and_those_given(
         ("swaps: [5]", "swaps: a list of texts was expected, got [5]"),
         ("bag: [b]", "bag: a text was expected, got ['b']"),
         ('bag: "a\\0b"', "bag: a text was expected"),
-        ("robot: null", "robot: a text was expected, got None"),
+        ("robot: null", "robot: a text or a mapping of numbers was expected, got None"),
         ("parameters: 5", "parameters: a mapping of nodes to their parameters was expected"),
         ("parameters: {plant: 5}", "a mapping of nodes to their parameters was expected"),
         ("parameters: {plnt: {}}", "unknown node 'plnt'"),
@@ -203,7 +203,7 @@ _TEXTS = st.sampled_from(
 @given(st.lists(st.tuples(_NAMES, _TEXTS), min_size=1, max_size=3))
 def test_any_parameters_fly_or_are_refused_in_one_line(pairs: list[tuple[str, str]]) -> None:
     """Of the options' parser and of the plan; nothing is flown."""
-    from space_robot.cli.options import _set
+    from space_robot.cli.scenario_option import _set
 
     tree: dict[str, dict[str, Any]] = {}
     try:
@@ -212,3 +212,12 @@ def test_any_parameters_fly_or_are_refused_in_one_line(pairs: list[tuple[str, st
         Flight(validate(FlightPlan, {"parameters": tree}, "options"))
     except InputError as error:
         assert len(str(error).splitlines()) == 1  # noqa: PT017
+
+
+@pytest.mark.parametrize(
+    "text", ["/mine=/joint_states", ":=/joint_states", "/mine:=", "/mine", ":="]
+)
+def test_a_remapping_needs_both_names_and_the_sign(text: str) -> None:
+    ended = CliRunner().invoke(cli.cli, ["analyze", "nowhere", "--remap", text])
+    assert ended.exit_code == 2
+    assert f"{text!r}: THEIRS:=OURS expected" in " ".join(ended.output.split())

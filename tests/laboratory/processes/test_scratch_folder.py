@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from space_robot.processes.scratch_folder import NEW_S, PREFIX, ScratchFolder
+from space_robot.processes.scratch_folder import NEW_S, PREFIX, ScratchFolder, remove_stale_folders
 
 
 @pytest.fixture(autouse=True)
@@ -63,3 +63,14 @@ def test_what_is_not_its_own_or_new_stays(temporary: Path) -> None:
     with ScratchFolder():
         pass
     assert all(path.exists() for path in (new, other, file, target))
+
+
+def test_looking_for_stale_folders_leaves_no_file_open(temporary: Path) -> None:
+    stale = temporary / f"{PREFIX}stale"
+    open_before = len(os.listdir("/proc/self/fd"))
+    for _ in range(20):
+        stale.mkdir()
+        os.utime(stale, (time.time() - 2 * NEW_S,) * 2)
+        remove_stale_folders()
+        assert not stale.exists()
+    assert len(os.listdir("/proc/self/fd")) == open_before

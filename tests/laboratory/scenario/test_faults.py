@@ -171,3 +171,13 @@ def test_the_page_has_every_kind_as_it_is() -> None:
             assert default == ("for ever" if math.isinf(kind.default) else f"{kind.default:g}")
         assert description == kind.description
         assert parse_fault(example.strip("`"), KINDS).kind == kind
+
+
+def test_every_default_argument_is_one_that_is_allowed() -> None:
+    with_default = [kind for kind in KINDS.values() if kind.argument and kind.default is not None]
+    assert len(with_default) > 5
+    for kind in with_default:
+        assert kind.argument is not None
+        assert kind.default is not None
+        assert kind.default == math.inf or kind.argument.low <= kind.default <= kind.argument.high
+        assert kind.argument.symbol != "P" or kind.default == 1.0, kind.name

@@ -90,7 +90,7 @@ def test_a_command_prints_it_another_flies_it_a_third_compares(tmp_path: Path) -
     other.write_text(yaml.safe_dump(content))
     compared = run("diff", str(file), str(other), "--json", code=1)
     assert json.loads(compared.stdout) == [
-        {"key": "case.payload.mass", "first": 0.0, "second": 12.5},
+        {"key": "case.payload.mass", "first": 10.0, "second": 12.5},
         {"key": "seed", "first": 0, "second": 1},
     ]
 

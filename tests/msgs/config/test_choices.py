@@ -49,3 +49,9 @@ def test_as_many_names_as_may_be_listed_are_listed() -> None:
     for listing in ("", "--all"):
         assert choices("x", names[:-1], listing=listing) == f"choose one of {', '.join(names[:-1])}"
     assert names[-1] not in choices("x", names)
+
+
+def test_a_part_of_a_name_names_it_from_three_letters_on() -> None:
+    names = ["thrusters_and_more", "wheels_and_thrusters", "something_else"]
+    assert nearest("ust", names) == names[:2]
+    assert nearest("us", names) == []

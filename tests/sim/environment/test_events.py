@@ -15,8 +15,9 @@ from random_robots import random_inertia, random_robot
 
 from space_robot_msgs_py.errors import InputError
 from space_robot_sim.environment.captures import Captures
+from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.events import Capture, Release, named_targets, parse_events
-from space_robot_sim.environment.target import Target
+from space_robot_sim.environment.target import Target, TargetPlace
 
 BODY: dict[str, Any] = {"mass": 2.0, "inertia": [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]}
 NUMBER = st.floats(-1e3, 1e3)
@@ -144,3 +145,15 @@ def test_any_text_is_read_or_refused(text: str) -> None:
     except InputError as error:
         said = str(error)
     assert "\n" not in said
+
+
+@pytest.mark.parametrize("text", ["capture@1:{mass: x}", "capture@1:{name: a", "release@1:fast"])
+def test_wrong_numbers_in_the_text_of_an_event_are_refused_by_the_settings(text: str) -> None:
+    with pytest.raises(ValueError, match="event"):
+        EnvironmentSettings(events=[text])
+
+
+def test_by_default_a_target_is_held_as_it_stands_at_the_tools_origin() -> None:
+    place = TargetPlace()
+    assert place.quaternion == [1.0, 0.0, 0.0, 0.0]
+    assert place.position == [0.0, 0.0, 0.0]

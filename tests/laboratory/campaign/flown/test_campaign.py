@@ -247,3 +247,9 @@ def test_a_mapping_is_as_good_as_a_file(tmp_path: Path) -> None:
     assert found.rerun(0).is_same
     with pytest.raises(InputError, match=r"campaign: .*laws"):
         Campaign.of({"runs": 3})
+
+
+def test_a_seed_is_zero_or_more(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="seed: 0 or more is allowed, got -1"):
+        Campaign(study()).run(1, -1, tmp_path / "none", workers=0)
+    assert not (tmp_path / "none").exists()

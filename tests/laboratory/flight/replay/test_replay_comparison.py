@@ -199,3 +199,9 @@ def test_commands_of_bags_up_to_release_0_7_are_compared_by_their_numbers() -> N
     found = compared.first_difference()
     assert found is not None
     assert [difference.field for difference in found[1]] == ["effort[base_z]"]
+
+
+def test_forces_are_in_newtons_and_torques_in_newton_metres() -> None:
+    sent = commands(messages(range(3)).values())
+    compared = Comparison(AXES, np.arange(3), sent, sent, forces=AXES[3:4])
+    assert compared.units == ("N m", "N m", "N m", "N", "N m")
