@@ -20,7 +20,7 @@ LAUNCH = [str(path) for path in sorted(Path("launch").glob("*.launch.py"))]
 
 setup(
     name=NAME,
-    version="0.8.0",
+    version="0.9.0",
     description="Test bed for the flight software of space robots, on ROS 2",
     license="Apache-2.0",
     maintainer="space_robot maintainers",

@@ -76,7 +76,9 @@ FURTHER = (
 """Pages made from the code, commands with their output, flights in process and on the graph."""
 CLOSED_LOOP = ("laboratory/flight/test_compiled_loop.py", "laboratory/flight/test_closed_loop.py")
 AREAS = {
-    "messages": _files("msgs", "msgs/test_*.py", "msgs/bag/test_*.py", marks="not slow"),
+    "messages": _files(
+        "msgs", "msgs/test_*.py", "msgs/bag/test_*.py", "msgs/ros/test_recorder_*.py", marks="not slow"
+    ),
     "bag": _room("msgs/bag"),
     "compiled": _room("msgs/compiled"),
     "config": _room("msgs/config", "laboratory/cli/test_options.py"),
