@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
 
 import pytest
 from import_graph import PACKAGES, cycles, edges, folders, imports, modules, strings
+from paths import ROOT
 
 ROOMS = {
     "space_robot_msgs_py": (
@@ -157,3 +159,14 @@ def test_the_rules_notice_what_they_forbid() -> None:
     found = [text for _, text in strings(Path(__file__))]
     assert "space_robot_sim" in found
     assert __doc__ not in found
+
+
+def test_no_class_name_stands_for_two_things() -> None:
+    """But for those that every law has."""
+    places: dict[str, list[Path]] = {}
+    for file in modules().values():
+        for node in ast.walk(ast.parse((ROOT / file).read_text("utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                places.setdefault(node.name, []).append(file)
+    twice = {name: files for name, files in places.items() if len(files) > 1}
+    assert set(twice) <= {"Gains", "Memory"}, twice

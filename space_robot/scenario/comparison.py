@@ -15,7 +15,7 @@ from space_robot_msgs_py.errors import InputError
 from .options import FlightPlan
 
 
-class Difference(NamedTuple):
+class ChangedNumber(NamedTuple):
     """A number, or a text, that two flights do not share."""
 
     key: str
@@ -55,12 +55,12 @@ def written_options(file: Path) -> FlightPlan:
     return validate(FlightPlan, content, str(file))
 
 
-def differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[Difference]:
+def differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[ChangedNumber]:
     """Return where two resolved scenarios differ, in the order of the first one's keys."""
     return list(_compared("", first, second))
 
 
-def _compared(path: str, first: Any, second: Any) -> Iterator[Difference]:
+def _compared(path: str, first: Any, second: Any) -> Iterator[ChangedNumber]:
     if isinstance(first, Mapping) and isinstance(second, Mapping):
         for key in dict.fromkeys((*first, *second)):
             inner = f"{path}.{key}" if path else str(key)
@@ -70,7 +70,7 @@ def _compared(path: str, first: Any, second: Any) -> Iterator[Difference]:
             name = one.get("name", number) if one.get("name") == other.get("name") else number
             yield from _compared(f"{path}.{name}", one, other)
     elif first != second:
-        yield Difference(path, first, second)
+        yield ChangedNumber(path, first, second)
 
 
 def _are_records(value: Any) -> bool:

@@ -176,7 +176,7 @@ OPTIONS = (
         "namespace",
         "text",
         "ROS namespace of the nodes and their topics, as /sat1: one for each robot in a domain",
-        "",
+        "/",
         metavar="NS",
         needs_graph=True,
     ),

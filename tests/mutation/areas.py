@@ -77,7 +77,11 @@ FURTHER = (
 CLOSED_LOOP = ("laboratory/flight/test_compiled_loop.py", "laboratory/flight/test_closed_loop.py")
 AREAS = {
     "messages": _files(
-        "msgs", "msgs/test_*.py", "msgs/bag/test_*.py", "msgs/ros/test_recorder_*.py", marks="not slow"
+        "msgs",
+        "msgs/test_*.py",
+        "msgs/bag/test_*.py",
+        "msgs/ros/test_recorder_*.py",
+        marks="not slow",
     ),
     "bag": _room("msgs/bag"),
     "compiled": _room("msgs/compiled"),
