@@ -243,10 +243,10 @@ class ReferenceChunk:
 
     def references(self) -> Block:
         """(k,) array of a `Reference` each, a copy."""
-        found: Block = np.empty(len(self.joints), Reference.dtype(self.joints.shape[2]))
-        joints, base = Reference.parts(found)
+        references: Block = np.empty(len(self.joints), Reference.dtype(self.joints.shape[2]))
+        joints, base = Reference.parts(references)
         joints[:], base[:] = self.joints, self.base
-        return found
+        return references
 
 
 class LawInForce(NamedTuple):

@@ -76,8 +76,8 @@ class Latency(Metric):
         known = np.concatenate([np.empty(0), *self._known])
         if not len(known):
             raise InputError("no wall-clock times of states and commands: not flown as a graph")
-        found = np.percentile(known, list(PERCENTILES.values()))
-        values = dict(zip(PERCENTILES, found, strict=True))
+        percentiles = np.percentile(known, list(PERCENTILES.values()))
+        values = dict(zip(PERCENTILES, percentiles, strict=True))
         return {
             **{f"{name}_ms": float(1e3 * value) for name, value in values.items()},
             **{f"{name}_ticks": float(value / self._period) for name, value in values.items()},

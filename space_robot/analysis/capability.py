@@ -58,7 +58,7 @@ def _largest(columns: Array, low: Array, high: Array) -> Array:
     from scipy.optimize import linprog  # slow to import
 
     count = columns.shape[1]
-    found = np.zeros((2, 3))
+    limits = np.zeros((2, 3))
     for side, i in np.ndindex(2, 3):
         wanted = np.zeros((3, 1))
         wanted[i] = 1.0 if side else -1.0
@@ -69,8 +69,8 @@ def _largest(columns: Array, low: Array, high: Array) -> Array:
             b_eq=np.zeros(3),
             bounds=bounds,
         )
-        found[side, i] = np.inf if solved.status == 3 else -solved.fun if solved.success else 0.0
-    both: Array = found.min(axis=0)
+        limits[side, i] = np.inf if solved.status == 3 else -solved.fun if solved.success else 0.0
+    both: Array = limits.min(axis=0)
     return both
 
 
@@ -126,8 +126,8 @@ def _unlike(vectors: Array) -> Array:
 
 
 def _largest_product(normals: Array, vectors: Array) -> Array:
-    found = np.empty(len(vectors))
+    products = np.empty(len(vectors))
     for start in range(0, len(vectors), BATCH):
         part = slice(start, start + BATCH)
-        found[part] = np.maximum(np.max(vectors[part] @ normals.T, axis=1), 0.0)
-    return found
+        products[part] = np.maximum(np.max(vectors[part] @ normals.T, axis=1), 0.0)
+    return products

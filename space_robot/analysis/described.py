@@ -230,16 +230,16 @@ def flown_actuators(log: FlightLog) -> BaseActuatorSettings:
     Raises:
         InputError: they do not, or the robot is not known.
     """
-    found = base_actuators_of(log)
-    if found.base_actuation == "hardware":
-        found.check(robot_of(log), "of the bag")
+    actuators = base_actuators_of(log)
+    if actuators.base_actuation == "hardware":
+        actuators.check(robot_of(log), "of the bag")
     counts = log.wheel_velocities.shape[1], log.thrusts.shape[1]
-    if counts != (found.wheel_count, found.thruster_count):
+    if counts != (actuators.wheel_count, actuators.thruster_count):
         raise NotDescribedError(
-            f"the bag describes {found.wheel_count} wheels and {found.thruster_count} thrusters, "
+            f"the bag describes {actuators.wheel_count} wheels and {actuators.thruster_count} thrusters, "
             f"and has the states of {counts[0]} and {counts[1]}"
         )
-    return found
+    return actuators
 
 
 def navigation_of(log: FlightLog) -> str:

@@ -86,15 +86,15 @@ class WheelLoad(Load):
     def requirements(self, period: float) -> list[LoadRequirement]:
         """Return both of every wheel."""
         limits = [self._wheels.limits(f"max_{key}") for key in ("torque", "momentum")]
-        found = []
+        requirements = []
         for i in range(self._wheels.count):
             name = f"wheel_{i + 1}"
             torque, momentum = float(self._torque[i]), float(self._momentum[i])
-            found += [
+            requirements += [
                 LoadRequirement(name, "peak torque", "N m", torque, float(limits[0][i])),
                 LoadRequirement(name, "largest momentum", "N m s", momentum, float(limits[1][i])),
             ]
-        return found
+        return requirements
 
     def _series(self, log: FlightLog, demand: Demand) -> WheelRows:
         """Return what the motors give and where they bring the wheels."""
@@ -150,16 +150,16 @@ class ThrusterLoad(Load):
 
     def requirements(self, period: float) -> list[LoadRequirement]:
         """Return what is asked of all together."""
-        found = []
+        requirements = []
         if self._torques:
-            found.append(
+            requirements.append(
                 LoadRequirement("thrusters", "share of their torque", "-", self._share, 1.0)
             )
         if self._rate_of_axes is not None:
             tank = self._thrusters.propellant or np.inf
             mass = period * self._rate
-            found.append(LoadRequirement("thrusters", "propellant", "kg", mass, tank))
-        return found
+            requirements.append(LoadRequirement("thrusters", "propellant", "kg", mass, tank))
+        return requirements
 
     def pulses(self) -> NDArray[np.intp] | None:
         """(3,) of each axis: a pulse counts for the one that it turns the base about most."""

@@ -47,8 +47,8 @@ def axis_groups(
     groups: dict[str, AxisIndex] = {"base": slice(0, 3)} if controls_base else {}
     if any(prismatic[:n]):
         for key, is_prismatic in (("revolute", False), ("prismatic", True)):
-            found = [3 + joint for joint in range(n) if prismatic[joint] == is_prismatic]
-            groups |= {key: found} if found else {}
+            joints = [3 + joint for joint in range(n) if prismatic[joint] == is_prismatic]
+            groups |= {key: joints} if joints else {}
         return groups
     if len(branches) > 1:
         first = 1
@@ -71,7 +71,10 @@ def error_columns(
 ) -> dict[str, AxisIndex]:
     """Return which of the m = n+3 axes each error column of Table V is of."""
     groups = axis_groups(axes - 3, controls_base, prismatic, branches)
-    return {"attitude" if k == "base" else f"joints_{k}": found for k, found in groups.items()}
+    return {
+        "attitude" if k == "base" else f"joints_{k}": axes_of_group
+        for k, axes_of_group in groups.items()
+    }
 
 
 def torque_columns(
@@ -83,7 +86,7 @@ def torque_columns(
     """Return which of the m = n+3 axes each torque column of Table V is of."""
     groups = axis_groups(axes - 3, controls_base, prismatic, branches)
     names = {"base": "base_torque", "prismatic": "force_prismatic"}
-    return {names.get(k, f"torque_{k}"): found for k, found in groups.items()}
+    return {names.get(k, f"torque_{k}"): axes_of_group for k, axes_of_group in groups.items()}
 
 
 def unit_of(column: str) -> str:

@@ -70,15 +70,15 @@ class MomentumSeries:
         if self._part is None:  # the first state that is known is that after the first tick's
             self._part = self._begin(self._captures.robot_at(start), np.zeros(3))
             start += 1
-        found, begin = [], log.first_tick
+        momentum, begin = [], log.first_tick
         for tick in self._captures.ticks(start, stop):
             if tick > begin:
-                found.append(self._part.add(_rows(log, begin, tick)))
-            found.append(self._exchange(_rows(log, tick, tick + 1)))
+                momentum.append(self._part.add(_rows(log, begin, tick)))
+            momentum.append(self._exchange(_rows(log, tick, tick + 1)))
             begin = tick + 1
         if begin < stop:
-            found.append(self._part.add(_rows(log, begin, stop)))
-        return Momentum(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+            momentum.append(self._part.add(_rows(log, begin, stop)))
+        return Momentum(*(np.concatenate(columns) for columns in zip(*momentum, strict=True)))
 
     def _begin(self, robot: Robot, outside: Array) -> _OfOneRobot:
         return _OfOneRobot(robot, self.flown, self._disturbance, outside)
@@ -95,8 +95,8 @@ class MomentumSeries:
             bare = self._begin(exchange.after, np.zeros(3)).add(after)
             outside = before.outside[0] + bare.total[0] - before.total[0]
             self._part = self._begin(exchange.after, outside)
-            found = self._part.add(after)
-        return found
+            momentum = self._part.add(after)
+        return momentum
 
 
 class _OfOneRobot:
@@ -124,17 +124,17 @@ class _OfOneRobot:
             rows.all_positions,
             rows.all_velocities,
         )
-        found = robot_momentum(self._robot, motion)
+        momentum = robot_momentum(self._robot, motion)
         wheels = self._flown.wheels
         spin = product(wheels.spin_momenta(rows.wheel_velocities), wheels.unit_axes)
-        outside = self._from_outside(rows, axes, found.centre_of_mass)
+        outside = self._from_outside(rows, axes, momentum.centre_of_mass)
         self._before, self._outside = last_rows(log, 1), outside[-1].copy()
         whole = Momentum(
-            found.angular,
-            found.base,
+            momentum.angular,
+            momentum.base,
             to_inertial(axes, spin.T).T,
             outside,
-            rows.base_position + found.centre_of_mass,
+            rows.base_position + momentum.centre_of_mass,
         )
         return Momentum(*(values[skipped:] for values in whole))
 
@@ -171,14 +171,14 @@ class MomentumBudget(Metric):
 
     def add(self, log: FlightLog, error: Array) -> None:
         """Take further rows."""
-        found = self._series.add(log)
+        momentum = self._series.add(log)
         if self._start is None:
-            self._start = Momentum(*(values[:1].copy() for values in found))
+            self._start = Momentum(*(values[:1].copy() for values in momentum))
         start = self._start
         for name in self._largest:
-            self._largest[name] = max(self._largest[name], _longest(getattr(found, name)))
-        self._drift = max(self._drift, _longest(found.total - start.total - found.outside))
-        pushed = np.linalg.norm(found.centre_of_mass - start.centre_of_mass, axis=1)
+            self._largest[name] = max(self._largest[name], _longest(getattr(momentum, name)))
+        self._drift = max(self._drift, _longest(momentum.total - start.total - momentum.outside))
+        pushed = np.linalg.norm(momentum.centre_of_mass - start.centre_of_mass, axis=1)
         self._pushed, self._end = max(self._pushed, float(pushed.max())), float(pushed[-1])
 
     def result(self) -> dict[str, Any]:
@@ -201,12 +201,12 @@ def disturbance_impulse(disturbance: DisturbanceSettings, time: Array) -> Array:
 
     It acts as friction does, against the torque: ``-integral sin(w t) = (cos(w t) - 1) / w``.
     """
-    found = np.zeros_like(time)
+    integral = np.zeros_like(time)
     for frequency in disturbance.base_frequencies:
         if frequency:
             omega = 2.0 * np.pi * frequency
-            found += (sines_cosines(omega * time)[1] - 1.0) / omega
-    impulse: Array = disturbance.scale * disturbance.base_amplitude * found
+            integral += (sines_cosines(omega * time)[1] - 1.0) / omega
+    impulse: Array = disturbance.scale * disturbance.base_amplitude * integral
     return impulse
 
 

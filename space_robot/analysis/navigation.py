@@ -35,9 +35,9 @@ class NavigationError(Metric):
         """Take further rows."""
         if log.believed_error is None:
             return
-        found = navigation_error(log, error)
-        self._rms.add(found)
-        self._maximum.add(found)
+        errors = navigation_error(log, error)
+        self._rms.add(errors)
+        self._maximum.add(errors)
 
     def result(self) -> dict[str, Any]:
         """Return the ticks with telemetry, ``rms`` (mean of axes) and ``max`` by column."""
@@ -62,5 +62,5 @@ def navigation_error(log: FlightLog, error: Array) -> Array:
     """
     assert log.believed_error is not None
     known = np.isfinite(log.believed_error).all(axis=1)
-    found: Array = log.believed_error[known] - error[known]
-    return found
+    difference: Array = log.believed_error[known] - error[known]
+    return difference

@@ -150,14 +150,14 @@ class Analysis:
 
 
 def _without_gaps(log: FlightLog) -> FlightLog:
-    found = log.longest_stretch()
-    if not found.ticks:
+    without_gaps = log.longest_stretch()
+    if not without_gaps.ticks:
         raise InputError("no tick has both a state and a reference")
-    if found.ticks < log.ticks:
-        start, stop = found.time[0], found.time[-1]
+    if without_gaps.ticks < log.ticks:
+        start, stop = without_gaps.time[0], without_gaps.time[-1]
         said = f"analyzed from t = {start:.4f} to {stop:.4f} s, the longest stretch without a gap"
-        found.damage += (said,)
-    return found
+        without_gaps.damage += (said,)
+    return without_gaps
 
 
 def _missed_deadlines(log: FlightLog) -> MissedDeadlines:

@@ -127,11 +127,11 @@ def comparison_table(reports: Mapping[str, Report]) -> Table:
 def _groups(shown: Sequence[Line]) -> list[Group]:
     return [
         Group(
-            [[f"{x.name} ({x.unit})" if x.unit else x.name, *x.texts] for x in found],
+            [[f"{x.name} ({x.unit})" if x.unit else x.name, *x.texts] for x in lines],
             name,
             DEFINITIONS[name],
         )
-        for name, found in groupby(shown, key=lambda line: line.group)
+        for name, lines in groupby(shown, key=lambda line: line.group)
     ]
 
 
@@ -143,46 +143,46 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
         brief: without what `rms_table` shows.
     """
     each, one = partial(_each_key, reports), partial(_line, reports)
-    found: list[Line] = []
+    rows: list[Line] = []
     if not brief:
-        found += each("RMS, mean of axes", ("rms", "mean_axis"), unit_of)
-        found += each("RMS, eq. (64)", ("rms", "eq64"), unit_of)
-        found += each("variation per s", ("chatter", "total_variation_per_s"), _per_second)
-        found += each("power > 100 Hz", ("chatter", "power_above_100_hz"))
-        found += each("ripple", ("ripple", "rms"), unit_of)
-    found += each("ripple's peak", ("ripple", "peak"), text_of=_peak_of)
-    found += each("attitude drift", ("attitude_drift",), "deg", label=_end_or_max)
-    found += each("navigation error", ("navigation_error", "rms"), unit_of)
-    found += each("maximum", ("maxima",), unit_of)
-    found += each("settled after", ("settling", "settled_s"), "s", text=_settled)
-    found.append(one("saturation", "ticks at a limit", "", _saturated))
-    found += each("saturation", ("wheel_saturation", "wheels"), "", text=_full)
+        rows += each("RMS, mean of axes", ("rms", "mean_axis"), unit_of)
+        rows += each("RMS, eq. (64)", ("rms", "eq64"), unit_of)
+        rows += each("variation per s", ("chatter", "total_variation_per_s"), _per_second)
+        rows += each("power > 100 Hz", ("chatter", "power_above_100_hz"))
+        rows += each("ripple", ("ripple", "rms"), unit_of)
+    rows += each("ripple's peak", ("ripple", "peak"), text_of=_peak_of)
+    rows += each("attitude drift", ("attitude_drift",), "deg", label=_end_or_max)
+    rows += each("navigation error", ("navigation_error", "rms"), unit_of)
+    rows += each("maximum", ("maxima",), unit_of)
+    rows += each("settled after", ("settling", "settled_s"), "s", text=_settled)
+    rows.append(one("saturation", "ticks at a limit", "", _saturated))
+    rows += each("saturation", ("wheel_saturation", "wheels"), "", text=_full)
     for name in ("p50", "p99", "max"):
-        found.append(one("latency", name, "ms", partial(_latency, name=name)))
-    found.append(one("commands", "unanswered", "", lambda r: str(r["unanswered_ticks"])))
-    found.append(one("commands", "not as commanded", "", _differing))
+        rows.append(one("latency", name, "ms", partial(_latency, name=name)))
+    rows.append(one("commands", "unanswered", "", lambda r: str(r["unanswered_ticks"])))
+    rows.append(one("commands", "not as commanded", "", _differing))
     for kind in ("rms", "max"):
         label = partial(_axes, kind=kind)
-        found += each("estimate error", ("estimate_error", kind), _group_unit, label=label)
+        rows += each("estimate error", ("estimate_error", kind), _group_unit, label=label)
     for group, key in (("pointing", "boresight_rad"), ("rotation", "rotation_rad")):
-        found += each(group, ("pointing", key), text=_angle, label=_upper)
+        rows += each(group, ("pointing", key), text=_angle, label=_upper)
     for group, key in (("tool position", "tool_position_m"), ("base's drift", "base_drift_m")):
-        found += each(group, ("pointing", key), "m", label=_upper)
-    found += each("momentum", ("momentum", "peak_n_m_s"), "N m s", label="{} at most".format)
-    found += each(
+        rows += each(group, ("pointing", key), "m", label=_upper)
+    rows += each("momentum", ("momentum", "peak_n_m_s"), "N m s", label="{} at most".format)
+    rows += each(
         "momentum",
         ("momentum", "drift"),
         lambda key: "N m s" if key == "n_m_s" else "",
         text=_drift,
         label=lambda key: "drift" if key == "n_m_s" else "drift, relative",
     )
-    found += each("pushed by thrusters", ("momentum", "pushed_m"), "m")
+    rows += each("pushed by thrusters", ("momentum", "pushed_m"), "m")
     if not brief:
         for key, name, unit in (
             ("peak_torque_n_m", "torque", "N m"),
             ("peak_momentum_n_m_s", "momentum", "N m s"),
         ):
-            found += each(
+            rows += each(
                 "asked of the base",
                 ("sizing", "axes"),
                 unit,
@@ -190,7 +190,7 @@ def lines(reports: Sequence[Report], brief: bool = False) -> list[Line]:
                 label=partial(_named, name=name),
             )
     return [
-        *found,
+        *rows,
         one("recording", "messages lost", "", lambda r: str(sum(r["lost"].values()))),
         one("recording", "states filled in", "", lambda r: str(r["filled_ticks"])),
         one("recording", "finished", "", lambda r: "no" if r["unfinished"] else "yes"),
@@ -235,10 +235,10 @@ def _each_key(
 
 
 def _at(report: Report, path: tuple[str, ...]) -> dict[str, Any]:
-    found: Any = report
+    value: Any = report
     for key in path:
-        found = (found or {}).get(key)
-    return found or {}
+        value = (value or {}).get(key)
+    return value or {}
 
 
 def _line(
@@ -287,12 +287,12 @@ def _settled(value: float | None) -> str:
 
 
 def _saturated(report: Report) -> str:
-    found = report["saturation"]
-    if found is None:
+    saturation = report["saturation"]
+    if saturation is None:
         return NONE
-    if found["base_torque_limit_n_m"] is None and found["joint_torque_limit_n_m"] is None:
+    if saturation["base_torque_limit_n_m"] is None and saturation["joint_torque_limit_n_m"] is None:
         return "no limits"
-    return f"{found['ticks']} ({found['share']:.2%})"
+    return f"{saturation['ticks']} ({saturation['share']:.2%})"
 
 
 def _full(wheel: dict[str, Any]) -> str:
@@ -304,13 +304,13 @@ def _full(wheel: dict[str, Any]) -> str:
 
 
 def _latency(report: Report, name: str) -> str:
-    found = report["latency"]
-    return f"{found[f'{name}_ms']:.3g} ({found[f'{name}_ticks']:.3g})" if found else NONE
+    latency = report["latency"]
+    return f"{latency[f'{name}_ms']:.3g} ({latency[f'{name}_ticks']:.3g})" if latency else NONE
 
 
 def _differing(report: Report) -> str:
-    found = report["missed_deadlines"]
-    return str(found["differing_ticks"]) if found else NONE
+    deadlines = report["missed_deadlines"]
+    return str(deadlines["differing_ticks"]) if deadlines else NONE
 
 
 def _axes(key: str, kind: str) -> str:

@@ -123,9 +123,9 @@ class Ripple(Metric):
 
         ``fast`` is the RMS of what is above `FAST`.
         """
-        found = self.spectrum()
-        columns, rms, fast = self._columns, found.rms(), found.rms(FAST)
-        peaks = {name: found.peak(axes) for name, axes in columns.items()}
+        spectrum = self.spectrum()
+        columns, rms, fast = self._columns, spectrum.rms(), spectrum.rms(FAST)
+        peaks = {name: spectrum.peak(axes) for name, axes in columns.items()}
         return {
             "above_hz": SLOWEST,
             "rms": {name: float(np.mean(rms[axes])) for name, axes in columns.items()},

@@ -96,7 +96,7 @@ class Sizing(Metric):
                 for i, axis in enumerate(BASE_AXES)
             },
             "peak_momentum_n_m_s": self._largest,
-            "requirements": [_as_data(found) for found in self._requirements()],
+            "requirements": [_as_data(requirement) for requirement in self._requirements()],
         }
 
     def _requirements(self) -> Iterator[LoadRequirement]:
@@ -115,6 +115,11 @@ class Sizing(Metric):
             yield from load.requirements(self._period)
 
 
-def _as_data(found: LoadRequirement) -> dict[str, Any]:
-    has = found.has if np.isfinite(found.has) else None
-    return {**found._asdict(), "has": has, "margin": found.margin, "is_met": found.is_met}
+def _as_data(requirement: LoadRequirement) -> dict[str, Any]:
+    has = requirement.has if np.isfinite(requirement.has) else None
+    return {
+        **requirement._asdict(),
+        "has": has,
+        "margin": requirement.margin,
+        "is_met": requirement.is_met,
+    }

@@ -22,19 +22,19 @@ BY_AXIS = (
 
 def sizing_table(report: Report) -> Table | None:
     """Tabulate the sizing of a flight; None where it has none."""
-    found = report["sizing"]
-    if found is None:
+    sizing = report["sizing"]
+    if sizing is None:
         return None
-    requirements = found["requirements"]
+    requirements = sizing["requirements"]
     parts = groupby(requirements, key=lambda requirement: requirement["part"])
     judged = {(r["part"], r["quantity"]): r for r in requirements}
     groups = [
-        Group(list(_of_axis(name, axis, judged)), name) for name, axis in found["axes"].items()
+        Group(list(_of_axis(name, axis, judged)), name) for name, axis in sizing["axes"].items()
     ]
     groups += [
         Group([_row(r["quantity"], r["unit"], r["asked"], r) for r in each], part)
         for part, each in parts
-        if part not in found["axes"]
+        if part not in sizing["axes"]
     ]
     columns = (
         Column(is_label=True),
@@ -43,7 +43,7 @@ def sizing_table(report: Report) -> Table | None:
         *((Column("has"), Column("margin")) if requirements else ()),
     )
     rows = [Group([row[: len(columns)] for row in g.rows], g.name) for g in groups]
-    return Table(_title(found), columns, rows, _notes(report))
+    return Table(_title(sizing), columns, rows, _notes(report))
 
 
 def _of_axis(name: str, axis: dict[str, Any], judged: dict[tuple[str, str], Any]) -> Iterator[Row]:
@@ -61,23 +61,23 @@ def _row(quantity: str, unit: str, asked: float, judged: dict[str, Any] | None) 
     return quantity, unit, asked, has, JudgedCell(margin, *verdict)
 
 
-def _title(found: dict[str, Any]) -> str:
-    if not found["requirements"]:
+def _title(sizing: dict[str, Any]) -> str:
+    if not sizing["requirements"]:
         return "what the flight asks of its base"
-    who = "had" if found["flown"] else "would have"
-    return f"what the flight asks of its base, and what actuators {found['actuators']} {who}"
+    who = "had" if sizing["flown"] else "would have"
+    return f"what the flight asks of its base, and what actuators {sizing['actuators']} {who}"
 
 
 def _notes(report: Report) -> list[str]:
-    found, notes = report["sizing"], []
+    sizing, notes = report["sizing"], []
     if (report["wheel_saturation"] or {}).get("ticks"):
         notes.append(
             "wheels were at their limits: a law that is told of it asks for no more, so that this "
             "flight does not say what its mission asks; fly ideal actuators for that"
         )
-    if not found["requirements"] or found["flown"]:
+    if not sizing["requirements"] or sizing["flown"]:
         return notes
-    parts = {requirement["part"] for requirement in found["requirements"]}
+    parts = {requirement["part"] for requirement in sizing["requirements"]}
     if "thrusters" in parts:
         notes.append("propellant: the least, were thrusters not on or off; pulses: fly them")
     if "wheel_1" in parts:

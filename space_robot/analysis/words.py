@@ -41,39 +41,39 @@ def law_of(described: Mapping[str, Any]) -> str | None:
 def remarks(report: Report) -> list[str]:
     """Say in sentences what was lost, damaged or left unanswered."""
     lost = {topic: count for topic, count in report["lost"].items() if count}
-    found = [f"messages lost: {lost or 'none'}"]
+    remarks = [f"messages lost: {lost or 'none'}"]
     if step := report.get("start_step"):
-        found.append(sentence(step))
+        remarks.append(sentence(step))
     if report["events"]:
-        found.append(f"events: {', '.join(report['events'])}")
+        remarks.append(f"events: {', '.join(report['events'])}")
     if drift := report["attitude_drift"]:
-        found.append(
+        remarks.append(
             f"{FREE}: its attitude is no error but drift, {drift['max_deg']:.4g} deg at most and "
             f"{drift['end_deg']:.4g} deg at the end, which pointing includes"
         )
     if full := report["wheel_saturation"]:
-        found += _saturated_wheels(full)
-    found += [
+        remarks += _saturated_wheels(full)
+    remarks += [
         text for text in (report["unfinished"], *report["damage"], *report["foreign"]) if text
     ]
     if report["unanswered_ticks"]:
-        found.append(f"ticks that no command was recorded for: {report['unanswered_ticks']}")
+        remarks.append(f"ticks that no command was recorded for: {report['unanswered_ticks']}")
     if report["filled_ticks"]:
-        found.append(
+        remarks.append(
             f"ticks without a usable state, shown as the one before: {report['filled_ticks']}"
         )
-    return found
+    return remarks
 
 
-def _saturated_wheels(found: dict[str, Any]) -> list[str]:
+def _saturated_wheels(saturation: dict[str, Any]) -> list[str]:
     """Say which wheel reached a limit first, and for how long any was at one."""
-    first = {n: w["first_s"] for n, w in found["wheels"].items() if w["first_s"] is not None}
+    first = {n: w["first_s"] for n, w in saturation["wheels"].items() if w["first_s"] is not None}
     if not first:
         return []
     name = min(first, key=lambda wheel: first[wheel])
     return [
-        f"wheels were at a limit of torque or momentum at {found['ticks']} ticks "
-        f"({found['share']:.2%}), {name} first at {first[name]:g} s"
+        f"wheels were at a limit of torque or momentum at {saturation['ticks']} ticks "
+        f"({saturation['share']:.2%}), {name} first at {first[name]:g} s"
     ]
 
 

@@ -130,8 +130,8 @@ class SpaceRobotEnv(gymnasium.Env[Array, Array]):
 
     def _observation(self, state: RobotState) -> Array:
         error, rate = self._errors(state)
-        found = np.concatenate((error, rate, state.joint_positions))
-        cut: Array = np.clip(np.nan_to_num(found), -self._high, self._high)
+        observation = np.concatenate((error, rate, state.joint_positions))
+        cut: Array = np.clip(np.nan_to_num(observation), -self._high, self._high)
         return cut
 
     def _errors(self, state: RobotState) -> tuple[Array, Array]:

@@ -184,10 +184,10 @@ class Study(StrictModel):
         Raises:
             InputError: neither says it.
         """
-        found = runs or self.runs or (self.until and self.until.runs)
-        if not found:
+        count = runs or self.runs or (self.until and self.until.runs)
+        if not count:
             raise InputError(f"{self.where}: runs: missing: say there how many, or with --runs")
-        return found
+        return count
 
     @property
     def content(self) -> dict[str, Any]:

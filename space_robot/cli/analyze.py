@@ -151,8 +151,8 @@ def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
     from ..console.terminal import echo_json, terminal
 
     if as_json:
-        found = list(reports.values())
-        echo_json(found[0] if len(found) == 1 else found)
+        reports_shown = list(reports.values())
+        echo_json(reports_shown[0] if len(reports_shown) == 1 else reports_shown)
         return
     from ..analysis.report_tables import metrics_table, rms_table
     from ..analysis.sizing_table import sizing_table

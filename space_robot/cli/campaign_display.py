@@ -49,7 +49,7 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
     findings = Findings(subject_of(flown))
     names = findings.names
     print_table(medians(flown.table, names, flown.seed), console)
-    if found := findings.verdicts:
+    if verdicts := findings.verdicts:
         print_table(
             Table.of(
                 "Requirements",
@@ -68,7 +68,7 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
                         v.limits.low,
                         Judged("", v.word, TONES[v.word]),
                     ]
-                    for v in found
+                    for v in verdicts
                 ],
             ),
             console,

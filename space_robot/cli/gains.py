@@ -53,13 +53,13 @@ def check(as_json: bool, **options: Any) -> None:
     from .gains_checked import checked, report_of
     from .gains_display import print_checks
 
-    found = checked(options)
+    checks = checked(options)
     if as_json:
-        echo_json(report_of(found))
+        echo_json(report_of(checks))
     else:
-        print_checks(found, terminal())
-    if not found.is_sound:
-        names = ", ".join(check.law for check in found.checks if not check.is_sound)
+        print_checks(checks, terminal())
+    if not checks.is_sound:
+        names = ", ".join(check.law for check in checks.checks if not check.is_sound)
         raise SpaceRobotError(f"{names}: h_bar leaves too little margin in torque scale")
 
 

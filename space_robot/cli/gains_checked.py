@@ -98,22 +98,22 @@ def _first_law(plan: FlightPlan) -> str:
     return names[0]
 
 
-def report_of(found: Checked) -> dict[str, Any]:
+def report_of(checks: Checked) -> dict[str, Any]:
     """Return the findings as data for JSON."""
-    flight = found.flight
+    flight = checks.flight
     return {
         **{
             key: flight.description[key]
             for key in ("robot", "mission", "case", "actuators", "gains")
         },
         "axes": flight.robot.axis_names,
-        "is_sound": found.is_sound,
-        **({"sensors": flight.plant_settings.sensors} if found.ripple else {}),
-        "laws": {check.law: dict(_of_law(check, found)) for check in found.checks},
+        "is_sound": checks.is_sound,
+        **({"sensors": flight.plant_settings.sensors} if checks.ripple else {}),
+        "laws": {check.law: dict(_of_law(check, checks)) for check in checks.checks},
     }
 
 
-def _of_law(check: GainCheck, found: Checked) -> Iterable[tuple[str, Any]]:
+def _of_law(check: GainCheck, checks: Checked) -> Iterable[tuple[str, Any]]:
     yield "is_sound", check.is_sound
     if spectrum := check.spectrum:
         yield from (
@@ -125,6 +125,6 @@ def _of_law(check: GainCheck, found: Checked) -> Iterable[tuple[str, Any]]:
             ("largest_torque_scale", spectrum.largest_scale),
         )
     yield "noise_gain", check.noise_gain.tolist()
-    if found.ripple:
-        ripple = found.ripple[check.law]
+    if checks.ripple:
+        ripple = checks.ripple[check.law]
         yield "held_ripple", None if ripple is None else ripple.tolist()

@@ -11,22 +11,22 @@ from ..tuning.spectrum import LEAST_MARGIN
 from .gains_checked import Checked
 
 
-def print_checks(found: Checked, console: Console) -> None:
+def print_checks(checks: Checked, console: Console) -> None:
     """Print margins, noise gains and what they mean."""
-    what = found.flight.description
+    what = checks.flight.description
     say(
         console,
         f"robot {what['robot']}, mission {what['mission']}, case {what['case']}, "
         f"gains {what['gains']}, actuators {what['actuators']}",
     )
-    if any(check.spectrum for check in found.checks):
-        print_table(_margins(found), console)
-    print_table(_noise_gains(found), console)
-    if found.ripple:
-        print_table(_ripple(found), console)
+    if any(check.spectrum for check in checks.checks):
+        print_table(_margins(checks), console)
+    print_table(_noise_gains(checks), console)
+    if checks.ripple:
+        print_table(_ripple(checks), console)
 
 
-def _margins(found: Checked) -> Table:
+def _margins(checks: Checked) -> Table:
     columns = [
         Column("", is_label=True),
         Column("smallest", spec=".4f"),
@@ -35,7 +35,7 @@ def _margins(found: Checked) -> Table:
         Column("margin"),
     ]
     rows = []
-    for check in found.checks:
+    for check in checks.checks:
         if spectrum := check.spectrum:
             small = "good" if spectrum.is_sound else "bad"
             word = "sound" if spectrum.margin >= LEAST_MARGIN else "small"
@@ -50,7 +50,7 @@ def _margins(found: Checked) -> Table:
                     ),
                 ]
             )
-    inertia = "H_S" if found.flight.controls_base else "H_f"
+    inertia = "H_S" if checks.flight.controls_base else "H_f"
     table = Table.of(f"Eigenvalues of {inertia}^-1 h_bar along the mission", columns, rows)
     note = (
         "The margin is the share by which the torque reported may exceed the one commanded "
@@ -63,23 +63,23 @@ def _holds(value: bool) -> tuple[str, str]:
     return ("holds", "good") if value else ("fails", "bad")
 
 
-def _noise_gains(found: Checked) -> Table:
+def _noise_gains(checks: Checked) -> Table:
     columns = [
         Column("", is_label=True),
-        *(Column(check.law, spec=".3g") for check in found.checks),
+        *(Column(check.law, spec=".3g") for check in checks.checks),
     ]
-    names = _axes(found, "N s/m")
+    names = _axes(checks, "N s/m")
     rows = [
-        [name, *(float(check.noise_gain[axis]) for check in found.checks)]
+        [name, *(float(check.noise_gain[axis]) for check in checks.checks)]
         for axis, name in enumerate(names)
     ]
     title = "Torque that noise on the rate of an axis becomes, N m per rad/s"
     return Table.of(title, columns, rows)
 
 
-def _axes(found: Checked, of_prismatic: str) -> list[str]:
+def _axes(checks: Checked, of_prismatic: str) -> list[str]:
     """Name the axes, those of prismatic joints with the unit of their own."""
-    robot = found.flight.robot
+    robot = checks.flight.robot
     slides = (False, False, False, *robot.is_prismatic[: robot.n])
     return [
         f"{name} ({of_prismatic})" if is_prismatic else name
@@ -87,14 +87,14 @@ def _axes(found: Checked, of_prismatic: str) -> list[str]:
     ]
 
 
-def _ripple(found: Checked) -> Table:
-    columns = [Column("", is_label=True), *(Column(law, spec=".3g") for law in found.ripple)]
+def _ripple(checks: Checked) -> Table:
+    columns = [Column("", is_label=True), *(Column(law, spec=".3g") for law in checks.ripple)]
     rows = [
-        [name, *(None if x is None else float(x[axis]) for x in found.ripple.values())]
-        for axis, name in enumerate(_axes(found, "N"))
+        [name, *(None if x is None else float(x[axis]) for x in checks.ripple.values())]
+        for axis, name in enumerate(_axes(checks, "N"))
     ]
-    sensors = found.flight.plant_settings.sensors
+    sensors = checks.flight.plant_settings.sensors
     table = Table.of(f"Torque ripple with sensors {sensors}, held still, N m RMS", columns, rows)
-    diverged = [law for law, ripple in found.ripple.items() if ripple is None]
+    diverged = [law for law, ripple in checks.ripple.items() if ripple is None]
     notes = [f"Held still, {', '.join(diverged)} diverged."] if diverged else []
     return Table(table.title, table.columns, table.groups, notes)

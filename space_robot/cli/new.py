@@ -46,13 +46,13 @@ def new(
     from ..console.terminal_tables import print_table
     from ..flight.compilation import compile_kernels
 
-    found = robot_files(robot_as_path(robot))
+    files = robot_files(robot_as_path(robot))
     words = ["space-robot", "new", robot, *(["--base", base] if base else [])]
     command = shlex.join([*words, *(["--repair"] if repair else [])])
-    texts, read = robot_texts(found.file, base, repair, command)
+    texts, read = robot_texts(files.file, base, repair, command)
     for line in read.repairs:
         click.echo(f"repaired: {line}", err=True)
-    folder = out or Path(found.name)
+    folder = out or Path(files.name)
     check_replaceable(folder, force, texts)
     compile_kernels()
     with terminal(stderr=True).status("reading") as status:

@@ -138,7 +138,7 @@ def _print_axes(report: dict[str, Any], console: Console) -> None:
     rows = [
         [axis if unit == "N m" else f"{axis} ({unit})", *numbers]
         for axis, (unit, *numbers) in (
-            (name, found.values()) for name, found in report["axes"].items()
+            (name, values.values()) for name, values in report["axes"].items()
         )
     ]
     print_table(Table.of("torque, N m, over the ticks compared", columns, rows), console)

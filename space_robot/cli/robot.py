@@ -55,8 +55,8 @@ def robot(robot: str, base: str | None, repair: bool, out: Path | None, as_json:
             written.write(source.text.encode())
         click.echo(f"wrote {out}", err=True)
     # the URDF's own names of links
-    found = describe(Robot.from_urdf(file, base, repair) if is_urdf else source.robot)
+    description = describe(Robot.from_urdf(file, base, repair) if is_urdf else source.robot)
     if as_json:
-        echo_json({"file": str(file), **found, "defects": [f.told for f in findings]})
+        echo_json({"file": str(file), **description, "defects": [f.told for f in findings]})
     else:
-        print_robot(found, findings, terminal())
+        print_robot(description, findings, terminal())

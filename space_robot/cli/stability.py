@@ -51,17 +51,17 @@ def stability(initial_error: float, as_json: bool, plot: Path | None, **options:
     if plot:
         make_folder(plot)
     compile_kernels()
-    found = study(plan, initial_error, _fly)
+    proofs = study(plan, initial_error, _fly)
     if plot:
         from ..paper.stability.figures import draw
 
-        written = draw(found, plot)
+        written = draw(proofs, plot)
         names = ", ".join(map(str, written)) or "nothing: the figures are of K_1 and K_2"
         click.echo(f"wrote {names}", err=True)
     if as_json:
-        echo_json(report(found))
+        echo_json(report(proofs))
     else:
-        print_study(found, terminal())
+        print_study(proofs, terminal())
 
 
 def _fly(flight: Flight, which: str) -> FlightLog:

@@ -40,8 +40,8 @@ class Ending(NamedTuple):
             outcome, tick = UNANSWERED, error.tick
         elif isinstance(error, DivergedError):
             outcome, tick = DIVERGED, error.tick
-        elif found := _DIVERGED.search(str(error)):
-            outcome, tick = DIVERGED, int(found[1])
+        elif match := _DIVERGED.search(str(error)):
+            outcome, tick = DIVERGED, int(match[1])
         return cls(outcome, str(error), tick, _seconds(tick, period), error)
 
     def as_record(self) -> dict[str, Any]:

@@ -99,9 +99,9 @@ class Flight:
             return assumed_actuators(name, robot)
         given = self.plan.actuators if isinstance(self.plan.actuators, dict) else {}
         own = {key: given[key] for key in BaseActuatorSettings.model_fields if key in given}
-        found = validate(BaseActuatorSettings, own, "actuators")
-        found.check(robot, GIVEN)
-        return found
+        actuators = validate(BaseActuatorSettings, own, "actuators")
+        actuators.check(robot, GIVEN)
+        return actuators
 
     def build_controller(self, law: ControlLaw) -> Controller:
         """Build a controller that remembers nothing, with ``law`` in force."""

@@ -33,9 +33,9 @@ def remove_stale_folders() -> None:
     """Remove the folders of this user that no running process has locked."""
     for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
         with suppress(OSError):  # of somebody else, in use, or gone by now
-            found = folder.lstat()
-            is_own = stat.S_ISDIR(found.st_mode) and found.st_uid == os.geteuid()
-            if not is_own or time.time() < found.st_mtime + NEW_S:
+            status = folder.lstat()
+            is_own = stat.S_ISDIR(status.st_mode) and status.st_uid == os.geteuid()
+            if not is_own or time.time() < status.st_mtime + NEW_S:
                 continue
             lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
             try:

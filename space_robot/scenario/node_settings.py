@@ -122,12 +122,12 @@ class FlightSettings(NamedTuple):
             for name, law in laws.items()
             for gain, values in law.gain_values.items()
         }
-        found = {}
+        parameters = {}
         for node, names in self.given.items():
             settings: NodeSettings = getattr(self, node)
             resolved = dict(flatten(settings.model_dump())) | gains
-            found[node] = {name: resolved[name] for name in names if name in resolved}
-        return found
+            parameters[node] = {name: resolved[name] for name in names if name in resolved}
+        return parameters
 
     def _check_periods(self) -> None:
         periods = {node: getattr(self, node).period for node in NODES}

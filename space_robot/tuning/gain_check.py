@@ -75,8 +75,8 @@ def check_gains(
     """
     weight = low_pass_weight(acceleration_filter_hz, law.period) or 1.0
     h_bar = law.h_bar[-inertia.shape[-1] :]
-    found = spectrum(inertia, h_bar, weight) if h_bar.size else None
-    return GainCheck(law.name, found, noise_gain(law, inertia, quaternion, weight))
+    eigen = spectrum(inertia, h_bar, weight) if h_bar.size else None
+    return GainCheck(law.name, eigen, noise_gain(law, inertia, quaternion, weight))
 
 
 def noise_gain(law: ControlLaw, inertia: Array, quaternion: Array, weight: float = 1.0) -> Array:

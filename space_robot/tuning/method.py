@@ -119,8 +119,8 @@ def tune(
     margin, share = wishes.margin, wishes.mass_uncertainty
     shape = axis_inertia(inertia)
     asked = asked.on_all_axes(shape)
-    found = eigenvalues(inertia, shape)
-    low, high = float(found.min()), float(found.max())
+    eigen = eigenvalues(inertia, shape)
+    low, high = float(eigen.min()), float(eigen.max())
     size = margin * (1.0 + share) / low
     weight = min(1.0, (1.0 - share) / (size * high))
     h_bar, allowed = size * shape, wishes.ripple * asked.peak

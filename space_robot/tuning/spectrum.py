@@ -82,9 +82,9 @@ class Spectrum:
 
 def spectrum(inertia: Array, h_bar: Array, weight: float = 1.0) -> Spectrum:
     """Return the `Spectrum` of the diagonal ``h_bar`` (m,) over ``inertia`` (K, m, m), H_S."""
-    found = eigenvalues(inertia, h_bar)
+    eigen = eigenvalues(inertia, h_bar)
     norm = np.linalg.norm(contraction_matrix(inertia, h_bar), 2, axis=(-2, -1))
-    return Spectrum(float(found.min()), float(found.max()), float(norm.max()), weight)
+    return Spectrum(float(eigen.min()), float(eigen.max()), float(norm.max()), weight)
 
 
 def eigenvalues(inertia: Array, h_bar: Array) -> Array:

@@ -56,12 +56,12 @@ def margin_remarks(
     remarks = []
     for name, law in laws.items():
         weight = low_pass_weight(acceleration_filter_hz, law.period) or 1.0
-        found = spectrum(inertia, law.h_bar[-inertia.shape[-1] :], weight)
-        if not found.contracts:
-            why = f"h_bar is too large for the robot (radius {found.radius:.3g}): it will diverge"
-        elif not found.is_sound and on_thin_margin:
+        eigen = spectrum(inertia, law.h_bar[-inertia.shape[-1] :], weight)
+        if not eigen.contracts:
+            why = f"h_bar is too large for the robot (radius {eigen.radius:.3g}): it will diverge"
+        elif not eigen.is_sound and on_thin_margin:
             why = (
-                f"h_bar leaves {found.margin:.2%} of margin in torque scale, "
+                f"h_bar leaves {eigen.margin:.2%} of margin in torque scale, "
                 f"at least {LEAST_MARGIN:.0%} is recommended"
             )
             if on_thrusters:

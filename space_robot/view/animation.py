@@ -60,7 +60,7 @@ def animate(
     times = np.linspace(start, end, round(LENGTH_S * RATE_HZ))
     ground = Image.fromarray(_gradient(width, height))
     overlay = _Overlay(plots, times, caption)
-    found = []
+    drawn = []
     with local_server() as server:
         moves = add_flights(server, [flight], times, False, True, shadows=False)
         pose = _camera(server.initial_camera.position, server.initial_camera.look_at)
@@ -87,9 +87,9 @@ def animate(
                 frame = ground.copy()
                 for layer in (draw(k), overlay.draw(k)):
                     frame.alpha_composite(Image.fromarray(layer))
-                found.append(frame.convert("RGB"))
+                drawn.append(frame.convert("RGB"))
                 done()
-    return found
+    return drawn
 
 
 def encoded(frames: Sequence[Image], file: Path) -> bytes:

@@ -39,10 +39,10 @@ def find_browser() -> str:
     Raises:
         InputError: there is none.
     """
-    found = next(filter(None, map(shutil.which, NAMES)), None)
-    if not found:
+    path = next(filter(None, map(shutil.which, NAMES)), None)
+    if not path:
         raise InputError(f"a browser is needed, one of {', '.join(NAMES)}: none is here")
-    return found
+    return path
 
 
 @contextmanager

@@ -124,12 +124,12 @@ def shown_robot(log: FlightLog, given: str = "") -> Robot:
 
 def remarks_on(logs: Mapping[str, FlightLog], robots: Mapping[str, Robot]) -> list[str]:
     """Return what is wrong with the recordings and the shapes of the robots, a line each."""
-    found = [f"{name}: {text}" for name, log in logs.items() for text in log.defects]
-    found += [line for robot in robots.values() for line in shown_shapes(robot).remarks]
+    lines = [f"{name}: {text}" for name, log in logs.items() for text in log.defects]
+    lines += [line for robot in robots.values() for line in shown_shapes(robot).remarks]
     for name, log in logs.items():
         if (urdf := _urdf_of(log)) and not robots[name].visuals:
-            found.append(f"a bag has no robot's shapes: --robot {urdf} draws those of that file")
-    return list(dict.fromkeys(found))
+            lines.append(f"a bag has no robot's shapes: --robot {urdf} draws those of that file")
+    return list(dict.fromkeys(lines))
 
 
 def _urdf_of(log: FlightLog) -> str:

@@ -33,26 +33,26 @@ def marks_of(log: FlightLog) -> list[Mark]:
     period = log.timebase.period
     start = log.first_tick * period
     end = start + log.ticks * period
-    found = [_of_event(event) for event in _events(log)]
-    found += [_of_fault(fault) for fault in _faults(log)]
-    found += [
+    marks = [_of_event(event) for event in _events(log)]
+    marks += [_of_fault(fault) for fault in _faults(log)]
+    marks += [
         Mark(law.tick * period, law.tick * period, str(LawChange(before, law)), "law")
         for before, law in pairwise(laws_of(log))
     ]
-    return sorted(mark for mark in found if mark.start < end and mark.stop >= start)
+    return sorted(mark for mark in marks if mark.start < end and mark.stop >= start)
 
 
 def shared_marks(flights: Mapping[str, FlightLog]) -> list[Mark]:
     """Return the marks of some flights, by time; one that not all have names those that do."""
     of_each = {name: marks_of(log) for name, log in flights.items()}
     every = sorted({mark for marks in of_each.values() for mark in marks})
-    found = []
+    shared = []
     for mark in every:
         names = [name for name, marks in of_each.items() if mark in marks]
         if len(names) < len(of_each):
             mark = mark._replace(text=f"{', '.join(names)}: {mark.text}")
-        found.append(mark)
-    return found
+        shared.append(mark)
+    return shared
 
 
 def _of_event(event: Event) -> Mark:
@@ -68,13 +68,13 @@ def _events(log: FlightLog) -> list[Event]:
 
 
 def _faults(log: FlightLog) -> list[Fault]:
-    found = []
+    faults = []
     for text in log.flight.get("faults", ()):
         try:
-            found.append(parse_fault(str(text), KINDS))
+            faults.append(parse_fault(str(text), KINDS))
         except InputError:
             continue
-    return found
+    return faults
 
 
 def _of_fault(fault: Fault) -> Mark:

@@ -130,14 +130,14 @@ def extent(robot: Robot, position: Array, quaternion: Array, joint_positions: Ar
     """
     axes = base_axes(quaternion.T)
     frames = {f.body: f for f in body_frames(robot, tuple(axes), joint_positions.T)}
-    found = []
+    corners = []
     drawn = shown_shapes(robot)
     for shape in drawn.shapes:
         frame = frames[shape.body]
         for corner in _corners(shape, drawn.meshes.get(shape.mesh)):
             place = frame.on_outer_axes(shape.position + shape.rotation @ corner)
-            found.append(position + (frame.origin + place).T)
-    return np.concatenate(found)
+            corners.append(position + (frame.origin + place).T)
+    return np.concatenate(corners)
 
 
 def _corners(shape: Visual, mesh: Mesh | None) -> Array:

@@ -37,7 +37,7 @@ def trails(
         width: of them, m.
     """
     edges = np.unique(np.linspace(0, len(frames.time) - 1, PIECES + 1).round().astype(int))
-    found: list[Move] = []
+    trails: list[Move] = []
     for tool, places in frames.tools.items():
         pieces = {
             int(stop): _line(
@@ -50,10 +50,10 @@ def trails(
             )
             for start, stop in pairwise(edges)
         }
-        found.append(_appearing(pieces))
+        trails.append(_appearing(pieces))
     if frames.desired is not None:
         _line(scene, f"{root}/desired", frames.desired, DESIRED, 0.3 * width, True)
-    return found
+    return trails
 
 
 def _line(

@@ -28,6 +28,6 @@ def assumed_actuators(name: str, robot: Robot) -> BaseActuatorSettings:
     path = named_file("actuators", name)
     tree = node_parameters(path, OWNER)
     own = {key: tree[key] for key in BaseActuatorSettings.model_fields if key in tree}
-    found = validate(BaseActuatorSettings, own, str(path))
-    found.check(robot, name)
-    return found
+    actuators = validate(BaseActuatorSettings, own, str(path))
+    actuators.check(robot, name)
+    return actuators

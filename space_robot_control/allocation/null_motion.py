@@ -124,10 +124,10 @@ def _choose(motion: NullMotion, wheels: AssumedWheels) -> None:
         for side in (1.0, -1.0):
             edge = side * BEYOND * motion.least_speed * wheels.inertia[k]
             c = (edge - motion.stored[k]) / part
-            found = badness(motion, wheels, c)
+            cost = badness(motion, wheels, c)
             is_nearer = abs(c - motion.c) < abs(best - motion.c)
-            if found < least or (found == least and is_nearer and best != motion.c):
-                best, least = c, found
+            if cost < least or (cost == least and is_nearer and best != motion.c):
+                best, least = c, cost
     motion.c = best
 
 

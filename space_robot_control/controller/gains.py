@@ -44,10 +44,10 @@ def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
         return {path.stem: path}
     if "/" in gain_set:
         return _gains_folder(path)
-    found = robot_files(robot)
+    files = robot_files(robot)
     if robot == GIVEN:
         raise InputError("a robot that no file tells has no gains of its own: give some")
-    if (folder := found.gains) is None:
+    if (folder := files.gains) is None:
         raise InputError(
             f"robot {short(robot)} has no gains of its own: `{new_command(robot)}` makes "
             "it some, with a mission; or name a folder of <law>.yaml files as gains"
@@ -57,7 +57,7 @@ def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
             return _gains_folder(folder)
         chosen = read_yaml(folder / DEFAULT_SETS)
         return {law: folder / str(name) / f"{law}.yaml" for law, name in chosen.items()}
-    one_of(gain_set, [DEFAULT, *_sets(folder)], "gain set", f" of robot {short(found.name)}")
+    one_of(gain_set, [DEFAULT, *_sets(folder)], "gain set", f" of robot {short(files.name)}")
     return _files(folder / gain_set)
 
 

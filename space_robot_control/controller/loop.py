@@ -93,11 +93,11 @@ class ControllerLoop:
         """Take a state and answer it, if it and its reference are there."""
         tick = self._unanswered
         if tick < 0:
-            found = self._states.take()
-            if found is None:
+            received = self._states.take()
+            if received is None:
                 self._look_ahead(time.monotonic())
                 return self._states.wait
-            tick = found
+            tick = received
             last = self._answering.stamps.last
             standing = self._answering.judge(tick)
             if standing is StampStatus.ANSWERED:  # the plant asked again: the same answer
@@ -126,8 +126,8 @@ class ControllerLoop:
             tick = self._unanswered
             while tick <= answered and time.monotonic() < until:
                 self._node.let_others_work()
-                found = self._states.take()
-                tick = answered if found is None else found
+                received = self._states.take()
+                tick = answered if received is None else received
             if tick > answered:
                 none = answering.supervisor.deactivate(tick)
                 self._command_out.publish(answering.encode(none))

@@ -31,13 +31,13 @@ class FunctionLaw(ControlLaw):
             InputError: it returned something else than one number an axis.
         """
         force: Array = self.memory.force
-        found = np.asarray(type(self).function(signals))
-        if found.shape != force.shape:
+        value = np.asarray(type(self).function(signals))
+        if value.shape != force.shape:
             raise InputError(
                 f"controller {self.name}: {force.size} numbers were expected, "
-                f"got an array of shape {found.shape}"
+                f"got an array of shape {value.shape}"
             )
-        force[:] = found
+        force[:] = value
         return force
 
 

@@ -60,17 +60,17 @@ class StateInput:
         while self._lacking:
             part = self._lacking[0]
             try:
-                found = part.take(tick, self.state, self._first.source.is_sure)
+                taken = part.take(tick, self.state, self._first.source.is_sure)
             except MessageError as error:
                 self._tick = -1
                 self._reject(error.reason, part.input)
                 return None
-            if found is None:  # it may still come
+            if taken is None:  # it may still come
                 now = time.monotonic()
                 self._until = self._until or now + TIMEOUT_S
                 if now < self._until:
                     return None
-            if not found:
+            if not taken:
                 self._tick = -1
                 return None
             self._lacking.popleft()
@@ -143,8 +143,8 @@ class _LaterPart:
         self._kept.clear()
 
     def _take_up_to(self, tick: int, state: RobotState) -> bool | None:
-        if self._kept and (found := self._take_kept(tick, state)) is not None:
-            return found
+        if self._kept and (kept := self._take_kept(tick, state)) is not None:
+            return kept
         taken = -1
         while taken < tick:
             data = self.input.take()

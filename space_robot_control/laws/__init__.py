@@ -42,12 +42,12 @@ LONGEST_REASON = 200
 @cache
 def laws() -> dict[str, type[ControlLaw]]:
     """Every law of this folder by name."""
-    found: dict[str, type[ControlLaw]] = {}
+    laws: dict[str, type[ControlLaw]] = {}
     for module in pkgutil.iter_modules(__path__):
         for value in vars(importlib.import_module(f"{__name__}.{module.name}")).values():
             if _is_law(value):
-                found[value.name] = value
-    return found
+                laws[value.name] = value
+    return laws
 
 
 def find_law(name: str) -> type[ControlLaw]:
@@ -81,8 +81,8 @@ def find_law(name: str) -> type[ControlLaw]:
         raise InputError(f"controller {short(name)} cannot be imported ({why}): {advice}") from None
     if not _is_law(law):
         raise InputError(f"controller {short(name)} is not a ControlLaw: {advice}")
-    found: type[ControlLaw] = law
-    return found
+    law_class: type[ControlLaw] = law
+    return law_class
 
 
 def _advice(module: str, attribute: str, error: BaseException) -> str:

@@ -28,13 +28,13 @@ REST_OF_HALF_PI = 6.123233995736766e-17
 def arctan2(y: ArrayLike, x: ArrayLike) -> Array:
     """Return the angles of points, rad, from -pi to pi, in the shape of ``y`` and ``x``."""
     sines, cosines = np.broadcast_arrays(y, x)
-    found = np.empty(sines.shape)
+    angles = np.empty(sines.shape)
     _fill(
         np.ascontiguousarray(sines, dtype=np.float64).reshape(-1),
         np.ascontiguousarray(cosines, dtype=np.float64).reshape(-1),
-        found.reshape(-1),
+        angles.reshape(-1),
     )
-    return found
+    return angles
 
 
 @kernel

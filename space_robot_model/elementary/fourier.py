@@ -28,9 +28,9 @@ def squared_spectrum(rows: Array) -> Array:
         real, imaginary = _transformed(rows, np.zeros_like(rows), sines, cosines)
         return (real * real + imaginary * imaginary)[:count]
     halves = _transformed(rows[0::2], rows[1::2], sines[::2], cosines[::2])
-    found = np.empty((count, rows.shape[1]))
-    _squares(*halves, sines, cosines, found)
-    return found
+    spectrum = np.empty((count, rows.shape[1]))
+    _squares(*halves, sines, cosines, spectrum)
+    return spectrum
 
 
 def _transformed(
@@ -48,16 +48,16 @@ def _transformed(
 
 def _factors(size: int) -> list[tuple[int, int]]:
     """Return the prime factors of ``size``, each with the product of those before it."""
-    found, stride, factor = [], 1, 2
+    factors, stride, factor = [], 1, 2
     while stride < size:
         if factor * factor > size // stride:
             factor = size // stride
         if (size // stride) % factor:
             factor += 1
         else:
-            found.append((factor, stride))
+            factors.append((factor, stride))
             stride *= factor
-    return found
+    return factors
 
 
 @kernel

@@ -19,11 +19,11 @@ MOST_SWEEPS = 30
 def product(a: ArrayLike, b: ArrayLike) -> Array:
     """Return ``a @ b`` of vectors, matrices, or a stack of them in ``a``."""
     left, right = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
-    found = np.zeros(left.shape[:-1] + right.shape[1:])
+    result = np.zeros(left.shape[:-1] + right.shape[1:])
     for k in range(len(right)):
         column = left[..., k]
-        found += column * right[k] if right.ndim == 1 else column[..., np.newaxis] * right[k]
-    return found
+        result += column * right[k] if right.ndim == 1 else column[..., np.newaxis] * right[k]
+    return result
 
 
 def rotate_tensor(rotation: Array, tensor: Array) -> Array:

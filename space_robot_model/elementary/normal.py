@@ -62,9 +62,9 @@ def normal_quantile(share: ArrayLike) -> Array:
     infinity at 1, NaN outside.
     """
     shares = np.asarray(share, dtype=np.float64)
-    found = np.empty(shares.size)
-    _quantiles(np.ascontiguousarray(shares).reshape(-1), found)
-    return found.reshape(shares.shape)
+    quantiles = np.empty(shares.size)
+    _quantiles(np.ascontiguousarray(shares).reshape(-1), quantiles)
+    return quantiles.reshape(shares.shape)
 
 
 @kernel
@@ -97,8 +97,8 @@ def quantile(share: float) -> float:
     if not small > 0.0:
         return math.copysign(math.inf, q) if small == 0.0 else math.nan
     r = math.sqrt(-log(small))
-    found = _ratio(MIDDLE, r - 1.6) if r <= TAIL else _ratio(OUTER, r - TAIL)
-    return -found if q < 0.0 else found
+    value = _ratio(MIDDLE, r - 1.6) if r <= TAIL else _ratio(OUTER, r - TAIL)
+    return -value if q < 0.0 else value
 
 
 @subroutine

@@ -55,8 +55,8 @@ def vectors(flat: list[float]) -> Array:
 
 def directions(flat: list[float]) -> Array:
     """Return the vectors (k, 3) of a flat list with length 1."""
-    found = vectors(flat)
-    units: Array = found / np.linalg.norm(found, axis=1, keepdims=True)
+    rows = vectors(flat)
+    units: Array = rows / np.linalg.norm(rows, axis=1, keepdims=True)
     return units
 
 

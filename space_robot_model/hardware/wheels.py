@@ -90,9 +90,9 @@ class WheelSettings(StrictModel):
         """
         if not self.count:
             return
-        found = {name: self.values(name) for name in type(self).model_fields if name != "axes"}
-        inertia, axes = found["rotor_inertia"], self.unit_axes
-        stored, limits = inertia * np.abs(found["initial_speed"]), found["max_momentum"]
+        values = {name: self.values(name) for name in type(self).model_fields if name != "axes"}
+        inertia, axes = values["rotor_inertia"], self.unit_axes
+        stored, limits = inertia * np.abs(values["initial_speed"]), values["max_momentum"]
         for i in np.flatnonzero((limits > 0.0) & (stored > limits)):
             raise InputError(
                 f"wheels.initial_speed stores {stored[i]:g} N m s in wheel_{i + 1}, "

@@ -33,7 +33,7 @@ def with_choice(robot: str, base: str | None, repair: bool) -> str:
 
 def split_choice(robot: str) -> RobotChoice:
     """Take a robot's name apart; any text is one."""
-    found = _CHOICE.search(robot)
-    if not found:
+    match = _CHOICE.search(robot)
+    if not match:
         return RobotChoice(robot, None, False)
-    return RobotChoice(robot[: found.start()], found[1] and unquote(found[1]), bool(found[2]))
+    return RobotChoice(robot[: match.start()], match[1] and unquote(match[1]), bool(match[2]))

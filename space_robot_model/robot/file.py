@@ -185,13 +185,13 @@ class RobotFile(StrictModel):
         tools = [*([self.tool] if self.tool else []), *self.tools] or [ToolFile()]
         last = self.links[-1].name
         base = Body(BASE, self.base.mass, inertia_tensor(self.base.inertia), np.zeros(3))
-        found = [replace(base, tools=_tools_of(BASE, tools, last))]
+        bodies = [replace(base, tools=_tools_of(BASE, tools, last))]
         for above, link in itertools.pairwise((None, *self.links)):
             assert link
             above_name = above.name if above else BASE
             body = _body(link, link.parent or above_name)
-            found.append(replace(body, tools=_tools_of(link.name, tools, last)))
-        return found
+            bodies.append(replace(body, tools=_tools_of(link.name, tools, last)))
+        return bodies
 
 
 def _tools_of(body: str, tools: list[ToolFile], last: str) -> tuple[Tool, ...]:

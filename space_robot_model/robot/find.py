@@ -107,16 +107,16 @@ def mission_file(robot: str, mission: str = "") -> Path:
     """
     if mission:
         return named_file("missions", mission)
-    found = robot_files(robot)
+    files = robot_files(robot)
     if robot == GIVEN:
         raise InputError("a robot that no file tells has no mission of its own: give one")
-    if found.mission is None:
+    if files.mission is None:
         find_robot(robot)  # what is wrong with that comes first
         raise InputError(
             f"robot {short(robot)} has no mission of its own: `{new_command(robot)}` "
             "makes it one, with gains; or name a mission"
         )
-    return found.mission
+    return files.mission
 
 
 def mission_layers(robot: str, mission: str) -> list[Path]:

@@ -55,13 +55,13 @@ def _link_name(name: str) -> str:
 
 def distinct(name: str, ending: str, taken: set[str]) -> str:
     """Return a name that is not taken, with an ending if need be, and take it."""
-    found = printable(name)
+    candidate = printable(name)
     number = 1
-    while found in taken:
-        found = f"{printable(name)}{ending}{number if number > 1 else ''}"
+    while candidate in taken:
+        candidate = f"{printable(name)}{ending}{number if number > 1 else ''}"
         number += 1
-    taken.add(found)
-    return found
+    taken.add(candidate)
+    return candidate
 
 
 def printable(name: str) -> str:

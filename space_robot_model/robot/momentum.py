@@ -70,7 +70,7 @@ def robot_momentum(robot: Robot, motion: Motion) -> RobotMomentum:
     for name, array, shape in zip(motion._fields, motion, wanted, strict=True):
         if array.shape != shape:
             raise ValueError(f"{name}: shape {shape} was expected, got {array.shape}")
-    found = RobotMomentum(*(np.empty((rows, 3)) for _ in RobotMomentum._fields))
+    momentum = RobotMomentum(*(np.empty((rows, 3)) for _ in RobotMomentum._fields))
     mass = float(np.sum(robot.mass))
     for start in range(0, rows, _BATCH):
         part = slice(start, start + _BATCH)
@@ -81,9 +81,9 @@ def robot_momentum(robot: Robot, motion: Motion) -> RobotMomentum:
             body.spin + body.mass * cross(body.com - centre, body.velocity - velocity)
             for body in bodies
         ]
-        found.centre_of_mass[part], found.base[part] = centre.T, shares[0].T
-        found.angular[part] = _sum(shares).T
-    return found
+        momentum.centre_of_mass[part], momentum.base[part] = centre.T, shares[0].T
+        momentum.angular[part] = _sum(shares).T
+    return momentum
 
 
 def _sum(vectors: Iterable[Array]) -> Array:

@@ -93,9 +93,9 @@ class Robot(TreeArrays):
         return cls._of_urdf(read_urdf(file, base, repair), str(file))
 
     @classmethod
-    def _of_urdf(cls, found: UrdfRobot, where: str) -> Robot:
-        robot = cls.of_tree(found.name, found.bodies, where)
-        return replace(robot, repairs=tuple(map(str, found.findings)))
+    def _of_urdf(cls, urdf: UrdfRobot, where: str) -> Robot:
+        robot = cls.of_tree(urdf.name, urdf.bodies, where)
+        return replace(robot, repairs=tuple(map(str, urdf.findings)))
 
     @property
     def content(self) -> dict[str, Any]:

@@ -91,13 +91,13 @@ def _reach(robot: Robot, joint: int) -> float:
 
 def _ends(robot: Robot) -> list[list[Array]]:
     """Return for each body the places, on its axes, of the joints and tools that it carries."""
-    found: list[list[Array]] = [[] for _ in robot.body_names]
+    ends: list[list[Array]] = [[] for _ in robot.body_names]
     for joint in robot.order:
         turn = robot.rotation[joint]
-        found[robot.parent[joint]].append(turn @ robot.offset[joint])
+        ends[robot.parent[joint]].append(turn @ robot.offset[joint])
     for tool in robot.tools:
-        found[tool.body].append(tool.position)
-    return found
+        ends[tool.body].append(tool.position)
+    return ends
 
 
 def _tube(start: Array, end: Array, radius: float, body: int) -> Iterator[Visual]:

@@ -32,7 +32,7 @@ def joint_transforms(robot: Robot, joint_positions: Array) -> list[Transform]:
         robot: whose frames have the names of `frame_names`.
         joint_positions: (T, N) of all joints, the passive ones behind; rad, or m of prismatic ones.
     """
-    found, names = [], frame_names(robot).bodies
+    transforms, names = [], frame_names(robot).bodies
     for joint in robot.order:
         turn, offset = robot.rotation[joint], robot.offset[joint]
         at_zero, moved = wxyz(turn)[np.newaxis], joint_positions[:, joint]
@@ -47,8 +47,10 @@ def joint_transforms(robot: Robot, joint_positions: Array) -> list[Transform]:
                 [w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s]
             )
             position = (turn @ offset)[np.newaxis]
-        found.append(Transform(names[robot.parent[joint]], names[joint + 1], position, quaternion))
-    return found
+        transforms.append(
+            Transform(names[robot.parent[joint]], names[joint + 1], position, quaternion)
+        )
+    return transforms
 
 
 def tool_transforms(robot: Robot) -> list[Transform]:

@@ -47,12 +47,12 @@ class UrdfFile(StrictModel):
     def read(self, folder: Path, where: str) -> UrdfRobot:
         """Read the URDF, which is in ``folder`` or below, and add springs and name."""
         if self.urdf:
-            found = read_urdf(folder / self.urdf, self.base, self.repair, self.tools)
+            urdf = read_urdf(folder / self.urdf, self.base, self.repair, self.tools)
         else:
             path = folder / f"{self.name or 'robot'}.urdf"
-            found = parse_urdf(self.urdf_text, path, self.base, self.repair, self.tools)
+            urdf = parse_urdf(self.urdf_text, path, self.base, self.repair, self.tools)
         is_prismatic = {
-            body.joint.name: body.joint.kind == "prismatic" for body in found.bodies if body.joint
+            body.joint.name: body.joint.kind == "prismatic" for body in urdf.bodies if body.joint
         }
         springs = {
             name: Spring(
@@ -62,8 +62,8 @@ class UrdfFile(StrictModel):
             )
             for name, given in self.passive.items()
         }
-        found = with_springs(found, springs, where)
-        return replace(found, name=self.name or found.name)
+        urdf = with_springs(urdf, springs, where)
+        return replace(urdf, name=self.name or urdf.name)
 
 
 class _UrdfDocument(StrictModel):
@@ -93,6 +93,6 @@ def read_urdf_content(content: dict[str, Any], folder: Path, where: str) -> Urdf
 def complete_content(content: dict[str, Any], folder: Path, where: str) -> dict[str, Any]:
     """Return the content of a YAML with the URDF's text in the place of its path."""
     file = validate(_UrdfDocument, content, where).robot
-    found = file.read(folder, where)
+    urdf = file.read(folder, where)
     robot = {key: value for key, value in content["robot"].items() if key != "urdf"}
-    return {"robot": {"name": found.name, **robot, "urdf_text": found.text}}
+    return {"robot": {"name": urdf.name, **robot, "urdf_text": urdf.text}}

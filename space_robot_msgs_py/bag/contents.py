@@ -113,25 +113,25 @@ class Bag:
     @property
     def damage(self) -> list[str]:
         """The faults of files and metadata.yaml, a sentence each."""
-        found = self._found + [text for file in self._files for text in file.damage]
+        texts = self._found + [text for file in self._files for text in file.damage]
         information, recorded = self._information, self.recorded()
         if not information or not recorded:
-            return found
+            return texts
         wrong = [
             f"{METADATA}: {count} messages on {name}, but {true} in the bag"
             for name, count in information.counts.items()
             if count != (true := max(recorded.get(name, 0), self._counts[name]))
         ]
-        found += wrong[:SHOWN]
+        texts += wrong[:SHOWN]
         if len(wrong) > SHOWN:
-            found.append(f"{METADATA}: so it is with {len(wrong) - SHOWN:,} more topics")
+            texts.append(f"{METADATA}: so it is with {len(wrong) - SHOWN:,} more topics")
         if self._counts == recorded and self._span_ns and information.span_ns != self._span_ns:
             claimed, true_span = (
                 f"{start / 1e9:.9g} to {stop / 1e9:.9g} s"
                 for start, stop in (information.span_ns, self._span_ns)
             )
-            found.append(f"{METADATA}: messages from {claimed}, but {true_span} in the bag")
-        return found
+            texts.append(f"{METADATA}: messages from {claimed}, but {true_span} in the bag")
+        return texts
 
     def counts(self) -> dict[str, int]:
         """Count the messages of each topic that can be read."""

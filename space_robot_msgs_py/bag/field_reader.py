@@ -38,9 +38,9 @@ class FieldReader:
         left: Places = np.arange(len(batch))
         while len(left):
             if self._known:
-                fits, found = _take(self._known, batch, left)
+                fits, values = _take(self._known, batch, left)
                 if fits.any():
-                    yield (left, found) if fits.all() else (left[fits], found[fits])
+                    yield (left, values) if fits.all() else (left[fits], values[fits])
                     left = left[~fits]
                     continue
             try:
@@ -54,7 +54,7 @@ class FieldReader:
 
 def _take(numbers: Numbers, batch: Batch, left: Places) -> tuple[NDArray[np.bool_], Array]:
     """Tell which of the messages ``left`` are laid out so, with a row of numbers for each."""
-    found = np.empty((len(left), len(numbers.offsets)))
+    values = np.empty((len(left), len(numbers.offsets)))
     fits = np.empty(len(left), np.bool_)
     gather(
         batch.data,
@@ -62,7 +62,7 @@ def _take(numbers: Numbers, batch: Batch, left: Places) -> tuple[NDArray[np.bool
         batch.lengths[left],
         numbers.layout.pattern,
         numbers.offsets,
-        found,
+        values,
         fits,
     )
-    return fits, found
+    return fits, values

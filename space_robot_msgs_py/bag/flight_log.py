@@ -313,8 +313,8 @@ class FlightLog:
 def finite_rows(columns: Iterable[Array]) -> NDArray[np.bool_]:
     """(N,) true where some columns (N, ...), at least one, have no NaN."""
     each = (np.isfinite(column.reshape(len(column), -1)).all(axis=1) for column in columns)
-    found: NDArray[np.bool_] = np.logical_and.reduce(list(each))
-    return found
+    finite_rows: NDArray[np.bool_] = np.logical_and.reduce(list(each))
+    return finite_rows
 
 
 def _beside(joints: Array, passive: Array) -> Array:

@@ -31,7 +31,7 @@ def _integer(data: Bytes, at: int, size: int) -> int:
 
 
 @kernel
-def walk_messages(data: Bytes, start: int, found: Integers, before: int) -> tuple[int, int]:
+def walk_messages(data: Bytes, start: int, messages: Integers, before: int) -> tuple[int, int]:
     """MCAP's Message records that stand one behind the other from ``start`` on.
 
     Returns:
@@ -39,15 +39,15 @@ def walk_messages(data: Bytes, start: int, found: Integers, before: int) -> tupl
         end: at a record of another kind, one that is not whole, or the end of the data.
     """
     at, count = start, before
-    while count < found.shape[1] and len(data) - at >= _HEAD + _FIELDS and data[at] == _MESSAGE:
+    while count < messages.shape[1] and len(data) - at >= _HEAD + _FIELDS and data[at] == _MESSAGE:
         length = _integer(data, at + 1, 8)
         if length < _FIELDS or length > len(data) - at - _HEAD:
             break
-        found[CHANNEL, count] = _integer(data, at + 9, 2)
-        found[START, count] = at + _HEAD + _FIELDS
-        found[LENGTH, count] = length - _FIELDS
-        found[LOG_NS, count] = _integer(data, at + 15, 8)
-        found[PUBLISH_NS, count] = _integer(data, at + 23, 8)
+        messages[CHANNEL, count] = _integer(data, at + 9, 2)
+        messages[START, count] = at + _HEAD + _FIELDS
+        messages[LENGTH, count] = length - _FIELDS
+        messages[LOG_NS, count] = _integer(data, at + 15, 8)
+        messages[PUBLISH_NS, count] = _integer(data, at + 23, 8)
         at += _HEAD + length
         count += 1
     return count, at

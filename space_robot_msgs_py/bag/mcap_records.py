@@ -82,8 +82,8 @@ def decompressed(chunk: Chunk) -> bytes:
 
 def whole_messages(piece: bytes) -> int:
     """Bytes of the whole messages at the beginning of ``piece``."""
-    found = np.empty((5, len(piece) // LEAST_MESSAGE + 1), np.int64)
-    _, end = walk_messages(np.frombuffer(piece, np.uint8), 0, found, 0)
+    messages = np.empty((5, len(piece) // LEAST_MESSAGE + 1), np.int64)
+    _, end = walk_messages(np.frombuffer(piece, np.uint8), 0, messages, 0)
     if not end:
         raise ValueError("a message that is not whole")
     return int(end)
@@ -112,10 +112,10 @@ def next_chunk(file: BinaryIO, at: int, size: int) -> int:
     while at < size:
         file.seek(at)
         piece = file.read(PIECE + _LONGEST_CHUNK_HEAD)
-        for found in _CHUNK.finditer(piece):
-            start = at + found.start()
-            _, length = HEAD.unpack_from(piece, found.start())
-            inner = len(found[1]) - HEAD.size + 8
+        for match in _CHUNK.finditer(piece):
+            start = at + match.start()
+            _, length = HEAD.unpack_from(piece, match.start())
+            inner = len(match[1]) - HEAD.size + 8
             file.seek(start + HEAD.size + inner - 8)
             held = file.read(8)
             if len(held) == 8 and int.from_bytes(held, "little") == length - inner:

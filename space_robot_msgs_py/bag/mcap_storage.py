@@ -101,14 +101,14 @@ class McapStorage:
     @property
     def damage(self) -> list[str]:
         """The things found broken; all are known when `batches` is through."""
-        found = [self._index_fault] if self._index_fault else []
+        texts = [self._index_fault] if self._index_fault else []
         if self._faults:
             at, why = self._faults[0]
             more = f", and {len(self._faults) - 1} places more" if len(self._faults) > 1 else ""
-            found.append(f"unreadable at byte {at} ({why}){more}")
+            texts.append(f"unreadable at byte {at} ({why}){more}")
         if self._of_no_topic:
-            found.append(f"{self._of_no_topic} messages of an unknown topic")
-        return [f"{self.path.name}: {text}" for text in found]
+            texts.append(f"{self._of_no_topic} messages of an unknown topic")
+        return [f"{self.path.name}: {text}" for text in texts]
 
     def _read_summary(self, file: BinaryIO) -> None:
         """Channels and counts from the file's end; they are there again if its beginning is not."""
@@ -197,18 +197,18 @@ class McapStorage:
     def _walk(self, pieces: list[bytes]) -> Iterator[Batch]:
         """The messages of several chunks: fewer batches, less to do for each."""
         data = np.frombuffer(b"".join(pieces), np.uint8)
-        found = np.empty((5, len(data) // LEAST_MESSAGE + 1), np.int64)
+        messages = np.empty((5, len(data) // LEAST_MESSAGE + 1), np.int64)
         count, stop = 0, 0
         for piece in pieces:
             start, stop = stop, stop + len(piece)
-            count = self._walk_chunk(data[:stop], start, found, count)
+            count = self._walk_chunk(data[:stop], start, messages, count)
         if count:
-            yield from self._by_topic(data, found[:, :count])
+            yield from self._by_topic(data, messages[:, :count])
 
-    def _walk_chunk(self, data: Bytes, at: int, found: Integers, count: int) -> int:
+    def _walk_chunk(self, data: Bytes, at: int, messages: Integers, count: int) -> int:
         """Find the messages from ``at`` on, note the channels; returns all that are found."""
         while at < len(data):
-            count, at = walk_messages(data, at, found, count)
+            count, at = walk_messages(data, at, messages, count)
             if at == len(data):
                 break
             try:
@@ -224,9 +224,9 @@ class McapStorage:
                 break
         return count
 
-    def _by_topic(self, data: Bytes, found: Integers) -> Iterator[Batch]:
-        for number in np.flatnonzero(np.bincount(found[CHANNEL])).tolist():
-            own = found[:, found[CHANNEL] == number]
+    def _by_topic(self, data: Bytes, messages: Integers) -> Iterator[Batch]:
+        for number in np.flatnonzero(np.bincount(messages[CHANNEL])).tolist():
+            own = messages[:, messages[CHANNEL] == number]
             channel = self._channels.get(number)
             if channel is None:
                 self._of_no_topic += own.shape[1]

@@ -171,8 +171,8 @@ def timebase_of(
     """
     described = flight.get("period")
     steps = np.diff(np.array(first_stamps, np.int64))
-    found, counts = np.unique(steps[steps > 0], return_counts=True)
-    likely_ns = int(found[np.argmax(counts)]) if len(found) else None
+    distinct, counts = np.unique(steps[steps > 0], return_counts=True)
+    likely_ns = int(distinct[np.argmax(counts)]) if len(distinct) else None
     if described is not None:
         described_ns = round(described * 1e9)
         if likely_ns is None or likely_ns == described_ns:

@@ -190,11 +190,11 @@ class BagRecorder:
 
     def foreign_names(self) -> list[str]:
         """Nodes whose messages are left out."""
-        found = set()
+        names = set()
         for topic in self.foreign:
             self.sources[topic].find_names()
-            found |= set(self.sources[topic].foreign_names)
-        return sorted(found)
+            names |= set(self.sources[topic].foreign_names)
+        return sorted(names)
 
     def pause(self) -> None:
         """Leave out on purpose what is sent until the next message recorded."""

@@ -17,22 +17,26 @@ def remappings_note(names: Mapping[str, str], namespace: str) -> dict[str, str]:
         names: full name of each topic, as it was recorded, by ours.
         namespace: the recorder's.
     """
-    found = {
+    note = {
         name: topic.full_name
         for topic in topics.ALL
         if (name := names[topic.name]) != topic.in_namespace(namespace)
     }
-    return {TOPICS_KEY: json.dumps(found)} if found else {}
+    return {TOPICS_KEY: json.dumps(note)} if note else {}
 
 
 def noted_remappings(noted: Mapping[str, str]) -> dict[str, str]:
     """Our topic by the one that it was recorded as; empty if nothing that makes sense is noted."""
     try:
-        found = json.loads(noted.get(TOPICS_KEY, "{}"))
+        remappings = json.loads(noted.get(TOPICS_KEY, "{}"))
     except (ValueError, RecursionError):
         return {}
-    if not isinstance(found, dict) or not all(isinstance(ours, str) for ours in found.values()):
+    if not isinstance(remappings, dict) or not all(
+        isinstance(ours, str) for ours in remappings.values()
+    ):
         return {}
-    if len(set(found.values())) < len(found) or not topics.BY_NAME.keys() >= set(found.values()):
+    if len(set(remappings.values())) < len(remappings) or not topics.BY_NAME.keys() >= set(
+        remappings.values()
+    ):
         return {}
-    return found
+    return remappings

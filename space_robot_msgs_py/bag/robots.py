@@ -36,15 +36,17 @@ def find_namespace(bag: Bag, wanted: str | None, known: Collection[str], is_ours
         InputError: it has several robots, or none in the namespace that is wanted.
     """
     needed = [topic for topic in REQUIRED if topic.full_name not in known]
-    found = _found(bag.topics(), needed)
-    if not is_ours and (not bag.finished or len(needed) not in found.values()):
+    namespaces = _found(bag.topics(), needed)
+    if not is_ours and (not bag.finished or len(needed) not in namespaces.values()):
         bag.counts()  # all topics are known once all messages have been passed
-        found = _found(bag.topics(), needed)
-    whole = sorted(name for name, count in found.items() if count == len(needed))
+        namespaces = _found(bag.topics(), needed)
+    whole = sorted(name for name, count in namespaces.items() if count == len(needed))
     if wanted is not None:
         namespace = full_namespace(wanted)
-        if found and namespace not in found:
-            raise InputError(f"no robot in namespace {namespace}; it has {some_of(sorted(found))}")
+        if namespaces and namespace not in namespaces:
+            raise InputError(
+                f"no robot in namespace {namespace}; it has {some_of(sorted(namespaces))}"
+            )
         return namespace
     if len(whole) > 1:
         raise InputError(
@@ -52,14 +54,18 @@ def find_namespace(bag: Bag, wanted: str | None, known: Collection[str], is_ours
         )
     if whole:
         return whole[0]
-    return topics.ROOT if not found or topics.ROOT in found else found.most_common(1)[0][0]
+    return (
+        topics.ROOT
+        if not namespaces or topics.ROOT in namespaces
+        else namespaces.most_common(1)[0][0]
+    )
 
 
 def _found(there: Mapping[str, str], needed: Collection[topics.Topic]) -> Counter[str]:
     """Count by namespace the needed topics that are in a bag (type by full name)."""
-    found: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     for name, kind in there.items():
         for topic in needed:
             if name.endswith(f"/{topic.name}") and (not kind or is_type(kind, topic)):
-                found[name.removesuffix(topic.name).rstrip("/") or topics.ROOT] += 1
-    return found
+                counts[name.removesuffix(topic.name).rstrip("/") or topics.ROOT] += 1
+    return counts

@@ -77,22 +77,22 @@ class Rows:
 
     def anomalies(self, excused: bool) -> list[str]:
         """Messages that could not be used; invalid stamps are no news if ``excused``."""
-        found = [
+        anomalies = [
             f"{reader.misfits} messages on {topic.full_name} do not fit ({reader.fault})"
             for topic, reader in self._readers.items()
             if reader.misfits
         ]
         if faults := self._law_faults:
-            found.append(
+            anomalies.append(
                 f"{len(faults)} messages on {topics.LAW.full_name} do not fit ({faults[0]})"
             )
         for name, counted in self.accounting.items():
             if counted.invalid_stamps and not excused:
-                found.append(
+                anomalies.append(
                     f"{counted.invalid_stamps} messages on {name} whose stamp is no whole tick "
                     "or out of all order"
                 )
-        return found
+        return anomalies
 
     def take(self, topic: topics.Topic, batch: Batch) -> None:
         """Count the messages of a topic and put what they say into their ticks' rows."""

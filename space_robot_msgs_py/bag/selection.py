@@ -70,12 +70,12 @@ class Selection:
         for theirs in self._remap:
             if theirs not in there:
                 raise InputError(f"no topic {theirs} to remap; it has {self.listing()}")
-        found = [
+        chosen = [
             topic
             for name, kind in there.items()
             if (topic := self.ours(name)) and self._fits(topic, kind, "cdr")
         ]
-        return sorted(set(found), key=graph.ALL.index)
+        return sorted(set(chosen), key=graph.ALL.index)
 
     def recorded(self) -> dict[str, int] | None:
         """Messages that the bag should hold, by our topic; None: nobody counted."""

@@ -125,11 +125,11 @@ def _get_items(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     part = context.make_helper(builder, slice_type, args[1])
     slicing.guard_invalid_slice(context, builder, slice_type, part)
     slicing.fix_slice(builder, part, block.size)
-    found = cgutils.create_struct_proxy(kind)(context, builder, value=args[0])
-    found.data = _item(builder, block, part.start)
-    found.size = slicing.get_slice_length(builder, part)
-    found.step = builder.mul(block.step, part.step)
-    return found._getvalue()
+    proxy = cgutils.create_struct_proxy(kind)(context, builder, value=args[0])
+    proxy.data = _item(builder, block, part.start)
+    proxy.size = slicing.get_slice_length(builder, part)
+    proxy.step = builder.mul(block.step, part.step)
+    return proxy._getvalue()
 
 
 @imputils.lower_builtin(operator.setitem, BlockType, types.Integer, RecordType)

@@ -90,10 +90,10 @@ def dimensions_of(name: str, shape: Callable[[int], tuple[int, ...]]) -> tuple[D
     Raises:
         TypeError: a dimension is not ``a + b n``.
     """
-    found = tuple(
+    dimensions = tuple(
         Dimension(at_0, at_1 - at_0) for at_0, at_1 in zip(shape(0), shape(1), strict=True)
     )
     for n in (2, 7):
-        if tuple(constant + slope * n for constant, slope in found) != shape(n):
+        if tuple(constant + slope * n for constant, slope in dimensions) != shape(n):
             raise TypeError(f"the shape of field {name!r} must be linear in n")
-    return found
+    return dimensions

@@ -95,10 +95,10 @@ class _RecordAttributes(AttributeTemplate):
     key = RecordType
 
     def generic_resolve(self, record: RecordType, name: str) -> Any:  # type: ignore[override]
-        found = record.layout.find(name)
-        if found is None:
+        place = record.layout.find(name)
+        if place is None:
             return None
-        kind = found[1]
+        kind = place[1]
         if isinstance(kind, Layout):
             return RecordType(kind)
         return types.Array(types.float64, len(kind), "C") if kind else types.float64
@@ -148,9 +148,9 @@ def _set_field(context: Any, builder: Any, sig: Any, args: Any, name: str) -> No
 
 
 def _found(kind: RecordType, name: str) -> tuple[Polynomial, tuple[Dimension, ...] | Layout]:
-    found = kind.layout.find(name)
-    assert found is not None
-    return found
+    place = kind.layout.find(name)
+    assert place is not None
+    return place
 
 
 def _place(builder: Any, data: Any, offset: Polynomial, n: Any) -> Any:

@@ -58,14 +58,14 @@ class Record:
     @classmethod
     def fields(cls) -> dict[str, Field | type[Record]]:
         """The fields by name, in their order in memory."""
-        found: dict[str, Field | type[Record]] = {}
+        fields: dict[str, Field | type[Record]] = {}
         for base in reversed(cls.__mro__):
             for name, value in vars(base).items():
                 if isinstance(value, Field) or (
                     isinstance(value, type) and issubclass(value, Record)
                 ):
-                    found[name] = value
-        return found
+                    fields[name] = value
+        return fields
 
     @classmethod
     def layout(cls) -> Layout:
@@ -95,13 +95,13 @@ class Record:
 
         They are written in place (``view.name[:] = ...``); fields without a shape are left out.
         """
-        found = RecordView(address=block.ctypes.data)
+        record = RecordView(address=block.ctypes.data)
         for name, field in cls.fields().items():
             if not isinstance(field, Field):
-                setattr(found, name, field.view(block[name]))
+                setattr(record, name, field.view(block[name]))
             elif block[name].ndim > 1:
-                setattr(found, name, block[name][0])
-        return cast(Self, found)
+                setattr(record, name, block[name][0])
+        return cast(Self, record)
 
 
 class RecordView(SimpleNamespace):
@@ -191,11 +191,11 @@ def _dtype(record: Any, n: int) -> np.dtype[Any]:
             fields.append((name, np.float64, value.shape(n)))
         else:
             fields.append((name, value.dtype(n)))
-    found = np.dtype((np.record, np.dtype(fields, align=True)))
+    dtype = np.dtype((np.record, np.dtype(fields, align=True)))
     layout = record.layout()
-    if _LAYOUTS.setdefault(found, layout) != layout:
+    if _LAYOUTS.setdefault(dtype, layout) != layout:
         raise TypeError(f"{record.__name__} cannot be told from another record of equal names")
-    return found
+    return dtype
 
 
 _LAYOUTS: dict[np.dtype[Any], Layout] = {}

@@ -99,8 +99,8 @@ def commands_in(domain: int) -> list[Holder]:
 def nodes_in(domain: int, namespace: str = ROOT) -> list[Holder]:
     """The nodes of this project in a namespace of a domain, those further down left out."""
     wanted = node_lock(domain, f"{namespace.rstrip('/')}/*")
-    found = wanted.parent.glob(wanted.name)
-    return _holders([path for path in found if path.name.count(".") == wanted.name.count(".")])
+    files = wanted.parent.glob(wanted.name)
+    return _holders([path for path in files if path.name.count(".") == wanted.name.count(".")])
 
 
 def living_nodes(name: str, namespace: str = "") -> Iterator[tuple[int, str]]:
@@ -114,9 +114,9 @@ def living_nodes(name: str, namespace: str = "") -> Iterator[tuple[int, str]]:
     files = _path("").parent.glob(f"{start}*@*{end}")
     for path in sorted(files, key=lambda file: file.stat().st_mtime, reverse=True):
         domain, _, dotted = path.name.removeprefix(start).removesuffix(end).partition("@")
-        found = dotted.replace(".", "/") or ROOT
-        if domain.isdecimal() and namespace in ("", found) and look(path)[0]:
-            yield int(domain), found
+        own_namespace = dotted.replace(".", "/") or ROOT
+        if domain.isdecimal() and namespace in ("", own_namespace) and look(path)[0]:
+            yield int(domain), own_namespace
 
 
 def newest_node(name: str, namespace: str = "") -> tuple[int, str] | None:
@@ -125,16 +125,16 @@ def newest_node(name: str, namespace: str = "") -> tuple[int, str] | None:
 
 
 def _holders(paths: Iterable[Path]) -> list[Holder]:
-    found = []
+    holders = []
     for path in sorted(paths):
         try:
             descriptor = _open(path)
         except InputError:
             continue
         if not _try(descriptor, fcntl.LOCK_SH):
-            found.append(_holder(descriptor))
+            holders.append(_holder(descriptor))
         os.close(descriptor)
-    return found
+    return holders
 
 
 def look(path: Path) -> tuple[bool, list[str]]:

@@ -60,6 +60,6 @@ class Codec:
             given = np.frombuffer(data, np.uint8, len(layout))
             if not np.any((given ^ layout) & constant):
                 return header_stamp_ns(data), body(given)[self._from]
-        found = self._description.learn(data)
-        self._read_like(found)
-        return header_stamp_ns(found.layout.data), found.values
+        known = self._description.learn(data)
+        self._read_like(known)
+        return header_stamp_ns(known.layout.data), known.values

@@ -127,9 +127,9 @@ class CompiledCodec:
         """
         stamp_ns = self.read(data, values)
         if stamp_ns == FOREIGN:
-            found = self._description.learn(data)
-            self._read_like(found)
-            return self.read(found.layout.data, values)
+            layout = self._description.learn(data)
+            self._read_like(layout)
+            return self.read(layout.layout.data, values)
         return stamp_ns
 
     def read(self, data: bytes, values: Array) -> int:

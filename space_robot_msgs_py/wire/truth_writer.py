@@ -47,9 +47,9 @@ class TruthWriter:
         if not len(rows):
             return ()
         stamp_ns = self._timebase.stamp_ns(self._start)
-        found = []
+        messages = []
         for describe, codec in self._codecs:
             columns = [rows[c.name][:, c.first : c.first + c.length] for c in describe.columns]
             values = np.concatenate(columns, axis=1).reshape(-1)
-            found.append((describe.topic, codec.encode(stamp_ns, values)))
-        return found
+            messages.append((describe.topic, codec.encode(stamp_ns, values)))
+        return messages

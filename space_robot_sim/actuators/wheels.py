@@ -78,7 +78,7 @@ def drive_wheels(
     Returns:
         1 if a wheel is saturated, else 0.
     """
-    found = 0.0
+    any_saturated = 0.0
     for k in range(int(wheels.count)):
         momentum, limit = wheels.inertia[k] * velocities[k], wheels.max_momentum[k]
         upper = min(wheels.max_torque[k], max(0.0, limit - momentum) / period)
@@ -90,11 +90,11 @@ def drive_wheels(
             torque = saturated = 0.0
         wheels.saturated[k] = saturated
         wheels.saturated_ticks[k] += saturated
-        found = max(found, saturated)
+        any_saturated = max(any_saturated, saturated)
         torques[k] = torque
         for i in range(3):
             base[i] -= wheels.axis[k, i] * torque
-    return found
+    return any_saturated
 
 
 WHEEL_FAIL = Kind(

@@ -67,12 +67,12 @@ class Captures:
             tick = tick_from(event.time_s, period)
             if isinstance(event, Capture):
                 grasp = Grasp.of(robot, event.target)
-                found = CaptureEvent(tick, event, robot, grasp.holding(robot), grasp)
+                exchange = CaptureEvent(tick, event, robot, grasp.holding(robot), grasp)
             else:
                 last = self.exchanges[-1]
-                found = CaptureEvent(tick, event, last.after, robot, last.grasp)
-            self.exchanges.append(found)
-            found.impact(*self._at_zero)  # its compiled code is loaded now, not in flight
+                exchange = CaptureEvent(tick, event, last.after, robot, last.grasp)
+            self.exchanges.append(exchange)
+            exchange.impact(*self._at_zero)  # its compiled code is loaded now, not in flight
 
     @property
     def _at_zero(self) -> tuple[Array, Array, Array, Array]:

@@ -92,9 +92,9 @@ def in_order(events: Sequence[Event]) -> list[Event]:
     Raises:
         InputError: something is captured while something is held, or released while nothing is.
     """
-    found = sorted(events, key=lambda event: event.time_s)
+    ordered = sorted(events, key=lambda event: event.time_s)
     held: Capture | None = None
-    for event in found:
+    for event in ordered:
         if isinstance(event, Release):
             if held is None:
                 raise InputError(f"event {event.label!r}: nothing is held then")
@@ -106,7 +106,7 @@ def in_order(events: Sequence[Event]) -> list[Event]:
             )
         else:
             held = event
-    return found
+    return ordered
 
 
 def check_events(texts: list[str]) -> list[str]:
@@ -131,8 +131,8 @@ def named_targets(texts: Iterable[str]) -> list[str]:
     Raises:
         InputError: a text that can be no event.
     """
-    found = [_split(text) for text in texts if text.strip()]
-    return [name for kind, _, name in found if kind == "capture" and not name.startswith("{")]
+    parts = [_split(text) for text in texts if text.strip()]
+    return [name for kind, _, name in parts if kind == "capture" and not name.startswith("{")]
 
 
 EventTexts = Annotated[Texts, AfterValidator(check_events)]

@@ -73,10 +73,10 @@ class Friction(Record):
         """Give each joint its own friction, or the settings', which passive joints do not have."""
         friction = cls.allocate(robot.n)
         assign(friction, count=robot.joint_count, set_valued=settings.set_valued)
-        found = coefficients(robot, settings)
+        values = coefficients(robot, settings)
         for row, joint in enumerate(robot.order):
             friction.row[joint] = row
-            friction.coulomb[row], friction.viscous[row] = found[joint]
+            friction.coulomb[row], friction.viscous[row] = values[joint]
         return friction
 
     @staticmethod

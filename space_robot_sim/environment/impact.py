@@ -80,8 +80,8 @@ class Impact:
 
     def capture(self, motion: TargetMotion, velocity: Array) -> Array:
         """Return qdot after a capture at ``velocity``."""
-        found: Array = velocity + product(self._gain, self._relative(motion, velocity))
-        return found
+        after: Array = velocity + product(self._gain, self._relative(motion, velocity))
+        return after
 
     def before_capture(self, motion: TargetMotion, velocity: Array) -> Array:
         """Return qdot before a capture that led to ``velocity``."""
@@ -94,8 +94,8 @@ class Impact:
 
     def release(self, speed: float, velocity: Array) -> Array:
         """Return qdot after a release at ``velocity`` by a spring, m/s along z of the tool."""
-        found: Array = velocity - product(self._gain[:, :3], speed * self._tool_axes[:, 2])
-        return found
+        after: Array = velocity - product(self._gain[:, :3], speed * self._tool_axes[:, 2])
+        return after
 
     def before_release(self, speed: float, velocity: Array) -> Array:
         """Return qdot before a release that led to ``velocity``."""
@@ -138,9 +138,9 @@ def _spatial(motion: TargetMotion) -> Array:
 def _with_wheels(inertia: Array, axes: Array, rotors: Array) -> Array:
     """Return the inertia with rows for the wheels, whose axes (W, 3) are on inertial axes."""
     size, count = len(inertia), len(rotors)
-    found = np.zeros((size + count, size + count))
-    found[:size, :size] = inertia
-    found[3:6, size:] = (rotors[:, np.newaxis] * axes).T
-    found[size:, 3:6] = found[3:6, size:].T
-    found[size:, size:] = np.diag(rotors)
-    return found
+    wheels = np.zeros((size + count, size + count))
+    wheels[:size, :size] = inertia
+    wheels[3:6, size:] = (rotors[:, np.newaxis] * axes).T
+    wheels[size:, 3:6] = wheels[3:6, size:].T
+    wheels[size:, size:] = np.diag(rotors)
+    return wheels

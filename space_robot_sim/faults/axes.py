@@ -52,9 +52,9 @@ def axes_of(name: str, about: About, names: RobotNames) -> tuple[int, ...]:
             groups = {group: tuple(meant)} if those else {}
     numbers = {str(1 + place - counted.start): (place,) for place in counted}
     known = {those[place]: (place,) for place in meant}
-    found = {**numbers, **groups, **known}.get(name)
-    if found is None:
+    axes = {**numbers, **groups, **known}.get(name)
+    if axes is None:
         also = [*([f"1 to {len(numbers)}"] if numbers else []), *groups]
         advice = choices(name, known, f", {', '.join(also)}") if known else "there is none"
         raise InputError(f"no {about.name.lower().replace('_', ' ')} {short(name)}: {advice}")
-    return found
+    return axes

@@ -115,14 +115,14 @@ def slip_or_stick(
 def first_at_rest(model: Model, environment: Environment, x: Array, stages: Stages) -> int:
     """Return the joint that came to rest first between ``x`` and ``stages.end``, or `NONE`."""
     directions, end = stages.directions, stages.end
-    first, earliest, found = first_velocity(model), 2.0, NONE
+    first, earliest, joint = first_velocity(model), 2.0, NONE
     for i in range(int(environment.friction.count)):
         before, after = x[first + i], end[first + i]
         if after * directions[i] < 0.0:
             share = before / (before - after)
             if share < earliest:
-                earliest, found = share, i
-    return found
+                earliest, joint = share, i
+    return joint
 
 
 @kernel
@@ -146,16 +146,16 @@ def cut(
     for _ in range(MOST_TRIALS):
         length = (low * at_high - high * at_low) / (at_high - at_low)
         rk4_step(model, environment, x, time, length, stages)
-        found = stages.end[velocity]
-        if abs(found) <= AT_REST or not low < length < high:
+        rate = stages.end[velocity]
+        if abs(rate) <= AT_REST or not low < length < high:
             break
-        if found * at_high > 0.0:
-            high, at_high = length, found
+        if rate * at_high > 0.0:
+            high, at_high = length, rate
             if side == -1:
                 at_low *= 0.5
             side = -1
         else:
-            low, at_low = length, found
+            low, at_low = length, rate
             if side == 1:
                 at_high *= 0.5
             side = 1

@@ -29,18 +29,18 @@ INERTIAL = ("x", "y", "z")
 
 
 @house_style()
-def momentum(log: FlightLog, found: Momentum, flown: BaseActuatorSettings) -> Figure:
+def momentum(log: FlightLog, budget: Momentum, flown: BaseActuatorSettings) -> Figure:
     """Draw the angular momentum of robot, wheels and both, by inertial axis.
 
     What came from outside stands beside them; without it the sum is a straight line. Of a base
     that nothing turned, base and arm have what the other lacks.
     """
-    parts = {"robot": found.robot, "wheels": found.wheels, "sum": found.total}
+    parts = {"robot": budget.robot, "wheels": budget.wheels, "sum": budget.total}
     if not flown.wheel_count:
-        arm = found.robot - found.base
-        parts = {"base": found.base, "arm": arm, "sum": found.total}
-    if np.any(found.outside):
-        parts["from outside"] = found.outside
+        arm = budget.robot - budget.base
+        parts = {"base": budget.base, "arm": arm, "sum": budget.total}
+    if np.any(budget.outside):
+        parts["from outside"] = budget.outside
     figure = page(18.0 + 45.0 * 3)
     panels = figure.subplots(3, 1, sharex=True)
     for i, (axes, name) in enumerate(zip(panels, INERTIAL, strict=True)):

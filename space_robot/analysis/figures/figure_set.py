@@ -108,33 +108,33 @@ class FigureSet:
         """Return the figures that there are, by name of the file; none is drawn yet."""
         flights = self._flights
         torques = {n: s.base_torque for n, s in flights.items() if s.base_torque is not None}
-        found: dict[str, Drawing] = {}
+        drawings: dict[str, Drawing] = {}
         several = len(self._missions) > 1
         for number, (name, figure) in enumerate(self._missions.values(), start=1):
             suffix, of = (f"_{number}", f" of {name}") if several else ("", "")
             caption = f"Desired joint angles{of} (Fig. 5)"
-            found[f"desired_joints{suffix}"] = Drawing(caption, partial(_drawn, figure))
+            drawings[f"desired_joints{suffix}"] = Drawing(caption, partial(_drawn, figure))
         if len(flights) == 1 and self._first is not None:
             caption = "Errors and torques of base and joints (Figs. 6 to 9)"
-            found["control_results"] = Drawing(caption, partial(_drawn, self._first))
+            drawings["control_results"] = Drawing(caption, partial(_drawn, self._first))
         else:
             caption = "Errors and torques, norms over each group of axes (Figs. 6 to 9)"
-            found["control_results"] = Drawing(caption, partial(errors_and_torques, flights))
+            drawings["control_results"] = Drawing(caption, partial(errors_and_torques, flights))
         if torques:
             caption = "Base torque x where two motions meet"
-            found["junctions"] = Drawing(caption, partial(junctions, torques))
+            drawings["junctions"] = Drawing(caption, partial(junctions, torques))
             caption = "A stretch of base torque, and its spectrum"
-            found["chatter"] = Drawing(caption, partial(chatter, torques))
-        found["ripple"] = Drawing("Spectrum of the torques' ripple", partial(ripple, flights))
+            drawings["chatter"] = Drawing(caption, partial(chatter, torques))
+        drawings["ripple"] = Drawing("Spectrum of the torques' ripple", partial(ripple, flights))
         for number, (name, figures) in enumerate(self._hardware.items(), start=1):
             suffix, of = (f"_{number}", f" of {name}") if len(flights) > 1 else ("", "")
             for stem, (caption, figure) in figures.items():
-                found[f"{stem}{suffix}"] = Drawing(f"{caption}{of}", partial(_drawn, figure))
+                drawings[f"{stem}{suffix}"] = Drawing(f"{caption}{of}", partial(_drawn, figure))
         caption = "The end effector's pointing error in the inertial frame"
-        found["pointing"] = Drawing(caption, partial(pointing, flights))
+        drawings["pointing"] = Drawing(caption, partial(pointing, flights))
         caption = "Time from a state's sending to its command's"
-        found["latency"] = Drawing(caption, partial(latency_histogram, flights))
-        return found
+        drawings["latency"] = Drawing(caption, partial(latency_histogram, flights))
+        return drawings
 
 
 def _drawn(figure: Figure) -> Figure:
@@ -149,14 +149,14 @@ def _of_hardware(log: FlightLog) -> Iterator[tuple[str, tuple[str, Figure]]]:
     """
     if not log.ticks:
         raise InputError("no tick has both a state and a reference")
-    flown, found = flown_actuators(log), momentum_of(log).add(log)
+    flown, budget = flown_actuators(log), momentum_of(log).add(log)
     caption = "Angular momentum about the common centre of mass"
-    yield "momentum", (caption, momentum(log, found, flown))
+    yield "momentum", (caption, momentum(log, budget, flown))
     if flown.wheel_count:
         caption = "Momentum and torque of the wheels, between their limits"
         yield "wheels", (caption, wheels(log, flown.wheels))
     if flown.thruster_count:
-        pushed = found.centre_of_mass - found.centre_of_mass[0]
+        pushed = budget.centre_of_mass - budget.centre_of_mass[0]
         caption = "Pulses and propellant, how far the robot was pushed, and the limit cycle"
         yield "thrusters", (caption, thrusters(log, pushed, flown.thrusters))
 

@@ -154,7 +154,7 @@ def _panels(
     for name, series in flights.items():
         for key, values in values_of(series).items():
             curves.setdefault(key, {})[name] = series.time, values
-    return [_Panel(found, label(key), is_logarithmic) for key, found in curves.items()]
+    return [_Panel(lines, label(key), is_logarithmic) for key, lines in curves.items()]
 
 
 def words(key: str) -> str:

@@ -94,15 +94,15 @@ class Changes:
     def scenario(self, **options: Any) -> Scenario:
         """Return the flight with these changes and further options."""
         given = self.nominal.scenario.given
-        found = {**given, **self.options, **options}
+        merged = {**given, **self.options, **options}
         if self._robot is not None:
-            found["plant_robot"] = self._robot.robot()
+            merged["plant_robot"] = self._robot.robot()
         if self.faults:
-            found["faults"] = [*given.get("faults", ()), *self.faults]
+            merged["faults"] = [*given.get("faults", ()), *self.faults]
         if self._parameters:
             own = given.get("parameters", {})
-            found["parameters"] = {
+            merged["parameters"] = {
                 node: {**own.get(node, {}), **self._parameters.get(node, {})}
                 for node in {**own, **self._parameters}
             }
-        return Scenario(**found)
+        return Scenario(**merged)

@@ -32,7 +32,7 @@ def parts_of(name: str) -> list[NamePart]:
     """
     if not _NAME.fullmatch(name):
         raise InputError(f"{short(name)} is no name of a variable, as robot.links[*].mass is one")
-    return [NamePart(*found) for found in _PARTS.findall(name)]
+    return [NamePart(*match) for match in _PARTS.findall(name)]
 
 
 def chosen(element: str, names: Sequence[str], what: str) -> list[tuple[int, str]]:

@@ -80,8 +80,9 @@ def spread(inertia: Rows, factors: list[float], turn: list[float]) -> Rows:
     scaled = [max(moment, 0.0) * factor for moment, factor in zip(moments, factors, strict=True)]
     axes = product(rotation(turn), axes)
     weighted = [[axes[i][k] * scaled[k] for k in range(3)] for i in range(3)]
-    found = product(weighted, transposed(axes))
-    trace = found[0][0] + found[1][1] + found[2][2]
+    covariance = product(weighted, transposed(axes))
+    trace = covariance[0][0] + covariance[1][1] + covariance[2][2]
     return [
-        [trace * (i == j) - 0.5 * (found[i][j] + found[j][i]) for j in range(3)] for i in range(3)
+        [trace * (i == j) - 0.5 * (covariance[i][j] + covariance[j][i]) for j in range(3)]
+        for i in range(3)
     ]

@@ -41,7 +41,7 @@ class RobotArrays:
         inertia, shift = self.inertia.copy(), -self.com[0]
         for body, own in self.spreads.items():
             inertia[body] = spread(inertia[body].tolist(), own.factors, own.turn)
-        found = replace(
+        changed = replace(
             self.nominal,
             mass=self.mass,
             inertia=inertia,
@@ -49,7 +49,7 @@ class RobotArrays:
             friction=tuple(self.friction),
             springs=tuple(self.springs),
         )
-        return _with_base_moved(found, shift) if shift.any() else found
+        return _with_base_moved(changed, shift) if shift.any() else changed
 
 
 def _with_base_moved(robot: Robot, shift: Array) -> Robot:

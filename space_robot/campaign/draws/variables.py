@@ -33,16 +33,16 @@ def variables_of(study: Study, nominals: Sequence[Nominal]) -> list[Variable]:
     Raises:
         InputError: names the key of ``vary`` that is wrong.
     """
-    found: list[Variable] = []
+    variables: list[Variable] = []
     for key, given in study.vary.items():
         where = f"{study.where}: vary.{key}"
         if key == FAULTS:
-            found += _faults(given, where, nominals[0])
+            variables += _faults(given, where, nominals[0])
             continue
         with told_at(where):
-            found += _of_key(key, given, where, nominals)
-    _check_places(study, found)
-    return found
+            variables += _of_key(key, given, where, nominals)
+    _check_places(study, variables)
+    return variables
 
 
 @contextmanager
@@ -75,31 +75,31 @@ def _of_key(key: str, given: Any, where: str, nominals: Sequence[Nominal]) -> Se
 def _faults(given: Any, where: str, nominal: Nominal) -> list[Variable]:
     if not isinstance(given, dict):
         raise InputError(f"{where}: a mapping of faults was expected, got {short(given)}")
-    found: list[Variable] = []
+    faults: list[Variable] = []
     for text, distribution in given.items():
         own = f"{where}.{text}"
         with told_at(own):
-            found += fault_variables(str(text), distribution, own, nominal.names)
-    return found
+            faults += fault_variables(str(text), distribution, own, nominal.names)
+    return faults
 
 
-def _check_places(study: Study, found: Sequence[Variable]) -> None:
-    for what, count in Counter(variable.place for variable in found).items():
+def _check_places(study: Study, variables: Sequence[Variable]) -> None:
+    for what, count in Counter(variable.place for variable in variables).items():
         if count > 1:
-            twice = [variable for variable in found if variable.place == what]
+            twice = [variable for variable in variables if variable.place == what]
             raise InputError(
                 f"{study.where}: vary.{twice[1].key}: {twice[1].name} is varied by "
                 f"{twice[0].key} already"
             )
-    whole = {(v.place) for v in found if isinstance(v, InertiaScale)}
-    for variable in found:
+    whole = {(v.place) for v in variables if isinstance(v, InertiaScale)}
+    for variable in variables:
         if isinstance(variable.place, tuple) and variable.place[:2] in whole - {variable.place}:
             raise InputError(
                 f"{study.where}: vary.{variable.key}: {variable.name} is of an inertia that is "
                 "varied as a whole"
             )
-    if any(v.key.startswith("robot.") for v in found):
-        for variable in found:
+    if any(v.key.startswith("robot.") for v in variables):
+        for variable in variables:
             if variable.name == "scenario.robot":
                 raise InputError(
                     f"{study.where}: vary.scenario.robot: robots cannot be chosen while numbers "

@@ -54,9 +54,9 @@ class Campaign:
         Raises:
             InputError: in one line, naming file and key.
         """
-        found = cls(read_study(path))
-        found._text = read_file(Path(found.study.where))
-        return found
+        campaign = cls(read_study(path))
+        campaign._text = read_file(Path(campaign.study.where))
+        return campaign
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> Campaign:

@@ -20,7 +20,7 @@ def hinges(robot: Robot) -> dict[str, dict[str, float]]:
     """
     if max(robot.branches) < 2:
         return {}
-    found = {}
+    hinges = {}
     for joint, name in enumerate(robot.joint_names):
         body = joint + 1
         is_alone = robot.parent[joint] == 0 and body not in robot.parent
@@ -30,20 +30,20 @@ def hinges(robot: Robot) -> dict[str, dict[str, float]]:
             rate = 2.0 * math.pi * FREQUENCY_HZ
             values = inertia * rate**2, 2.0 * DAMPING_RATIO * inertia * rate
             stiffness, damping = (float(f"{value:.2g}") for value in values)
-            found[name] = {"stiffness": stiffness, "damping": damping}
-    return found
+            hinges[name] = {"stiffness": stiffness, "damping": damping}
+    return hinges
 
 
 def hinge_remark(robot: Robot) -> str:
     """Return a proposal to make hinges passive; empty if there are none."""
-    found = hinges(robot)
-    if not found:
+    names = hinges(robot)
+    if not names:
         return ""
     flow = yaml.safe_dump(
-        {"passive": found}, default_flow_style=True, sort_keys=False, width=math.inf
+        {"passive": names}, default_flow_style=True, sort_keys=False, width=math.inf
     )
     return (
-        f"{', '.join(found)}: each carries one body on the base. If that is a panel on a hinge "
+        f"{', '.join(names)}: each carries one body on the base. If that is a panel on a hinge "
         f"without a motor, add to `robot:` in robot.yaml `{flow.strip()[1:-1]}` (springs of "
         f"{FREQUENCY_HZ:g} Hz: yours may be others), and give that file to `space-robot new`."
     )

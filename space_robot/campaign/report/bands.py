@@ -45,11 +45,11 @@ def bands(rows: DataFrame, series: str) -> Array:
         rows: of one law, at one point of the grid.
         series: a name of `series_of`.
     """
-    found = [np.asarray(b, np.float64) for b in rows[f"band.{series}"] if np.ndim(b)]
-    found += [np.empty(0)] * (len(rows) - len(found))
-    bins = max(map(len, found))
-    table = np.full((len(found), bins), np.inf)
-    for row, values in zip(table, found, strict=True):
+    curves = [np.asarray(b, np.float64) for b in rows[f"band.{series}"] if np.ndim(b)]
+    curves += [np.empty(0)] * (len(rows) - len(curves))
+    bins = max(map(len, curves))
+    table = np.full((len(curves), bins), np.inf)
+    for row, values in zip(table, curves, strict=True):
         row[: len(values)] = values
     table[np.isnan(table)] = np.inf
     quantiles = np.quantile(table, SHARES, axis=0, method="inverted_cdf")
@@ -71,20 +71,20 @@ def band_figure(
         time_s: what all bins last together, s.
     """
     shown = parts[:MOST_PANELS]
-    found = {
+    curves = {
         (number, law): bands(of_law(part.table, law), series)
         for number, part in enumerate(shown)
         for law in laws_of(part.table)
     }
-    found = {key: value for key, value in found.items() if value.size}
-    if not found:
+    curves = {key: value for key, value in curves.items() if value.size}
+    if not curves:
         return page(12.0, "No flight has a series over time.")
     per_law = len(shown) == 1
     titles = list(short_names(laws).values()) if per_law else [part.point for part in shown]
     columns = columns_of(len(titles))
     figure = page(16.0 + 42.0 * -(-len(titles) // columns))
     panels = grid(figure, len(titles), columns)
-    for (number, law), values in found.items():
+    for (number, law), values in curves.items():
         index = laws.index(law)
         axes = panels[index if per_law else number]
         edges = np.linspace(0.0, time_s, values.shape[1] + 1)
@@ -102,7 +102,7 @@ def band_figure(
         panels[number].set_ylabel(f"{words(series)} ({unit})" if unit else f"{words(series)} error")
     for axes in panels[-columns:]:
         axes.set_xlabel("time (s)")
-    _scale(panels[0], list(found.values()))
+    _scale(panels[0], list(curves.values()))
     if per_law:
         _name_bands(figure)
     else:
@@ -140,11 +140,11 @@ def _name_bands(figure: Figure) -> None:
     )
 
 
-def _scale(axes: Axes, found: Sequence[Array]) -> None:
+def _scale(axes: Axes, curves: Sequence[Array]) -> None:
     """Make the common vertical axis logarithmic, from the least of the 5 % on."""
     axes.set_yscale("log", nonpositive="mask")
     low, high, worst = (
-        np.concatenate([v[k][np.isfinite(v[k]) & (v[k] > 0.0)] for v in found]) for k in (0, 2, 3)
+        np.concatenate([v[k][np.isfinite(v[k]) & (v[k] > 0.0)] for v in curves]) for k in (0, 2, 3)
     )
     usual = high if len(high) else worst
     if not len(low) or not len(usual):

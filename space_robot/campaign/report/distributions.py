@@ -82,8 +82,8 @@ def _with_tail(table: DataFrame, laws: Sequence[str], quantity: Quantity) -> Fig
 
 def _numbers(table: DataFrame, law: str, quantity: Quantity) -> Array:
     """Return a law's numbers in order, infinite ones of failed flights last."""
-    found: Array = np.sort(measured(of_law(table, law), quantity.column))
-    return found
+    numbers: Array = np.sort(measured(of_law(table, law), quantity.column))
+    return numbers
 
 
 def _draw(axes: Axes, values: Array, index: int, above: bool = False, small: bool = False) -> None:

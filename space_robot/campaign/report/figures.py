@@ -54,12 +54,12 @@ def drawings(findings: Findings) -> Iterator[CampaignDrawing]:
     for quantity in findings.driven:
         for number, part in enumerate(parts[:MOST_INFLUENCES]):
             of = f", {part.point}" if part.point else ""
-            found = [s for p, q, s in findings.sensitivities if (p, q) == (part, quantity)]
-            if found:
+            matching = [s for p, q, s in findings.sensitivities if (p, q) == (part, quantity)]
+            if matching:
                 caption = f"What drives {quantity.heading}{of}"
                 stem = f"influence_{quantity.name}_{number}"
                 yield CampaignDrawing(
-                    "sensitivity", stem, caption, partial(influence_figure, found)
+                    "sensitivity", stem, caption, partial(influence_figure, matching)
                 )
     for metric in dict.fromkeys(s.metric for s in findings.sobol):
         found_indices = [s for s in findings.sobol if s.metric == metric]
@@ -70,6 +70,6 @@ def drawings(findings: Findings) -> Iterator[CampaignDrawing]:
 
 def summary_figure(findings: Findings) -> Figure | None:
     """Draw the one figure that says most: the first of the laws, or of the distributions."""
-    found = {drawing.section: drawing for drawing in reversed([*drawings(findings)])}
-    chosen = found.get("league") or found.get("distributions")
+    by_section = {drawing.section: drawing for drawing in reversed([*drawings(findings)])}
+    chosen = by_section.get("league") or by_section.get("distributions")
     return chosen.draw() if chosen else None

@@ -86,14 +86,14 @@ class Findings:
     @cached_property
     def sensitivities(self) -> list[tuple[GridPoint, Quantity, Sensitivity]]:
         """Return what drives each quantity under each law at each point of the grid."""
-        found = []
+        sensitivities = []
         for quantity in self.driven:
             for part in self.parts:
                 rows = turned(part.table, quantity.column, quantity.sign)
                 for law in laws_of(rows):
                     if result := sensitivity(rows, law, quantity.column, CONFIDENCE):
-                        found.append((part, quantity, result))
-        return found
+                        sensitivities.append((part, quantity, result))
+        return sensitivities
 
     def worst(
         self, part: GridPoint, quantity: Quantity, count: int = 10, law: str = ""
@@ -121,7 +121,7 @@ class Findings:
         table = self.subject.table
         if self.subject.study.design != SALTELLI:
             return []
-        found = [
+        indices = [
             sobol_indices(
                 saltelli_values(table, law, metric.column),
                 variables(table),
@@ -132,7 +132,7 @@ class Findings:
             for metric in self.metrics
             for law in self.laws
         ]
-        return [each for each in found if each]
+        return [each for each in indices if each]
 
     @property
     def _is_precise(self) -> bool:
@@ -147,9 +147,9 @@ class Findings:
     def remarks(self) -> list[str]:
         """Return what a reader must know of these rows, a sentence each."""
         subject, table = self.subject, self.subject.table
-        found, asked = [*subject.remarks], subject.runs * len(subject.study.laws)
+        remarks, asked = [*subject.remarks], subject.runs * len(subject.study.laws)
         if len(table) < asked and not self._is_precise:
-            found.append(
+            remarks.append(
                 f"The campaign is not finished: {len(table)} of {asked} flights have been flown; "
                 "all numbers are of these."
                 + " The number of runs is fixed: there are no verdicts before all are flown."
@@ -158,17 +158,17 @@ class Findings:
         counts = table["outcome"].value_counts()
         foreign = [f"{counts[o]} {o}" for o in ("killed", "out_of_time", "refused") if o in counts]
         if foreign:
-            found.append(
+            remarks.append(
                 f"Of the flights that did not come to their end {', '.join(foreign)}: they count "
                 "as failures, though the law may be without blame."
             )
         if not ended(table).any():
-            found.append("No flight came to its end, so there are no metrics.")
+            remarks.append("No flight came to its end, so there are no metrics.")
         if (design := subject.study.design) != "independent":
-            found.append(
+            remarks.append(
                 f"The runs are of the design {design}, not independent of one another: verdicts "
                 "and intervals, which take them for independent, are approximate."
                 + " They are of its points A and B."
                 * (design == SALTELLI)
             )
-        return found
+        return remarks

@@ -24,16 +24,16 @@ LONGEST = 34
 
 
 @house_style()
-def influence_figure(found: Sequence[Sensitivity]) -> Figure:
+def influence_figure(sensitivities: Sequence[Sensitivity]) -> Figure:
     """Draw how strongly each variable drives a quantity, a panel a law.
 
     Bars are the share of the spread that it explains by itself, points its rank correlation (the
     partial one where there is one) with the interval.
 
     Args:
-        found: of one quantity, a law each.
+        sensitivities: of one quantity, a law each.
     """
-    shown = found[:PANELS]
+    shown = sensitivities[:PANELS]
     strength: dict[str, float] = {}
     for each in shown:
         for i in each.influences:
@@ -70,9 +70,9 @@ def influence_figure(found: Sequence[Sensitivity]) -> Figure:
 
 
 @house_style()
-def sobol_figure(found: Sequence[SobolIndices]) -> Figure:
+def sobol_figure(indices: Sequence[SobolIndices]) -> Figure:
     """Draw first and total Sobol indices of one metric, a panel a law."""
-    shown = found[:PANELS]
+    shown = indices[:PANELS]
     largest: dict[str, float] = {}
     for each in shown:
         for i in each.indices:

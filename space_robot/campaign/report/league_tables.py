@@ -52,8 +52,8 @@ def league_table(findings: Findings) -> Table:
         Column("failed"),
     ]
     groups = [
-        Group([_standing(s, findings.names[s.law]) for s in found.standings], metric.label)
-        for _, metric, found in findings.leagues
+        Group([_standing(s, findings.names[s.law]) for s in league.standings], metric.label)
+        for _, metric, league in findings.leagues
     ]
     return Table("Laws, by metrics of which less is better", columns, groups, [RANKS])
 
@@ -84,8 +84,8 @@ def pair_table(findings: Findings) -> Table:
         Column("is", is_label=True),
     ]
     groups = [
-        Group([_pair(c, findings.names) for c in found.comparisons], metric.label, part.point)
-        for part, metric, found in findings.leagues
+        Group([_pair(c, findings.names) for c in league.comparisons], metric.label, part.point)
+        for part, metric, league in findings.leagues
     ]
     note = (
         "Better in: runs in which the law's number is smaller than the other's in the same draw. "
@@ -126,10 +126,10 @@ def _choices(findings: Findings, metric: Quantity) -> Table:
     rows = [
         [
             *part.values,
-            *_medians(findings, found),
-            JudgedCell("", best(found, findings.names), "good"),
+            *_medians(findings, league),
+            JudgedCell("", best(league, findings.names), "good"),
         ]
-        for part, quantity, found in findings.leagues
+        for part, quantity, league in findings.leagues
         if quantity is metric
     ]
     columns = [
@@ -140,8 +140,8 @@ def _choices(findings: Findings, metric: Quantity) -> Table:
     return Table(metric.label, columns, [Group(rows)])
 
 
-def _medians(findings: Findings, found: League) -> list[str]:
-    by_law = {s.law: s for s in found.standings}
+def _medians(findings: Findings, league: League) -> list[str]:
+    by_law = {s.law: s for s in league.standings}
     texts = []
     for law in findings.laws:
         if (s := by_law.get(law)) is None:
@@ -152,9 +152,9 @@ def _medians(findings: Findings, found: League) -> list[str]:
     return texts
 
 
-def best(found: League, names: Mapping[str, str]) -> str:
+def best(league: League, names: Mapping[str, str]) -> str:
     """Name the laws of rank 1 that did not fail in every flight, unless these are all laws."""
-    first = [names[s.law] for s in found.standings if s.rank == 1 and s.failures < s.runs]
-    if len(first) == len(found.standings) > 1:
+    first = [names[s.law] for s in league.standings if s.rank == 1 and s.failures < s.runs]
+    if len(first) == len(league.standings) > 1:
         return "not told apart"
     return ", ".join(first) or "-"

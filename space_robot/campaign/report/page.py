@@ -56,7 +56,7 @@ def lean(svg: str) -> str:
 
 def _summaries(findings: Findings) -> list[tuple[str, list[tuple[str, str]]]]:
     """Say of each requirement what it asks for, and which laws meet it, with tones."""
-    found = []
+    summaries = []
     for quantity in findings.required:
         own = [v for v in findings.verdicts if v.requirement == quantity.name]
         words = []
@@ -68,8 +68,8 @@ def _summaries(findings: Findings) -> list[tuple[str, list[tuple[str, str]]]]:
             ]
             if named:
                 words.append((f"{word} {_counted(named)}", TONES[word]))
-        found.append((f"{quantity.name}, {demanded(quantity)}", words))
-    return found
+        summaries.append((f"{quantity.name}, {demanded(quantity)}", words))
+    return summaries
 
 
 def _counted(names: list[str]) -> str:
@@ -79,11 +79,11 @@ def _counted(names: list[str]) -> str:
 
 def _worst(findings: Findings) -> list[tuple[Table, list[Table]]]:
     """Return the worst runs of all laws, and without a grid those of each law."""
-    found = []
+    rows = []
     for quantity in findings.driven:
         for part in findings.parts:
             each = []
             if len(findings.parts) == 1 and len(findings.laws) > 1:
                 each = [worst_table(findings, part, quantity, law=law) for law in findings.laws]
-            found.append((worst_table(findings, part, quantity), each))
-    return found
+            rows.append((worst_table(findings, part, quantity), each))
+    return rows

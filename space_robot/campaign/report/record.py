@@ -31,14 +31,14 @@ def record(findings: Findings) -> dict[str, Any]:
             {
                 "point": part.point,
                 "metric": metric.name,
-                "standings": plain(found.standings),
-                "comparisons": [{**plain(c), "finding": c.finding} for c in found.comparisons],
+                "standings": plain(entry.standings),
+                "comparisons": [{**plain(c), "finding": c.finding} for c in entry.comparisons],
             }
-            for part, metric, found in findings.leagues
+            for part, metric, entry in findings.leagues
         ],
         "sensitivity": [
-            {"point": part.point, "of": quantity.column, **plain(found)}
-            for part, quantity, found in findings.sensitivities
+            {"point": part.point, "of": quantity.column, **plain(entry)}
+            for part, quantity, entry in findings.sensitivities
         ],
         "sobol": plain(findings.sobol),
         "worst": [

@@ -28,11 +28,13 @@ def sensitivity_table(findings: Findings, shown: int = SHOWN) -> Table:
         Column("p"),
     ]
     groups, without = [], []
-    for part, quantity, found in findings.sensitivities:
-        explained = "" if found.explained is None else f"{found.explained:.0%} explained by all"
-        law = findings.names[found.law]
+    for part, quantity, sensitivity in findings.sensitivities:
+        explained = (
+            "" if sensitivity.explained is None else f"{sensitivity.explained:.0%} explained by all"
+        )
+        law = findings.names[sensitivity.law]
         name = ", ".join(text for text in (law, quantity.heading, part.point) if text)
-        rows = [_row(i) for i in found.influences[:shown] if i.p < 1.0 - CONFIDENCE]
+        rows = [_row(i) for i in sensitivity.influences[:shown] if i.p < 1.0 - CONFIDENCE]
         if rows:
             groups.append(Group(rows, name, explained))
         else:
@@ -59,7 +61,7 @@ def _row(influence: Influence) -> list[str]:
     return [influence.variable, *cells, f"{influence.spread:.1%}", f"{influence.p:.2g}"]
 
 
-def sobol_table(found: Sequence[SobolIndices], shown: int = SHOWN) -> Table:
+def sobol_table(indices: Sequence[SobolIndices], shown: int = SHOWN) -> Table:
     """Tabulate Sobol indices, a group for every law and metric."""
     columns = [
         Column("variable", is_label=True),
@@ -69,7 +71,7 @@ def sobol_table(found: Sequence[SobolIndices], shown: int = SHOWN) -> Table:
         Column("interval"),
     ]
     groups = []
-    for each in found:
+    for each in indices:
         rows = [
             [
                 i.variable,

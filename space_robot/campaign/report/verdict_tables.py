@@ -134,12 +134,12 @@ def verdict_grid(findings: Findings, quantity: Quantity) -> Table:
     by_place = {(v.point, v.law): v for v in findings.verdicts if v.requirement == quantity.name}
     rows = []
     for part in findings.parts:
-        found = [by_place.get((part.point, law)) for law in findings.laws]
+        verdicts = [by_place.get((part.point, law)) for law in findings.laws]
         cells = [
             JudgedCell("" if v.not_measured else f"{v.failures}", v.word, TONES[v.word])
             if v
             else None
-            for v in found
+            for v in verdicts
         ]
         rows.append([*part.values, *cells])
     columns = [

@@ -103,9 +103,9 @@ def _row(
 ) -> Row:
     state = flight.plant.truth.block.tobytes()
     if ending.error is not None:
-        found = Row(task, ending.outcome, ending.reason, ending.ended_at_s, vary)
+        row = Row(task, ending.outcome, ending.reason, ending.ended_at_s, vary)
     else:
-        found = Row(
+        row = Row(
             task,
             ending.outcome,
             "",
@@ -115,7 +115,7 @@ def _row(
             measure.require(),
             measure.bands(),
         )
-    return found.digested(state)
+    return row.digested(state)
 
 
 @lru_cache(maxsize=4)

@@ -49,10 +49,10 @@ class Measure:
     def require(self) -> dict[str, float]:
         """Return the metric of each requirement in its window, by the requirement's name."""
         whole = self.metrics()
-        found = {name: whole.get(metric) for name, metric in self._same.items()}
+        values = {name: whole.get(metric) for name, metric in self._same.items()}
         for name, window in self._require.items():
-            found[name] = next(iter(window.result().values()), None)
-        return {name: value for name, value in found.items() if value is not None}
+            values[name] = next(iter(window.result().values()), None)
+        return {name: value for name, value in values.items() if value is not None}
 
     def bands(self) -> dict[str, NDArray[np.float32]]:
         """Return the bands of each column over time."""

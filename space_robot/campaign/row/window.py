@@ -94,13 +94,21 @@ class WindowMetrics:
 
     def result(self) -> dict[str, float]:
         """Return the metrics that this flight has, by name."""
-        found = {f"{name}_max": value for name, value in self._largest.items()} | self._ripples()
+        values_by_name = {
+            f"{name}_max": value for name, value in self._largest.items()
+        } | self._ripples()
         if self._rms:
             both = self._columns.errors, self._columns.torques
             for rms, columns in zip(self._rms, both, strict=True):
                 values = rms.value
-                found |= {f"{name}_rms": float(np.mean(values[ax])) for name, ax in columns.items()}
-        return {name: found[name] for name in self._wanted if np.isfinite(found.get(name, np.nan))}
+                values_by_name |= {
+                    f"{name}_rms": float(np.mean(values[ax])) for name, ax in columns.items()
+                }
+        return {
+            name: values_by_name[name]
+            for name in self._wanted
+            if np.isfinite(values_by_name.get(name, np.nan))
+        }
 
     def _ripples(self) -> dict[str, float]:
         if self._ripple is None or missing_for_ripple(RIPPLE, self._ticks, self._period):

@@ -212,7 +212,7 @@ def _largest(flights: Sequence[SoakedFlight]) -> dict[str, dict[str, float] | No
 
     None stands for an error that no bag tells.
     """
-    found: dict[str, dict[str, float] | None] = {}
+    largest: dict[str, dict[str, float] | None] = {}
     for name in ("attitude", "joint"):
         errors = [
             (error, flown.number)
@@ -220,8 +220,8 @@ def _largest(flights: Sequence[SoakedFlight]) -> dict[str, dict[str, float] | No
             if (error := getattr(flown.verdict, f"{name}_error")) is not None
         ]
         error, number = max(errors, default=(None, 0))
-        found[name] = None if error is None else {"value": error, "flight": number}
-    return found
+        largest[name] = None if error is None else {"value": error, "flight": number}
+    return largest
 
 
 def _growth(peaks: Sequence[float]) -> float | None:

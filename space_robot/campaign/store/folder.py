@@ -76,17 +76,17 @@ def begin_or_resume(folder: Path, manifest: Manifest, study_text: str) -> list[s
     Raises:
         InputError: another campaign was begun here; or it cannot be written.
     """
-    found, study = [], folder / STUDY
+    rows, study = [], folder / STUDY
     is_begun = any((folder / name).exists() for name in (MANIFEST, JOURNAL, TABLE, BAGS))
     if is_begun:
-        found = _resumed(folder, manifest)
+        rows = _resumed(folder, manifest)
         if changes := study_changes(study, manifest.study):
-            found.append(changes)
+            rows.append(changes)
     if not is_begun or not study.exists():
         with whole_file(study, replace=True) as file:
             file.write(study_text.encode())
     manifest.write(folder / MANIFEST)  # last: it says that the campaign was begun
-    return found
+    return rows
 
 
 def study_changes(file: Path, flown: Mapping[str, Any]) -> str:

@@ -67,8 +67,8 @@ class Journal:
         """Return a note; empty if there is none of that name."""
         with self._named_errors():
             query = "SELECT value FROM notes WHERE name = ?"
-            found = self._database.execute(query, (name,)).fetchone()
-        return str(found[0]) if found else ""
+            record = self._database.execute(query, (name,)).fetchone()
+        return str(record[0]) if record else ""
 
     def make_note(self, name: str, value: str) -> None:
         """Store a note, in the place of an older one of that name."""

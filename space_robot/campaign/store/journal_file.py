@@ -50,7 +50,7 @@ def damage_of(path: Path, codec: JournalCodec) -> list[str]:
     Raises:
         InputError: it cannot be opened, whatever is in it.
     """
-    found, last = [], (-1, -1)
+    damaged, last = [], (-1, -1)
     try:
         with closing(connect(path)) as database:
             tables = [sql for (sql,) in database.execute("SELECT sql FROM sqlite_master")]
@@ -62,14 +62,14 @@ def damage_of(path: Path, codec: JournalCodec) -> list[str]:
             for stored in database.execute(f"{SELECT} {IN_ORDER}"):
                 run, law = stored[:2]
                 if codec.decode(stored) is None or (run, law) <= last:
-                    found.append(_named(run, law, codec))
+                    damaged.append(_named(run, law, codec))
                 else:
                     last = run, law
     except sqlite3.Error as error:
         if str(error) in NOT_OF_THE_FILE:
             raise InputError(f"{path}: {error}") from None
-        found.append(str(error))
-    return found
+        damaged.append(str(error))
+    return damaged
 
 
 def whole_rows(path: Path, codec: JournalCodec) -> Iterator[Row]:

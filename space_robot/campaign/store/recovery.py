@@ -38,25 +38,25 @@ def open_journal(folder: Path, manifest: Manifest) -> tuple[Journal, list[str]]:
         InputError: the journal cannot be opened or written.
     """
     path, codec = folder / JOURNAL, JournalCodec(manifest.campaign, manifest.laws)
-    found = []
+    damaged = []
     if (folder / TABLE).exists():
         try:
             check_table(folder / TABLE, manifest.campaign)
         except InputError as error:
-            found.append(str(error))
+            damaged.append(str(error))
     if not path.exists():
         count = write_journal(path, codec, _rows_of_table(folder, manifest))
         if (folder / TABLE).exists():
-            found.append(f"{path}: is gone; {count} rows are taken from {TABLE}")
+            damaged.append(f"{path}: is gone; {count} rows are taken from {TABLE}")
     elif damage := damage_of(path, codec):
         rows = chain(whole_rows(path, codec), _rows_of_table(folder, manifest))
         count = write_journal(path, codec, rows)
         more = f" and {len(damage) - MOST_NAMED} more" * (len(damage) > MOST_NAMED)
-        found.append(
+        damaged.append(
             f"{path}: damaged: {', '.join(damage[:MOST_NAMED])}{more}; {count} rows are kept, "
             f"and the damaged file is {JOURNAL}{SET_ASIDE}"
         )
-    return Journal(path, codec), found
+    return Journal(path, codec), damaged
 
 
 def _rows_of_table(folder: Path, manifest: Manifest) -> Iterator[Row]:

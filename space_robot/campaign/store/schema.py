@@ -53,8 +53,8 @@ class Schema(StrictModel):
         """Return the row of which these are the values of each column, by name."""
 
         def known(group: str, names: Iterable[str]) -> dict[str, Any]:
-            found = {name: values[f"{group}.{name}"] for name in names}
-            return {name: value for name, value in found.items() if value is not None}
+            group_values = {name: values[f"{group}.{name}"] for name in names}
+            return {name: value for name, value in group_values.items() if value is not None}
 
         bands = known("band", self.bands)
         return Row(

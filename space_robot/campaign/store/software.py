@@ -33,8 +33,8 @@ def software() -> dict[str, str | None]:
         tables: str | None = version(OF_TABLES)
     except PackageNotFoundError:
         tables = None
-    found = {name: known[name] for name in DECIDE}
-    return {**found, OF_TABLES: tables, "sources": source_digest(ROOT)}
+    decisive = {name: known[name] for name in DECIDE}
+    return {**decisive, OF_TABLES: tables, "sources": source_digest(ROOT)}
 
 
 def file_digests(values: Any) -> dict[str, str]:

@@ -124,12 +124,12 @@ def read_table(path: Path, schema: Schema) -> DataFrame:
 
     check_there(path)
     try:
-        found: DataFrame = read_parquet(path, engine="pyarrow")
+        frame: DataFrame = read_parquet(path, engine="pyarrow")
     except (OSError, ValueError, ArrowException) as error:
         raise InputError(f"{path}: cannot be read ({' '.join(str(error).split())})") from None
-    if list(found) != [name for name, _ in schema.columns()]:
+    if list(frame) != [name for name, _ in schema.columns()]:
         raise InputError(f"{path}: damaged: its columns are not those of the campaign")
-    return found
+    return frame
 
 
 def table_rows(path: Path, schema: Schema) -> Iterator[Row]:

@@ -30,18 +30,18 @@ class SweepCell(NamedTuple):
     """5 %, 50 % and 95 % of those that did not fail, by name; none if all did."""
 
 
-def shown(found: Sequence[SweepCell]) -> list[str]:
+def shown(swept: Sequence[SweepCell]) -> list[str]:
     """Return the metrics that tables show: RMS errors, then ripple."""
-    names = list(dict.fromkeys(name for cell in found for name in cell.metrics))
+    names = list(dict.fromkeys(name for cell in swept for name in cell.metrics))
     ripples = [name for name in names if name.startswith(RIPPLE)]
     if FAST_OF_BASE in names:  # beside what it is a share of
         ripples.insert(1, FAST_OF_BASE)
     return _errors(names) + ripples
 
 
-def drawn(found: Sequence[SweepCell]) -> list[str]:
+def drawn(swept: Sequence[SweepCell]) -> list[str]:
     """Return the metrics that a figure shows: of the base, then of the outermost joints."""
-    names = shown(found)
+    names = shown(swept)
     errors, ripples = _errors(names), [name for name in names if name.startswith(RIPPLE)]
     return list(dict.fromkeys([*errors[:1], *ripples[:1], *errors[-1:], *ripples[-1:]]))
 
@@ -52,11 +52,11 @@ def _errors(names: Sequence[str]) -> list[str]:
 
 def cells(rows: Sequence[Row]) -> list[SweepCell]:
     """Sum up the rows by hardware and law, in their order."""
-    found: dict[tuple[Law, str, str], list[Row]] = {}
+    swept: dict[tuple[Law, str, str], list[Row]] = {}
     for row in rows:
         law, (sensors, actuators) = Law.parse(row.task.law), hardware_of(row)
-        found.setdefault((law, sensors, actuators), []).append(row)
-    return [_cell(*key, own) for key, own in found.items()]
+        swept.setdefault((law, sensors, actuators), []).append(row)
+    return [_cell(*key, own) for key, own in swept.items()]
 
 
 def hardware_of(row: Row) -> tuple[str, str]:
@@ -87,19 +87,19 @@ def _cell(law: Law, sensors: str, actuators: str, rows: Sequence[Row]) -> SweepC
     return SweepCell(law, sensors, actuators, len(rows), len(rows) - len(flown), metrics)
 
 
-def hardware(found: Sequence[SweepCell]) -> dict[str, list[str]]:
+def hardware(swept: Sequence[SweepCell]) -> dict[str, list[str]]:
     """Return what the cells fly with, a value a cell: sensors, actuators, or both, unless ideal."""
     named = {
-        "sensors": [cell.sensors for cell in found],
-        "actuators": [cell.actuators for cell in found],
+        "sensors": [cell.sensors for cell in swept],
+        "actuators": [cell.actuators for cell in swept],
     }
     told = {key: values for key, values in named.items() if set(values) != {"ideal"}}
     return told or {"sensors": named["sensors"]}
 
 
-def summary_table(found: Sequence[SweepCell]) -> Table:
+def summary_table(swept: Sequence[SweepCell]) -> Table:
     """Tabulate the medians, a group for every hardware."""
-    flown_with, told = hardware(found), [of_metric(name) for name in shown(found)]
+    flown_with, told = hardware(swept), [of_metric(name) for name in shown(swept)]
     columns = (
         Column("law", is_label=True),
         Column("gains", is_label=True),
@@ -107,7 +107,7 @@ def summary_table(found: Sequence[SweepCell]) -> Table:
         Column("failed"),
     )
     groups: dict[tuple[str, ...], list[list[Any]]] = {}
-    for cell, *names in zip(found, *flown_with.values(), strict=True):
+    for cell, *names in zip(swept, *flown_with.values(), strict=True):
         middles = [cell.metrics[m.name][1] if m.name in cell.metrics else None for m in told]
         row = [cell.law.controller, cell.law.gains, *middles, f"{cell.failed} of {cell.flights}"]
         groups.setdefault(tuple(names), []).append([*names, *row])
@@ -126,7 +126,7 @@ def _short(metric: Quantity) -> str:
     return kind if column == "RMS" else f"{kind} {column.replace('torque', '').strip()}"
 
 
-def as_records(found: Sequence[SweepCell]) -> list[dict[str, Any]]:
+def as_records(swept: Sequence[SweepCell]) -> list[dict[str, Any]]:
     """Return a dictionary a cell, ready for JSON."""
     return [
         {
@@ -141,17 +141,17 @@ def as_records(found: Sequence[SweepCell]) -> list[dict[str, Any]]:
                 for name, values in cell.metrics.items()
             },
         }
-        for cell in found
+        for cell in swept
     ]
 
 
 @house_style()
-def figure(found: Sequence[SweepCell]) -> Figure:
+def figure(swept: Sequence[SweepCell]) -> Figure:
     """Draw errors (left) and ripple (right) of every law by hardware; bars from 5 % to 95 %."""
-    titles = [", ".join(map(plain, names)) for names in zip(*hardware(found).values(), strict=True)]
+    titles = [", ".join(map(plain, names)) for names in zip(*hardware(swept).values(), strict=True)]
     kinds = list(dict.fromkeys(titles))
-    laws = list(dict.fromkeys(cell.law for cell in found))
-    if not (names := drawn(found)):
+    laws = list(dict.fromkeys(cell.law for cell in swept))
+    if not (names := drawn(swept)):
         return page(12.0, "None of these flights came to its end.")
     sheet = page(130.0)
     legend_above(sheet, [law.title for law in laws], dashed=False)
@@ -160,7 +160,7 @@ def figure(found: Sequence[SweepCell]) -> Figure:
             look, shift = LineStyle.of(number), 0.09 * (number - 0.5 * (len(laws) - 1))
             own = [
                 (kinds.index(title) + shift, c.metrics[name])
-                for title, c in zip(titles, found, strict=True)
+                for title, c in zip(titles, swept, strict=True)
                 if c.law == law and name in c.metrics
             ]
             places = [place for place, _ in own]

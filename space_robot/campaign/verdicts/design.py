@@ -49,6 +49,6 @@ def saltelli_values(table: DataFrame, law: str, column: str) -> Array:
     """
     rows, step = of_law(table, law), len(variables(table)) + 2
     count = int(rows["run"].max()) // step + 1 if len(rows) else 0
-    found = np.full(count * step, np.nan)
-    found[rows["run"].to_numpy()] = measured(rows, column)
-    return found.reshape(count, step)
+    matrix = np.full(count * step, np.nan)
+    matrix[rows["run"].to_numpy()] = measured(rows, column)
+    return matrix.reshape(count, step)

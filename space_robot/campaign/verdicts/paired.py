@@ -93,13 +93,17 @@ def compare_all(table: DataFrame, column: str, confidence: float = 0.95) -> list
     flown = {
         law: ordered[ordered["law"] == law].set_index("run")["_value"] for law in laws_of(table)
     }
-    found = []
+    comparisons = []
     for law, other in itertools.combinations(flown, 2):
         both = flown[law].to_frame("a").join(flown[other].rename("b"), how="inner")
-        found.append(compare(both["a"].to_numpy(), both["b"].to_numpy(), confidence, law, other))
-    corrected = holm([p for c in found for p in (c.p_better, c.p_failed)])
+        comparisons.append(
+            compare(both["a"].to_numpy(), both["b"].to_numpy(), confidence, law, other)
+        )
+    corrected = holm([p for c in comparisons for p in (c.p_better, c.p_failed)])
     pairs = zip(corrected[::2], corrected[1::2], strict=True)
-    return [replace(c, p_better=p, p_failed=q) for c, (p, q) in zip(found, pairs, strict=True)]
+    return [
+        replace(c, p_better=p, p_failed=q) for c, (p, q) in zip(comparisons, pairs, strict=True)
+    ]
 
 
 def compare(
@@ -143,8 +147,8 @@ def _sign_test(one: int, two: int) -> float:
 def holm(p_values: list[float]) -> list[float]:
     """Correct p values for their number, so that one false finding in all keeps its probability."""
     order = np.argsort(p_values, kind="stable")
-    found, largest = [1.0] * len(p_values), 0.0
+    adjusted, largest = [1.0] * len(p_values), 0.0
     for place, index in enumerate(order.tolist()):
         largest = max(largest, min(1.0, (len(p_values) - place) * p_values[index]))
-        found[index] = largest
-    return found
+        adjusted[index] = largest
+    return adjusted

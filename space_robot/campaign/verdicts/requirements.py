@@ -154,6 +154,6 @@ def verdict(
     )
 
 
-def family_error(study: Study, found: list[Verdict]) -> float:
+def family_error(study: Study, verdicts: list[Verdict]) -> float:
     """Return the largest probability that any of some verdicts is false (Bonferroni)."""
-    return min(1.0, sum(1.0 - study.require[v.requirement].confidence for v in found))
+    return min(1.0, sum(1.0 - study.require[v.requirement].confidence for v in verdicts))

@@ -85,14 +85,14 @@ def sensitivity(
     correlations = rank_correlations(list(numbers.values()), ranked, confidence)
     by_name = dict(zip(numbers, zip(*correlations[:2], strict=True), strict=True))
     tested = {name: _by_groups(series, ranked) for name, series in variables.items()}
-    found = []
+    influences = []
     for (name, (spread, _)), p in zip(
         tested.items(), holm([p for _, p in tested.values()]), strict=True
     ):
         plain, partial = by_name.get(name, (None, None))
-        found.append(Influence(name, plain, partial, spread, p))
-    found.sort(key=_strength, reverse=True)
-    return Sensitivity(law, column.partition(".")[2], len(rows), found, correlations[2])
+        influences.append(Influence(name, plain, partial, spread, p))
+    influences.sort(key=_strength, reverse=True)
+    return Sensitivity(law, column.partition(".")[2], len(rows), influences, correlations[2])
 
 
 def _strength(influence: Influence) -> float:

@@ -49,5 +49,5 @@ def _interval(
 ) -> Interval:
     if n == 0:
         return Interval(0.0, 1.0)
-    found = binomtest(successes, n, alternative=side).proportion_ci(confidence, method="exact")
-    return Interval(float(found.low), float(found.high))
+    interval = binomtest(successes, n, alternative=side).proportion_ci(confidence, method="exact")
+    return Interval(float(interval.low), float(interval.high))

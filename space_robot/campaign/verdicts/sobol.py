@@ -69,7 +69,7 @@ def sobol_indices(
         bounds = np.nanquantile(
             np.array(drawn), shares, axis=0
         )  # low, high; first, total; variable
-    found = [
+    estimates = [
         SobolIndex(
             name,
             *(
@@ -79,8 +79,8 @@ def sobol_indices(
         )
         for i, name in enumerate(variables)
     ]
-    found.sort(key=lambda index: index.total.value, reverse=True)
-    return SobolIndices(law, metric, len(used), int(np.sum(~whole)), found)
+    estimates.sort(key=lambda index: index.total.value, reverse=True)
+    return SobolIndices(law, metric, len(used), int(np.sum(~whole)), estimates)
 
 
 def indices(values: Array) -> tuple[Array, Array]:

@@ -40,13 +40,13 @@ def parts(table: DataFrame, grid: Sequence[str]) -> list[GridPoint]:
     if not grid:
         return [GridPoint((), "", table)]
     columns = [f"vary.{name}" for name in grid]
-    found = []
+    parts = []
     for key, rows in table.groupby(columns, sort=False, dropna=False):
         values = tuple(_word(value) for value in key)
         names = (name.removeprefix("scenario.") for name in grid)
         point = ", ".join(f"{name} = {v}" for name, v in zip(names, values, strict=True))
-        found.append(GridPoint(values, point, rows))
-    return found
+        parts.append(GridPoint(values, point, rows))
+    return parts
 
 
 def _word(value: Any) -> str:
@@ -65,8 +65,8 @@ def of_law(table: DataFrame, law: str) -> DataFrame:
 
 def ended(table: DataFrame) -> Bools:
     """Tell of each row whether its flight came to its end."""
-    found: Bools = (table["outcome"] == COMPLETE).to_numpy(bool)
-    return found
+    is_complete: Bools = (table["outcome"] == COMPLETE).to_numpy(bool)
+    return is_complete
 
 
 def measured(table: DataFrame, column: str) -> Array:
@@ -75,8 +75,8 @@ def measured(table: DataFrame, column: str) -> Array:
     So it is where a flight did not come to its end, whatever the column says.
     """
     values = table[column].to_numpy(np.float64, na_value=np.nan)
-    found: Array = np.where(ended(table) & ~np.isnan(values), values, np.inf)
-    return found
+    with_failures: Array = np.where(ended(table) & ~np.isnan(values), values, np.inf)
+    return with_failures
 
 
 def turned(table: DataFrame, column: str, sign: float) -> DataFrame:

@@ -32,15 +32,15 @@ def degradation(
         fault_kinds: what was made to fail.
         realtime: whether it was flown by the wall clock.
     """
-    found = Degradation([], [])
+    degraded = Degradation([], [])
     for node, values in nodes.items():
         held = int(values.get("references_held", 0))
         if held and not fault_kinds & MISSION_FAULTS:
             text = f"{node} held the reference for {held} ticks, for the mission's did not come"
-            (found.warnings if realtime else found.failures).append(text)
-        found.warnings.extend(
+            (degraded.warnings if realtime else degraded.failures).append(text)
+        degraded.warnings.extend(
             f"{node} {key}: {count} messages"
             for key, count in values.items()
             if _NOT_USED.match(key)
         )
-    return found
+    return degraded

@@ -152,15 +152,15 @@ class _Follower:
         if self._stopped:
             raise InterruptedFlightError("stopped when the flight was complete", self._stopped[0])
         self._monitor.poll()  # the nodes' last reports
-        found = degradation(self._monitor.values, self._fault_kinds, self._realtime)
+        degraded = degradation(self._monitor.values, self._fault_kinds, self._realtime)
         return {
             "events": [
                 event._asdict() for event in sorted(self._events, key=lambda e: e.simulated_s)
             ],
             "nodes": self._monitor.values,
             "restarts": self._watch.restarts,
-            "failures": [*self._watch.failures, *found.failures],
-            "warnings": found.warnings,
+            "failures": [*self._watch.failures, *degraded.failures],
+            "warnings": degraded.warnings,
         }
 
     def _check_start(self) -> None:

@@ -56,8 +56,8 @@ class ForeignNodes:
             self._look_at = now + LOOK_S
             self._look(self._publishers())
 
-    def _look(self, found: Sequence[str]) -> None:
-        self._seen = Counter({what: self._seen[what] + 1 for what in found})
+    def _look(self, names: Sequence[str]) -> None:
+        self._seen = Counter({what: self._seen[what] + 1 for what in names})
         for what, times in self._seen.items():
             if times >= LASTING:
                 raise InputError(
@@ -67,10 +67,10 @@ class ForeignNodes:
     def _publishers(self) -> list[str]:
         from space_robot_msgs_py.ros.exclusive import foreign_publishers
 
-        found = foreign_publishers(
+        publishers = foreign_publishers(
             self._node, [topic.name for topic in topics.RECORDED], self._names
         )
-        return [f"{topic} is also published by {', '.join(n)}" for topic, n in found.items()]
+        return [f"{topic} is also published by {', '.join(n)}" for topic, n in publishers.items()]
 
     def _namesakes(self) -> list[str]:
         return [

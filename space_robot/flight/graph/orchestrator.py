@@ -118,8 +118,8 @@ def _claim(bag: Path) -> None:
 def _has_states(bag: Path, namespace: str) -> bool:
     """Tell if a tick was flown."""
     try:
-        found = Selection(open_bag(bag), {}, namespace).batches()
-        return any(topic is topics.JOINT_STATES for topic, _ in found)
+        batches = Selection(open_bag(bag), {}, namespace).batches()
+        return any(topic is topics.JOINT_STATES for topic, _ in batches)
     except (InputError, OSError):
         return False
 

@@ -63,13 +63,13 @@ def domain_of_plant(namespace: str) -> int:
     Raises:
         InputError: there is none, or more than one.
     """
-    found = sorted(domain for domain, _ in living_nodes(PLANT, namespace))
-    if len(found) != 1:
+    domains = sorted(domain for domain, _ in living_nodes(PLANT, namespace))
+    if len(domains) != 1:
         name = f"{namespace.rstrip('/')}/{PLANT}"
-        there = f"in ROS domains {', '.join(map(str, found))}" if found else "on this machine"
-        number = "several" if found else "no"
+        there = f"in ROS domains {', '.join(map(str, domains))}" if domains else "on this machine"
+        number = "several" if domains else "no"
         raise InputError(f"{number} {name} {there}: name one's ROS domain with --domain")
-    return found[0]
+    return domains[0]
 
 
 def _wait_for(node: Any, service: str, domain: int) -> None:

@@ -125,18 +125,18 @@ class Recording:
 
     def commands(self, names: tuple[str, ...]) -> ReplayedCommands:
         """The recorded answers; ``names``: see `RobotNames.commanded`."""
-        found = CommandList(names, self.timebase)
+        recorded = CommandList(names, self.timebase)
         for _, data in self._messages(topics.COMMAND) if self.has_commands else ():
-            found.add(data)
-        return found.commands()
+            recorded.add(data)
+        return recorded.commands()
 
     def laws(self) -> tuple[LawInForce, ...]:
         """The laws in force, with their gains, by rising tick; empty: not recorded."""
-        found = []
+        in_force = []
         for _, tick, data in self._of_ticks(topics.LAW):
             with suppress(MessageError):
-                found.append(LawCodec.decode(data, tick))
-        return in_order(found)
+                in_force.append(LawCodec.decode(data, tick))
+        return in_order(in_force)
 
     def states(
         self, parts: Sequence[Topic], start: int = 0, stop: float = math.inf

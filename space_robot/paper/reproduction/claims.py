@@ -55,11 +55,11 @@ def claims_table(records: Iterable[dict[str, Any]]) -> Table:
 def claims(results: Sequence[Result], comparison: Sequence[Cell]) -> list[Claim]:
     """Judge every claim whose flights are among the results."""
     paper = [c for c in comparison if c.definition == "mean_axis" and c.gains == "printed"]
-    found = list(_torques(paper))
-    found += _tracking(paper)
-    found += _chatter(results)
-    found += _robustness(paper)
-    return found
+    claims = list(_torques(paper))
+    claims += _tracking(paper)
+    claims += _chatter(results)
+    claims += _robustness(paper)
+    return claims
 
 
 def _torques(cells: Iterable[Cell]) -> Iterator[Claim]:

@@ -65,4 +65,4 @@ def figure_groups(rows: Sequence[TableRow], folder: FigureFolder) -> dict[str, l
             for row in rows
             if row.case == case
         ]
-    return {title: found for title, g in groups.items() if (found := folder.saved(g))}
+    return {title: files for title, g in groups.items() if (files := folder.saved(g))}

@@ -68,13 +68,13 @@ def cells_table(comparison: Sequence[Cell]) -> Table:
 
 def variant_tables(comparison: Sequence[Cell]) -> list[Table]:
     """Tabulate each variant flown by each definition, cells ``measured / printed (ratio)``."""
-    found = []
+    tables = []
     for definition, meaning in DEFINITIONS.items():
         for variant in VARIANTS:
             rows = _rows(comparison, variant, definition)
             if rows:
-                found.append(Table.of(f"{variant.title}; {meaning}", COLUMN_HEADS, rows))
-    return found
+                tables.append(Table.of(f"{variant.title}; {meaning}", COLUMN_HEADS, rows))
+    return tables
 
 
 def _rows(comparison: Sequence[Cell], variant: Variant, definition: str) -> list[list[str]]:
@@ -114,7 +114,7 @@ def chatter(results: Sequence[Result]) -> list[LawChatter]:
     ]
 
 
-def chatter_table(found: Sequence[LawChatter]) -> Table:
+def chatter_table(chatter: Sequence[LawChatter]) -> Table:
     """Tabulate the chatter of the laws."""
     names = ("base", "joints 1-3", "joints 4-6")
     columns = (
@@ -130,6 +130,6 @@ def chatter_table(found: Sequence[LawChatter]) -> Table:
             *(x.total_variation_per_s[column] for column in TORQUE),
             *(x.power_above_100_hz[column] for column in TORQUE),
         ]
-        for x in found
+        for x in chatter
     ]
     return Table.of("Chatter in case 1, printed friction", columns, rows)

@@ -20,7 +20,7 @@ from .time_delay_error import ErrorDerivative
 def report(study: StabilityStudy) -> dict[str, Any]:
     """Everything found; lists hold one entry an axis, in the order of ``axes``."""
     flight, lemma_1 = study.flight, study.lemma_1
-    found = {
+    content = {
         **{key: flight.description[key] for key in ("controller", "case", "gains", "robot")},
         "friction": flight.has_friction,
         "duration_s": flight.ticks * flight.period,
@@ -35,32 +35,32 @@ def report(study: StabilityStudy) -> dict[str, Any]:
         "time_delay_error": {"as_flown": study.error, "without_friction": study.frictionless_error},
         "super_twisting": study.super_twisting and _super_twisting(study.super_twisting),
     }
-    plain: dict[str, Any] = _plain(found)
+    plain: dict[str, Any] = _plain(content)
     return plain
 
 
-def _super_twisting(found: SuperTwisting) -> dict[str, Any]:
+def _super_twisting(twisting: SuperTwisting) -> dict[str, Any]:
     return {
-        "k_1": found.k_1,
-        "k_2": found.k_2,
-        "beta": found.beta,
-        "tolerated_beta": found.tolerated_beta,
-        "beta_below_k_2": found.k_2_above_beta,
-        "4_k_2_below_k_1_squared": found.k_1_squared_above_4_k_2,
-        "circle_criterion": found.circle_criterion,
+        "k_1": twisting.k_1,
+        "k_2": twisting.k_2,
+        "beta": twisting.beta,
+        "tolerated_beta": twisting.tolerated_beta,
+        "beta_below_k_2": twisting.k_2_above_beta,
+        "4_k_2_below_k_1_squared": twisting.k_1_squared_above_4_k_2,
+        "circle_criterion": twisting.circle_criterion,
         "lmi": {
-            "residual_of_paper_m_at_beta_0_gamma_0": found.paper_m_residual,
-            "paper_m_eigenvalues": found.paper_m_eigenvalues,
-            "measured_beta": found.measured_certificates,
-            "assumed_beta_half_of_tolerated": found.assumed_certificates,
+            "residual_of_paper_m_at_beta_0_gamma_0": twisting.paper_m_residual,
+            "paper_m_eigenvalues": twisting.paper_m_eigenvalues,
+            "measured_beta": twisting.measured_certificates,
+            "assumed_beta_half_of_tolerated": twisting.assumed_certificates,
         },
         "reaching": {
-            "initial_error": found.initial_error,
-            "initial_lyapunov_value": found.initial_values,
-            "threshold_of_s": found.reaching.threshold,
-            "beta_of_bound": [c and c.beta for c in found.certificates],
-            "beta_of_this_flight": found.reaching_beta,
-            "reaching_time_s_below_bound": found.reaching_time,
+            "initial_error": twisting.initial_error,
+            "initial_lyapunov_value": twisting.initial_values,
+            "threshold_of_s": twisting.reaching.threshold,
+            "beta_of_bound": [c and c.beta for c in twisting.certificates],
+            "beta_of_this_flight": twisting.reaching_beta,
+            "reaching_time_s_below_bound": twisting.reaching_time,
         },
     }
 

@@ -52,8 +52,8 @@ class Finder:
     def find(self) -> FlightPlace | None:
         """Return where a plant is, of several on this machine the one that began last."""
         if self._domain is not None:
-            found = sorted(self._publishing())
-            return FlightPlace(self._domain, found[0]) if found else None
+            places = sorted(self._publishing())
+            return FlightPlace(self._domain, places[0]) if places else None
         newest = newest_node(PLANT, self._namespace)
         return FlightPlace(*newest) if newest else None
 
@@ -78,12 +78,12 @@ class Finder:
         """Return the namespaces of the domain whose base state is published."""
         assert self._node is not None
         node, last = self._node.node, topics.BASE_STATE
-        found = set()
+        places = set()
         for name, types in node.get_topic_names_and_types():
             if last.type in types and name.endswith(f"/{last.name}"):
-                found.add(name.removesuffix(f"/{last.name}") or topics.ROOT)
-        wanted = {self._namespace} if self._namespace else found
-        return {n for n in found & wanted if node.count_publishers(last.in_namespace(n))}
+                places.add(name.removesuffix(f"/{last.name}") or topics.ROOT)
+        wanted = {self._namespace} if self._namespace else places
+        return {n for n in places & wanted if node.count_publishers(last.in_namespace(n))}
 
     def close(self) -> None:
         """Leave the domain."""

@@ -139,7 +139,7 @@ class TreeArrays:
 
     def bodies(self) -> list[Body]:
         """Return the tree that `of_tree` makes this robot of, as a walk down each branch."""
-        found = []
+        bodies = []
         for number in (0, *(joint + 1 for joint in self.order)):
             name = self.body_names[number]
             body = Body(
@@ -163,8 +163,8 @@ class TreeArrays:
                     spring=self.springs[passive] if passive >= 0 else None,
                 )
                 body = replace(body, parent=self.body_names[self.parent[j]], joint=joint)
-            found.append(body)
-        return found
+            bodies.append(body)
+        return bodies
 
 
 def _joint(moved: Moved) -> Joint:
@@ -174,8 +174,8 @@ def _joint(moved: Moved) -> Joint:
 
 def _numbered_tools(members: Sequence[Body]) -> tuple[Tool, ...]:
     """Return the tools of all bodies; a robot without any has one on its last body."""
-    found = [
+    numbered = [
         replace(tool, body=number) for number, body in enumerate(members) for tool in body.tools
     ]
-    found = found or [Tool("tool", np.eye(3), np.zeros(3), len(members) - 1)]
-    return tuple(sorted(found, key=lambda tool: tool.rank))
+    numbered = numbered or [Tool("tool", np.eye(3), np.zeros(3), len(members) - 1)]
+    return tuple(sorted(numbered, key=lambda tool: tool.rank))

@@ -46,7 +46,7 @@ def flatten(bodies: Sequence[Body], where: str = "robot") -> list[Moved]:
             mass or inertia once what is fixed to it is counted.
     """
     by_name = _check_names(bodies, where)
-    found: list[Moved] = []
+    flat: list[Moved] = []
     parts: list[list[Body]] = []
     place: dict[str, tuple[int, Array, Array]] = {}
     """Of each body: its carrier, and its own frame in the carrier's."""
@@ -64,16 +64,16 @@ def flatten(bodies: Sequence[Body], where: str = "robot") -> list[Moved]:
                 rotation = product(product(turned, joint.rotation), axes)
                 offset = product(rotation.T, at) + product(axes.T, joint.offset)
                 joint = replace(joint, rotation=rotation, offset=offset, axis=np.eye(3)[2])
-                place[body.name] = (len(found), axes.T, np.zeros(3))
+                place[body.name] = (len(flat), axes.T, np.zeros(3))
         number, rotation, at = place[body.name]
-        if number == len(found):
-            found.append(Moved(replace(body, joint=joint), 0 if joint is None else carrier))
+        if number == len(flat):
+            flat.append(Moved(replace(body, joint=joint), 0 if joint is None else carrier))
             parts.append([])
         parts[number].append(_moved_to(body, rotation, at))
-    for moved, members in zip(found, parts, strict=True):
+    for moved, members in zip(flat, parts, strict=True):
         moved.body = _merged(moved.body, members, where)
-    _put_base_at_com(found)
-    return found
+    _put_base_at_com(flat)
+    return flat
 
 
 def axes_with_z(axis: Array) -> Array:
@@ -87,8 +87,8 @@ def axes_with_z(axis: Array) -> Array:
 
 def parallel_axes(mass: float, arm: Array) -> Array:
     """Return what a mass (kg) at ``arm`` (3,), m, adds to the inertia about a point, kg m2."""
-    found: Array = mass * (product(arm, arm) * np.eye(3) - np.outer(arm, arm))
-    return found
+    parallel_axes: Array = mass * (product(arm, arm) * np.eye(3) - np.outer(arm, arm))
+    return parallel_axes
 
 
 def first_repeated(names: Iterable[str]) -> str | None:
@@ -187,12 +187,12 @@ def _about(body: Body, point: Array) -> Array:
     return body.inertia + parallel_axes(body.mass, body.com - point)
 
 
-def _put_base_at_com(found: list[Moved]) -> None:
-    shift = -found[0].body.com
+def _put_base_at_com(members: list[Moved]) -> None:
+    shift = -members[0].body.com
     if not shift.any():
         return
-    found[0].body = _moved_to(found[0].body, np.eye(3), shift)
-    for moved in found[1:]:
+    members[0].body = _moved_to(members[0].body, np.eye(3), shift)
+    for moved in members[1:]:
         joint = moved.body.joint
         if moved.parent == 0 and joint:
             offset = joint.offset + product(joint.rotation.T, shift)

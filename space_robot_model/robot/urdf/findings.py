@@ -102,16 +102,16 @@ class Report:
 
     def only(self, element: Element, tag: str, part: str) -> Element | None:
         """Return the child with a tag, None if there is none; a second one is a defect."""
-        found = list(element.all(tag))
-        for again in found[1:]:
+        elements = list(element.all(tag))
+        for again in elements[1:]:
             self.repaired(
                 again.line,
                 part,
                 f"<{tag}> stands there twice",
-                f"line {found[0].line} and here",
+                f"line {elements[0].line} and here",
                 "the first one holds",
             )
-        return found[0] if found else None
+        return elements[0] if elements else None
 
 
 def short_tag(tag: str) -> str:

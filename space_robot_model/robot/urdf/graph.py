@@ -40,11 +40,11 @@ class Tree:
 
     def carriers(self) -> dict[str, str]:
         """Return for each link the one, itself perhaps, whose joint moves it; base if none."""
-        found = {self.base: self.base}
+        carriers = {self.base: self.base}
         for name in self.order[1:]:
             edge = self.edges[name]
-            found[name] = name if edge.moves else found[edge.parent]
-        return found
+            carriers[name] = name if edge.moves else carriers[edge.parent]
+        return carriers
 
     def leaves(self) -> set[str]:
         """Return the links that carry no other one."""

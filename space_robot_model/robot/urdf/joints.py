@@ -63,16 +63,16 @@ def read_joints(
     robot: Element, links: Mapping[str, UrdfLink], report: Report
 ) -> dict[str, UrdfJoint]:
     """Return all joints by their names, in the order of the file."""
-    found: dict[str, UrdfJoint] = {}
+    joints: dict[str, UrdfJoint] = {}
     for element in robot.all("joint"):
         name = read_name(element, report)
         part = f"joint {short(name)}"
-        if name in found:
+        if name in joints:
             raise report.error(
-                element.line, part, f"the name is taken by the joint in line {found[name].line}"
+                element.line, part, f"the name is taken by the joint in line {joints[name].line}"
             )
-        found[name] = _joint(element, name, links, Fields(report, part))
-    return found
+        joints[name] = _joint(element, name, links, Fields(report, part))
+    return joints
 
 
 def _joint(element: Element, name: str, links: Mapping[str, UrdfLink], fields: Fields) -> UrdfJoint:
@@ -201,7 +201,7 @@ def _friction(element: Element | None, fields: Fields) -> JointFriction:
     if element is None:
         return JointFriction()
     fields.report.check_content(element, fields.part, (), ("damping", "friction"))
-    found = {}
+    coefficients = {}
     for name in ("friction", "damping"):
         value = fields.number(element, name, 0.0)
         if value < 0.0:
@@ -212,5 +212,5 @@ def _friction(element: Element | None, fields: Fields) -> JointFriction:
                 element.attributes[name],
                 "read as 0",
             )
-        found[name] = max(value, 0.0)
-    return JointFriction(coulomb=found["friction"], viscous=found["damping"])
+        coefficients[name] = max(value, 0.0)
+    return JointFriction(coulomb=coefficients["friction"], viscous=coefficients["damping"])

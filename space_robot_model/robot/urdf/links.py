@@ -52,19 +52,19 @@ def read_links(
     robot: Element, colours: Colours, folder: Path, report: Report
 ) -> dict[str, UrdfLink]:
     """Return all links by their names, in the order of the file."""
-    found: dict[str, UrdfLink] = {}
+    links: dict[str, UrdfLink] = {}
     for element in robot.all("link"):
         name = read_name(element, report)
-        if name in found:
+        if name in links:
             raise report.error(
                 element.line,
                 f"link {short(name)}",
-                f"the name is taken by the link in line {found[name].line}",
+                f"the name is taken by the link in line {links[name].line}",
             )
-        found[name] = _link(element, name, colours, folder, report)
-    if not found:
+        links[name] = _link(element, name, colours, folder, report)
+    if not links:
         raise report.error(robot.line, "robot", "there is no <link>")
-    return found
+    return links
 
 
 def read_name(element: Element, report: Report) -> str:

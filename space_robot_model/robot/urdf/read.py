@@ -95,7 +95,7 @@ def parse_urdf(
     return UrdfRobot(name, bodies, tuple(report.sorted()), text)
 
 
-def with_springs(found: UrdfRobot, springs: Mapping[str, Spring], where: str) -> UrdfRobot:
+def with_springs(urdf: UrdfRobot, springs: Mapping[str, Spring], where: str) -> UrdfRobot:
     """Return the robot with some of its joints held by springs in the place of motors.
 
     URDF knows no springs. Their damping takes the place of that in ``<dynamics>``.
@@ -103,11 +103,11 @@ def with_springs(found: UrdfRobot, springs: Mapping[str, Spring], where: str) ->
     Raises:
         InputError: one of the names is no joint that moves.
     """
-    moving = [body.joint.name for body in found.bodies if body.joint and body.joint.kind != "fixed"]
+    moving = [body.joint.name for body in urdf.bodies if body.joint and body.joint.kind != "fixed"]
     for name in springs:
         one_of(name, moving, "passive joint", f" of {where}")
     bodies = []
-    for body in found.bodies:
+    for body in urdf.bodies:
         if body.joint and body.joint.name in springs:
             coulomb = body.joint.friction.coulomb
             joint = replace(
@@ -117,7 +117,7 @@ def with_springs(found: UrdfRobot, springs: Mapping[str, Spring], where: str) ->
             )
             body = replace(body, joint=joint)
         bodies.append(body)
-    return replace(found, bodies=bodies)
+    return replace(urdf, bodies=bodies)
 
 
 def _robot_name(root: Element, path: Path, report: Report) -> str:
@@ -158,10 +158,10 @@ def _check_counts(root: Element, report: Report) -> None:
 
 
 def _all_elements(root: Element) -> list[Element]:
-    found = [root]
-    for element in found:
-        found += element.children
-    return found
+    elements = [root]
+    for element in elements:
+        elements += element.children
+    return elements
 
 
 def _check_moving(tree: Tree, report: Report) -> None:

@@ -25,7 +25,7 @@ def read_colours(robot: Element, report: Report) -> Colours:
         for visual in link.all("visual")
         for material in visual.all("material")
     ]
-    found: Colours = {}
+    colours: Colours = {}
     for material in [*in_visuals, *robot.all("material")]:
         name = material.attributes.get("name", "")
         try:
@@ -34,23 +34,23 @@ def read_colours(robot: Element, report: Report) -> Colours:
             _left_out(material, f"material {short(name)}", error, "the colour", report)
         else:
             if name and colour:
-                found[name] = colour
-    return found
+                colours[name] = colour
+    return colours
 
 
 def read_visuals(
     link: Element, part: str, colours: Colours, folder: Path, report: Report
 ) -> tuple[Visual, ...]:
     """Return the shapes of a link; one that makes no sense is a defect and left out."""
-    found = []
+    visuals = []
     for element in link.all("visual"):
         fields = Fields(Report(report.where), part)
         try:
-            found.append(_visual(element, fields, colours, folder))
+            visuals.append(_visual(element, fields, colours, folder))
         except InputError as error:
             _left_out(element, part, error, "the shape", report)
         report.findings += fields.report.findings
-    return tuple(found)
+    return tuple(visuals)
 
 
 def _visual(element: Element, fields: Fields, colours: Colours, folder: Path) -> Visual:
