@@ -136,8 +136,8 @@ class RecorderLoop:
         if self._until_ns is not None:
             return
         self._until_ns = time.time_ns()
-        told = last_arrival = time.monotonic()
-        while time.monotonic() < min(last_arrival + SILENCE_S, told + DRAIN_S):
+        begun = last_arrival = time.monotonic()
+        while time.monotonic() < min(last_arrival + SILENCE_S, begun + DRAIN_S):
             is_timely, busy = self._take_round()
             self._recorder.flush_if_due()
             if is_timely or self._recorder.is_behind:

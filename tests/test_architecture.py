@@ -66,6 +66,7 @@ LOOSE = {
     "space_robot": {"__main__"},
 }
 """The rooms that are a module in the package's own folder; all others are folders."""
+VAGUE = {"found", "given", "told"}
 UPPER = re.compile(r"space_robot_(sim|control|model)\b|\b(plant|controller|mission)_node\b")
 
 
@@ -170,3 +171,15 @@ def test_no_class_name_stands_for_two_things() -> None:
                 places.setdefault(node.name, []).append(file)
     twice = {name: files for name, files in places.items() if len(files) > 1}
     assert set(twice) <= {"Gains", "Memory"}, twice
+
+
+def test_no_variable_is_called_found_given_or_told() -> None:
+    """Such a name says where its value is from; it should say what it is."""
+    broken = [
+        f"{file}:{node.lineno}"
+        for file in modules().values()
+        for node in ast.walk(ast.parse((ROOT / file).read_text("utf-8")))
+        if (isinstance(node, ast.arg) and node.arg in VAGUE)
+        or (isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node.id in VAGUE)
+    ]
+    assert not broken, broken

@@ -120,9 +120,9 @@ class MissedDeadlines(Metric):
         Drives give another torque than commanded, an echo tells another one, and in time: what
         counts is that neither is as commanded.
         """
-        told = log.as_measured()
-        measured = measured_rows(told, self._before)
-        self._before, self._unanswered = last_rows(told, 1), log.unanswered
+        reported = log.as_measured()
+        measured = measured_rows(reported, self._before)
+        self._before, self._unanswered = last_rows(reported, 1), log.unanswered
         if log.commanded_torque is None:
             return
         self._known += int(np.count_nonzero(np.isfinite(log.commanded_torque[:, 0])))
@@ -134,8 +134,8 @@ class MissedDeadlines(Metric):
         limit = self._limits.of_axes(log.axes)
         commanded = np.clip(commands[: log.ticks - first], -limit, limit)
         known = np.isfinite(commanded).all(axis=1) & measured[first:]
-        differ = self._differ(told, first, commanded) & known
-        if told is not log:
+        differ = self._differ(reported, first, commanded) & known
+        if reported is not log:
             differ &= self._differ(log, first, commanded)
         self.differing += int(np.count_nonzero(differ))
         self.compared += int(np.count_nonzero(known))

@@ -57,12 +57,12 @@ class BaseDemand:
 
     def _asked(self, log: FlightLog) -> Array:
         """Return the torque commanded for the interval before each row, or else the one given."""
-        given = log.applied_torque[:, :3]
+        torque = log.applied_torque[:, :3]
         if log.commanded_torque is None:
-            return given
+            return torque
         commands = np.concatenate([self._command, log.commanded_torque[:, :3]])
         self._command = commands[-1:].copy()
-        return np.where(np.isfinite(commands[:-1]), commands[:-1], given)
+        return np.where(np.isfinite(commands[:-1]), commands[:-1], torque)
 
     def _given(self, log: FlightLog, axes: Array, torque: Array) -> Array:
         """Return what the wheels must have taken up, by the mean of an interval's two attitudes."""

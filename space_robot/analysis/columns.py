@@ -78,12 +78,12 @@ def _columns(log: FlightLog) -> Iterator[tuple[list[str], Array]]:
         yield _of_joints("{}_position", names, slides), positions
         yield _of_joints("{}_velocity", names, slides, "_s"), velocities
     yield _with_units("applied_torque", axes, torques), log.applied_torque
-    if (told := log.measured) is not None:
-        yield _each("measured_q", WXYZ), told.quaternion
-        yield _each("measured_omega_base", XYZ, "rad_s"), told.omega_base
-        yield _of_joints("measured_position_{}", joints, lengths), told.joint_positions
-        yield _of_joints("measured_velocity_{}", joints, lengths, "_s"), told.joint_velocities
-        yield _with_units("reported_torque", axes, torques), told.applied_torque
+    if (measured := log.measured) is not None:
+        yield _each("measured_q", WXYZ), measured.quaternion
+        yield _each("measured_omega_base", XYZ, "rad_s"), measured.omega_base
+        yield _of_joints("measured_position_{}", joints, lengths), measured.joint_positions
+        yield _of_joints("measured_velocity_{}", joints, lengths, "_s"), measured.joint_velocities
+        yield _with_units("reported_torque", axes, torques), measured.applied_torque
     if log.believed_error is not None:
         yield _each("believed_error_q", XYZ), log.believed_error[:, :3]
         yield _of_joints("believed_error_{}", joints, lengths), log.believed_error[:, 3:]

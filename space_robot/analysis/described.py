@@ -159,27 +159,35 @@ def event_times(log: FlightLog) -> Array:
 
 def _plant_settings(log: FlightLog, keys: Sequence[str] = ()) -> PlantNodeSettings:
     """Return the plant's settings; if all ``keys`` are given, nothing but these is looked at."""
-    given = _parameters(log, PlantNodeSettings.node)
-    if not given:
-        given = {key: log.flight[key] for key in ("robot", "case", "mission") if key in log.flight}
-    if not given:
+    parameters = _parameters(log, PlantNodeSettings.node)
+    if not parameters:
+        parameters = {
+            key: log.flight[key] for key in ("robot", "case", "mission") if key in log.flight
+        }
+    if not parameters:
         raise NotDescribedError("the bag does not say what the plant was told")
-    if keys and all(key in given for key in keys):
-        given = {key: given[key] for key in keys}
-    given = _without_told_robot(log, given)
-    _check_files(log, given)
+    if keys and all(key in parameters for key in keys):
+        parameters = {key: parameters[key] for key in keys}
+    parameters = _without_told_robot(log, parameters)
+    _check_files(log, parameters)
     # their numbers are in the bag, while their files may be elsewhere
-    given = {key: value for key, value in given.items() if key not in ("actuators", "sensors")}
-    return PlantNodeSettings.resolve(given)
+    parameters = {
+        key: value for key, value in parameters.items() if key not in ("actuators", "sensors")
+    }
+    return PlantNodeSettings.resolve(parameters)
 
 
-def _without_told_robot(log: FlightLog, given: Mapping[str, Any]) -> dict[str, Any]:
+def _without_told_robot(log: FlightLog, parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Leave out the files of a robot and a mission all of which the bag tells."""
-    told = {
+    files = {
         "robot": isinstance(log.flight.get("robot_file"), dict),
         "mission": "waypoints_deg" in _parameters(log, "mission"),
     }
-    return {key: value for key, value in given.items() if not told.get(key) or is_plain(str(value))}
+    return {
+        key: value
+        for key, value in parameters.items()
+        if not files.get(key) or is_plain(str(value))
+    }
 
 
 def estimator(log: FlightLog) -> tuple[HBar, float]:
@@ -220,8 +228,8 @@ def base_actuators_of(log: FlightLog) -> BaseActuatorSettings:
     Raises:
         InputError: what the bag tells cannot be.
     """
-    told = log.flight.get("base_actuators", {})
-    return validate(BaseActuatorSettings, told, "base_actuators of the bag")
+    recorded = log.flight.get("base_actuators", {})
+    return validate(BaseActuatorSettings, recorded, "base_actuators of the bag")
 
 
 def flown_actuators(log: FlightLog) -> BaseActuatorSettings:
@@ -236,8 +244,8 @@ def flown_actuators(log: FlightLog) -> BaseActuatorSettings:
     counts = log.wheel_velocities.shape[1], log.thrusts.shape[1]
     if counts != (actuators.wheel_count, actuators.thruster_count):
         raise NotDescribedError(
-            f"the bag describes {actuators.wheel_count} wheels and {actuators.thruster_count} thrusters, "
-            f"and has the states of {counts[0]} and {counts[1]}"
+            f"the bag describes {actuators.wheel_count} wheels and {actuators.thruster_count} "
+            f"thrusters, and has the states of {counts[0]} and {counts[1]}"
         )
     return actuators
 
@@ -284,14 +292,14 @@ def _described_h_bar(log: FlightLog) -> Array:
     return np.broadcast_to(h_bar, log.axes)
 
 
-def _check_files(log: FlightLog, given: Mapping[str, Any]) -> None:
+def _check_files(log: FlightLog, parameters: Mapping[str, Any]) -> None:
     """See that nothing but what is shipped is read, unless the bag is trusted."""
     if not log.trusted:
         for what in ("robot", "case", "mission", "gains", "sensors", "actuators"):
-            check_file(what, str(given.get(what, "")))
+            check_file(what, str(parameters.get(what, "")))
 
 
 def _parameters(log: FlightLog, node: str) -> dict[str, Any]:
     parameters = log.flight.get("parameters")
-    given = parameters.get(node) if isinstance(parameters, dict) else None
-    return dict(given) if isinstance(given, dict) else {}
+    own = parameters.get(node) if isinstance(parameters, dict) else None
+    return dict(own) if isinstance(own, dict) else {}

@@ -117,8 +117,8 @@ class EstimateErrors:
         as_measured = log.as_measured()
         measured = np.concatenate([self._measured, measured_rows(as_measured, self._before)])
         rows, true = self._true.of(log)
-        told = true if as_measured is log else self._told.of(as_measured)[1]
-        estimates = self._estimate.of(told)
+        as_told = true if as_measured is log else self._told.of(as_measured)[1]
+        estimates = self._estimate.of(as_told)
         if self._last is not None:
             estimates = np.concatenate([self._last, estimates])
         known = slice(len(true) - len(estimates) + 1, len(true))

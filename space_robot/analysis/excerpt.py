@@ -32,18 +32,18 @@ def excerpt(log: FlightLog, from_s: float | None, to_s: float | None) -> FlightL
     period = log.timebase.period
     begin, end = log.first_tick * period, (log.first_tick + log.ticks) * period
     low, high = begin if from_s is None else from_s, end if to_s is None else to_s
-    given = " ".join(
+    limits = " ".join(
         f"--{name} {value:g}"
         for name, value in (("from", from_s), ("to", to_s))
         if value is not None
     )
     if low >= high and None not in (from_s, to_s):
-        raise InputError(f"{given}: the start must come before the end")
+        raise InputError(f"{limits}: the start must come before the end")
     if not (begin - ROUNDING * period <= low < end and begin < high <= end + ROUNDING * period):
-        raise InputError(f"{given}: outside the flight, which lasts from {begin:g} to {end:g} s")
+        raise InputError(f"{limits}: outside the flight, which lasts from {begin:g} to {end:g} s")
     first, stop = (math.ceil(t / period - ROUNDING) - log.first_tick for t in (low, high))
     if first >= stop:
-        raise InputError(f"{given}: no tick lies between (one every {period:g} s)")
+        raise InputError(f"{limits}: no tick lies between (one every {period:g} s)")
     cut = log.rows(first, stop)
     if cut.commanded_torque is not None:
         cut.unanswered = int(np.count_nonzero(np.isnan(cut.commanded_torque[:, 0])))

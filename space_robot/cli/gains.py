@@ -152,8 +152,8 @@ def _command(context: click.Context) -> str:
             words.append(option.opts[0])
             continue
         if name == "parameters":
-            given = [(f"{n}.{key}", v) for n, own in value.items() for key, v in own.items()]
-            value = [f"{parameter}={json.dumps(v)}" for parameter, v in given]
+            parameters = [(f"{n}.{key}", v) for n, own in value.items() for key, v in own.items()]
+            value = [f"{parameter}={json.dumps(v)}" for parameter, v in parameters]
         for each in value if isinstance(value, (list, tuple)) else [value]:
             words += [option.opts[0], str(each)]
     return shlex.join(["space-robot", "gains", "tune", *words])

@@ -114,8 +114,8 @@ def launched_flight(values: Mapping[str, str]) -> LaunchedFlight:
     """
     words = []
     for option in _plan.params:
-        if isinstance(option, click.Option) and (given := values.get(_name(option), "")):
-            words += _words(option, given)
+        if isinstance(option, click.Option) and (text := values.get(_name(option), "")):
+            words += _words(option, text)
     if file := values.get(PARAMS_FILE, ""):
         words += _words_of_file(Path(file))
     try:
@@ -127,12 +127,12 @@ def launched_flight(values: Mapping[str, str]) -> LaunchedFlight:
     return launched
 
 
-def _words(option: click.Option, given: str) -> list[str]:
+def _words(option: click.Option, argument: str) -> list[str]:
     if option.is_flag:
-        if _TRUTH[given.lower()]:
+        if _TRUTH[argument.lower()]:
             return option.opts[:1]
         return option.secondary_opts[:1]
-    texts = shlex.split(given) if option.multiple else [given]
+    texts = shlex.split(argument) if option.multiple else [argument]
     return [f"{max(option.opts, key=len)}={text}" for text in texts]
 
 

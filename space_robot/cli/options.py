@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 Decorator = Callable[[Any], Any]
 
 
-def _remap(context: click.Context, option: click.Parameter, given: Any) -> dict[str, str]:
+def _remap(context: click.Context, option: click.Parameter, texts: Any) -> dict[str, str]:
     """``/arm/states:=/joint_states`` to ``{"/arm/states": "/joint_states"}``."""
     from space_robot_msgs_py.config.validation import one_of
     from space_robot_msgs_py.topics import BY_NAME
 
     remap = {}
-    for text in given:
+    for text in texts:
         theirs, sign, ours = text.partition(":=")
         if not (theirs and sign and ours):
             raise click.BadParameter(
@@ -69,16 +69,16 @@ TRUST = click.option(
 
 
 def _list_faults(
-    context: click.Context, option: click.Parameter, given: Sequence[str]
+    context: click.Context, option: click.Parameter, texts: Sequence[str]
 ) -> Sequence[str]:
-    if list(given) == ["list"]:
+    if list(texts) == ["list"]:
         from space_robot_sim.faults.grammar import help_lines
 
         from ..scenario.faults import KINDS
 
         click.echo("\n".join(help_lines(KINDS)))
         context.exit()
-    return given
+    return texts
 
 
 def _robot_options(function: Any) -> Any:

@@ -15,21 +15,22 @@ from ..console.terminal import say
 from ..console.terminal_tables import print_table
 
 
-def print_robot(told: dict[str, Any], findings: Sequence[Finding], console: Console) -> None:
+def print_robot(description: dict[str, Any], findings: Sequence[Finding], console: Console) -> None:
     """Print what `space_robot_model.robot.described.describe` tells of a robot."""
-    passive = len(told["passive_names"])
+    passive = len(description["passive_names"])
     say(
         console,
-        f"robot {told['name']}: {told['mass']:g} kg, {len(told['joint_names'])} joints with a "
-        f"motor{f', {passive} with a spring' if passive else ''}",
+        f"robot {description['name']}: {description['mass']:g} kg, "
+        f"{len(description['joint_names'])} joints with a motor"
+        f"{f', {passive} with a spring' if passive else ''}",
     )
     if findings:
         print_defects(findings, console, are_repaired=True)
-    print_table(_bodies(told), console)
-    print_table(_joints(told), console)
-    print_table(_tools(told), console)
-    if told["shapes"]:
-        print_table(_shapes(told), console)
+    print_table(_bodies(description), console)
+    print_table(_joints(description), console)
+    print_table(_tools(description), console)
+    if description["shapes"]:
+        print_table(_shapes(description), console)
 
 
 def print_defects(
@@ -45,7 +46,7 @@ def print_defects(
     print_table(Table.of("Defects", columns, rows), console)
 
 
-def _bodies(told: dict[str, Any]) -> Table:
+def _bodies(description: dict[str, Any]) -> Table:
     columns = [
         Column("body", is_label=True),
         Column("moved by", is_label=True),
@@ -61,14 +62,14 @@ def _bodies(told: dict[str, Any]) -> Table:
             _vector(body["com"]),
             _vector(body["principal_moments"]),
         ]
-        for body in told["bodies"]
+        for body in description["bodies"]
     ]
     note = "With all that is fixed to it; its frame is its joint's, whose axis is z."
     return Table("Bodies", columns, [Group(rows)], [note])
 
 
-def _joints(told: dict[str, Any]) -> Table:
-    joints = told["joints"]
+def _joints(description: dict[str, Any]) -> Table:
+    joints = description["joints"]
     columns = {
         "joint": [joint["name"] for joint in joints],
         "kind": [joint["kind"] for joint in joints],
@@ -109,17 +110,19 @@ def _limit(joint: dict[str, Any], name: str) -> str | None:
     return f"{value:.5g} {'N' if unit == 'm' else 'N m'}"
 
 
-def _coefficients(told: dict[str, float] | None) -> str | None:
-    return ", ".join(f"{value:.4g}" for value in told.values()) if told else None
+def _coefficients(description: dict[str, float] | None) -> str | None:
+    return ", ".join(f"{value:.4g}" for value in description.values()) if description else None
 
 
-def _tools(told: dict[str, Any]) -> Table:
+def _tools(description: dict[str, Any]) -> Table:
     columns = [Column("tool", is_label=True), Column("body", is_label=True), Column("place", "m")]
-    rows = [[tool["name"], tool["body"], _vector(tool["position"])] for tool in told["tools"]]
+    rows = [
+        [tool["name"], tool["body"], _vector(tool["position"])] for tool in description["tools"]
+    ]
     return Table("Tools", columns, [Group(rows)], ["The first one is that of tool_pose."])
 
 
-def _shapes(told: dict[str, Any]) -> Table:
+def _shapes(description: dict[str, Any]) -> Table:
     columns = [
         Column("body", is_label=True),
         Column("shape", is_label=True),
@@ -133,7 +136,7 @@ def _shapes(told: dict[str, Any]) -> Table:
             _vector(seen["size"]),
             seen.get("mesh", "") + ("" if seen.get("found", True) else " (not there)"),
         ]
-        for seen in told["shapes"]
+        for seen in description["shapes"]
     ]
     return Table.of("Shapes", columns, rows)
 

@@ -25,11 +25,11 @@ class NameOrNumbers(click.ParamType[Any]):
 
 
 def parameters(
-    context: click.Context, option: click.Parameter, given: Any
+    context: click.Context, option: click.Parameter, texts: Any
 ) -> dict[str, dict[str, Any]]:
     """``plant.hold_ticks=40`` to ``{"plant": {"hold_ticks": 40}}``, over the scenario's."""
     tree: dict[str, dict[str, Any]] = context.meta.pop(_SCENARIO_PARAMETERS, {})
-    for text in given:
+    for text in texts:
         _set(tree, text, "--set")
     return tree
 
@@ -73,24 +73,24 @@ def scenario(context: click.Context, option: click.Parameter, path: Path | None)
     context.default_map = {**(context.default_map or {}), **values}
 
 
-def _scenario_parameters(given: Any, where: str) -> dict[str, dict[str, Any]]:
+def _scenario_parameters(content: Any, where: str) -> dict[str, dict[str, Any]]:
     """``parameters`` of a scenario: by node and name, or as ``--set`` has them."""
     from space_robot_msgs_py.config.trees import flatten, nest
     from space_robot_msgs_py.config.validation import one_of, short
     from space_robot_msgs_py.errors import InputError
 
     tree: dict[str, dict[str, Any]] = {}
-    if isinstance(given, list) and all(isinstance(text, str) for text in given):
-        for text in given:
+    if isinstance(content, list) and all(isinstance(text, str) for text in content):
+        for text in content:
             _set(tree, text, f"{where}: parameters")
-    elif isinstance(given, dict) and all(isinstance(values, dict) for values in given.values()):
-        for node, values in given.items():
+    elif isinstance(content, dict) and all(isinstance(values, dict) for values in content.values()):
+        for node, values in content.items():
             one_of(node, NODES, "node", f" in {where}: parameters")
             tree[node] = dict(flatten(nest(values)))
     else:
         raise InputError(
             f"{where}: parameters: a mapping of nodes to their parameters was expected, "
-            f"got {short(given)}"
+            f"got {short(content)}"
         )
     return tree
 

@@ -133,8 +133,8 @@ def sweep(
         save_figure(figure(found), out / "sweep")
     if failed := [row for row in rows if not row.is_complete]:
         task, reason = failed[0].task, failed[0].reason
-        told = f"the first, run {task.run} under {task.law}: {reason}"
-        click.echo(f"{len(failed)} of {len(rows)} flights failed, {told}", err=True)
+        first = f"the first, run {task.run} under {task.law}: {reason}"
+        click.echo(f"{len(failed)} of {len(rows)} flights failed, {first}", err=True)
     put_json({"cells": as_records(found)}, as_json, output)
     if not as_json:
         print_table(table, terminal())

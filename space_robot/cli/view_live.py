@@ -28,8 +28,8 @@ def check_options(context: click.Context, live: bool, bags: Collection[object]) 
         raise InputError("a BAG was expected, or --live without one")
     for option in context.command.params:
         name = option.name or ""
-        given = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
-        if given and name not in ("bags", *OF_BOTH) and (name in OF_LIVE) != live:
+        is_typed = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        if is_typed and name not in ("bags", *OF_BOTH) and (name in OF_LIVE) != live:
             other = "recorded flights" if live else "--live"
             raise InputError(f"{option.opts[0]} is for {other} only")
 

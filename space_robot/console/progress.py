@@ -80,8 +80,8 @@ def rated_progress(what: str, line_s: float = LINE_S) -> Iterator[Callable[[int,
             nonlocal progress, told_at
             if not console.is_terminal and time.monotonic() >= told_at + line_s:
                 told_at = time.monotonic()
-                told = f"{what} {done}/{total}"
-                say(console, f"{told}, {remark}" if remark else told)
+                line = f"{what} {done}/{total}"
+                say(console, f"{line}, {remark}" if remark else line)
             if progress is None:
                 remarks = TextColumn("{task.fields[remark]}", markup=False)
                 counts = "{task.completed:.0f}/{task.total:.0f}"

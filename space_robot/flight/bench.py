@@ -227,10 +227,10 @@ class Bench(RecordOwner):
 
     def _command_of(self, torque: ArrayLike) -> Command:
         """Return the command of numbers that somebody else gives."""
-        numbers, given = as_numbers(torque, "torque"), self._given
+        numbers, torques = as_numbers(torque, "torque"), self._given
         if numbers.shape == self._shape:
-            given.torque[:] = numbers
-            return given
+            torques.torque[:] = numbers
+            return torques
         if numbers.shape != (self.axes,):
             counts = " or ".join(str(count) for count in sorted({self.axes, *self._shape}))
             raise InputError(

@@ -97,8 +97,8 @@ class Flight:
             return assumed
         if name != GIVEN:
             return assumed_actuators(name, robot)
-        given = self.plan.actuators if isinstance(self.plan.actuators, dict) else {}
-        own = {key: given[key] for key in BaseActuatorSettings.model_fields if key in given}
+        numbers = self.plan.actuators if isinstance(self.plan.actuators, dict) else {}
+        own = {key: numbers[key] for key in BaseActuatorSettings.model_fields if key in numbers}
         actuators = validate(BaseActuatorSettings, own, "actuators")
         actuators.check(robot, GIVEN)
         return actuators

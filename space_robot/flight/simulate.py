@@ -94,13 +94,13 @@ class Messages:
         assert log.telemetry is not None
         record, flight = self.record, self._flight
         laws = [law for law in log.laws if start <= law.tick < stop]
-        told = log.as_measured()
+        measured = log.as_measured()
         for tick in range(start, stop):
             self.begin_tick(tick)
-            parts = self._states.encode(told.state(tick))
+            parts = self._states.encode(measured.state(tick))
             for topic, data in zip(self._states.topics, parts, strict=True):
                 record(topic, data)
-            if told is not log:
+            if measured is not log:
                 self.update_true_state(log.state(tick))
             self.show(tick, log.state)
             if tick >= answered:
@@ -294,8 +294,8 @@ def _note_beliefs(flight: Flight, block: FlightLog, start: int, stop: int) -> No
         return
     assert block.telemetry is not None
     every = flight.controller_settings.telemetry_decimation
-    told = slice(-(-start // every) * every - block.first_tick, stop - block.first_tick, every)
-    block.believed_error[told] = block.telemetry[told, SIGNALS.index("e")]
+    rows = slice(-(-start // every) * every - block.first_tick, stop - block.first_tick, every)
+    block.believed_error[rows] = block.telemetry[rows, SIGNALS.index("e")]
 
 
 def _ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:

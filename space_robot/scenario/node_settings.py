@@ -57,7 +57,7 @@ class FlightSettings(NamedTuple):
     recorder: RecorderNodeSettings
     gains: dict[str, Tree]
     """Gains by law; they come over those of the gain set."""
-    given: dict[str, tuple[str, ...]]
+    overrides: dict[str, tuple[str, ...]]
     """Dotted names of the settings given to each node, over its files."""
 
     @classmethod
@@ -68,49 +68,49 @@ class FlightSettings(NamedTuple):
             InputError: a parameter that is wrong, or that cannot be set so.
         """
         check_may_be_set(parameters)
-        given = {
+        overrides = {
             node: dict(flatten(nest({**options.get(node, {}), **parameters.get(node, {})})))
             for node in NODES
         }
-        plant = PlantNodeSettings.resolve(given["plant"])
-        mission = MissionNodeSettings.resolve(given["mission"])
+        plant = PlantNodeSettings.resolve(overrides["plant"])
+        mission = MissionNodeSettings.resolve(overrides["mission"])
         for node in (plant, mission):  # a file that is not shipped: a bag tells all of it
             for file in mission_layers(node.robot, node.mission):
                 if config_directory() not in file.parents:
-                    told = dict(flatten(node_parameters(file, node.node)))
-                    given[node.node] = {**told, **given[node.node]}
+                    of_file = dict(flatten(node_parameters(file, node.node)))
+                    overrides[node.node] = {**of_file, **overrides[node.node]}
         if events := [str(event) for event in plant.parsed_events]:  # their files' numbers too
-            given["plant"]["events"] = events
+            overrides["plant"]["events"] = events
             plant = plant.model_copy(update={"events": events})
-        given["controller"].setdefault("actuators", plant.actuators)
+        overrides["controller"].setdefault("actuators", plant.actuators)
         if plant.realtime:  # by the wall clock there is no time to wait
-            given["controller"] = {"reference_timeout": 0.0, **given["controller"]}
-        own, gains = split_gains(given["controller"])
+            overrides["controller"] = {"reference_timeout": 0.0, **overrides["controller"]}
+        own, gains = split_gains(overrides["controller"])
         controller = ControllerNodeSettings.resolve(own)
         path = gains_as_path(controller.gains, controller.robot)
         of_flight = named_layers("actuators", controller.actuators)
         # as if given: a bag tells of it
         for file in (*of_flight, *set_file(controller.robot, path)):
             of_the_set = dict(flatten(node_parameters(file, "controller")))
-            given["controller"] = {**of_the_set, **given["controller"]}
+            overrides["controller"] = {**of_the_set, **overrides["controller"]}
             own = merge(nest(of_the_set), own)
             controller = ControllerNodeSettings.resolve(own)
         if controller.navigation == "filtered" and "navigation_sensors" not in own:
             if plant.sensors == GIVEN:
                 assumed = {"navigation_filter": assumed_numbers(plant, plant.period)}
-                given["controller"] = {**dict(flatten(assumed)), **given["controller"]}
+                overrides["controller"] = {**dict(flatten(assumed)), **overrides["controller"]}
                 own = merge(assumed, own)
             else:
                 own["navigation_sensors"] = plant.sensors
-                given["controller"]["navigation_sensors"] = plant.sensors
+                overrides["controller"]["navigation_sensors"] = plant.sensors
             controller = ControllerNodeSettings.resolve(own)
         settings = cls(
             plant,
             controller.model_copy(update={"gains": path}),
             mission,
-            RecorderNodeSettings.resolve(given["recorder"]),
+            RecorderNodeSettings.resolve(overrides["recorder"]),
             gains,
-            {node: tuple(names) for node, names in given.items()},
+            {node: tuple(names) for node, names in overrides.items()},
         )
         settings._check_periods()
         return settings
@@ -123,7 +123,7 @@ class FlightSettings(NamedTuple):
             for gain, values in law.gain_values.items()
         }
         parameters = {}
-        for node, names in self.given.items():
+        for node, names in self.overrides.items():
             settings: NodeSettings = getattr(self, node)
             resolved = dict(flatten(settings.model_dump())) | gains
             parameters[node] = {name: resolved[name] for name in names if name in resolved}

@@ -109,15 +109,15 @@ def picture_of(
     return encoded(animate(flight, shown[:MOST_PLOTS], title or _told(flight), advance), file)
 
 
-def shown_robot(log: FlightLog, given: str = "") -> Robot:
+def shown_robot(log: FlightLog, name: str = "") -> Robot:
     """Return the robot of a flight: the one given, or the one that the bag tells.
 
     Raises:
         InputError: it is not there, not told, or has other joints than the bag.
     """
-    if not given:
+    if not name:
         return robot_of(log)
-    robot = find_robot(robot_as_path(given))
+    robot = find_robot(robot_as_path(name))
     check_joints(robot, log)
     return robot
 

@@ -158,7 +158,7 @@ def build_law(
     name: str | type[ControlLaw],
     settings: ControllerNodeSettings,
     axes: int,
-    given: Mapping[str, Any] | None = None,
+    overrides: Mapping[str, Any] | None = None,
 ) -> ControlLaw:
     """A law by name (or as `find_law` takes it) with the gains that the settings choose.
 
@@ -166,13 +166,13 @@ def build_law(
         name: of the law, or its class.
         settings: they choose its gains.
         axes: m = n+3.
-        given: gains that come over those.
+        overrides: gains that come over those.
 
     Raises:
         InputError: unknown law, gain set without it, or gains that do not fit.
     """
     law = find_law(name) if isinstance(name, str) else name
-    may_lack = settings.gains == DEFAULT and (bool(given) or not law.gain_descriptions())
+    may_lack = settings.gains == DEFAULT and (bool(overrides) or not law.gain_descriptions())
     files = _gain_files(settings, may_lack)
     if law.name in files:
         gains = read_gains(files[law.name], law, axes)
@@ -183,8 +183,8 @@ def build_law(
             f"gains {settings.gains!r} have no file for controller {law.name!r}, "
             f"only for {', '.join(sorted(files))}"
         )
-    if given:
-        gains = check_gains({**gains, **given}, law, axes, PARAMETERS)
+    if overrides:
+        gains = check_gains({**gains, **overrides}, law, axes, PARAMETERS)
     try:
         return law(gains, settings.period) if gains else law(gains, settings.period, axes)
     except SpaceRobotError:
@@ -198,7 +198,7 @@ def build_law(
 def build_laws(
     settings: ControllerNodeSettings,
     axes: int,
-    given: Mapping[str, Tree] | None = None,
+    overrides: Mapping[str, Tree] | None = None,
     own: str | type[ControlLaw] | ControlLaw = "",
 ) -> dict[str, ControlLaw]:
     """The laws a controller can fly, by name: the one in force first, then those of the gain set.
@@ -206,33 +206,36 @@ def build_laws(
     Args:
         settings: they choose the law in force and the gains.
         axes: m = n+3.
-        given: gains by law that come over those of the files.
+        overrides: gains by law that come over those of the files.
         own: the law in force as a class or an object, which brings its gains; it is copied.
 
     Raises:
         InputError: a law that is not there, or gains that do not fit.
     """
-    given = given or {}
+    overrides = overrides or {}
     first = own if not isinstance(own, str) else find_law(settings.controller)
     wanted: dict[str, str | type[ControlLaw] | ControlLaw] = {first.name: first}
     brings_gains = isinstance(first, ControlLaw) or not first.gain_descriptions()
-    available = available_laws(settings, brings_gains or first.name in given)
-    for name in available or given:  # without a gain set, the gains given are all there are
+    available = available_laws(settings, brings_gains or first.name in overrides)
+    for name in available or overrides:  # without a gain set, the gains given are all there are
         wanted.setdefault(name, name)
-    for name in given:
+    for name in overrides:
         one_of(name, wanted, "law", f" in {PARAMETERS} (gains are <law>.<gain>)")
     return {
-        name: _copy_of(law, settings, axes, given.get(name))
+        name: _copy_of(law, settings, axes, overrides.get(name))
         if isinstance(law, ControlLaw)
-        else build_law(law, settings, axes, given.get(name))
+        else build_law(law, settings, axes, overrides.get(name))
         for name, law in wanted.items()
     }
 
 
 def _copy_of(
-    law: ControlLaw, settings: ControllerNodeSettings, axes: int, given: Mapping[str, Any] | None
+    law: ControlLaw,
+    settings: ControllerNodeSettings,
+    axes: int,
+    overrides: Mapping[str, Any] | None,
 ) -> ControlLaw:
-    """A law of its own memory, with the gains of ``law`` and those ``given`` over them.
+    """A law of its own memory, with the gains of ``law`` and those ``overrides`` over them.
 
     Raises:
         InputError: it is for another robot or another period.
@@ -243,8 +246,8 @@ def _copy_of(
             f"{law.period:g} s, the flight has {axes} and {settings.period:g} s"
         )
     copied = copy.deepcopy(law)
-    if given:
-        values = {**law.gain_values, **given}
+    if overrides:
+        values = {**law.gain_values, **overrides}
         copied.gain_values = check_gains(values, type(law), axes, PARAMETERS)
     return copied
 

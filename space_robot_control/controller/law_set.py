@@ -74,8 +74,8 @@ class LawSet:
     def _declare(self, law: ControlLaw) -> None:
         """Declare a law's gains, and take those given as parameters over those of its file."""
         node, descriptions = self._node, law.gain_descriptions()
-        given = overrides(node, [f"{law.name}.{gain}" for gain in descriptions])
-        tree = {**law.gain_values, **nest(given).get(law.name, {})}
+        overridden = overrides(node, [f"{law.name}.{gain}" for gain in descriptions])
+        tree = {**law.gain_values, **nest(overridden).get(law.name, {})}
         law.gain_values = check_gains(tree, type(law), self._axes, PARAMETERS)
         for gain, values in law.gain_values.items():
             node.declare_parameter(

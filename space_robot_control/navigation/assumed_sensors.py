@@ -49,8 +49,8 @@ def completed(
     Raises:
         InputError: there is no such file, or it is wrong.
     """
-    given = settings.model_dump()
-    lacking = [name for name, value in given.items() if not _is_given(name, value)]
+    numbers = settings.model_dump()
+    lacking = [name for name, value in numbers.items() if not _is_given(name, value)]
     if not lacking:
         return settings
     assumed = assumed_numbers(read_sensors(sensors), period)

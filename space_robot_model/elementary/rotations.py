@@ -16,9 +16,9 @@ GIMBAL_LOCK = 1e-12
 
 def exact_sines_cosines(angles: ArrayLike) -> tuple[Array, Array]:
     """Return sines and cosines; those of right angles without the rounding error of pi."""
-    given = np.asarray(angles, dtype=np.float64)
-    pairs = np.array([plain_sin_cos(float(angle)) for angle in given.flat])
-    exact = _exact(pairs.reshape(*given.shape, 2))
+    values = np.asarray(angles, dtype=np.float64)
+    pairs = np.array([plain_sin_cos(float(angle)) for angle in values.flat])
+    exact = _exact(pairs.reshape(*values.shape, 2))
     return exact[..., 0], exact[..., 1]
 
 

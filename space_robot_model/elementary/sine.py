@@ -17,9 +17,9 @@ sin_cos = kernel(plain_sin_cos)
 
 def sines_cosines(angles: ArrayLike) -> tuple[Array, Array]:
     """Return sines and cosines of ``angles``, rad, in their shape."""
-    given = np.asarray(angles, dtype=np.float64, order="C")
-    sines, cosines = np.empty(given.shape), np.empty(given.shape)
-    _fill(given.reshape(-1), sines.reshape(-1), cosines.reshape(-1))
+    values = np.asarray(angles, dtype=np.float64, order="C")
+    sines, cosines = np.empty(values.shape), np.empty(values.shape)
+    _fill(values.reshape(-1), sines.reshape(-1), cosines.reshape(-1))
     return sines, cosines
 
 

@@ -75,14 +75,14 @@ class BaseActuatorSettings(StrictModel):
             raise InputError(f"actuators {file}: {error}") from None
 
     def _check(self, robot: Robot) -> None:
-        given = [part for part in ("wheels", "thrusters") if getattr(self, part).count]
+        parts = [part for part in ("wheels", "thrusters") if getattr(self, part).count]
         if self.base_actuation != "hardware":
-            if given:
+            if parts:
                 raise InputError(
-                    f"{given[0]} are for base_actuation hardware, got {self.base_actuation!r}"
+                    f"{parts[0]} are for base_actuation hardware, got {self.base_actuation!r}"
                 )
             return
-        if not given:
+        if not parts:
             raise InputError("base_actuation is hardware: wheels.axes or thrusters.positions lack")
         self.wheels.check(robot.inertia[0])
         self.thrusters.check()

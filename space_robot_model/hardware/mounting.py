@@ -60,15 +60,15 @@ def directions(flat: list[float]) -> Array:
     return units
 
 
-def values_of(given: list[float], key: str, count: int, what: str) -> Array:
+def values_of(numbers: list[float], key: str, count: int, what: str) -> Array:
     """Return (count,) values of a setting with one value for all, or one for each.
 
     Raises:
         InputError: it has another number of them.
     """
-    if len(given) not in (1, count):
+    if len(numbers) not in (1, count):
         raise InputError(
-            f"{key} has {len(given)} values, one for all or {count} are allowed: one a {what}"
+            f"{key} has {len(numbers)} values, one for all or {count} are allowed: one a {what}"
         )
-    values: Array = np.broadcast_to(np.array(given, dtype=np.float64), count)
+    values: Array = np.broadcast_to(np.array(numbers, dtype=np.float64), count)
     return values

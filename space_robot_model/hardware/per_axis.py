@@ -23,11 +23,11 @@ def per_axis(settings: object, name: str, n: int) -> Array:
     Raises:
         InputError: it is neither one value nor one an axis.
     """
-    given = getattr(settings, name)
-    if len(given) not in (1, n + 3):
+    numbers = getattr(settings, name)
+    if len(numbers) not in (1, n + 3):
         raise InputError(
-            f"{name} has {len(given)} values, one for all or {n + 3} are allowed: base x, y, z "
+            f"{name} has {len(numbers)} values, one for all or {n + 3} are allowed: base x, y, z "
             f"and {n} joints"
         )
-    values: Array = np.broadcast_to(np.array(given, dtype=np.float64), n + 3)
+    values: Array = np.broadcast_to(np.array(numbers, dtype=np.float64), n + 3)
     return values

@@ -56,7 +56,7 @@ def _body(robot: Robot, number: int) -> dict[str, Any]:
 def _joint(robot: Robot, number: int) -> dict[str, Any]:
     is_actuated = number < robot.n
     friction = robot.friction[number]
-    told: dict[str, Any] = {
+    entry: dict[str, Any] = {
         "name": robot.all_joint_names[number],
         "kind": "prismatic" if robot.is_prismatic[number] else "revolute",
         "is_actuated": is_actuated,
@@ -65,8 +65,8 @@ def _joint(robot: Robot, number: int) -> dict[str, Any]:
         "friction": None if np.isnan(friction.coulomb) else friction._asdict(),
     }
     if is_actuated:
-        return {**told, "limits": robot.limits[number]._asdict()}
-    return {**told, "spring": robot.springs[number - robot.n]._asdict()}
+        return {**entry, "limits": robot.limits[number]._asdict()}
+    return {**entry, "spring": robot.springs[number - robot.n]._asdict()}
 
 
 def _numbers(values: Array) -> list[float]:

@@ -67,18 +67,18 @@ def _link(robot: Robot, joint: int) -> dict[str, Any]:
 
 
 def _limits(robot: Robot, joint: int) -> dict[str, Any]:
-    given, is_prismatic = robot.limits[joint], robot.is_prismatic[joint]
+    own, is_prismatic = robot.limits[joint], robot.is_prismatic[joint]
 
     def number(value: float) -> float:
         return float(value if is_prismatic else np.degrees(value))
 
     limits: dict[str, Any] = {}
-    if np.isfinite((given.lower, given.upper)).all():
-        limits["position_deg"] = [number(given.lower), number(given.upper)]
-    if np.isfinite(given.velocity):
-        limits["velocity_deg"] = number(given.velocity)
-    if np.isfinite(given.effort):
-        limits["effort"] = float(given.effort)
+    if np.isfinite((own.lower, own.upper)).all():
+        limits["position_deg"] = [number(own.lower), number(own.upper)]
+    if np.isfinite(own.velocity):
+        limits["velocity_deg"] = number(own.velocity)
+    if np.isfinite(own.effort):
+        limits["effort"] = float(own.effort)
     return limits
 
 

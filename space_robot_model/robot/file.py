@@ -143,10 +143,10 @@ class LinkFile(FrameFile):
 
     @field_validator("friction", "passive", mode="after")
     @classmethod
-    def _moves(cls, given: StrictModel | None, info: ValidationInfo) -> StrictModel | None:
-        if given and info.data.get("joint") == "fixed":
+    def _moves(cls, joint: StrictModel | None, info: ValidationInfo) -> StrictModel | None:
+        if joint and info.data.get("joint") == "fixed":
             raise ValueError("a fixed link has no friction and no spring")
-        return given
+        return joint
 
 
 class ToolFile(FrameFile):
@@ -204,17 +204,17 @@ def _tools_of(body: str, tools: list[ToolFile], last: str) -> tuple[Tool, ...]:
 
 def _body(link: LinkFile, parent: str) -> Body:
     kind = "revolute" if link.joint == "continuous" else link.joint
-    is_prismatic, given = kind == "prismatic", link.limits
+    is_prismatic, own_limits = kind == "prismatic", link.limits
 
     def number(value: float) -> float:
         return value if is_prismatic else float(np.radians(value))
 
-    limits = JointLimits(effort=given.effort or np.inf)
-    if given.position_deg:
-        lower, upper = (number(value) for value in given.position_deg)
+    limits = JointLimits(effort=own_limits.effort or np.inf)
+    if own_limits.position_deg:
+        lower, upper = (number(value) for value in own_limits.position_deg)
         limits = limits._replace(lower=lower, upper=upper)
-    if given.velocity_deg:
-        limits = limits._replace(velocity=number(given.velocity_deg))
+    if own_limits.velocity_deg:
+        limits = limits._replace(velocity=number(own_limits.velocity_deg))
     spring, friction = None, JointFriction()
     if link.passive:
         p = link.passive

@@ -59,16 +59,16 @@ class BodyNumbers(StrictModel):
     @property
     def body(self) -> Body:
         """The body that they are of."""
-        joint, given = None, self.joint
-        if given:
+        joint, own = None, self.joint
+        if own:
             joint = Joint(
-                given.name,
-                given.kind,
-                np.array(given.rotation),
-                np.array(given.offset),
-                limits=JointLimits(*_or(given.limits, JointLimits())),
-                friction=JointFriction(*_or(given.friction, JointFriction())),
-                spring=Spring(*given.spring) if given.spring else None,
+                own.name,
+                own.kind,
+                np.array(own.rotation),
+                np.array(own.offset),
+                limits=JointLimits(*_or(own.limits, JointLimits())),
+                friction=JointFriction(*_or(own.friction, JointFriction())),
+                spring=Spring(*own.spring) if own.spring else None,
             )
         tools = (
             Tool(t.name, np.array(t.rotation), np.array(t.position), rank=t.rank)

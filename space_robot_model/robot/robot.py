@@ -121,13 +121,13 @@ class Robot(TreeArrays):
         Raises:
             InputError: they are no numbers, or not n.
         """
-        given, n = self._of_joints(values), self.n
-        return np.where(self.is_prismatic[:n], given, np.radians(given))
+        numbers, n = self._of_joints(values), self.n
+        return np.where(self.is_prismatic[:n], numbers, np.radians(numbers))
 
     def to_degrees(self, values: ArrayLike) -> Array:
         """Invert `from_degrees`."""
-        given, n = self._of_joints(values), self.n
-        return np.where(self.is_prismatic[:n], given, np.degrees(given))
+        numbers, n = self._of_joints(values), self.n
+        return np.where(self.is_prismatic[:n], numbers, np.degrees(numbers))
 
     def _of_joints(self, values: ArrayLike) -> Array:
         numbers = as_numbers(values, "values")

@@ -56,11 +56,13 @@ class UrdfFile(StrictModel):
         }
         springs = {
             name: Spring(
-                given.stiffness,
-                given.damping,
-                given.rest_deg if is_prismatic.get(name) else float(np.radians(given.rest_deg)),
+                springs_of_joint.stiffness,
+                springs_of_joint.damping,
+                springs_of_joint.rest_deg
+                if is_prismatic.get(name)
+                else float(np.radians(springs_of_joint.rest_deg)),
             )
-            for name, given in self.passive.items()
+            for name, springs_of_joint in self.passive.items()
         }
         urdf = with_springs(urdf, springs, where)
         return replace(urdf, name=self.name or urdf.name)

@@ -68,8 +68,8 @@ def joined(before: FlightLog | None, log: FlightLog) -> FlightLog:
         for name, column in log.columns.items()
     }
     if log.measured is not None and before.measured is not None:
-        told = before.measured.columns
+        measured = before.measured.columns
         columns["measured"] = log.measured.each(
-            lambda name, column: np.concatenate([told[name], column])
+            lambda name, column: np.concatenate([measured[name], column])
         )
     return replace(log, **columns, first_tick=before.first_tick)

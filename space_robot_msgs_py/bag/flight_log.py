@@ -238,15 +238,17 @@ class FlightLog:
     @property
     def prismatic(self) -> tuple[bool, ...]:
         """Of the n joints with motors and then of the p without: True for those that slide."""
-        told = self.flight.get("prismatic_joints", ())
-        return tuple(name in told for name in (*self.joint_names, *self.passive_names))
+        names = self.flight.get("prismatic_joints", ())
+        return tuple(name in names for name in (*self.joint_names, *self.passive_names))
 
     @property
     def branches(self) -> tuple[int, ...]:
         """Number of actuated joints of each branch on the base; empty: one branch, or unknown."""
-        told = self.flight.get("branches", ())
-        is_list = isinstance(told, (list, tuple)) and all(type(c) is int and c > 0 for c in told)
-        return tuple(told) if is_list and sum(told) == len(self.joint_names) else ()
+        recorded = self.flight.get("branches", ())
+        is_list = isinstance(recorded, (list, tuple)) and all(
+            type(c) is int and c > 0 for c in recorded
+        )
+        return tuple(recorded) if is_list and sum(recorded) == len(self.joint_names) else ()
 
     @property
     def axes(self) -> int:

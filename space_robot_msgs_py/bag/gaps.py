@@ -17,14 +17,14 @@ def fill_gaps(log: FlightLog) -> None:
     From the first whole tick to the last state; `FlightLog.filled` counts the states. Only what
     the sensors told is filled in: the truth has no such gaps.
     """
-    told = log if log.measured is None else log.measured
-    states = finite_rows(getattr(told, name) for name in STATE_FIELDS)
+    measured = log if log.measured is None else log.measured
+    states = finite_rows(getattr(measured, name) for name in STATE_FIELDS)
     known = log.finite(STATE_FIELDS) | states
     end = len(known) - int(np.argmax(known[::-1])) if known.any() else 0
     log.filled = int(np.count_nonzero(~states[:end]))
-    _repeat_before(told, STATE_FIELDS, states, end)
-    passive = finite_rows(getattr(told, name) for name in PASSIVE_FIELDS)
-    _repeat_before(told, PASSIVE_FIELDS, passive, end)
+    _repeat_before(measured, STATE_FIELDS, states, end)
+    passive = finite_rows(getattr(measured, name) for name in PASSIVE_FIELDS)
+    _repeat_before(measured, PASSIVE_FIELDS, passive, end)
     _repeat_before(log, ACTUATOR_FIELDS, log.finite(ACTUATOR_FIELDS), end)
     references = log.finite(REFERENCE)
     _repeat_before(log, REFERENCE, references, end)

@@ -35,8 +35,8 @@ def walk_messages(data: Bytes, start: int, messages: Integers, before: int) -> t
     """MCAP's Message records that stand one behind the other from ``start`` on.
 
     Returns:
-        How many there are in ``found``, a column each behind the ``before`` first, and where they
-        end: at a record of another kind, one that is not whole, or the end of the data.
+        How many there are in ``messages``, a column each behind the ``before`` first, and where
+        they end: at a record of another kind, one that is not whole, or the end of the data.
     """
     at, count = start, before
     while count < messages.shape[1] and len(data) - at >= _HEAD + _FIELDS and data[at] == _MESSAGE:

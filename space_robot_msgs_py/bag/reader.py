@@ -181,8 +181,8 @@ def timebase_of(
             return Timebase(described_ns), []  # states were kept back
     if likely_ns is None:
         return Timebase(round(DEFAULT_PERIOD * 1e9)), []
-    told = f"described with a period of {described} s, flown with {likely_ns / 1e9} s"
-    return Timebase(likely_ns), [] if described is None else [told]
+    said = f"described with a period of {described} s, flown with {likely_ns / 1e9} s"
+    return Timebase(likely_ns), [] if described is None else [said]
 
 
 def missing(topic: topics.Topic, bag: Bag, selection: Selection) -> InputError:

@@ -140,10 +140,10 @@ class Rows:
             self._apart = None
         if self._apart is None:
             return
-        told = MeasuredStates.of(self.log)
+        measured = MeasuredStates.of(self.log)
         for name, column in self._apart.columns.items():
             setattr(self.log, name, column)
-        self.log.measured = self._apart = told
+        self.log.measured = self._apart = measured
 
     def finish(self, ticks: int) -> FlightLog:
         """The log, cut to ``ticks`` rows."""

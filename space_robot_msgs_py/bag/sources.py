@@ -62,7 +62,7 @@ class Source:
     """The highest sequence number."""
     passed_over: int = 0
     """Messages sent while nothing was to be recorded."""
-    told: int = 0
+    reported: int = 0
     """Messages that were sent, by their sender's own account."""
     is_resuming: bool = False
     name: str = ""
@@ -83,7 +83,7 @@ class Source:
     @property
     def tail(self) -> int:
         """Messages that were sent after the last one here."""
-        return 0 if self.is_resuming else max(0, self.told - self.last)
+        return 0 if self.is_resuming else max(0, self.reported - self.last)
 
 
 class Sources:
@@ -145,7 +145,7 @@ class Sources:
             same = [p for p in claimed if p[:PARTICIPANT_BYTES] == participant]
         if same:  # of several the newest: a node that was configured again counts anew
             source = self._sources.get(same[-1]) or self._meet(same[-1])
-            source.told = max(source.told, count)
+            source.reported = max(source.reported, count)
             self.is_counted = True
 
     def pause(self) -> None:

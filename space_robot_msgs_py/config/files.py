@@ -66,9 +66,9 @@ def node_parameters(path: Path, node: str) -> Tree:
             raise InputError(
                 f"{path}: {name}: 'ros__parameters' was expected below the node's name"
             )
-        given = content["ros__parameters"] or {}
-        if not isinstance(given, dict):
-            raise InputError(f"{path}: {name}: parameters were expected, got {short(given)}")
+        parameters = content["ros__parameters"] or {}
+        if not isinstance(parameters, dict):
+            raise InputError(f"{path}: {name}: parameters were expected, got {short(parameters)}")
         if str(name).strip("/").removeprefix("**/") in ("**", f"{node}_node"):
-            merged = merge(merged, nest(given))
+            merged = merge(merged, nest(parameters))
     return merged

@@ -79,15 +79,15 @@ class NodeSettings(StrictModel):
             InputError: naming the file or override at fault.
         """
         where = f"{cls.node} parameters"
-        given, tree = nest(overrides), Tree()
+        own, tree = nest(overrides), Tree()
         base = node_parameters(config_directory() / GRAPH_FILE, cls.node)
-        chosen = validate(cls, merge(base, given), where)
+        chosen = validate(cls, merge(base, own), where)
         selected = {name: str(getattr(chosen, name)) for name in cls.selectors}
         for path in cls.layers(selected):
             layer = node_parameters(path, cls.node)
             validate(cls, merge(tree, layer), str(path))
             tree = merge(tree, layer)
-        return validate(cls, merge(tree, given), where)
+        return validate(cls, merge(tree, own), where)
 
 
 def leaves(schema: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -84,15 +84,15 @@ def one_line(error: ValidationError, schema: type[BaseModel], where: str) -> str
     )
     first = faults[0]
     key = printable(".".join(str(part) for part in first["loc"]))
-    given = "" if first["type"] == "missing" else f", got {short(first['input'])}"
+    got = "" if first["type"] == "missing" else f", got {short(first['input'])}"
     text = first["msg"].removeprefix("Value error, ")
     if first["type"] == "model_type":
         text = "a mapping was expected"
     if first["type"] == "extra_forbidden":
         allowed = choices(str(first["loc"][-1]), _allowed_keys(schema, first["loc"][:-1]))
-        text, given = f"unknown key{given}: {allowed}", ""
+        text, got = f"unknown key{got}: {allowed}", ""
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-    return f"{where}: {key + ': ' if key else ''}{text}{given}{more}"
+    return f"{where}: {key + ': ' if key else ''}{text}{got}{more}"
 
 
 def _allowed_keys(schema: Any, location: tuple[int | str, ...]) -> list[str]:

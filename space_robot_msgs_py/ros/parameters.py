@@ -64,8 +64,8 @@ def declare_settings(node: Node, schema: type[Schema], changeable: tuple[str, ..
 
 def overrides(node: Node, names: Iterable[str]) -> dict[str, Any]:
     """Return what the user gave for these parameters, on the command line or in a file."""
-    given = parameter_overrides(node)
-    return {name: _plain(given[name].value) for name in names if name in given}
+    values = parameter_overrides(node)
+    return {name: _plain(values[name].value) for name in names if name in values}
 
 
 def refuse_unknown(node: Node) -> None:

@@ -57,9 +57,9 @@ class Codec:
         """
         layout, constant = self._pattern
         if len(data) >= len(layout):  # foreign writers may leave bytes behind the message
-            given = np.frombuffer(data, np.uint8, len(layout))
-            if not np.any((given ^ layout) & constant):
-                return header_stamp_ns(data), body(given)[self._from]
+            message = np.frombuffer(data, np.uint8, len(layout))
+            if not np.any((message ^ layout) & constant):
+                return header_stamp_ns(data), body(message)[self._from]
         known = self._description.learn(data)
         self._read_like(known)
         return header_stamp_ns(known.layout.data), known.values

@@ -38,11 +38,11 @@ class LawCodec:
             f"{law.name}.{gain}": {"type": DOUBLE_ARRAY, "double_array_value": numbers}
             for gain, numbers in law.gains.items()
         }
-        given = [{"name": name, "value": value} for name, value in values.items()]
+        parameters = [{"name": name, "value": value} for name, value in values.items()]
         content = {
             "stamp": {"sec": sec, "nanosec": nanosec},
             "node": self._node,
-            "new_parameters" if law.is_first else "changed_parameters": given,
+            "new_parameters" if law.is_first else "changed_parameters": parameters,
         }
         return MessageLayout(topics.LAW.type, content).data
 
@@ -54,12 +54,14 @@ class LawCodec:
             MessageError: the message names no law, or a gain of it is no list of numbers.
         """
         message = decode(data, topics.LAW.type)
-        given = {p.name: p.value for p in (*message.new_parameters, *message.changed_parameters)}
-        law = given.get(CONTROLLER)
+        parameters = {
+            p.name: p.value for p in (*message.new_parameters, *message.changed_parameters)
+        }
+        law = parameters.get(CONTROLLER)
         if law is None or law.type != STRING:
             raise MessageError(f"{topics.LAW.full_name}: no parameter {CONTROLLER!r}")
         name, gains = law.string_value, {}
-        for key, value in given.items():
+        for key, value in parameters.items():
             if key.startswith(f"{name}."):
                 if value.type != DOUBLE_ARRAY:
                     raise MessageError(f"{topics.LAW.full_name}: {key} is no list of numbers")

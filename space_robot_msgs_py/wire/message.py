@@ -116,15 +116,15 @@ class MessageDescription(ABC):
         return Numbers(layout, np.array(places, np.uint64))
 
 
-def name_order(given: Sequence[str], expected: Sequence[str], topic: str) -> list[int]:
+def name_order(names: Sequence[str], expected: Sequence[str], topic: str) -> list[int]:
     """Find where each expected name stands among the given ones.
 
     Raises:
         MessageError: other names than expected.
     """
-    if sorted(given) != sorted(expected):
-        raise MessageError(f"{topic}: names {list(given)}, expected {list(expected)}", "names")
-    return [list(given).index(name) for name in expected]
+    if sorted(names) != sorted(expected):
+        raise MessageError(f"{topic}: names {list(names)}, expected {list(expected)}", "names")
+    return [list(names).index(name) for name in expected]
 
 
 def description(topic: Topic) -> type[MessageDescription] | None:

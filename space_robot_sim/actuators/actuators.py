@@ -171,26 +171,31 @@ def actuate(
             the robot), ``wheel_torques`` and ``thrusts`` are written.
         measured: the same are written, ``applied_torque`` being what the flight software is told.
     """
-    given, reported = truth.applied_torque, measured.applied_torque
+    applied, reported = truth.applied_torque, measured.applied_torque
     due, wrench = actuators.due, actuators.base_wrench
     delay_command(actuators.latency, command_delay_buffer, command, tick, due)
     reported[:] = due[: reported.size]
     if actuators.base_is_ideal == 0.0:
         reported[:3] = 0.0
     saturated = limit_torque(actuators.torque_limit, reported)
-    drive_torque(actuators.drive, reported, given)
+    drive_torque(actuators.drive, reported, applied)
     if actuators.base_is_ideal == 0.0:
         wrench[:] = 0.0
-        wheels, axes = int(actuators.wheels.count), given.size
+        wheels, axes = int(actuators.wheels.count), applied.size
         fire(actuators.thrusters, due[axes + wheels :], period, truth.thrusts, wrench)
-        given[:3] = wrench[3:]
+        applied[:3] = wrench[3:]
         saturated += drive_wheels(
-            actuators.wheels, due[axes:], truth.wheel_velocities, period, truth.wheel_torques, given
+            actuators.wheels,
+            due[axes:],
+            truth.wheel_velocities,
+            period,
+            truth.wheel_torques,
+            applied,
         )
-        reported[:3] = given[:3]
+        reported[:3] = applied[:3]
         measured.wheel_torques[:] = truth.wheel_torques
         measured.thrusts[:] = truth.thrusts
     else:
-        wrench[3:] = given[:3]
+        wrench[3:] = applied[:3]
     actuators.saturated_ticks += min(saturated, 1.0)
-    report_torque(actuators.torque_echo, given, reported)
+    report_torque(actuators.torque_echo, applied, reported)

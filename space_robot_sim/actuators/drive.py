@@ -94,13 +94,13 @@ def lag_decays(lag: float, period: float) -> tuple[float, float]:
 
 
 @kernel
-def drive_torque(drive: Drive, asked: Array, given: Array) -> None:
-    """Write into ``given`` (n+3,) what the drives make of ``asked`` (n+3,) over a tick, N m."""
+def drive_torque(drive: Drive, asked: Array, applied: Array) -> None:
+    """Write into ``applied`` (n+3,) what the drives make of ``asked`` (n+3,) over a tick, N m."""
     is_exact = drive.is_exact != 0.0
     for i in range(asked.size):
         u = asked[i]
         if is_exact:
-            given[i] = u
+            applied[i] = u
             continue
         if drive.step[i] > 0.0:
             u = drive.step[i] * np.floor(u / drive.step[i] + 0.5)
@@ -110,7 +110,7 @@ def drive_torque(drive: Drive, asked: Array, given: Array) -> None:
             behind = drive.lagging[i] - u
             drive.lagging[i] = u + behind * drive.decay[i]
             u += behind * drive.mean_decay[i]
-        given[i] = drive.scale[i] * u + drive.bias[i]
+        applied[i] = drive.scale[i] * u + drive.bias[i]
 
 
 DRIVE_SCALE = Kind(

@@ -79,15 +79,15 @@ def judge(echo: TorqueEcho) -> None:
 
 
 @kernel
-def report_torque(echo: TorqueEcho, given: Array, reported: Array) -> None:
-    """Write into ``reported`` (n+3,) what is told of ``given`` (n+3,), N m.
+def report_torque(echo: TorqueEcho, applied: Array, reported: Array) -> None:
+    """Write into ``reported`` (n+3,) the report on ``applied`` (n+3,), N m.
 
     ``reported`` holds the command within its limits before.
     """
     if echo.is_of_given == 0.0 and echo.is_exact != 0.0:
         return
-    for i in range(given.size):
-        source = reported[i] if echo.is_of_given == 0.0 else given[i]
+    for i in range(applied.size):
+        source = reported[i] if echo.is_of_given == 0.0 else applied[i]
         reported[i] = source if echo.is_exact != 0.0 else echo.scale[i] * source + echo.bias[i]
 
 

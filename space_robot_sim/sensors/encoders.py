@@ -56,7 +56,7 @@ class Encoders(Record):
     """1 for each joint whose angle told stands still."""
     draws: Array = shaped(lambda n: (BLOCK_TICKS, 2, n))
     """Standard normal numbers, a row a tick: of the angles, of the rates."""
-    told: Array = shaped(lambda n: (MOST_DIFFERENCED, n))
+    history: Array = shaped(lambda n: (MOST_DIFFERENCED, n))
     """The last angles told, by tick modulo `MOST_DIFFERENCED`, rad."""
 
     @classmethod
@@ -84,7 +84,7 @@ class Encoders(Record):
             difference_ticks=settings.difference_ticks,
             velocity_sigma=settings.velocity_noise,
             velocity_step=settings.velocity_step,
-            told=step * np.floor(at_rest / step + 0.5) if settings.bits else at_rest,
+            history=step * np.floor(at_rest / step + 0.5) if settings.bits else at_rest,
         )
         return encoders
 
@@ -98,9 +98,9 @@ def read_encoders(
     A stuck encoder tells the angle of the tick before, and no rate.
     """
     draws, lag = encoders.draws[row_of(tick)], int(encoders.difference_ticks)
-    before = encoders.told[(tick - 1) % MOST_DIFFERENCED]
-    then = encoders.told[(tick - lag) % MOST_DIFFERENCED]
-    now = encoders.told[tick % MOST_DIFFERENCED]
+    before = encoders.history[(tick - 1) % MOST_DIFFERENCED]
+    then = encoders.history[(tick - lag) % MOST_DIFFERENCED]
+    now = encoders.history[tick % MOST_DIFFERENCED]
     for i in range(now.size):
         angle = truth.joint_positions[i] + encoders.sigma[i] * draws[0, i]
         angle = in_steps(angle, encoders.step[i])

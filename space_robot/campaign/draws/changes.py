@@ -93,14 +93,14 @@ class Changes:
 
     def scenario(self, **options: Any) -> Scenario:
         """Return the flight with these changes and further options."""
-        given = self.nominal.scenario.given
-        merged = {**given, **self.options, **options}
+        options_written = self.nominal.scenario.given
+        merged = {**options_written, **self.options, **options}
         if self._robot is not None:
             merged["plant_robot"] = self._robot.robot()
         if self.faults:
-            merged["faults"] = [*given.get("faults", ()), *self.faults]
+            merged["faults"] = [*options_written.get("faults", ()), *self.faults]
         if self._parameters:
-            own = given.get("parameters", {})
+            own = options_written.get("parameters", {})
             merged["parameters"] = {
                 node: {**own.get(node, {}), **self._parameters.get(node, {})}
                 for node in {**own, **self._parameters}

@@ -229,21 +229,21 @@ KINDS: dict[str, type[Distribution]] = {
 """Distributions by the key that tells them."""
 
 
-def read_distribution(given: Any, where: str) -> Distribution:
+def read_distribution(value: Any, where: str) -> Distribution:
     """Read a distribution; a number or a text alone is a constant.
 
     Raises:
         InputError: it is none; ``where`` names file and key.
     """
-    if isinstance(given, (bool, int, float, str)):
-        return validate(Choice, {"choice": [given]}, where)
-    if isinstance(given, dict):
+    if isinstance(value, (bool, int, float, str)):
+        return validate(Choice, {"choice": [value]}, where)
+    if isinstance(value, dict):
         for key, kind in KINDS.items():
-            if key in given:
-                return validate(kind, given, where)
+            if key in value:
+                return validate(kind, value, where)
     raise InputError(
         f"{where}: a distribution was expected, a mapping with one of {', '.join(KINDS)}, "
-        f"got {short(given)}"
+        f"got {short(value)}"
     )
 
 

@@ -140,11 +140,11 @@ class Draws:
         if key not in self._nominals:
             if len(self._nominals) >= MOST_NOMINALS:
                 del self._nominals[next(reversed(self._nominals))]
-            given, (controller, gains) = {**self.study.scenario, **options}, Law.parse(law)
+            merged, (controller, gains) = {**self.study.scenario, **options}, Law.parse(law)
             if "=" in law:
-                given["gains"] = gains
+                merged["gains"] = gains
             try:
-                self._nominals[key] = Nominal.of(Scenario(**given, controller=controller))
+                self._nominals[key] = Nominal.of(Scenario(**merged, controller=controller))
             except InputError as error:
                 raise InputError(f"{self.study.where}: law {law}: {error}") from None
         return self._nominals[key]

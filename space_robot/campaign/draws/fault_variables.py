@@ -39,12 +39,12 @@ class OfFault(Variable):
         changes.faults.append(self.text.replace("{}", _written(value)))
 
 
-def fault_variables(key: str, given: Any, where: str, names: RobotNames) -> list[Variable]:
+def fault_variables(key: str, value: Any, where: str, names: RobotNames) -> list[Variable]:
     """Return the variables of a fault.
 
     Args:
         key: the fault's text without what is drawn: its last number, or ``T`` for its time.
-        given: the distribution.
+        value: the distribution.
         where: file and key, for errors.
         names: of axes, wheels and thrusters.
 
@@ -54,7 +54,7 @@ def fault_variables(key: str, given: Any, where: str, names: RobotNames) -> list
     kind = PLANT_KINDS[
         one_of(key.partition("@")[0], PLANT_KINDS, "kind of fault", listing="--fault list")
     ]
-    distribution = read_distribution(given, where)
+    distribution = read_distribution(value, where)
     if distribution.relative or distribution.offset:
         raise InputError(f"{where}: a fault has no nominal value: neither relative nor offset")
     if not distribution.is_number:

@@ -141,14 +141,14 @@ class SpreadFile(StrictModel):
 
 
 def robot_variables(
-    key: str, parts: list[NamePart], given: Any, where: str, robot: Robot
+    key: str, parts: list[NamePart], value: Any, where: str, robot: Robot
 ) -> list[OfRobot]:
     """Return the variables of ``robot.*``.
 
     Args:
         key: of ``vary``.
         parts: the key's, behind ``robot``.
-        given: what stands there.
+        value: what stands there.
         where: file and key, for errors.
         robot: the nominal one.
 
@@ -176,13 +176,13 @@ def robot_variables(
         raise InputError(f"{what} has no elements")
     if group == "joints":
         return [
-            _of_joint(f"{name}.{what}", key, given, where, robot, body, what)
+            _of_joint(f"{name}.{what}", key, value, where, robot, body, what)
             for body, name in bodies
         ]
     if what == "com":
         if not parts[-1].element:
             raise InputError(f"along which axis: {key}[x], [y], [z] or [*]")
-        distribution = _number(given, where)
+        distribution = _number(value, where)
         return [
             CentreOfMass(f"{name}.com[{axis_name}]", key, distribution, body, axis)
             for body, name in bodies
@@ -190,13 +190,13 @@ def robot_variables(
         ]
     if what == "mass":
         return [
-            Mass(f"{name}.mass", key, _positive(given, where, float(robot.mass[body])), body)
+            Mass(f"{name}.mass", key, _positive(value, where, float(robot.mass[body])), body)
             for body, name in bodies
         ]
     return [
         variable
         for body, name in bodies
-        for variable in _of_inertia(f"{name}.inertia", key, given, where, body)
+        for variable in _of_inertia(f"{name}.inertia", key, value, where, body)
     ]
 
 
@@ -206,9 +206,9 @@ def _chosen(element: str, names: tuple[str, ...], robot: Robot, what: str) -> li
     return chosen(element, names, what)
 
 
-def _of_inertia(name: str, key: str, given: Any, where: str, body: int) -> list[OfRobot]:
-    if isinstance(given, dict) and {"scale", "rotate_deg"} & given.keys():
-        spread = validate(SpreadFile, given, where)
+def _of_inertia(name: str, key: str, value: Any, where: str, body: int) -> list[OfRobot]:
+    if isinstance(value, dict) and {"scale", "rotate_deg"} & value.keys():
+        spread = validate(SpreadFile, value, where)
         factors = [
             InertiaSpread(
                 f"{name}.scale_{i + 1}", key, Normal(normal=0.0, sigma=spread.scale), body, i
@@ -228,14 +228,14 @@ def _of_inertia(name: str, key: str, given: Any, where: str, body: int) -> list[
             if spread.rotate_deg
         ]
         return [*factors, *turns]
-    distribution = _positive(given, where, 1.0)
+    distribution = _positive(value, where, 1.0)
     if not distribution.relative:
         raise InputError(f"{where}: a factor of all of it needs relative: true")
     return [InertiaScale(name, key, distribution, body)]
 
 
 def _of_joint(
-    name: str, key: str, given: Any, where: str, robot: Robot, body: int, what: str
+    name: str, key: str, value: Any, where: str, robot: Robot, body: int, what: str
 ) -> OfRobot:
     joint = body - 1
     if what.startswith("friction"):
@@ -249,21 +249,21 @@ def _of_joint(
         raise InputError(f"joint {robot.all_joint_names[joint]} has a motor and no spring")
     else:
         nominal = getattr(robot.springs[joint - robot.n], what)
-    distribution = _number(given, where)
+    distribution = _number(value, where)
     least = 0.0 if not distribution.offset else -nominal
     return OfJoint(name, key, _at_least(distribution, least, where), body, what)
 
 
-def _number(given: Any, where: str) -> Distribution:
-    distribution = read_distribution(given, where)
+def _number(value: Any, where: str) -> Distribution:
+    distribution = read_distribution(value, where)
     if not distribution.is_number:
         raise InputError(f"{where}: numbers are needed")
     return distribution
 
 
-def _positive(given: Any, where: str, nominal: float) -> Distribution:
+def _positive(value: Any, where: str, nominal: float) -> Distribution:
     """Read the distribution of what must stay positive: a normal one is truncated."""
-    distribution = _number(given, where)
+    distribution = _number(value, where)
     if distribution.relative:
         least = LEAST
     else:

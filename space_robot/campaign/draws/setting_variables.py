@@ -94,7 +94,7 @@ class OfGains(Variable):
 
 
 def option_variables(
-    key: str, parts: list[NamePart], given: Any, where: str, nominal: Nominal
+    key: str, parts: list[NamePart], value: Any, where: str, nominal: Nominal
 ) -> list[Variable]:
     """Return the variable of ``scenario.<option>``.
 
@@ -110,7 +110,7 @@ def option_variables(
         raise InputError("gain sets are the laws': laws: [LAW=SET, LAW=OTHER_SET]")
     if parts[-1].element or name in ("faults", "events", "swaps", "parameters"):
         raise InputError(f"the option {name} has no elements to vary; see faults, plant.*")
-    distribution = read_distribution(given, where)
+    distribution = read_distribution(value, where)
     has_number = type(nominal.scenario.given.get(name)) in (int, float)
     if (distribution.relative or distribution.offset) and not has_number:
         raise InputError(f"{where}: relative to what: scenario gives no number {name}")
@@ -118,7 +118,7 @@ def option_variables(
 
 
 def node_variables(
-    key: str, parts: list[NamePart], given: Any, where: str, nominal: Nominal, node: str
+    key: str, parts: list[NamePart], content: Any, where: str, nominal: Nominal, node: str
 ) -> list[Variable]:
     """Return the variables of ``plant.*``, ``controller.*`` or ``mission.*``.
 
@@ -129,7 +129,7 @@ def node_variables(
     if any(part.element for part in parts[:-1]):
         raise InputError("elements stand behind the whole name")
     element = parts[-1].element if parts else ""
-    distribution = read_distribution(given, where)
+    distribution = read_distribution(content, where)
     if node == "mission" and name == START:
         names = nominal.robot.joint_names
         return [
@@ -173,7 +173,7 @@ def node_variables(
 
 
 def gain_variables(
-    key: str, parts: list[NamePart], given: Any, where: str, nominals: Sequence[Nominal]
+    key: str, parts: list[NamePart], value: Any, where: str, nominals: Sequence[Nominal]
 ) -> list[Variable]:
     """Return the variables of ``gains.<gain>``, of all axes together or of each.
 
@@ -182,7 +182,7 @@ def gain_variables(
     """
     name = ".".join(part.word for part in parts)
     one_of(name, sorted({gain for own in nominals for gain in own.gains}), "gain", " of the laws")
-    distribution = _numbers(read_distribution(given, where), where)
+    distribution = _numbers(read_distribution(value, where), where)
     if not (element := parts[-1].element):
         return [OfGains(f"gains.{name}", key, distribution, name, None)]
     return [

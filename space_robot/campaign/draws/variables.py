@@ -34,13 +34,13 @@ def variables_of(study: Study, nominals: Sequence[Nominal]) -> list[Variable]:
         InputError: names the key of ``vary`` that is wrong.
     """
     variables: list[Variable] = []
-    for key, given in study.vary.items():
+    for key, value in study.vary.items():
         where = f"{study.where}: vary.{key}"
         if key == FAULTS:
-            variables += _faults(given, where, nominals[0])
+            variables += _faults(value, where, nominals[0])
             continue
         with told_at(where):
-            variables += _of_key(key, given, where, nominals)
+            variables += _of_key(key, value, where, nominals)
     _check_places(study, variables)
     return variables
 
@@ -55,7 +55,7 @@ def told_at(where: str) -> Iterator[None]:
         raise InputError(text if text.startswith(where) else f"{where}: {text}") from None
 
 
-def _of_key(key: str, given: Any, where: str, nominals: Sequence[Nominal]) -> Sequence[Variable]:
+def _of_key(key: str, value: Any, where: str, nominals: Sequence[Nominal]) -> Sequence[Variable]:
     parts = parts_of(key)
     group = one_of(parts[0].word, GROUPS, "group")
     if parts[0].element or group == FAULTS:
@@ -64,19 +64,19 @@ def _of_key(key: str, given: Any, where: str, nominals: Sequence[Nominal]) -> Se
     if not inner:
         raise InputError(f"a name was expected, as in {group}.NAME")
     if group == "robot":
-        return robot_variables(key, inner, given, where, nominal.robot)
+        return robot_variables(key, inner, value, where, nominal.robot)
     if group == "scenario":
-        return option_variables(key, inner, given, where, nominal)
+        return option_variables(key, inner, value, where, nominal)
     if group == "gains":
-        return gain_variables(key, inner, given, where, nominals)
-    return node_variables(key, inner, given, where, nominal, group)
+        return gain_variables(key, inner, value, where, nominals)
+    return node_variables(key, inner, value, where, nominal, group)
 
 
-def _faults(given: Any, where: str, nominal: Nominal) -> list[Variable]:
-    if not isinstance(given, dict):
-        raise InputError(f"{where}: a mapping of faults was expected, got {short(given)}")
+def _faults(value: Any, where: str, nominal: Nominal) -> list[Variable]:
+    if not isinstance(value, dict):
+        raise InputError(f"{where}: a mapping of faults was expected, got {short(value)}")
     faults: list[Variable] = []
-    for text, distribution in given.items():
+    for text, distribution in value.items():
         own = f"{where}.{text}"
         with told_at(own):
             faults += fault_variables(str(text), distribution, own, nominal.names)

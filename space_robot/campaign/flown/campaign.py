@@ -119,7 +119,7 @@ class Campaign:
                     if not flights.are_complete:
                         asked.compile()
                         journal.make_note(WRITTEN, "")  # until it has the rows to come
-                        flights.fly(progress or (lambda told: None), options)
+                        flights.fly(progress or (lambda _: None), options)
                 finally:  # whatever ended it: the rows that there are have their table
                     runs_of_table = flights.precision.stop
                     write_if_older(folder, journal, manifest, runs_of_table)

@@ -40,12 +40,12 @@ def robot_texts(
     if file.suffix not in URDF:
         return {ROBOT_FILE: source.text}, source.robot
     name = f"{file.stem}.urdf"
-    told = {
+    texts = {
         "urdf": name,
         **({"base": base} if base else {}),
         **({"repair": True} if repair else {}),
     }
     text = HEAD.format(urdf=name, command=command) + yaml.safe_dump(
-        {"robot": told}, sort_keys=False, allow_unicode=True
+        {"robot": texts}, sort_keys=False, allow_unicode=True
     )
     return {ROBOT_FILE: text, name: read_urdf(file, base, repair).text}, source.robot

@@ -78,5 +78,5 @@ class Row:
 
 def _take(digest: hashlib._Hash, values: Mapping[str, Value]) -> None:
     for name, value in values.items():
-        told = value.encode() if isinstance(value, str) else struct.pack("<d", value)
-        digest.update(name.encode() + b"\0" + told + b"\0")
+        data = value.encode() if isinstance(value, str) else struct.pack("<d", value)
+        digest.update(name.encode() + b"\0" + data + b"\0")

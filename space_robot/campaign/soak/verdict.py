@@ -97,9 +97,9 @@ def not_finite(bag: Path, flight: Flight) -> list[str]:
     states, commands = StateCodec(names, timebase), CommandCodec(names.commanded, timebase)
     state = RobotState.allocate(len(names.joints))
     command = Command(0, np.zeros(len(names.commanded)))
-    told = (state.applied_torque, state.wheel_torques, state.thrusts)
+    numbers = (state.applied_torque, state.wheel_torques, state.thrusts)
     for name, data in open_bag(bag).messages(topics.COMMAND, *states.topics):
-        torques: tuple[Array, ...] = told
+        torques: tuple[Array, ...] = numbers
         if name == topics.COMMAND.full_name:
             commands.decode(data, command)
             torques = (command.torque,)

@@ -52,8 +52,8 @@ def flight_digest(flight: Flight) -> str:
 
     The software, which is told apart from it, is left out.
     """
-    told = {k: v for k, v in flight.description.items() if k not in ("versions", "commit")}
-    return digest(json.dumps(told, sort_keys=True, default=str).encode())
+    content = {k: v for k, v in flight.description.items() if k not in ("versions", "commit")}
+    return digest(json.dumps(content, sort_keys=True, default=str).encode())
 
 
 def digest(data: bytes) -> str:

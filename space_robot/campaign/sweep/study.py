@@ -38,7 +38,7 @@ def sweep_study(
         InputError: an option that cannot be.
     """
     off = {"uniform": [1.0 - spread, 1.0 + spread], "relative": True}
-    given = {
+    content = {
         "scenario": dict(common or {}),
         "laws": list(laws),
         "vary": {
@@ -48,4 +48,4 @@ def sweep_study(
         },
         "runs": draws * len(sensors) * len(actuators),
     }
-    return validate(Study, given, "options").named("options")
+    return validate(Study, content, "options").named("options")

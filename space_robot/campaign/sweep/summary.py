@@ -93,22 +93,24 @@ def hardware(swept: Sequence[SweepCell]) -> dict[str, list[str]]:
         "sensors": [cell.sensors for cell in swept],
         "actuators": [cell.actuators for cell in swept],
     }
-    told = {key: values for key, values in named.items() if set(values) != {"ideal"}}
-    return told or {"sensors": named["sensors"]}
+    varied = {key: values for key, values in named.items() if set(values) != {"ideal"}}
+    return varied or {"sensors": named["sensors"]}
 
 
 def summary_table(swept: Sequence[SweepCell]) -> Table:
     """Tabulate the medians, a group for every hardware."""
-    flown_with, told = hardware(swept), [of_metric(name) for name in shown(swept)]
+    flown_with, metrics_shown = hardware(swept), [of_metric(name) for name in shown(swept)]
     columns = (
         Column("law", is_label=True),
         Column("gains", is_label=True),
-        *(Column(_short(metric), metric.unit, ".2g") for metric in told),
+        *(Column(_short(metric), metric.unit, ".2g") for metric in metrics_shown),
         Column("failed"),
     )
     groups: dict[tuple[str, ...], list[list[Any]]] = {}
     for cell, *names in zip(swept, *flown_with.values(), strict=True):
-        middles = [cell.metrics[m.name][1] if m.name in cell.metrics else None for m in told]
+        middles = [
+            cell.metrics[m.name][1] if m.name in cell.metrics else None for m in metrics_shown
+        ]
         row = [cell.law.controller, cell.law.gains, *middles, f"{cell.failed} of {cell.flights}"]
         groups.setdefault(tuple(names), []).append([*names, *row])
     return Table(

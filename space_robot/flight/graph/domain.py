@@ -33,8 +33,8 @@ _held: set[tuple[int, str]] = set()
 
 
 @contextmanager
-def ros_domain(given: int | None = None, namespace: str = ROOT) -> Iterator[int]:
-    """``given``, or the user's ROS_DOMAIN_ID, or a free one; held until the context ends.
+def ros_domain(number: int | None = None, namespace: str = ROOT) -> Iterator[int]:
+    """``number``, or the user's ROS_DOMAIN_ID, or a free one; held until the context ends.
 
     Others may have another ``namespace`` of a domain that the user names.
 
@@ -43,8 +43,8 @@ def ros_domain(given: int | None = None, namespace: str = ROOT) -> Iterator[int]
             started some.
         FlightError: none is free.
     """
-    given = domain_asked_for(given)
-    domain, lock = _free_domain(namespace) if given is None else (given, _take(given, namespace))
+    number = domain_asked_for(number)
+    domain, lock = _free_domain(namespace) if number is None else (number, _take(number, namespace))
     _held.add((domain, namespace))
     try:
         yield domain
@@ -54,10 +54,10 @@ def ros_domain(given: int | None = None, namespace: str = ROOT) -> Iterator[int]
             lock.release()
 
 
-def domain_asked_for(given: int | None) -> int | None:
-    """Return ``given``, or the user's ROS_DOMAIN_ID; None: the user leaves it open."""
+def domain_asked_for(domain: int | None) -> int | None:
+    """Return ``domain``, or the user's ROS_DOMAIN_ID; None: the user leaves it open."""
     of_user = os.environ.get("ROS_DOMAIN_ID", "")
-    return int(of_user) if given is None and of_user.isdecimal() else given
+    return int(of_user) if domain is None and of_user.isdecimal() else domain
 
 
 def _free_domain(namespace: str) -> tuple[int, FileLock]:

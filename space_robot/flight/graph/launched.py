@@ -28,5 +28,5 @@ def launched_parameters(flight: Flight, bag: Path, autostart: bool, folder: Path
     check_bag_path(bag)
     compile_kernels(bool(flight.plant.names.actuators))
     parameters = flight_parameters(flight, bag)
-    told = {node: {**values, "autostart": autostart} for node, values in parameters.items()}
-    return write_parameters(told, folder)
+    started = {node: {**values, "autostart": autostart} for node, values in parameters.items()}
+    return write_parameters(started, folder)

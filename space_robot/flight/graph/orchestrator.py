@@ -95,11 +95,11 @@ def _commands(
     flight: Flight, parameters: Mapping[str, Mapping[str, Any]], folder: Path
 ) -> dict[str, list[str]]:
     """Command lines of the processes: one a node, or one for all; their files go to ``folder``."""
-    told = {node: {**values, "autostart": False} for node, values in parameters.items()}
+    started = {node: {**values, "autostart": False} for node, values in parameters.items()}
     namespace = flight.plan.namespace
     if flight.plan.composed:
-        return {NAME: composed_command(told, namespace, folder)}
-    return {node: node_command(node, values, namespace) for node, values in told.items()}
+        return {NAME: composed_command(started, namespace, folder)}
+    return {node: node_command(node, values, namespace) for node, values in started.items()}
 
 
 def _claim(bag: Path) -> None:
@@ -141,7 +141,7 @@ def require_ros() -> None:
 
 def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
     """The parameters of every node of a flight that is recorded to ``bag``."""
-    parameters = {node: dict(given) for node, given in flight.parameters.items()}
+    parameters = {node: dict(values) for node, values in flight.parameters.items()}
     parameters["plant"] |= {
         "ticks": flight.ticks,
         "wait_for": wait_for("plant"),

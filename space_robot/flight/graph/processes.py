@@ -108,8 +108,8 @@ class NodeProcess:
         self._output.seek(0)
         lines = self._output.read().decode(errors="replace").strip().splitlines()
         errors = [line for line in lines[:-TAIL_LINES] if ERROR in line]
-        told = errors[-TAIL_LINES:] + lines[-TAIL_LINES:]
-        return "\n".join(f"  {line}" for line in told) or "  (it said nothing)"
+        tail = errors[-TAIL_LINES:] + lines[-TAIL_LINES:]
+        return "\n".join(f"  {line}" for line in tail) or "  (it said nothing)"
 
     def signal(self, number: int) -> None:
         """Send a signal to the whole group: ``ros2 run`` would keep it to itself."""

@@ -45,7 +45,7 @@ class ControllerChoice:
         folder: Path,
         controller: str = "",
         gains: str = "",
-        given: Mapping[str, Any] | None = None,
+        chosen: Mapping[str, Any] | None = None,
         trust: bool = False,
     ) -> None:
         """Put the parameters together and check them.
@@ -55,15 +55,15 @@ class ControllerChoice:
             folder: where to write recorded numbers as files, which the node will read.
             controller: law to fly (empty: the recorded one).
             gains: gain set to fly (empty: the recorded one).
-            given: further parameters of the node, over the recorded ones.
+            chosen: further parameters of the node, over the recorded ones.
             trust: whether modules and files that the description names may be opened.
 
         Raises:
             InputError: something recorded or given does not exist here, or does not fit.
         """
-        given = given or {}
-        controller = str(given.get("controller", controller))
-        gains = str(given.get("gains", gains))
+        chosen = chosen or {}
+        controller = str(chosen.get("controller", controller))
+        gains = str(chosen.get("gains", gains))
         flown = recorded_parameters(flight)
         if not (named := controller or flown.get("controller") or flight.get("controller")):
             raise InputError(
@@ -76,7 +76,7 @@ class ControllerChoice:
         self._said = {
             **({"controller": controller} if controller else {}),
             **({"gains": gains} if gains else {}),
-            **given,
+            **chosen,
         }
         """By the user; all else is the bag's word."""
         if not trust:
@@ -112,8 +112,8 @@ class ControllerChoice:
         self.is_as_flown = is_same_law and (
             not gains or gains == flown.get("gains") or _same(now.gain_values, recorded_gains)
         )
-        """True if law and gains are those that flew; what was ``given`` is not looked at."""
-        self.follows_flight = is_same_law and "swaps" not in given
+        """True if law and gains are those that flew; what was ``chosen`` is not looked at."""
+        self.follows_flight = is_same_law and "swaps" not in chosen
         """True if laws and gains change as they did in flight."""
 
     def law_parameters(self, law: LawInForce) -> dict[str, str | list[float]]:

@@ -155,11 +155,11 @@ def fly(
             navigation=None if equipment.navigation == "direct" else equipment.navigation,
         )
     )
-    told = parameters(flight)
+    flown = parameters(flight)
     try:
         log = simulate(flight)
     except DivergedError as error:
-        return Result(row, variant, told, error.tick)
+        return Result(row, variant, flown, error.tick)
     if planned.shown and figures is not None:
         title = f"{row.controller}, case {row.case}: {variant.title}"
         figures.save(control_results(log, title), row.stem)
@@ -167,7 +167,7 @@ def fly(
     return Result(
         row,
         variant,
-        told,
+        flown,
         None,
         of_log(Rms(log.axes), log),
         of_log(Chatter(log.axes, log.timebase.period), log) if is_judged else None,

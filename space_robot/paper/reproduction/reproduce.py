@@ -136,7 +136,7 @@ def _write(
         "navigation": equipment.navigation,
         "actuators": equipment.actuators,
     }
-    told = {
+    content = {
         f"{r.row.controller}, case {r.row.case}, {r.variant.gains} gains": r.parameters
         for r in results
         if r.variant.friction
@@ -147,7 +147,7 @@ def _write(
         "claims": claim_records,
         "cells": as_records(numbers),
         "chatter": [row._asdict() for row in chattering],
-        "parameters": told,
+        "parameters": content,
     }
     title = "Table V: measured / printed (ratio)"
     (folder / f"{TABLE}.md").write_text(as_markdown(title, tables), "utf-8")
@@ -155,7 +155,7 @@ def _write(
     (folder / f"{TABLE}.json").write_text(json.dumps(record, indent=1) + "\n", "utf-8")
     page = template("space_robot.paper.reproduction", "report.html.j2").render(
         provenance=provenance,
-        parameters={name: json.dumps(value, indent=1) for name, value in told.items()},
+        parameters={name: json.dumps(value, indent=1) for name, value in content.items()},
         claims=claims_table(claim_records),
         tables=tables,
         figure_groups=figure_groups(rows, figures),

@@ -143,8 +143,8 @@ class _Job:
         except Exception as failure:  # not the function's: that one comes as a result
             if future.cancelled():
                 raise self._gone() from None
-            told = f"{type(failure).__name__}: " * (not isinstance(failure, SpaceRobotError))
-            raise ClusterError(f"scheduler {self._address}: {told}{_line(failure)}") from failure
+            kind = f"{type(failure).__name__}: " * (not isinstance(failure, SpaceRobotError))
+            raise ClusterError(f"scheduler {self._address}: {kind}{_line(failure)}") from failure
         del self._under_way[future]
         return Done(item, result, with_traceback(error, text))
 

@@ -136,8 +136,8 @@ class Listener:
     @property
     def complaints(self) -> dict[str, str]:
         """The modes of nodes that are not well, by their names, and of a plant with faults."""
-        told = self._monitor.values.get(PLANT, {})
-        faults = {PLANT: f"faults: {told['faults']}"} if "faults" in told else {}
+        values = self._monitor.values.get(PLANT, {})
+        faults = {PLANT: f"faults: {values['faults']}"} if "faults" in values else {}
         return {**faults, **self._monitor.complaints}
 
     def _choose_topics(self, with_states: bool) -> None:

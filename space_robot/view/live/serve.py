@@ -168,7 +168,7 @@ class Follower:
 
     def _show(self, listener: Listener, view: LiveView, check: Callable[[], None]) -> None:
         flown = tell_at = look_at = 0.0
-        told = time.monotonic(), 0.0
+        last_shown = time.monotonic(), 0.0
         while True:
             began = time.monotonic()
             if began >= look_at:
@@ -183,9 +183,9 @@ class Follower:
             if sample:
                 view.show(sample)
             if self._is_watched and began >= tell_at:
-                speed = (listener.time - told[1]) / max(began - told[0], TELL_S)
+                speed = (listener.time - last_shown[1]) / max(began - last_shown[0], TELL_S)
                 view.tell(listener, speed)
-                tell_at, told = began + TELL_S, (began, listener.time)
+                tell_at, last_shown = began + TELL_S, (began, listener.time)
             time.sleep(max(0.0, began + 1.0 / RATE_HZ - time.monotonic()))
 
     @property

@@ -105,8 +105,8 @@ def _check_names(bodies: Sequence[Body], where: str) -> dict[str, Body]:
     by_name = {body.name: body for body in bodies}
     names = [body.name for body in bodies]
     joints = [body.joint.name for body in bodies if body.joint]
-    for kind, given in (("body", names), ("joint", joints)):
-        if (name := first_repeated(given)) is not None:
+    for kind, listed in (("body", names), ("joint", joints)):
+        if (name := first_repeated(listed)) is not None:
             raise InputError(f"{where}: {kind} names must differ, {short(name)} occurs twice")
     bases = [body.name for body in bodies if body.joint is None]
     if len(bases) != 1:

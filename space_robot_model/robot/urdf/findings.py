@@ -50,8 +50,8 @@ class Report:
 
     def error(self, line: int, part: str, defect: str, value: str | None = None) -> InputError:
         """Return the error, to be raised, for a defect that has no repair."""
-        given = "" if value is None else f", got {short(value)}"
-        return InputError(f"{self.where}: line {line}: {part}: {defect}{given}")
+        got = "" if value is None else f", got {short(value)}"
+        return InputError(f"{self.where}: line {line}: {part}: {defect}{got}")
 
     def repaired(self, line: int, part: str, defect: str, value: str, repair: str) -> None:
         """Keep a defect that is repaired as ``repair`` says."""

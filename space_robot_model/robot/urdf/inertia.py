@@ -34,14 +34,14 @@ def inertia_defect(mass: float, inertia: Array) -> tuple[str, str]:
         The defect, empty if there is none, and the moments (kg m2) to be shown.
     """
     moments = np.linalg.eigvalsh(inertia)
-    given = ", ".join(f"{moment:.4g}" for moment in moments)
+    listed = ", ".join(f"{moment:.4g}" for moment in moments)
     if np.max(np.abs(moments)) <= mass * LEAST_GYRATION**2:
-        return "the inertia is zero", given
+        return "the inertia is zero", listed
     if moments[0] <= ROUNDING * moments[2]:
-        return "the inertia is not positive definite (principal moments)", given
+        return "the inertia is not positive definite (principal moments)", listed
     if moments[2] > (moments[0] + moments[1]) * (1.0 + ROUNDING):
-        return "the inertia breaks the triangle inequality (principal moments)", given
-    return "", given
+        return "the inertia breaks the triangle inequality (principal moments)", listed
+    return "", listed
 
 
 def nearest_inertia(inertia: Array) -> Array | None:

@@ -129,12 +129,12 @@ def _axis(element: Element | None, fields: Fields) -> Array:
     fields.report.check_content(element, fields.part, (), ("xyz",))
     axis = fields.vector(element, "xyz", None)
     length = norm(axis)
-    given = element.attributes.get("xyz", "")
+    text = element.attributes.get("xyz", "")
     if length < NEARLY_ONE:
-        raise fields.report.error(element.line, fields.part, "the axis has no direction", given)
+        raise fields.report.error(element.line, fields.part, "the axis has no direction", text)
     if abs(length - 1.0) > NEARLY_ONE:
         fields.report.repaired(
-            element.line, fields.part, "the axis must have length 1", given, "normalised"
+            element.line, fields.part, "the axis must have length 1", text, "normalised"
         )
     return axis / length
 
@@ -158,13 +158,13 @@ def _limits(
 def _range(element: Element, fields: Fields) -> tuple[float, float]:
     """Return the least and largest position; one that is not given is 0, as URDF says."""
     lower, upper = (fields.limit(element, name) or 0.0 for name in ("lower", "upper"))
-    given = f"{lower:g} to {upper:g}"
+    interval = f"{lower:g} to {upper:g}"
     if lower > upper:
         fields.report.repaired(
             element.line,
             fields.part,
             "the limits lower and upper are upside down",
-            given,
+            interval,
             "exchanged",
         )
         return upper, lower
@@ -173,7 +173,7 @@ def _range(element: Element, fields: Fields) -> tuple[float, float]:
             element.line,
             fields.part,
             "the limits lower and upper leave no room to move",
-            given,
+            interval,
             "no limits of position",
         )
         return -math.inf, math.inf
@@ -182,10 +182,10 @@ def _range(element: Element, fields: Fields) -> tuple[float, float]:
 
 def _most(element: Element, name: str, fields: Fields) -> float:
     """Return the largest velocity or effort."""
-    given = fields.limit(element, name)
-    if given is not None and given > 0.0:
-        return given
-    repair = "made positive" if given else f"no limit of {name}"
+    limit = fields.limit(element, name)
+    if limit is not None and limit > 0.0:
+        return limit
+    repair = "made positive" if limit else f"no limit of {name}"
     fields.report.repaired(
         element.line,
         fields.part,
@@ -193,7 +193,7 @@ def _most(element: Element, name: str, fields: Fields) -> float:
         element.attributes.get(name, ""),
         repair,
     )
-    return abs(given) if given else math.inf
+    return abs(limit) if limit else math.inf
 
 
 def _friction(element: Element | None, fields: Fields) -> JointFriction:

@@ -87,7 +87,7 @@ def test_with_trust_it_does_and_the_users_own_word_needs_none(
     assert ControllerChoice(flight, trusted, trust=True).law_name == "stranger"
     assert ran()
     assert ControllerChoice(flight, given, LAW).law_name == "stranger"
-    by_set = ControllerChoice(flight, given / "gains", given={"controller": "tde_stc"})
+    by_set = ControllerChoice(flight, given / "gains", chosen={"controller": "tde_stc"})
     assert by_set.law_name == by_set.parameters["controller"] == "tde_stc"
 
 

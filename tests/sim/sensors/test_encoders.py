@@ -42,7 +42,7 @@ def test_the_step_of_a_joint_that_slides_is_a_share_of_a_metre(bits: int) -> Non
     encoders = Encoders.build(N, settings, PERIOD, rest, slides)
     step = np.where(slides, 1.0, 2.0 * np.pi) / 2**bits if bits else np.zeros(N)
     np.testing.assert_array_equal(encoders.step, step)
-    told = encoders.told[0]
+    told = encoders.history[0]
     if bits:
         np.testing.assert_allclose(told / step, np.round(told / step), atol=1e-9)
     assert (np.abs(told - rest.joint_positions) <= 0.5 * step * (1.0 + 1e-9)).all()
