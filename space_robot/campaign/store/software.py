@@ -52,7 +52,8 @@ def flight_digest(flight: Flight) -> str:
 
     The software, which is told apart from it, is left out.
     """
-    content = {k: v for k, v in flight.description.items() if k not in ("versions", "commit")}
+    others = ("versions", "commit", "scenario")  # the scenario says the same once more
+    content = {k: v for k, v in flight.description.items() if k not in others}
     return digest(json.dumps(content, sort_keys=True, default=str).encode())
 
 

@@ -205,7 +205,10 @@ def test_scenarios_are_values() -> None:
         ({"controler": "ctc"}, "unknown option 'controler' of Scenario: did you mean controller"),
         ({"realtime": True}, "unknown option 'realtime' of Scenario"),
         ({"duration": -1.0}, "Scenario: duration: Input should be greater than 0, got -1.0"),
-        ({"robot": 3.5j}, "Scenario: robot: a name, a path or a Robot was expected"),
+        (
+            {"robot": 3.5j},
+            "Scenario: robot: a name, a path or a Robot (an object or a mapping) was expected",
+        ),
         ({"controller": int}, "Scenario: controller: a name, a path or a ControlLaw (class or"),
         ({"sensors": {"gyros": {}}}, "Scenario: sensors: numbers given: gyros: unknown key"),
         ({"mission": {"waypoint_times": []}}, "mission: numbers given: waypoint_times"),
