@@ -73,7 +73,7 @@ def tune(
     # beside the bandwidth there is the pole at which an angle corrects an integrated rate
     slowest = min(bandwidth, rate_noise / angle_noise) if rate_noise > 0.0 else bandwidth
     least = 40.0 / MOST_STEPS  # of a smaller pole the quotient may overflow
-    steps = math.ceil(40.0 / min(1.0, max(least, slowest * period)))
+    steps = min(MOST_STEPS, math.ceil(40.0 / min(1.0, max(least, slowest * period))))
     steady_gains(
         filter.angle_gain,
         filter.rate_gain,
