@@ -35,7 +35,7 @@ MADE: dict[type[SpaceRobotError], SpaceRobotError] = {
 def kinds() -> list[type[SpaceRobotError]]:
     """All there are, once the modules that define some are imported."""
     root = ROOT
-    for file in root.glob("space_robot_*/**/*.py"):
+    for file in root.glob("space_robot*/**/*.py"):
         if re.search(r"^class \w+Error\(", file.read_text("utf-8"), re.MULTILINE):
             import_module(".".join(file.relative_to(root).with_suffix("").parts))
     return _below(SpaceRobotError)

@@ -1,0 +1,347 @@
+"""The nodes of a process in turn, by a clock of the test's own: who is stepped, and when."""
+
+from __future__ import annotations
+
+import gc
+import itertools
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rclpy")
+
+from space_robot_msgs_py.ros import node_scheduler, upkeep
+from space_robot_msgs_py.ros.loop import Wait
+from space_robot_msgs_py.ros.node_scheduler import (
+    GLANCE_S,
+    LISTENER_PERIOD_S,
+    REMIND_S,
+    NodeScheduler,
+    ScheduledNode,
+)
+from space_robot_msgs_py.ros.upkeep import LONGEST_PAUSE_S, PERIOD_S, SERVICE_SHARE, Upkeep
+
+
+class Clock:
+    """Goes on when somebody sleeps, and by a microsecond at every look."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+        self.slept: list[float] = []
+
+    def monotonic(self) -> float:
+        self.now += 1e-6
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        assert seconds > 0.0
+        self.slept.append(seconds)
+        self.now += seconds
+
+
+class Loop:
+    """Asks for one wait after the other, the last again and again; None: it did something."""
+
+    wait_for = ("controller_node",)
+
+    def __init__(self, *waits: Wait | None) -> None:
+        self.waits = list(waits)
+        self.is_complete = False
+        self.begun = self.steps = 0
+        self.missing: dict[str, list[str]] = {}
+        self.outputs = [self._output(name) for name in ("/clock", "/joint_states")]
+
+    def _output(self, name: str) -> Any:
+        def missing(names: Sequence[str]) -> list[str]:
+            assert names == self.wait_for
+            return self.missing.get(name, [])
+
+        return SimpleNamespace(full_name=name, missing_listeners=missing)
+
+    def begin(self) -> None:
+        self.begun += 1
+
+    def step(self) -> Wait | None:
+        self.steps += 1
+        return self.waits.pop(0) if len(self.waits) > 1 else self.waits[0]
+
+
+class Node:
+    context = None
+
+    def __init__(self, *waits: Wait | None, fifo: int = 0) -> None:
+        self.loop = Loop(*waits)
+        self.settings = SimpleNamespace(fifo_priority=fifo)
+        self.is_active, self.is_shut_down = True, False
+        self.said: list[str] = []
+        self.reports = self.looks = 0
+        self.waited_s = 0.0
+        self.calls = SimpleNamespace(run_one=self._run_one)
+
+    def log(self, text: str) -> None:
+        self.said.append(text)
+
+    def report(self) -> None:
+        self.reports += 1
+
+    def _run_one(self, timeout_s: float) -> bool:
+        self.looks += 1
+        self.waited_s += timeout_s
+        return False
+
+
+@pytest.fixture(autouse=True)
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr(node_scheduler, "time", clock)
+    monkeypatch.setattr(upkeep, "time", clock)
+    monkeypatch.setattr(gc, "freeze", lambda: None)
+    monkeypatch.setattr(gc, "collect", lambda: None)
+    monkeypatch.setattr(node_scheduler, "ask_for_fifo", lambda priority: f"fifo {priority}")
+    return clock
+
+
+def seat_of(node: Any, is_alone: bool = True) -> ScheduledNode:
+    return ScheduledNode(node, is_alone)
+
+
+def scheduler_of(*nodes: Any) -> NodeScheduler:
+    return NodeScheduler(nodes)
+
+
+def test_a_node_begins_once_all_its_listeners_are_there() -> None:
+    node = Node(None)
+    seat, loop = seat_of(node), node.loop
+    loop.missing = {"/clock": ["a", "b"]}
+    assert not seat.step(100.0)
+    assert seat.wake_at == 100.0 + LISTENER_PERIOD_S
+    loop.missing = {}
+    assert not seat.step(100.0 + 0.5 * LISTENER_PERIOD_S), "it is not looked at so soon"
+    assert (loop.begun, loop.steps) == (0, 0)
+    assert seat.step(100.0 + LISTENER_PERIOD_S)
+    assert (loop.begun, loop.steps) == (1, 1)
+    assert seat.step(100.0 + LISTENER_PERIOD_S)
+    assert (loop.begun, loop.steps) == (1, 2)
+    assert node.said == []
+
+
+def test_it_is_said_from_time_to_time_who_is_waited_for() -> None:
+    node = Node(None)
+    seat = seat_of(node)
+    node.loop.missing = {"/clock": ["a", "b"], "/joint_states": ["b"]}
+    after = (0.0, REMIND_S, REMIND_S + 1.0, 2 * REMIND_S + 1.0, 2 * REMIND_S + 2.0)
+    said = []
+    for seconds in after:
+        seat.step(100.0 + seconds)
+        said.append(len(node.said))
+    assert said == [0, 0, 1, 1, 2]
+    assert set(node.said) == {"waiting for a, b on /clock, b on /joint_states"}
+    node.loop.missing = {}
+    seat.step(200.0)
+    node.is_active = False
+    seat.step(300.0)
+    node.is_active, node.loop.missing = True, {"/clock": ["a"]}
+    seat.step(400.0)
+    assert len(node.said) == 2, "time is counted anew for a node that was active"
+
+
+def test_a_node_that_stood_still_begins_anew() -> None:
+    node = Node(Wait(10.0, is_brief=True))
+    seat = seat_of(node)
+    assert not seat.step(1.0)
+    assert seat.spins
+    node.is_active = False
+    assert not seat.step(20.0)
+    assert (seat.wait, seat.spins, seat.is_complete) == (Wait(0.0), False, False)
+    node.is_active = True
+    assert not seat.step(2.0), "whatever it waited for before"
+    assert (node.loop.begun, node.loop.steps) == (2, 2)
+
+
+INPUT: Any = object()
+
+
+@pytest.mark.parametrize(
+    ("wait", "is_alone", "wake_after", "glance_after"),
+    [
+        (Wait(2.0), True, 2.0, 2.0),
+        (Wait(2.0, patience_s=0.5), True, 2.0, 2.0),
+        (Wait(2.0, patience_s=0.5), False, 2.0, 2.5),
+        (Wait(2.0, is_for_others=True), True, 2.0, 2.0),
+        (Wait(2.0, is_for_others=True), False, 0.0, 0.0),
+        (Wait(2.0, (INPUT,)), True, 2.0, GLANCE_S),
+        (Wait(2.0, (INPUT,)), False, 2.0, GLANCE_S),
+        (Wait(0.1 * GLANCE_S, (INPUT,)), True, 0.1 * GLANCE_S, 0.1 * GLANCE_S),
+        (Wait(2.0, (INPUT,), is_brief=True), True, 2.0, 0.0),
+    ],
+)
+def test_when_a_node_is_looked_at_again(
+    wait: Wait, is_alone: bool, wake_after: float, glance_after: float
+) -> None:
+    node = Node(wait)
+    seat = seat_of(node, is_alone)
+    assert not seat.step(100.0)
+    assert seat.wait == wait
+    assert seat.wake_at == pytest.approx(100.0 + wake_after, abs=1e-9)
+    glance_at = 0.0 if wait.is_brief and wait.inputs else 100.0 + glance_after
+    assert seat.glance_at == pytest.approx(glance_at, abs=1e-9)
+    seat.step(glance_at - 1e-6)
+    assert node.loop.steps == 1
+    seat.step(seat.glance_at)
+    assert node.loop.steps == 2
+
+
+def test_one_that_expects_a_message_at_once_looks_for_it_without_sleep(clock: Clock) -> None:
+    node = Node(Wait(5.0, (INPUT,), is_brief=True))
+    seat = seat_of(node)
+    seat.step(clock.monotonic())
+    assert seat.spins
+    begin = clock.monotonic()
+    assert not seat.spin(begin + 1e-4)
+    assert begin + 1e-4 <= clock.now < begin + 1.1e-4
+    assert seat.wake_at == pytest.approx(clock.now + 5.0)
+    node.loop.waits = [*node.loop.waits * 3, None]
+    assert seat.spin(begin + 1.0)
+    assert clock.now < begin + 0.01
+    under_fifo = seat_of(Node(Wait(5.0, is_brief=True), fifo=10))
+    under_fifo.step(1.0)
+    assert not under_fifo.spins, "yielding gives way to nobody there"
+    assert under_fifo.node.said == ["fifo 10"]  # type: ignore[attr-defined]
+
+
+def test_each_has_a_turn_a_round_until_one_has_come_to_its_end() -> None:
+    first, second, third = nodes = [Node(None) for _ in range(3)]
+    scheduler = scheduler_of(*nodes)
+    scheduler._upkeep_at = 1e9
+    assert all(scheduler.take() for _ in range(5))
+    assert [node.loop.steps for node in nodes] == [5, 5, 5]
+    second.loop.is_complete = True
+    assert not scheduler.take()
+    assert [first.loop.steps, second.loop.steps, third.loop.steps] == [6, 6, 5]
+
+
+def test_others_are_stepped_while_one_stands_down() -> None:
+    first, second = Node(None), Node(None)
+    scheduler = scheduler_of(first, second)
+    scheduler._seats[0].node.let_others_work()
+    assert (first.loop.steps, second.loop.steps) == (0, 1)
+    scheduler._seats[1].node.let_others_work()
+    assert (first.loop.steps, second.loop.steps) == (1, 1)
+    alone = Node(None)
+    scheduler_of(alone)
+    assert not hasattr(alone, "let_others_work")
+
+
+def test_the_process_sleeps_until_the_first_node_is_to_be_stepped(clock: Clock) -> None:
+    slow, fast, idle = Node(Wait(0.5)), Node(Wait(0.2)), Node(Wait(0.01))
+    idle.is_active = False
+    scheduler = scheduler_of(slow, fast, idle)
+    scheduler._upkeep_at = 1e9
+    for _ in range(2):
+        assert scheduler.take()
+    assert (slow.loop.steps, fast.loop.steps, idle.loop.steps) == (1, 2, 0)
+    assert clock.slept == pytest.approx([0.2, 0.2], abs=1e-4)
+
+
+def test_a_patient_wait_lasts_longer_only_while_another_node_is_busy(clock: Clock) -> None:
+    for other, seconds in ((Node(Wait(9.0)), 0.1), (Node(None), 0.4)):
+        patient = Node(Wait(0.1, patience_s=0.3), None)
+        scheduler = scheduler_of(patient, other)
+        scheduler._upkeep_at = 1e9
+        begin = clock.now
+        while patient.loop.steps < 2:
+            assert scheduler.take()
+            clock.now += 1e-4
+        assert clock.now - begin == pytest.approx(seconds, abs=1e-3)
+
+
+def test_it_waits_for_the_messages_of_all(monkeypatch: pytest.MonkeyPatch, clock: Clock) -> None:
+    waits: list[tuple[list[Any], float]] = []
+    mine, other = Node(Wait(0.5, (INPUT,))), Node(Wait(0.3, ("another",)))  # type: ignore[arg-type]
+    scheduler = scheduler_of(mine, other)
+    scheduler._upkeep_at = 1e9
+
+    def wait(inputs: list[Any], timeout_s: float) -> None:
+        waits.append((inputs, timeout_s))
+
+    monkeypatch.setattr(scheduler._waiter, "wait", wait)
+    for _ in range(2):
+        assert scheduler.take()
+    assert [inputs for inputs, _ in waits] == [[INPUT, "another"]] * 2
+    assert waits[0][1] == pytest.approx(0.3, abs=1e-4)
+    assert (mine.loop.steps, other.loop.steps) == (2, 2), "who waits is looked at after it"
+    assert clock.slept == []
+
+
+def test_without_an_active_node_calls_are_waited_for_until_all_are_shut_down(clock: Clock) -> None:
+    first, second = nodes = Node(None), Node(None)
+    first.is_active = second.is_active = False
+    scheduler = scheduler_of(*nodes)
+    first.is_shut_down = True
+    assert scheduler.take()
+    assert [node.waited_s for node in nodes] == [0.5 * PERIOD_S] * 2
+    second.is_shut_down = True
+    assert not scheduler.take()
+
+
+def test_upkeep_that_is_due_waits_for_a_moment_of_rest_but_not_for_long(clock: Clock) -> None:
+    resting, busy = Node(Wait(1e-3)), Node(None)
+    for node, patience in ((resting, 0.0), (busy, node_scheduler.UPKEEP_PATIENCE_S)):
+        scheduler = scheduler_of(node)
+        scheduler._upkeep_at = begin = clock.now
+        while not node.looks:
+            assert scheduler.take()
+            clock.now += 1e-4
+        assert clock.now - begin == pytest.approx(patience, abs=5e-4)
+
+
+def test_each_node_has_its_upkeep_one_after_the_other(clock: Clock) -> None:
+    nodes = Node(Wait(1e-3)), Node(Wait(1e-3)), Node(Wait(1e-3))
+    scheduler = scheduler_of(*nodes)
+    begin, at = clock.now, []
+    while clock.now < begin + 1.0:
+        before = sum(node.looks + node.reports for node in nodes)
+        assert scheduler.take()
+        after = sum(node.looks + node.reports for node in nodes)
+        at += [clock.now] * (after > before)
+        assert after - before <= 1
+    assert [node.looks for node in nodes] == pytest.approx([1.0 / PERIOD_S] * 3, abs=2)
+    assert [node.reports for node in nodes] == pytest.approx([1.0 / PERIOD_S] * 3, abs=2)
+    gaps = [b - a for a, b in itertools.pairwise(at)]
+    assert min(gaps) >= node_scheduler.UPKEEP_GAP_S - 1e-4
+
+
+@pytest.mark.parametrize(("lasts", "pause"), [(0.002, 0.02), (0.3, LONGEST_PAUSE_S)])
+def test_calls_one_behind_another_take_no_more_than_their_share(
+    clock: Clock, lasts: float, pause: float
+) -> None:
+    assert pytest.approx(min(lasts / SERVICE_SHARE, LONGEST_PAUSE_S)) == pause
+    node: Any = Node(None)
+    at = []
+
+    def run_one(timeout_s: float) -> bool:
+        at.append(clock.now)
+        clock.now += lasts
+        return True
+
+    node.calls.run_one = run_one
+    kept = Upkeep(node)
+    for _ in range(4000):
+        kept.run()
+        clock.now += 1e-3
+    gaps = [b - a for a, b in itertools.pairwise(at)]
+    assert min(gaps) == pytest.approx(lasts + pause, abs=3e-3)
+    assert node.reports == pytest.approx((clock.now - 1000.0) / PERIOD_S, rel=0.5)
+
+
+def test_where_both_are_overdue_calls_and_reports_take_turns(clock: Clock) -> None:
+    node: Any = Node(None)
+    kept = Upkeep(node)
+    for _ in range(10):
+        kept.run()
+        clock.now += 1.0
+    assert (node.looks, node.reports) == (5, 5)
+    kept.run(timeout_s=0.5)
+    assert (node.looks, node.reports, node.waited_s) == (6, 6, 0.5)
