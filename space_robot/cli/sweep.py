@@ -118,8 +118,8 @@ def sweep(
             check_writable(out / name)
     with counting_progress("flights") as progress:
         rows = run(study, seed, jobs or cores(), progress)
-    found = cells(rows)
-    table = summary_table(found)
+    swept = cells(rows)
+    table = summary_table(swept)
     if out:
         records = [row_record(row) for row in rows]
         names = list(dict.fromkeys(name for record in records for name in record))
@@ -130,11 +130,11 @@ def sweep(
         for name, text in (("table.csv", as_csv(flights)), ("summary.md", summary)):
             with whole_file(out / name, replace=True) as file:
                 file.write(text.encode())
-        save_figure(figure(found), out / "sweep")
+        save_figure(figure(swept), out / "sweep")
     if failed := [row for row in rows if not row.is_complete]:
         task, reason = failed[0].task, failed[0].reason
         first = f"the first, run {task.run} under {task.law}: {reason}"
         click.echo(f"{len(failed)} of {len(rows)} flights failed, {first}", err=True)
-    put_json({"cells": as_records(found)}, as_json, output)
+    put_json({"cells": as_records(swept)}, as_json, output)
     if not as_json:
         print_table(table, terminal())

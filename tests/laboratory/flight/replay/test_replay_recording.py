@@ -171,10 +171,10 @@ def test_older_bags_have_names_only(tmp_path: Path) -> None:
         ({}, {}, "does not say which law was flown"),
         (None, {"controller": "pid"}, "unknown controller 'pid'"),
         (None, {"gains": "old"}, "unknown gain set 'old'"),
-        (None, {"given": {"tde_stc.k_9": [1.0]}}, "unknown gain of tde_stc 'k_9'"),
-        (None, {"given": {"pid.k": [1.0]}}, "unknown law 'pid' in controller parameters"),
-        (None, {"given": {"tde_stc.h_bar": [-1.0]}}, "above 0"),
-        (None, {"given": {"hold_tick": 1}}, "unknown key"),
+        (None, {"chosen": {"tde_stc.k_9": [1.0]}}, "unknown gain of tde_stc 'k_9'"),
+        (None, {"chosen": {"pid.k": [1.0]}}, "unknown law 'pid' in controller parameters"),
+        (None, {"chosen": {"tde_stc.h_bar": [-1.0]}}, "above 0"),
+        (None, {"chosen": {"hold_tick": 1}}, "unknown key"),
     ],
 )
 def test_what_cannot_be_is_named(
