@@ -30,10 +30,19 @@ def nest(flat: Mapping[Any, Any]) -> Tree:
     for key, value in flat.items():
         head, _, rest = str(key).partition(".")
         inner = nest({rest: value}) if rest else nest(value) if isinstance(value, dict) else value
-        if head in tree and isinstance(tree[head], dict) is not isinstance(inner, dict):
-            raise InputError(f"{head}: given as a value, and as a group of values")
+        _refuse_both(tree, {head: inner})
         tree = merge(tree, {head: inner})
     return tree
+
+
+def _refuse_both(one: Tree, other: Tree, prefix: str = "") -> None:
+    """See that nothing is a value in one tree, and a group of values in the other."""
+    for key in one.keys() & other.keys():
+        groups = [tree[key] for tree in (one, other) if isinstance(tree[key], dict)]
+        if len(groups) == 1:
+            raise InputError(f"{prefix}{key}: given as a value, and as a group of values")
+        if groups:
+            _refuse_both(*groups, f"{prefix}{key}.")
 
 
 def flatten(tree: Mapping[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

@@ -97,7 +97,12 @@ AREAS = {
     ),
     "elementary": _room("model/elementary"),
     "environment": _room("sim/environment", "sim/plant/test_*.py"),
-    "faults": _room("sim/faults", "sim/sensors/test_*.py", "sim/plant/test_*.py"),
+    "faults": _room(
+        "sim/faults",
+        "laboratory/scenario/test_faults.py",
+        "sim/sensors/test_*.py",
+        "sim/plant/test_*.py",
+    ),
     "plant": _room("sim/plant"),
     "robot": _room("model/robot", "model/dynamics/test_equations_of_motion.py"),
     "sensors": _room("sim/sensors", "sim/plant/test_*.py"),

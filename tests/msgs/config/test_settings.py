@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,13 @@ from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import laws
 from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
 from space_robot_msgs_py.config.directory import config_directory
-from space_robot_msgs_py.config.files import named_file, node_parameters
+from space_robot_msgs_py.config.files import (
+    GIVEN,
+    is_named,
+    named_file,
+    named_layers,
+    node_parameters,
+)
 from space_robot_msgs_py.config.settings import leaves
 from space_robot_msgs_py.config.trees import flatten, merge, nest
 from space_robot_msgs_py.errors import InputError
@@ -146,6 +153,58 @@ def test_file_that_is_no_parameter_file(tmp_path: Path) -> None:
 def test_mission_of_another_robot_does_not_fit() -> None:
     with pytest.raises(InputError, match="7 values, robot 'paper' has 6 joints"):
         Flight(FlightPlan(mission="seven_joint"))
+
+
+def test_names_of_files_and_paths(tmp_path: Path) -> None:
+    for suffix in ("yaml", "yml"):
+        path = tmp_path / f"mine.{suffix}"
+        path.write_text("")
+        assert named_file("cases", str(path)) == path
+    assert named_layers("cases", "1") == [config_directory() / "cases/1.yaml"]
+    assert named_layers("cases", GIVEN) == []
+    assert is_named("cases", "4-1")
+    for name in ("4", "../cases/1", "1.yaml", "a" * 300):
+        assert not is_named("cases", name), name
+
+
+@pytest.mark.parametrize("period", [1e-5, 0.1, 0.00037])
+def test_a_period_is_a_whole_number_of_nanoseconds(period: float) -> None:
+    settings = PlantNodeSettings.resolve({"period": period})
+    assert settings.timebase.period_ns == int(Decimal(str(period)) * 10**9)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("period", 9.9e-6), ("period", 0.1001), ("fifo_priority", -1), ("fifo_priority", 99)],
+)
+def test_settings_of_every_node_have_limits(name: str, value: float) -> None:
+    for schema in SCHEMAS:
+        with pytest.raises(InputError, match=f"^{schema.node} parameters: {name}: Input should be"):
+            schema.resolve({name: value})
+    assert PlantNodeSettings.resolve({"fifo_priority": 98}).fifo_priority == 98
+
+
+@pytest.mark.parametrize(
+    ("flat", "name"),
+    [
+        ({"a": 1, "a.b": 2}, "a"),
+        ({"a.b": 1, "a": 2}, "a"),
+        ({"a.b.c": 1, "a.b": 2}, "a.b"),
+        ({"a": {"b": 1}, "a.b": {"c": 2}}, "a.b"),
+    ],
+)
+def test_a_value_that_is_a_group_too_is_refused(flat: dict[str, object], name: str) -> None:
+    with pytest.raises(InputError) as caught:
+        nest(flat)
+    assert str(caught.value) == f"{name}: given as a value, and as a group of values"
+
+
+def test_what_lies_below_is_not_changed_by_what_is_put_over_it() -> None:
+    below = {"a": {"b": 1}, "c": 2}
+    assert merge(below, {"a": {"d": 3}, "c": {"e": 4}}) == {"a": {"b": 1, "d": 3}, "c": {"e": 4}}
+    assert merge(below, {"a": 5}) == {"a": 5, "c": 2}
+    assert below == {"a": {"b": 1}, "c": 2}
+    assert list(flatten({"a": {}, "b": {"c": {"d": 1}}})) == [("a", {}), ("b.c.d", 1)]
 
 
 def test_trees() -> None:

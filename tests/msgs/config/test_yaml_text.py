@@ -15,6 +15,8 @@ from space_robot_msgs_py.config.validation import read_yaml
 from space_robot_msgs_py.config.yaml_text import (
     DEEPEST,
     LARGEST_FILE,
+    LONGEST_NAME,
+    MOST_REPEATED,
     MOST_VALUES,
     YamlTextError,
     check_file,
@@ -92,6 +94,35 @@ def test_mistakes_have_one_line(text: str, said: str) -> None:
         parse_yaml(text)
     assert said in str(caught.value)
     assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("allowed", "refused"),
+    [
+        ("[" + "1," * (MOST_VALUES - 1) + "]", "[" + "1," * MOST_VALUES + "1]"),
+        ("[" * DEEPEST + "]" * DEEPEST, "[" * (DEEPEST + 1) + "]" * (DEEPEST + 1)),
+        (
+            f"[&a [{'1,' * 999}], {'*a,' * (MOST_REPEATED // 1000)}]",
+            f"[&a [{'1,' * 999}], &b 1, *b, {'*a,' * (MOST_REPEATED // 1000)}]",
+        ),
+    ],
+    ids=["values", "levels", "repeated"],
+)
+def test_as_much_as_is_allowed_is_read(allowed: str, refused: str) -> None:
+    assert parse_yaml(allowed) is not None
+    with pytest.raises(YamlTextError, match=r"more than|deeper than"):
+        parse_yaml(refused)
+
+
+@pytest.mark.parametrize("text", [str(2**63), str(2**64 - 1), str(-(2**63))])
+def test_whole_numbers_of_64_bits_are_read(text: str) -> None:
+    assert parse_yaml(text) == int(text)
+
+
+@pytest.mark.parametrize("text", [str(2**64), str(-(2**63) - 1)])
+def test_larger_whole_numbers_are_refused(text: str) -> None:
+    with pytest.raises(YamlTextError, match=f"line 1: not YAML .the value '{text}' is no int"):
+        parse_yaml(text)
 
 
 def test_no_more_than_aliases_is_repeated() -> None:
@@ -203,3 +234,26 @@ def test_file_beyond_measure(tmp_path: Path) -> None:
         file.truncate(LARGEST_FILE + 1)
     with pytest.raises(InputError, match="more than 16 MiB"):
         read_yaml(path)
+    with path.open("wb") as file:
+        file.truncate(LARGEST_FILE)
+    assert len(read_file(path)) == LARGEST_FILE
+
+
+def test_a_long_name_is_shown_by_its_ends() -> None:
+    for length in (LONGEST_NAME, LONGEST_NAME + 1):
+        name = f"b/{'a' * (length - 7)}/no.e"[-length:]
+        with pytest.raises(InputError) as caught:
+            read_file(Path(name))
+        shown = name if length == LONGEST_NAME else f"{name[:40]}...{name[-40:]}"
+        assert str(caught.value) == f"{shown}: no such file"
+
+
+def test_reading_leaves_no_file_open(tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_text("a: 1")
+    before = len(os.listdir("/proc/self/fd"))
+    for _ in range(5):
+        check_file(path)
+        with pytest.raises(InputError, match="not a file"):
+            check_file(tmp_path)
+    assert len(os.listdir("/proc/self/fd")) == before

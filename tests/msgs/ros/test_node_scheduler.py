@@ -343,5 +343,10 @@ def test_where_both_are_overdue_calls_and_reports_take_turns(clock: Clock) -> No
         kept.run()
         clock.now += 1.0
     assert (node.looks, node.reports) == (5, 5)
+    assert kept.run() < clock.now, "the report is overdue"
+    assert kept.run() == pytest.approx(clock.now + PERIOD_S, abs=1e-4)
+    kept.run()
+    clock.now += 1.0
+    node.looks = node.reports = 5
     kept.run(timeout_s=0.5)
     assert (node.looks, node.reports, node.waited_s) == (6, 6, 0.5)

@@ -129,6 +129,7 @@ class Bench:
                 return
             wait = self.loop.step()
             self.now += STEP_S
+            assert wait is None or wait.seconds > 0.0
             if wait and not any(entry.waiting for entry in wait.inputs):  # type: ignore[attr-defined]
                 self.now += wait.seconds
                 self.waited_s += wait.seconds
