@@ -286,6 +286,12 @@ class TestControlResults:
     ) -> None:
         figure = control_results(flown(times=times, duration=duration), "x")
         assert len(figure.axes) == panels
+        per_side = (panels - 4) // 2
+        for axes in figure.axes:
+            if "s (ms)" in axes.get_xlabel():
+                assert axes.get_xlabel().startswith("time from" if per_side < 3 else "from")
+                shown = np.abs(axes.get_xticks()) <= 150.0
+                assert shown.sum() == (7 if per_side == 1 else 3), "more would overlap"
 
     @pytest.mark.parametrize("n", [1, 7, 12])
     def test_any_number_of_joints(self, n: int) -> None:

@@ -125,3 +125,15 @@ def test_the_bag_has_every_message_once_and_in_order(tmp_path: Path) -> None:
         assert len(set(found[topic.full_name])) == len(found[topic.full_name])
     assert len(found[topics.JOINT_STATES.full_name]) in range(TICKS - 2, TICKS + 1)
     assert len(found[topics.COMMAND.full_name]) < TICKS, "overtaken states are not answered"
+
+
+def test_what_was_flown_here_is_trusted_and_its_progress_is_told(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("space_robot.flight.simulate.STRETCH_OF_MESSAGES", 75)
+    for bag in (None, tmp_path / "bag"):
+        ticks: list[int] = []
+        plan = FlightPlan(faults=[NOTHING], duration=TICKS * 5e-4)
+        assert simulate(Flight(plan), bag, ticks.append).trusted
+        assert ticks == [0, 75, 150, TICKS]
+    assert flown().trusted

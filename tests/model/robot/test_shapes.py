@@ -14,7 +14,14 @@ from random_trees import random_bodies, random_rotation
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot, robot_names
 from space_robot_model.robot.inertia import inertia_tensor
-from space_robot_model.robot.shapes import BASE_COLOUR, even_box, shapes_of
+from space_robot_model.robot.shapes import (
+    BASE_COLOUR,
+    JOINT_COLOUR,
+    LINK_COLOUR,
+    PANEL_COLOUR,
+    even_box,
+    shapes_of,
+)
 from space_robot_model.robot.tree import Visual
 
 
@@ -38,8 +45,12 @@ def test_every_body_of_a_shipped_robot_is_drawn(name: str) -> None:
     robot = find_robot(name)
     shapes = shapes_of(robot)
     assert {shape.body for shape in shapes} == set(range(robot.joint_count + 1))
+    assert all(0.0 <= part <= 1.0 for shape in shapes for part in shape.colour)
     panels = {robot.n + 1 + k for k in range(len(robot.springs))}
     assert {s.body for s in shapes if s.shape == "box"} == {0, *panels}
+    base, panel = BASE_COLOUR, PANEL_COLOUR
+    assert all(s.colour == (panel if s.body else base) for s in shapes if s.shape == "box")
+    assert len({BASE_COLOUR, PANEL_COLOUR, LINK_COLOUR, JOINT_COLOUR}) == 4
 
 
 @given(st.integers(0, 2**32 - 1))
