@@ -1,0 +1,192 @@
+"""The mission's loop without a graph: what it streams, how far ahead, by whose clock."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from space_robot_control.guidance.settings import MissionNodeSettings
+from space_robot_model.robot import Robot
+from space_robot_msgs_py import topics
+from space_robot_msgs_py.wire.clock import ClockCodec
+from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
+from space_robot_msgs_py.wire.source_guard import SourceGuard
+
+pytest.importorskip("rclpy")
+
+from space_robot_control.guidance import loop
+from space_robot_control.guidance.loop import CLOCK_WAIT_S, GREET_S, MOST_AT_ONCE, MissionLoop
+from space_robot_control.guidance.mission import Mission
+
+CHUNK, LEAD = 10, 35
+PERIOD_NS = 500_000
+
+
+class Topic:
+    """Publisher or subscription: what was sent, and what is to be taken."""
+
+    def __init__(self, node: Node, topic: topics.Topic, *_: object, depth: int = 0) -> None:
+        self.sent: list[bytes] = []
+        self.waiting: deque[bytes] = deque()
+        self.listener_count, self._taken = 0, 0
+        self.source = SourceGuard()
+        node.by_name[topic.name] = self
+
+    def publish(self, data: bytes) -> None:
+        self.sent.append(data)
+
+    def take(self) -> bytes | None:
+        if not self.waiting:
+            return None
+        self._taken += 1
+        self.source.passes(self._taken, 0)
+        return self.waiting.popleft()
+
+    def counts(self, word: str) -> dict[str, int]:
+        return {f"{word}: another's": 3}
+
+
+class Node:
+    def __init__(self) -> None:
+        self.by_name: dict[str, Topic] = {}
+        self.said: list[str] = []
+
+    def log(self, text: str) -> None:
+        self.said.append(text)
+
+
+class Bench:
+    """The loop, by a clock of the test's own."""
+
+    def __init__(self, robot: Robot, patch: pytest.MonkeyPatch) -> None:
+        self.now = 1000.0
+        patch.setattr(time, "monotonic", lambda: self.now)
+        for name in ("RawPublisher", "FollowedSubscription"):
+            patch.setattr(loop, name, Topic)
+        self.settings = MissionNodeSettings.resolve({"chunk_ticks": CHUNK, "lead_ticks": LEAD})
+        self.node: Any = Node()
+        self.loop = MissionLoop(self.node, self.settings)
+        self.loop.begin()
+        self._codec = ReferenceCodec(robot.joint_names, self.settings.timebase)
+        self._mission = Mission(robot, self.settings, self.settings.period)
+        self.joints, self.base, self.clock = (
+            self.node.by_name[topic.name]
+            for topic in (topics.REFERENCE_JOINTS, topics.REFERENCE_BASE, topics.CLOCK)
+        )
+
+    def hear(self, ticks: Iterable[int]) -> None:
+        self.clock.waiting.extend(ClockCodec().encode(tick * PERIOD_NS) for tick in ticks)
+
+    def run(self) -> list[int]:
+        """Step until it waits; the first ticks of the chunks sent, each the mission's own."""
+        self.joints.sent.clear()
+        self.base.sent.clear()
+        steps = (self.loop.step() for _ in range(100_000))
+        wait = next(wait for wait in steps if wait is not None)
+        assert wait.seconds == CLOCK_WAIT_S
+        assert wait.inputs == (self.clock,)
+        starts = []
+        for joints, base in zip(self.joints.sent, self.base.sent, strict=True):
+            start, rows = self._codec.decode_joints(joints)
+            own = self._mission.chunk(start, CHUNK)
+            np.testing.assert_array_equal(rows, own.joints)
+            same, rows = self._codec.decode_base(base)
+            np.testing.assert_array_equal(rows, own.base)
+            assert same == start
+            starts.append(start)
+        return starts
+
+
+@pytest.fixture
+def bench(paper_robot: Robot, monkeypatch: pytest.MonkeyPatch) -> Bench:
+    return Bench(paper_robot, monkeypatch)
+
+
+def test_the_stream_is_kept_a_lead_ahead_of_the_clock(bench: Bench) -> None:
+    assert bench.run() == [0, 10, 20, 30], "before the clock is heard, from the mission's begin"
+    bench.hear([0])
+    assert bench.run() == []
+    bench.hear(range(1, 6))
+    assert bench.run() == []
+    bench.hear([6])
+    assert bench.run() == [40]
+    bench.hear([30])
+    assert bench.run() == [50, 60]
+    assert bench.loop.health().values["tick"] == 30
+
+
+def test_who_joins_is_told_again_what_is_still_needed(bench: Bench) -> None:
+    bench.hear([0, 33])
+    assert bench.run() == [0, 10, 20, 30, 40, 50, 60]
+    bench.joints.listener_count = bench.base.listener_count = 1
+    assert bench.run() == [], "nobody looks so soon"
+    bench.now += GREET_S
+    assert bench.run() == [30, 40, 50, 60]
+    for count in (1, 0):
+        bench.base.listener_count = count
+        bench.now += GREET_S
+        assert bench.run() == []
+    bench.base.listener_count = 1
+    bench.now += GREET_S
+    assert bench.run() == [30, 40, 50, 60]
+
+
+def test_in_the_midst_of_a_flight_nothing_is_said_of_its_past(bench: Bench) -> None:
+    bench.joints.listener_count = 1
+    bench.run()
+    bench.hear([5003])
+    assert bench.run() == [5000, 5010, 5020, 5030]
+    assert bench.node.said == []
+
+
+def test_a_new_time_has_a_new_stream(bench: Bench) -> None:
+    """Several stamps that agree are one; a single one is wrong, and its sender doubted."""
+    bench.hear([1000])
+    bench.run()
+    bench.hear([3, 1001, 10**9, 1002])
+    assert bench.run() == []
+    assert bench.loop.health().values["rejected: stamp"] == 2
+    bench.hear(range(20, 25))
+    assert bench.run() == [20, 30, 40, 50]
+    assert bench.node.said == ["a new time begins at tick 24, after 1002: the stream too"]
+    values = bench.loop.health().values
+    assert values == {"tick": 24, "rejected: stamp": 6, "rejected: another's": 3}
+
+
+def test_a_stop_of_a_minute_is_believed_and_a_longer_one_is_not(bench: Bench) -> None:
+    longest = round(60.0 / bench.settings.period)
+    bench.hear([0, longest])
+    bench.run()
+    assert bench.loop.health().values["tick"] == longest
+    bench.hear([2 * longest + 1])
+    assert bench.run() == []
+    assert bench.loop.health().values["tick"] == longest
+
+
+def test_stamps_that_are_no_tick_are_counted_and_the_same_one_again_is_not(bench: Bench) -> None:
+    assert bench.loop.health().values["tick"] == 0
+    bench.hear([5, 5, 5])
+    bench.clock.waiting.append(ClockCodec().encode(PERIOD_NS + 1))
+    bench.clock.waiting.append(b"no clock")
+    bench.run()
+    values = bench.loop.health().values
+    assert (values["tick"], values["rejected: stamp"]) == (5, 2)
+    assert bench.clock.source.is_followed
+    for _ in range(5):
+        bench.clock.waiting.append(b"no clock")
+    bench.run()
+    assert not bench.clock.source.is_followed
+
+
+def test_the_stream_goes_on_while_the_clock_is_flooded(bench: Bench) -> None:
+    bench.run()
+    bench.hear(range(2 * MOST_AT_ONCE + 1))
+    assert bench.loop.step() is None
+    assert len(bench.clock.waiting) == MOST_AT_ONCE + 1
+    assert len(bench.joints.sent) == 4 + 1
+    assert bench.run() == [*range(50, 2 * MOST_AT_ONCE + LEAD, CHUNK)]
