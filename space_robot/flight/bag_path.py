@@ -29,10 +29,10 @@ def check_bag_path(path: Path) -> None:
     Raises:
         InputError: it exists, or its nearest existing folder cannot be written.
     """
+    if _is_taken(path):
+        raise InputError(f"{path}: exists already; a bag is never overwritten")
     parent = path
     try:
-        if path.exists():
-            raise InputError(f"{path}: exists already; a bag is never overwritten")
         parent = next(p for p in path.absolute().parents if p.exists())
         with TemporaryDirectory(dir=parent):
             pass
@@ -40,5 +40,20 @@ def check_bag_path(path: Path) -> None:
         raise InputError(
             f"{path}: no bag can be written there ({parent}: {error.strerror})"
         ) from None
+
+
+def _is_taken(path: Path) -> bool:
+    """Tell whether something has this name.
+
+    Raises:
+        InputError: nothing can have it, which `Path.exists` does not tell.
+    """
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except OSError as error:
+        raise InputError(f"{path}: no bag can be written there ({error.strerror})") from None
     except ValueError as error:
         raise InputError(f"{short(str(path))}: no name of a folder ({error})") from None
+    return True
