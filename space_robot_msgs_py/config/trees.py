@@ -38,11 +38,11 @@ def nest(flat: Mapping[Any, Any]) -> Tree:
 def _refuse_both(one: Tree, other: Tree, prefix: str = "") -> None:
     """See that nothing is a value in one tree, and a group of values in the other."""
     for key in one.keys() & other.keys():
-        groups = [tree[key] for tree in (one, other) if isinstance(tree[key], dict)]
-        if len(groups) == 1:
+        first, second = one[key], other[key]
+        if isinstance(first, dict) is not isinstance(second, dict):
             raise InputError(f"{prefix}{key}: given as a value, and as a group of values")
-        if groups:
-            _refuse_both(*groups, f"{prefix}{key}.")
+        if isinstance(first, dict):
+            _refuse_both(first, second, f"{prefix}{key}.")
 
 
 def flatten(tree: Mapping[Any, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
