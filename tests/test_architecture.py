@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from import_graph import PACKAGES, cycles, edges, folders, imports, modules, strings
-from paths import ROOT
+from paths import ROOT, TESTS
 
 ROOMS = {
     "space_robot_msgs_py": (
@@ -183,3 +183,9 @@ def test_no_variable_is_called_found_given_or_told() -> None:
         or (isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node.id in VAGUE)
     ]
     assert not broken, broken
+
+
+def test_no_two_test_modules_have_one_name() -> None:
+    """Tests are no packages: pytest collects only one of two modules with the same name."""
+    names = [file.name for file in TESTS.rglob("test_*.py")]
+    assert len(set(names)) == len(names), sorted({name for name in names if names.count(name) > 1})

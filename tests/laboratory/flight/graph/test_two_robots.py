@@ -112,7 +112,8 @@ def check_report(report: dict[str, Any], namespace: str) -> None:
     assert report["graph"]["warnings"] == report["graph"]["failures"] == []
     assert set(report["graph"]["nodes"]) == NODES
     for node, topic in (("plant", "joint_states"), ("controller", "command")):
-        assert report["graph"]["nodes"][f"{node}_node"][f"sent {namespace}/{topic}"] == "600"
+        sent = report["graph"]["nodes"][f"{node}_node"][f"sent {namespace}/{topic}"]
+        assert int(sent) >= 600  # on a busy machine a state that nobody answers is sent again
 
 
 def check_names(bag: Path, namespace: str) -> None:
