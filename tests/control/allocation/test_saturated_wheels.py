@@ -174,10 +174,12 @@ def test_what_is_told_of_wheels_is_what_they_do() -> None:
     assert (found.failed, found.summary) == ((), "")
     assert found.values["fullest_wheel"] == pytest.approx(0.8)
     assert found.values["wheel_axes"] == 3
+    assert "failed" not in found.values
     bench.failed = {1, 3}
     bench.fly([0.3, 0.2, 0.1], 30)
     found = diagnose(bench.allocation)
     assert found.failed == ("wheel_2", "wheel_4")
     assert found.values["fullest_wheel"] == pytest.approx(abs(bench.momenta[2]) / 10.0, rel=1e-3)
     assert found.values["wheel_axes"] == 2
+    assert found.values["failed"] == "wheel_2, wheel_4"
     assert "pulses" not in found.values

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from paths import CONFIG
+from queued_input import QueuedInput
 
 from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.samples import RobotNames, RobotState, Timebase
 from space_robot_msgs_py.wire.codecs import StateCodec
-from space_robot_msgs_py.wire.source_guard import SourceGuard
 
 pytest.importorskip("rclpy")
 
@@ -22,26 +21,7 @@ from space_robot_control.controller import state_input
 from space_robot_control.controller.state_input import StateInput
 
 TIMEBASE = Timebase(500_000)
-MS = 1_000_000
 ROBOT = Robot.from_yaml(CONFIG / "robots" / "paper.yaml")
-
-
-class Queue:
-    """A `FollowedSubscription` that hears what the test sends."""
-
-    def __init__(self, node: object, topic: topics.Topic, group: object) -> None:
-        self.topic, self.source = topic, SourceGuard()
-        self._sent: deque[tuple[bytes, int]] = deque()
-
-    def send(self, data: bytes, sequence: int) -> None:
-        self._sent.append((data, sequence))
-
-    def take(self) -> bytes | None:
-        while self._sent:
-            data, sequence = self._sent.popleft()
-            if self.source.passes(sequence, MS):
-                return data
-        return None
 
 
 class Bench:
@@ -51,7 +31,7 @@ class Bench:
         self._wheels = wheels
         names = RobotNames(robot.joint_names, tuple(f"wheel_{k + 1}" for k in range(wheels)))
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(state_input, "FollowedSubscription", Queue)
+            patch.setattr(state_input, "FollowedSubscription", QueuedInput)
             no_node: Any = None
             self.input = StateInput(no_node, names, TIMEBASE)
         self._codec = StateCodec(names, TIMEBASE)
@@ -95,6 +75,7 @@ def test_a_plant_heard_in_mid_flight_is_heard_from_then_on(
         bench.send(tick, *heard_from)
         assert bench.take_all() == [tick]
     assert not any(queue.source.others_messages for queue in bench.input.inputs)
+    assert all(queue.source.is_followed for queue in bench.input.inputs)
 
 
 @pytest.mark.parametrize("part", range(3))
@@ -112,6 +93,14 @@ def test_a_state_that_was_sent_without_a_part_is_passed_over(
             bench.send(tick, parts[part], number=tick - (tick > 5))
         found += bench.take_all()
     assert found == [tick for tick in range(10) if tick != 5]
+
+
+def test_a_state_that_is_not_followed_leaves_every_sender_unknown() -> None:
+    bench = Bench(ROBOT, wheels=4)
+    for tick in range(20):
+        bench.send(tick, *(queue.topic for queue in bench.input.inputs))
+        bench.input.take()
+    assert not any(queue.source.is_followed for queue in bench.input.inputs)
 
 
 def test_a_controller_of_wheels_listens_to_them_and_not_to_thrusters() -> None:

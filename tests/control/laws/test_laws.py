@@ -188,6 +188,21 @@ def test_reset_empties_the_memory(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", EQUATIONS)
+def test_a_law_restored_goes_on_as_the_one_that_was_saved(name: str) -> None:
+    """Gains and memory come back into a law that has other gains and has answered for long."""
+    law, history = find_law(name)(random_gains(find_law(name), 9, seed=2), PERIOD), History(9, 3)
+    forces(law, history)
+    saved = law.save()
+    expected = forces(law, history)
+    other = find_law(name)(random_gains(find_law(name), 9, seed=5), PERIOD)
+    forces(other, history)
+    other.restore(saved)
+    for value, restored in zip(law.gain_values.values(), other.gain_values.values(), strict=True):
+        np.testing.assert_array_equal(restored, value)
+    np.testing.assert_array_equal(forces(other, history), expected)
+
+
+@pytest.mark.parametrize("name", EQUATIONS)
 def test_laws_of_one_class_share_nothing(name: str) -> None:
     law, history = find_law(name), History(9, 4)
     gains = random_gains(law, 9, seed=3)

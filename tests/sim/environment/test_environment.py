@@ -11,8 +11,9 @@ from pydantic import ValidationError
 from random_robots import random_robot
 from random_trees import KINDS, random_bodies
 
+from space_robot_model.dynamics.model import MOST_JOINTS
 from space_robot_model.robot import Robot
-from space_robot_msgs_py.samples import RobotNames
+from space_robot_msgs_py.samples import MOST_WHEELS, RobotNames
 from space_robot_sim.environment.disturbance import (
     Disturbance,
     DisturbanceSettings,
@@ -38,6 +39,21 @@ def disturbance(n: int, scale: float, time: float) -> Array:
     out = np.full(n + 3, np.nan)
     disturbance_torque(Disturbance.build(n, DisturbanceSettings(scale=scale)), time, out)
     return out
+
+
+def test_friction_of_the_largest_robot_with_the_most_wheels_is_each_ones_own() -> None:
+    """All rows of the record are there, and none reaches into another."""
+    robot = random_robot(np.random.default_rng(1), MOST_JOINTS)
+    joints = Friction.build(robot, FrictionSettings(coulomb=0.3, viscous=0.7))
+    wheels = np.arange(1.0, MOST_WHEELS + 1.0)
+    Friction.add_wheels(joints, 10.0 * wheels, 100.0 * wheels)
+    rates = np.full(MOST_JOINTS + MOST_WHEELS, 2.0)
+    out = np.full(rates.size, np.nan)
+    friction_torque(joints, rates, np.ones(rates.size), out)
+    np.testing.assert_array_equal(out[:MOST_JOINTS], np.full(MOST_JOINTS, 0.3 + 0.7 * 2.0))
+    np.testing.assert_array_equal(out[MOST_JOINTS:], 10.0 * wheels + 100.0 * wheels * 2.0)
+    assert joints.count == rates.size
+    assert joints.set_valued == float(FrictionSettings().set_valued)
 
 
 def friction(joints: Friction, joint: int, rate: float) -> float:
