@@ -49,6 +49,7 @@ setup(
         "rich>=13",
         "rosbags>=0.11",
         "scipy>=1.11.4",
+        "setproctitle>=1.2.2",
         "typing_extensions>=4.8",
         "zstandard>=0.22",
     ],

@@ -32,6 +32,9 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
       space-robot fly --event capture@10:target.yaml
       space-robot fly --fault drop_state@2-4:0.1 --fault noise_gyro@0:1e-5 --seed 7
     """
+    from ..flight.graph.processes import begin_loading
+
+    begin_loading()  # while this process looks at the options
     from space_robot_msgs_py.errors import FlightError
 
     from ..analysis import analyze

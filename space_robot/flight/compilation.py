@@ -53,12 +53,12 @@ def _compile_flights() -> None:
     own = [law.kernel for law in laws().values() if issubclass(law, CompiledLaw)]
     with _progress("the dynamics and the laws", fly_ticks, read, write, *own):
         with child_process(module_command(__name__), stdout=subprocess.DEVNULL) as helper:
-            _step_plant()
+            _step_plant(Flight(FlightPlan()))
             helper.wait()
         for law in laws():
             simulate(Flight(FlightPlan(controller=law, duration=0.002)))
-        _step_plant()
-        _answer_and_exchange()
+        _step_plant(Flight(FlightPlan()))
+        _answer_under_every_law()
     mark.touch()
 
 
@@ -69,24 +69,34 @@ def _progress(what: str, *kernels: Any) -> AbstractContextManager[None]:
     return watching_progress("kernels", len(files), lambda: count_compiled(files))
 
 
-def _step_plant() -> None:
-    flight = Flight(FlightPlan())
+def load_kernels() -> None:
+    """Read what nodes use from the cache, if it is there."""
+    if (cache_directory() / MARK).exists():
+        flight = Flight(FlightPlan())
+        _step_plant(flight)
+        _answer_and_exchange(flight)
+
+
+def _step_plant(flight: Flight) -> None:
     flight.plant.step(Command(0, np.zeros(len(flight.plant.names.commanded))))
 
 
-def _answer_and_exchange() -> None:
-    """The controller's entry under every law, and the messages."""
+def _answer_and_exchange(flight: Flight) -> None:
+    """The controller's entry, and the messages."""
+    states = StateCodec(flight.plant.names, flight.timebase)
+    commands = CommandCodec(flight.plant.names.commanded, flight.timebase)
+    state = RobotState.allocate(flight.robot.n)
+    for topic, data in zip(states.topics, states.encode(state), strict=True):
+        states.decode(topic, data, state)
+    command = flight.controller.update(state, Reference.at_rest(flight.robot.n))
+    commands.decode(commands.encode(command), command)
+
+
+def _answer_under_every_law() -> None:
     for law in laws():
-        flight = Flight(FlightPlan(controller=law, navigation="filtered"))
-        states = StateCodec(flight.plant.names, flight.timebase)
-        commands = CommandCodec(flight.plant.names.commanded, flight.timebase)
-        state = RobotState.allocate(flight.robot.n)
-        for topic, data in zip(states.topics, states.encode(state), strict=True):
-            states.decode(topic, data, state)
-        command = flight.controller.update(state, Reference.at_rest(flight.robot.n))
-        commands.decode(commands.encode(command), command)
+        _answer_and_exchange(Flight(FlightPlan(controller=law, navigation="filtered")))
 
 
 if __name__ == "__main__":
     hold_to_standard_input()
-    _answer_and_exchange()
+    _answer_under_every_law()

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from space_robot_control.controller.controller import Controller
 from space_robot_control.guidance.mission import Mission, MissionSettings
@@ -51,6 +50,8 @@ class Noise:
         ``weight`` is that of the pair's low-pass. Where nothing smooths, white noise is overrated
         by a root of 2: in flight a difference meets the command that the one before has made.
         """
+        from scipy.signal import lfilter  # slow to import
+
         differences = np.diff(self.rates, axis=0) / self.period
         smooth = lfilter([weight], [1.0, weight - 1.0], differences, axis=0)
         deviation: Array = smooth[len(smooth) // 10 :].std(axis=0)

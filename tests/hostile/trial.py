@@ -92,7 +92,7 @@ class Trial:
     def node(self, name: str) -> int | None:
         """The process of a node, if there is one."""
         for pid in self._left():
-            if f"{name}_node --ros-args" in _read(pid, "cmdline"):
+            if _read(pid, "cmdline").startswith(f"{name}_node"):
                 return pid
         return None
 

@@ -10,8 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
-from space_robot_msgs_py.ros.run_module import module_command
-
+from .node_server import Program
 from .processes import ros_arguments
 
 NAME = "composed"
@@ -20,15 +19,15 @@ NAME = "composed"
 
 def composed_command(
     parameters: Mapping[str, Mapping[str, Any]], namespace: str, folder: Path
-) -> list[str]:
-    """The command line of the process, with the parameters of each node.
+) -> Program:
+    """The program of the process, with the parameters of each node.
 
     They are written to a file in ``folder``: on a command line, ROS takes a parameter for a node
     that is named for one in the root namespace.
     """
     file = write_parameters(parameters, folder)
     arguments = ros_arguments({}, namespace) or ["--ros-args"]
-    return [*module_command(__name__), *arguments, "--params-file", str(file)]
+    return Program(__name__, [*arguments, "--params-file", str(file)])
 
 
 def write_parameters(parameters: Mapping[str, Mapping[str, Any]], folder: Path) -> Path:

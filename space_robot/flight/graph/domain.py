@@ -22,11 +22,15 @@ from space_robot_msgs_py.ros.locks import (
     domain_lock,
     nodes_in,
 )
+from space_robot_msgs_py.ros.process_environment import defaults
 from space_robot_msgs_py.topics import ROOT
 
 DOMAINS = range(1, 102)
 """Domains whose ports stay below Linux' ephemeral range."""
 LOOK_S = 0.05
+PORT_BASE, PORTS = 7400, 250
+UDP_TABLES = (Path("/proc/net/udp"), Path("/proc/net/udp6"))
+PEERS = "ROS_STATIC_PEERS"
 
 _held: set[tuple[int, str]] = set()
 """Domains and namespaces that this process has already."""
@@ -107,6 +111,23 @@ def _refusal(domain: int, namespace: str, holder: Holder) -> InputError:
     )
 
 
+def is_quiet(domain: int) -> bool:
+    """Tell if there is certainly nobody in a domain: discovery is local, and no port is taken.
+
+    Middlewares take their ports as DDS-RTPS 9.6.2 says, 250 to a domain, unless told otherwise.
+    """
+    environment = {**defaults(), **os.environ}
+    if environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] != "LOCALHOST" or environment.get(PEERS):
+        return False
+    first = PORT_BASE + PORTS * domain
+    try:
+        lines = [line for file in UDP_TABLES for line in file.read_text("ascii").splitlines()[1:]]
+    except OSError:
+        return False
+    ports = (int(line.split()[1].rpartition(":")[2], 16) for line in lines)
+    return not any(first <= port < first + PORTS for port in ports)
+
+
 def _is_alive(pid: int) -> bool:
     """Tell if a process runs; one that has ended and is only waited for (state Z) does not."""
     try:
@@ -120,7 +141,7 @@ def _in_use(domain: int) -> bool:
     """Tell if some participant has the domain's first unicast port (DDS-RTPS 9.6.2)."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.bind(("", 7410 + 250 * domain))
+            probe.bind(("", PORT_BASE + 10 + PORTS * domain))
         except OSError:
             return True
     return False

@@ -21,7 +21,7 @@ from .listeners import wait_for
 from .monitor import Event, Monitor
 from .node_names import NODE_NAMES, ORDER, PLANT
 from .node_services import change_state
-from .processes import Graph, node_command
+from .processes import Command, Graph, node_command
 from .watch import Watch
 
 POLL_S = 0.1
@@ -46,6 +46,7 @@ def follow(
     parameters: dict[str, dict[str, Any]],
     domain: int,
     stopped: list[int],
+    nobody_was_there: bool = False,
 ) -> dict[str, Any]:
     """Fly on started nodes until the plant has ended the flight; report what happened.
 
@@ -55,6 +56,7 @@ def follow(
         parameters: of each node, for one that is started again.
         domain: their ROS domain.
         stopped: filled when the user wants to end.
+        nobody_was_there: in the domain, so there is nobody to be discovered before the flight.
 
     Raises:
         InterruptedFlightError: the user has ended the flight.
@@ -65,7 +67,7 @@ def follow(
     try:
         follower = _Follower(graph, flight, parameters, monitor, stopped)
         with flight_progress(follower.total_s, flight.controller.law.name) as show:
-            follower.bring_up(show)
+            follower.bring_up(show, nobody_was_there)
             follower.until_complete(show)
         return follower.end()
     finally:
@@ -106,11 +108,12 @@ class _Follower:
         """The time when the first tick was seen; 0 before."""
         self._last_s, self._moved_at = 0.0, time.monotonic()
 
-    def bring_up(self, show: FlightProgress) -> None:
+    def bring_up(self, show: FlightProgress, nobody_was_there: bool) -> None:
         """Configure all nodes, then activate them, the plant last."""
         show(0.0, "configuring the nodes")
         self._change(NODE_NAMES, "configure")
-        self._foreign.wait(self._check_start)
+        if not nobody_was_there:
+            self._foreign.wait(self._check_start)
         for name in NODE_NAMES:
             self._change([name], "activate")
         show.say(f"configured and active: {', '.join(ORDER)}")
@@ -199,7 +202,7 @@ def _remark(
 
 def _restart_command(
     parameters: Mapping[str, Any], namespace: str, absent: Collection[str]
-) -> list[str]:
+) -> Command:
     """Return the command of a controller that is started again while some nodes are ``absent``.
 
     The recorder must have found it before it begins: the bag would lack what it answered until

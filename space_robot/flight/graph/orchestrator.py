@@ -25,11 +25,11 @@ from ..bag_path import check_bag_path
 from ..compilation import compile_kernels
 from ..plan import Flight
 from .composed import NAME, composed_command
-from .domain import ros_domain
+from .domain import is_quiet, ros_domain
 from .following import follow
 from .listeners import RESET_WITH, wait_for
 from .node_files import with_files
-from .processes import Graph, node_command, node_environment
+from .processes import Command, Graph, node_command, node_environment
 
 COMPOSED_DRAIN_S = 0.002
 """In one process the recorder takes little and often: while it does, no tick is flown."""
@@ -62,6 +62,7 @@ def fly(
     compile_kernels(bool(flight.plant.names.actuators))
     namespace = flight.plan.namespace
     with ros_domain(flight.plan.domain, namespace) as domain, stop_signals() as stopped:
+        nobody_is_there = is_quiet(domain)
         _claim(bag)
         begin = time.monotonic()
         try:
@@ -75,7 +76,9 @@ def fly(
                 parameters = with_files(parameters, flight, folder)
                 commands = _commands(flight, parameters, folder)
                 with Graph(commands, node_environment(domain)) as graph:
-                    what_happened = follow(graph, flight, parameters, domain, stopped)
+                    what_happened = follow(
+                        graph, flight, parameters, domain, stopped, nobody_is_there
+                    )
         except BaseException as error:
             if not _has_states(bag, namespace):
                 shutil.rmtree(bag, ignore_errors=True)
@@ -93,8 +96,8 @@ def fly(
 
 def _commands(
     flight: Flight, parameters: Mapping[str, Mapping[str, Any]], folder: Path
-) -> dict[str, list[str]]:
-    """Command lines of the processes: one a node, or one for all; their files go to ``folder``."""
+) -> Mapping[str, Command]:
+    """The processes: one a node, or one for all; their files go to ``folder``."""
     started = {node: {**values, "autostart": False} for node, values in parameters.items()}
     namespace = flight.plan.namespace
     if flight.plan.composed:

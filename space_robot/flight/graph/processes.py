@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import signal
@@ -17,13 +18,17 @@ from typing import Any
 from space_robot_msgs_py.errors import FlightError
 from space_robot_msgs_py.ros import lifeline
 from space_robot_msgs_py.ros.process_environment import defaults
-from space_robot_msgs_py.ros.run_module import clean_environment, module_command
+from space_robot_msgs_py.ros.run_module import clean_environment
 from space_robot_msgs_py.topics import ROOT
 
 from ...processes.node_modules import MODULES
+from .node_server import ForkedProcess, Program, node_server
 
 PACKAGE = "space_robot"
 TAIL_LINES = 5
+POLL_S = 0.005
+Command = Program | Sequence[str]
+"""A program is forked, a command line is started."""
 ERROR = ": error: "
 """Stands in a line that says why a process ends."""
 
@@ -39,19 +44,23 @@ def has_ros2_run() -> bool:
     )
 
 
+def begin_loading() -> None:
+    """Let the server of the nodes load what they need; else the first node waits for it."""
+    if not has_ros2_run():
+        node_server()
+
+
 def node_environment(domain: int) -> dict[str, str]:
     """Return a node's environment: the project's defaults unless the user set others."""
     return {**defaults(), **clean_environment(), **lifeline.held(), "ROS_DOMAIN_ID": str(domain)}
 
 
-def node_command(node: str, parameters: Mapping[str, Any], namespace: str = ROOT) -> list[str]:
-    """The command line of a node: through ``ros2 run`` where that works, else directly."""
-    command = (
-        ["ros2", "run", PACKAGE, f"{node}_node"]
-        if has_ros2_run()
-        else module_command(MODULES[node])
-    )
-    return command + ros_arguments(parameters, namespace)
+def node_command(node: str, parameters: Mapping[str, Any], namespace: str = ROOT) -> Command:
+    """How a node is started: through ``ros2 run`` where that works, else directly."""
+    arguments = ros_arguments(parameters, namespace)
+    if has_ros2_run():
+        return ["ros2", "run", PACKAGE, f"{node}_node", *arguments]
+    return Program(MODULES[node], arguments)
 
 
 def ros_arguments(parameters: Mapping[str, Any], namespace: str = ROOT) -> list[str]:
@@ -63,23 +72,40 @@ def ros_arguments(parameters: Mapping[str, Any], namespace: str = ROOT) -> list[
     return ["--ros-args", *arguments] if arguments else []
 
 
+class SpawnedProcess(subprocess.Popen[bytes]):
+    """A command line in a process group of its own, see `ForkedProcess`."""
+
+    def __init__(self, command: Sequence[str], output: int, environment: Mapping[str, str]) -> None:
+        super().__init__(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            env=dict(environment),
+            start_new_session=True,
+        )
+
+    def close(self) -> None:
+        """Close its standard input."""
+        assert self.stdin is not None
+        self.stdin.close()
+
+
 class NodeProcess:
     """One node in a process group of its own, its output kept in a file.
 
     Its standard input is a lifeline: when this process ends, however it does, so does the node.
     """
 
-    def __init__(self, node: str, command: Sequence[str], environment: Mapping[str, str]):
+    def __init__(self, node: str, command: Command, environment: Mapping[str, str]) -> None:
         self.node = node
         self._stopped = False
         self._output = tempfile.TemporaryFile()  # noqa: SIM115  (closed in `close`)
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=self._output,
-            stderr=subprocess.STDOUT,
-            env=dict(environment),
-            start_new_session=True,
+        output = self._output.fileno()
+        self._process = (
+            ForkedProcess(command, output, environment)
+            if isinstance(command, Program)
+            else SpawnedProcess(command, output, environment)
         )
 
     @property
@@ -114,7 +140,11 @@ class NodeProcess:
     def signal(self, number: int) -> None:
         """Send a signal to the whole group: ``ros2 run`` would keep it to itself."""
         with suppress(ProcessLookupError):
-            os.killpg(self._process.pid, number)
+            try:
+                os.killpg(self.pid, number)
+            except ProcessLookupError:
+                if self.exit_code is None:  # just forked, it is in no group of its own yet
+                    os.kill(self.pid, number)
 
     def ask_to_end(self) -> None:
         """Interrupt it, as Ctrl-C would."""
@@ -131,24 +161,25 @@ class NodeProcess:
             if self.exit_code is not None:
                 break
             self.signal(number)
-            try:
-                self._process.wait(wait_s)
-            except subprocess.TimeoutExpired:
-                continue
+            self._wait(wait_s)
         self.signal(signal.SIGKILL)
-        self._process.wait()
+        self._wait(math.inf)
+
+    def _wait(self, timeout_s: float) -> None:
+        deadline = time.monotonic() + timeout_s
+        while self.exit_code is None and time.monotonic() < deadline:
+            time.sleep(POLL_S)
 
     def close(self) -> None:
         """Let go of its output and its lifeline."""
         self._output.close()
-        if self._process.stdin:
-            self._process.stdin.close()
+        self._process.close()
 
 
 class Graph:
     """The processes of one flight; leaving the context leaves none behind."""
 
-    def __init__(self, commands: Mapping[str, Sequence[str]], environment: Mapping[str, str]):
+    def __init__(self, commands: Mapping[str, Command], environment: Mapping[str, str]):
         """``commands``: the command line of each node, or of the process that hosts them all."""
         self._commands, self._environment = commands, environment
         self.nodes: dict[str, NodeProcess] = {}
@@ -188,7 +219,7 @@ class Graph:
         """The process of a node."""
         return self.nodes.get(node, self.leader)
 
-    def restart(self, name: str, command: Sequence[str]) -> None:
+    def restart(self, name: str, command: Command) -> None:
         """Put a new process in the place of one that is dead or hangs."""
         old = self.nodes[name]
         old.signal(signal.SIGKILL)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection
 
 from .monitor import Event, Monitor
 from .node_names import PLANT
-from .processes import Graph, NodeProcess
+from .processes import Command, Graph, NodeProcess
 
 HUNG_S = 2.0
 """Without a word for this long a controller hangs; its diagnostics come every second."""
@@ -27,7 +27,7 @@ class Watch:
         graph: Graph,
         monitor: Monitor,
         planned: frozenset[str],
-        restart_command: Callable[[Collection[str]], Sequence[str]] | None,
+        restart_command: Callable[[Collection[str]], Command] | None,
         last_tick: int,
     ) -> None:
         """Watch a graph.

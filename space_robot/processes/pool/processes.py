@@ -26,9 +26,9 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
+from ..fork_server import ForkServer
 from .done import Done, OutOfTimeError, WorkerDiedError
-from .fork_server import ForkServer
-from .worker import unpacked
+from .worker import unpacked, worker_of
 
 MESSAGE_S = 60
 """Longest time for a message once it has begun."""
@@ -82,7 +82,7 @@ class Pool:
     ) -> None:
         self._size, self._function = size, function
         self._timeout_s, self._attempts = timeout_s, attempts
-        self._server = ForkServer(function)
+        self._server = ForkServer.of_this_process(worker_of(function))
         self._workers: dict[Connection, Worker] = {}
         self._again: deque[PoolTask] = deque()
         """Tasks to be given out before any new item."""
@@ -127,7 +127,7 @@ class Pool:
             pid, connection = self._server.fork()
         except ConnectionError:  # somebody killed the server, and with it all workers
             self._server.close()
-            self._server = ForkServer(self._function)
+            self._server = ForkServer.of_this_process(worker_of(self._function))
             pid, connection = self._server.fork()
         with _as_socket(connection) as end:
             for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):

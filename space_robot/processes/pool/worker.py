@@ -8,12 +8,16 @@ import os
 import pickle
 import signal
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection
 from typing import Any
 
 from space_robot_msgs_py.config.text import one_line_of
 
+from ..fork_server import Target, accept_signals
+
+IGNORED = (signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
+"""Signals of the terminal, which are for the process that has started it all."""
 PR_SET_PDEATHSIG = 1
 """Of prctl(2): the signal that a process gets when the one that forked it ends."""
 
@@ -26,17 +30,25 @@ class WorkerTraceback(Exception):  # noqa: N818 - shown as the cause of an error
         return f"\n{self.args[0]}"
 
 
-def work(function: Callable[[Any], Any], connection: Connection, starter: int) -> None:
+def worker_of(function: Callable[[Any], Any]) -> Target:
+    """What a forked worker does: `work` for as long as the process lives that forked it."""
+
+    def run(connection: Connection, descriptors: Sequence[int], server: int) -> None:
+        accept_signals(ignored=IGNORED)
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() == server:  # else it has ended before
+            work(function, connection)
+
+    return run
+
+
+def work(function: Callable[[Any], Any], connection: Connection) -> None:
     """Answer every pickled item that comes, until the other end is closed.
 
     Args:
         function: called with the items.
         connection: brings items, takes answers, see `unpacked`.
-        starter: pid of the process that forked this one, with which it ends.
     """
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != starter:  # it ended before
-        return
     # to look through what the modules hold, and a figure half drawn, costs a tenth of the time
     gc.freeze()
     gc.set_threshold(100_000)

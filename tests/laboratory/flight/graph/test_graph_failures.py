@@ -8,8 +8,10 @@ import resource
 import signal
 import subprocess
 import time
+from contextlib import suppress
 from pathlib import Path
 
+import psutil
 import pytest
 from flights import COMMAND, ros_environment, space_robot_here
 
@@ -18,16 +20,15 @@ from space_robot_msgs_py.bag.reader import read_flight
 pytest.importorskip("rclpy")
 
 
-def _children(pid: int) -> list[int]:
-    text = Path(f"/proc/{pid}/task/{pid}/children").read_text()
-    return [int(child) for child in text.split()]
-
-
-def _command_line(pid: int) -> str:
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_bytes().decode().replace("\0", " ")
-    except OSError:
-        return ""
+def _nodes(pid: int) -> dict[str, int]:
+    """The pids of a flight's nodes by name."""
+    nodes = {}
+    for process in psutil.Process(pid).children(recursive=True):
+        with suppress(psutil.Error):  # it has just ended
+            name, _, suffix = process.cmdline()[0].rpartition("_")
+            if suffix == "node":
+                nodes[name] = process.pid
+    return nodes
 
 
 def _start(bag: Path, *options: str) -> tuple[subprocess.Popen[str], dict[str, int]]:
@@ -46,18 +47,13 @@ def _start(bag: Path, *options: str) -> tuple[subprocess.Popen[str], dict[str, i
             break
         time.sleep(0.05)
     assert process.poll() is None, process.communicate()[1]
-    nodes = {}
-    for child in _children(process.pid):
-        for name in ("plant", "controller", "mission", "recorder"):
-            if f".{name}_node " in _command_line(child):
-                nodes[name] = child
+    nodes = _nodes(process.pid)
     assert len(nodes) == 4
     return process, nodes
 
 
 def _assert_gone(nodes: dict[str, int]) -> None:
-    for name, pid in nodes.items():
-        assert f".{name}_node " not in _command_line(pid)
+    assert not any(psutil.pid_exists(pid) for pid in nodes.values())
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

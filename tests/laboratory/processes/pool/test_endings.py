@@ -101,7 +101,7 @@ def test_a_worker_whose_answer_nobody_wants_ends_in_silence() -> None:
     ours, theirs = Pipe()
     ours.send_bytes(pickle.dumps(1))
     ours.close()
-    child = get_context("fork").Process(target=worker.work, args=(str, theirs, os.getpid()))
+    child = get_context("fork").Process(target=worker.work, args=(str, theirs))
     child.start()
     child.join()
     assert child.exitcode == 0
