@@ -185,8 +185,7 @@ class ControllerLoop:
             self._laws.tell(answering.change)
 
     def _believe(self, tick: int, last: int) -> None:
-        """Follow the sender of a state whose stamp is believed; it may begin a new time."""
-        self._states.follow()
+        """Take a state whose stamp is believed; it may begin a new time."""
         if self._answering.stamps.is_new_time and last >= 0:
             self._node.log(f"a new time begins at tick {tick}, after {last}")
         self._state_at = time.monotonic()

@@ -45,24 +45,20 @@ class ReferenceBuffer:
         aside = list(self._aside)
         self._aside.clear()
         for ring, start, rows in aside:
-            self._store(ring, start, rows, only_missing=False)
+            self._store(ring, start, rows)
 
     def add(self, chunk: ReferenceChunk) -> None:
         """Take both parts of a chunk."""
         self.add_joints(chunk.start, chunk.joints)
         self.add_base(chunk.start, chunk.base)
 
-    def add_joints(self, start: int, rows: Array, only_missing: bool = False) -> bool:
-        """Take (k, 3, n) rows from tick ``start`` on, or of those only what is not there yet.
+    def add_joints(self, start: int, rows: Array) -> None:
+        """Take (k, 3, n) rows from tick ``start`` on."""
+        self._store(self._joints, start, rows)
 
-        Returns:
-            Whether any of them has found its place.
-        """
-        return self._store(self._joints, start, rows, only_missing)
-
-    def add_base(self, start: int, rows: Array, only_missing: bool = False) -> bool:
-        """Take (k, 10) rows, see `add_joints`."""
-        return self._store(self._base, start, rows, only_missing)
+    def add_base(self, start: int, rows: Array) -> None:
+        """Take (k, 10) rows from tick ``start`` on."""
+        self._store(self._base, start, rows)
 
     def covers(self, tick: int) -> bool:
         """Tell if both parts of a tick's row are here."""
@@ -90,7 +86,7 @@ class ReferenceBuffer:
             held[name] = self._references[name][i]
         return held
 
-    def _store(self, ring: _Ring, start: int, rows: Array, only_missing: bool) -> bool:
+    def _store(self, ring: _Ring, start: int, rows: Array) -> None:
         if not np.all(np.abs(rows) <= LARGEST):
             raise MessageError(
                 f"reference from tick {start}: a number is not finite or beyond {LARGEST:g}",
@@ -105,11 +101,8 @@ class ReferenceBuffer:
             wanted = (first <= arriving) & (arriving < first + len(ring.ticks))
             if not wanted.all():
                 self._aside.append((ring, start, rows))
-        if only_missing:
-            wanted &= arriving != there
         places = arriving[wanted] % len(ring.ticks)
         ring.rows[places], ring.ticks[places] = rows[wanted], arriving[wanted]
-        return bool(wanted.any())
 
 
 class _Ring:

@@ -14,8 +14,9 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.compiled.records import Block
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.ros.endpoints import FollowedSubscription, PolledCallbackGroup
+from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup
 from space_robot_msgs_py.ros.loop import Wait
+from space_robot_msgs_py.ros.trusted_subscription import TrustedSubscription
 from space_robot_msgs_py.samples import Timebase
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 
@@ -54,12 +55,12 @@ class ReferenceInput:
         group = PolledCallbackGroup()
         self._halves = (
             _Half(
-                FollowedSubscription(node, topics.REFERENCE_JOINTS, group, QUEUE_DEPTH),
+                TrustedSubscription(node, topics.REFERENCE_JOINTS, group, QUEUE_DEPTH),
                 codec.decode_joints,
                 buffer.add_joints,
             ),
             _Half(
-                FollowedSubscription(node, topics.REFERENCE_BASE, group, QUEUE_DEPTH),
+                TrustedSubscription(node, topics.REFERENCE_BASE, group, QUEUE_DEPTH),
                 codec.decode_base,
                 buffer.add_base,
             ),
@@ -116,35 +117,26 @@ class ReferenceInput:
 
 
 class _Half:
-    """One of the two topics; what another than the mission sends only fills gaps."""
+    """One of the two topics."""
 
     def __init__(
         self,
-        source: FollowedSubscription,
+        source: TrustedSubscription,
         decode: Callable[[bytes], tuple[int, Array]],
-        add: Callable[[int, Array, bool], bool],
+        add: Callable[[int, Array], None],
     ) -> None:
         self.input, self._decode, self._add = source, decode, add
-        self._stop = -1
-        """Where the mission's next message should begin."""
 
     def take(self, rejected: Counter[str]) -> bool:
-        """Take the next good message, if there is one; bad ones take nobody's place."""
-        source = self.input.source
+        """Take the next good message, if there is one."""
         for _ in range(MOST_AT_ONCE):
             data = self.input.take()
             if data is None:
                 return False
             try:
-                start, rows = self._decode(data)
-                has_place = self._add(start, rows, not source.is_sure)
+                self._add(*self._decode(data))
             except MessageError as error:
                 rejected[f"reference: {error.reason}"] += 1
-                source.doubt()
                 continue
-            continues = start == self._stop
-            if source.is_sure or continues or (has_place and not source.is_contested):
-                source.follow()
-                self._stop = start + len(rows)
             return True
         return False

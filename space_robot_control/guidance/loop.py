@@ -7,14 +7,11 @@ import time
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.errors import MessageError
-from space_robot_msgs_py.ros.endpoints import (
-    FollowedSubscription,
-    PolledCallbackGroup,
-    RawPublisher,
-)
+from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawPublisher
 from space_robot_msgs_py.ros.health import Health
 from space_robot_msgs_py.ros.loop import Wait
 from space_robot_msgs_py.ros.managed_node import ManagedNode
+from space_robot_msgs_py.ros.trusted_subscription import TrustedSubscription
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.reference_codec import ReferenceCodec
 from space_robot_msgs_py.wire.stamp_guard import StampGuard
@@ -48,7 +45,7 @@ class MissionLoop:
         self._joints = RawPublisher(node, topics.REFERENCE_JOINTS)
         self._base = RawPublisher(node, topics.REFERENCE_BASE)
         self.outputs = (self._joints, self._base)
-        self._clock = FollowedSubscription(
+        self._clock = TrustedSubscription(
             node, topics.CLOCK, PolledCallbackGroup(), depth=CLOCK_DEPTH
         )
         self._for_clock = Wait(CLOCK_WAIT_S, (self._clock,))
@@ -111,13 +108,9 @@ class MissionLoop:
                 tick = self._settings.timebase.tick(header_stamp_ns(data))
             except MessageError:  # not this graph's clock
                 self._invalid_stamps += 1
-                self._clock.source.doubt()
                 continue
             if tick != self._stamps.last and not self._believe(tick):
                 self._invalid_stamps += 1
-                self._clock.source.doubt()
-            else:
-                self._clock.source.follow()
         return True
 
     def _believe(self, tick: int) -> bool:

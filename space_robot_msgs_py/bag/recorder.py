@@ -12,6 +12,7 @@ from .. import topics
 from ..errors import FlightError, MessageError
 from ..samples import Timebase
 from ..wire.carrier import unwrap
+from ..wire.sources import PARTICIPANT_BYTES, Publishers, Sources, Unknown
 from .accounts import ACCOUNTS_KEY
 from .mcap_file import Compression
 from .message_accounting import (
@@ -21,7 +22,6 @@ from .message_accounting import (
     topics_with_allowed_gaps,
 )
 from .remappings import remappings_note
-from .sources import PARTICIPANT_BYTES, Publishers, Sources, Unknown
 from .writer import BagWriter
 
 FLIGHT_KEY = "space_robot.flight"
@@ -118,17 +118,12 @@ class BagRecorder:
         """
         name = topic.full_name
         sources = self.sources[name]
-        is_unnamed = sequence > 0 and not publisher
-        if is_unnamed and not sources.take_unnamed(sequence, sent_ns):
+        if not sources.take(publisher, sequence):
             return False
-        if publisher:
-            if not sources.take(publisher, sequence):
-                return False
-            if sources.begins_anew:
-                sources.begins_anew = False
-                self.accounting[name] = MessageAccounting(topic)
+        if sources.begins_anew:
+            sources.begins_anew = False
+            self.accounting[name] = MessageAccounting(topic)
         counted = self.accounting[name]
-        invalid = counted.invalid_stamps
         data = unwrap(data) if topic.carries else data
         try:
             tick = message_tick(topic.carries or topic, data, self._timebase)
@@ -136,8 +131,6 @@ class BagRecorder:
         except MessageError:
             tick, is_new = counted.last, True
             counted.invalid_stamps += 1
-        if is_unnamed:
-            sources.judge(counted.invalid_stamps == invalid)
         if not is_new or self.failure:
             return True
         log_ns = self._timebase.stamp_ns(max(0, min(tick, counted.last)))

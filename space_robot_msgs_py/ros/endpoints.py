@@ -9,7 +9,6 @@ from __future__ import annotations
 import importlib
 import time
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
@@ -18,12 +17,8 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from ..topics import Topic
-from ..wire.source_guard import SourceGuard
-from .rclpy_internals import publishes_alone, raw_publish, take_serialized
+from .rclpy_internals import raw_publish, take_serialized
 from .serialized_take import Received, serialized_take
-
-MOST_REFUSED = 1_000
-"""So many messages of others are passed over before the loop may look after other things."""
 
 
 class PolledCallbackGroup(CallbackGroup):
@@ -172,32 +167,3 @@ class RawSubscription:
     def take_with_source(self) -> Received | None:
         """Take the next message, with when and by whom it was sent."""
         return self._take_serialized(self.handle, self._type)
-
-
-class FollowedSubscription(RawSubscription):
-    """Follows one publisher: what others send at the same time is not taken."""
-
-    def __init__(
-        self, node: Node, topic: Topic, group: PolledCallbackGroup, depth: int = 0
-    ) -> None:
-        super().__init__(node, topic, group, depth)
-        self.source = SourceGuard()
-        self._is_only = partial(publishes_alone, self.handle)
-
-    def take(self) -> bytes | None:
-        """Take the next message of the publisher followed, if there is one."""
-        for _ in range(MOST_REFUSED):
-            taken = take_serialized(self.handle, self._type)
-            if taken is None:
-                return None
-            data, info = taken
-            if self.source.passes(
-                info["publication_sequence_number"], info["received_timestamp"], self._is_only
-            ):
-                return data
-        return None
-
-    def counts(self, word: str) -> dict[str, int]:
-        """Count, for a node's health, the messages of others that were ``word``, if any."""
-        count = self.source.others_messages
-        return {f"{word}: another publisher's on {self.full_name}": count} if count else {}

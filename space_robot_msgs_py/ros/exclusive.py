@@ -12,8 +12,8 @@ from contextlib import ExitStack
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from ..bag.sources import Claimed
 from ..errors import InputError
+from ..wire.sources import Claimed
 from .endpoints import full_name_of
 from .locks import FileLock, HeldError, look, node_lock, topic_lock
 

@@ -48,11 +48,6 @@ def take_serialized(handle: Any, message_type: Any) -> tuple[bytes, dict[str, in
     return taken
 
 
-def publishes_alone(handle: Any) -> bool:
-    """Tell whether a subscription, by its handle, is connected with one publisher only."""
-    return bool(handle.get_publisher_count() == 1)
-
-
 def raw_publish(publisher: Publisher) -> Callable[[bytes], None]:
     """The publisher's function for serialized messages; see `take_serialized` for its guard."""
     publish: Callable[[bytes], None] = publisher.handle.publish_raw

@@ -56,17 +56,14 @@ class Monitor:
             period: of the plant's ticks, s; 0: not known, and events have the time at which they
                 are heard of.
         """
-        from space_robot_msgs_py.ros.endpoints import (
-            FollowedSubscription,
-            PolledCallbackGroup,
-            RawSubscription,
-        )
+        from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
+        from space_robot_msgs_py.ros.trusted_subscription import TrustedSubscription
 
         self._visitor = TemporaryNode(name, domain, namespace)
         self._namespace, self._period = namespace, period
         self.node = self._visitor.node
         group = PolledCallbackGroup()
-        self._clock = FollowedSubscription(self.node, topics.CLOCK, group, depth=CLOCK_DEPTH)
+        self._clock = TrustedSubscription(self.node, topics.CLOCK, group, depth=CLOCK_DEPTH)
         self._telemetry = RawSubscription(self.node, topics.TELEMETRY, group, depth=1)
         self._diagnostics = RawSubscription(self.node, topics.DIAGNOSTICS, group)
         self.simulated_s = 0.0
@@ -102,7 +99,6 @@ class Monitor:
         from space_robot_msgs_py.wire.cdr import header_stamp_ns
 
         self.simulated_s, self.has_begun = header_stamp_ns(data) / 1e9, True
-        self._clock.source.follow()
         return []
 
     def _read_telemetry(self, data: bytes) -> list[Event]:

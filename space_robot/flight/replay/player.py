@@ -66,12 +66,12 @@ class Player:
         self._take_or_wait = take_or_wait
         self._visitor = TemporaryNode("replay_node", domain)
         self.node = self._visitor.node
+        self._outs = {t.name: RawPublisher(self.node, t) for t in (*parts, *REFERENCES)}
         try:
-            self._claim = TopicClaim(self.node, [topic.name for topic in (*parts, *REFERENCES)])
+            self._claim = TopicClaim(self.node, list(self._outs))
         except InputError:
             self._visitor.leave()
             raise
-        self._outs = {t.name: RawPublisher(self.node, t) for t in (*parts, *REFERENCES)}
         self._parts_out = [self._outs[topic.name] for topic in parts]
         self._commands = RawSubscription(self.node, topics.COMMAND, PolledCallbackGroup())
         self._waiter = Waiter(self.node)

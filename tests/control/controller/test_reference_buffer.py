@@ -189,21 +189,6 @@ def test_what_is_put_aside_is_bounded() -> None:
     assert_holds(buffer, 4)
 
 
-def test_gaps_can_be_filled_without_overwriting() -> None:
-    """With what another than the mission has sent."""
-    buffer = ReferenceBuffer(2, CAPACITY)
-    buffer.begin(0)
-    buffer.add(chunk(2, 2))
-    stranger = chunk(0, 6, version=100.0)
-    buffer.add_joints(0, stranger.joints, only_missing=True)
-    buffer.add_base(0, stranger.base, only_missing=True)
-    assert_holds(buffer, 2)
-    assert_holds(buffer, 3)
-    assert buffer.at(1)[0].quaternion[0] == 101.5
-    buffer.add(chunk(0, 6))
-    assert_holds(buffer, 1)
-
-
 def test_the_longest_lead_and_chunk_of_a_mission_find_place() -> None:
     buffer, length = ReferenceBuffer(1), 10_000
     buffer.begin(70_000)

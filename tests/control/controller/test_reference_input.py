@@ -31,22 +31,20 @@ class Bench:
         self.now = 100.0
         clock = SimpleNamespace(monotonic=lambda: self.now)
         monkeypatch.setattr(reference_input, "time", clock)
-        monkeypatch.setattr(reference_input, "FollowedSubscription", QueuedInput)
+        monkeypatch.setattr(reference_input, "TrustedSubscription", QueuedInput)
         no_node: Any = None
         self.input = ReferenceInput(no_node, ROBOT, TIMEBASE, TIMEOUT_S)
         self._codec = ReferenceCodec(ROBOT.joint_names, TIMEBASE)
-        self._sent = 0
 
     def send(self, start: int, ticks: int) -> None:
         """Send a stretch whose values are the number of their tick."""
         rows = np.arange(start, start + ticks, dtype=float)
         joints = np.broadcast_to(rows[:, None, None], (ticks, 3, ROBOT.n)).copy()
         base = np.broadcast_to(rows[:, None], (ticks, 10)).copy()
-        self._sent += 1
         halves: Any = self.input.inputs
         chunk = ReferenceChunk(start, joints, base)
         for half, data in zip(halves, self._codec.encode(chunk), strict=True):
-            half.send(data, self._sent)
+            half.send(data)
 
     def joint(self, tick: int) -> float | None:
         """Position of joint 1 that stands for ``tick``; None: nothing does yet."""

@@ -10,8 +10,8 @@ import pytest
 from space_robot_msgs_py.bag.description import read_description
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.recorder import BagRecorder
-from space_robot_msgs_py.bag.sources import Claimed
 from space_robot_msgs_py.samples import Timebase
+from space_robot_msgs_py.wire.sources import Claimed
 
 FLOWN = {"robot": "mine", "robot_file": {"robot": {"name": "mine"}}, "period": 0.001}
 PLANT, FOREIGN = b"p" * 16, b"f" * 16

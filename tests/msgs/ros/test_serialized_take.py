@@ -16,7 +16,6 @@ from space_robot_msgs_py.ros.process_environment import set_defaults
 set_defaults()
 rclpy = pytest.importorskip("rclpy")
 
-from space_robot_msgs_py.bag.sources import Claimed  # noqa: E402
 from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawPublisher, RawSubscription  # noqa: E402
 from space_robot_msgs_py.ros.exclusive import GraphPublishers, TopicClaim  # noqa: E402
 from space_robot_msgs_py.ros.locks import MOST_NOTES  # noqa: E402
@@ -27,6 +26,7 @@ from space_robot_msgs_py.ros.serialized_take import (  # noqa: E402
     serialized_take,
     take_by_rclpy,
 )
+from space_robot_msgs_py.wire.sources import Claimed  # noqa: E402
 
 TOPIC = topics.COMMAND
 TIMEOUT_S = 30.0

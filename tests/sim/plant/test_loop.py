@@ -19,7 +19,6 @@ from space_robot_msgs_py import topics
 from space_robot_msgs_py.samples import Command
 from space_robot_msgs_py.wire.clock import ClockCodec
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
-from space_robot_msgs_py.wire.source_guard import SourceGuard
 from space_robot_sim.plant.plant import Plant
 from space_robot_sim.plant.settings import PlantNodeSettings
 
@@ -45,8 +44,6 @@ class Topic:
         self._node, self.topic, self.full_name = node, topic, topic.name
         self.sent: list[bytes] = []
         self.waiting: deque[bytes] = deque()
-        self.source = SourceGuard()
-        self._taken = 0
         node.by_name[topic.name] = self
 
     def publish(self, data: bytes) -> None:
@@ -54,11 +51,7 @@ class Topic:
         self._node.hear(self.topic, data)
 
     def take(self) -> bytes | None:
-        if not self.waiting:
-            return None
-        self._taken += 1
-        self.source.passes(self._taken, round(1e9 * self._node.now))
-        return self.waiting.popleft()
+        return self.waiting.popleft() if self.waiting else None
 
     def counts(self, word: str) -> dict[str, int]:
         return {}
@@ -90,7 +83,7 @@ class Bench:
         patch.setattr(time, "monotonic", lambda: self.now)
         for module in (loop, scene_output, truth_output):
             patch.setattr(module, "RawPublisher", Topic)
-        patch.setattr(loop, "FollowedSubscription", Topic)
+        patch.setattr(loop, "TrustedSubscription", Topic)
         patch.setattr(loop, "PausedOutput", lambda node: Topic(node, topics.SIMULATION_PAUSED))
         patch.setattr(scene_output, "find_spec", lambda name: None)
         self.settings = PlantNodeSettings.resolve(

@@ -1,4 +1,4 @@
-"""The publishers of recorded messages: the graph's own, and foreign ones.
+"""The publishers of a topic: the graph's own, and foreign ones.
 
 A topic of the graph has one publisher. Its node has claimed the topic and noted its publisher's
 identity there, so it is told from others without asking anybody's name, from its first message on;
@@ -12,12 +12,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-from ..wire.source_guard import SourceGuard
-
 PARTICIPANT_BYTES = 12
 """The first bytes of a publisher's GID, which name the participant, so the process."""
-FOLLOWED, OTHERS = b"followed", b"others"
-"""Stand for GIDs where messages tell none."""
 
 
 class Claimed(NamedTuple):
@@ -92,7 +88,6 @@ class Sources:
     def __init__(self, topic: str, publishers: Publishers) -> None:
         self._topic, self._publishers = topic, publishers
         self._sources: dict[bytes, Source] = {}
-        self._guard = SourceGuard()
         self._was_claimed = self._has_paused = False
         self.is_counted = False
         """True if our publisher tells how many messages it sent."""
@@ -103,33 +98,16 @@ class Sources:
         """Count a message; whether it is ours.
 
         Args:
-            publisher: GID.
+            publisher: GID; empty where messages tell none: then all are taken for ours.
             sequence: the message's place among all of its publisher, from 1 on; 0: not told.
         """
+        if not publisher:
+            return True
         source = self._sources.get(publisher) or self._meet(publisher)
         source.take(sequence)
         if source.is_ours and sequence:
             self.is_counted = True
         return source.is_ours
-
-    def take_unnamed(self, sequence: int, sent_ns: int) -> bool:
-        """`take` where messages tell no publisher: ours is the one whose numbers are followed.
-
-        What is lost cannot be known from such numbers.
-        """
-        is_ours = self._guard.passes(sequence, sent_ns)
-        publisher = FOLLOWED if is_ours else OTHERS
-        if publisher not in self._sources:
-            self._sources[publisher] = Source(is_ours, False, is_resuming=self._has_paused)
-        self._sources[publisher].take(sequence)
-        return is_ours
-
-    def judge(self, was_good: bool) -> None:
-        """Learn whether the message that `take_unnamed` took for ours made sense."""
-        if was_good:
-            self._guard.follow()
-        else:
-            self._guard.doubt()
 
     def note_sent(self, participant: bytes, count: int) -> None:
         """Our publisher of this participant says that it has sent ``count`` messages.

@@ -1,0 +1,42 @@
+"""A subscription that takes what the topic's own publisher sends, and nothing of others."""
+
+from __future__ import annotations
+
+from rclpy.node import Node
+
+from ..topics import Topic
+from ..wire.sources import Sources
+from .endpoints import PolledCallbackGroup, RawSubscription
+from .exclusive import GraphPublishers
+
+MOST_REFUSED = 1_000
+"""So many messages of others are passed over before the loop may look after other things."""
+
+
+class TrustedSubscription(RawSubscription):
+    """Tells publishers apart by the identity (GID) that each message carries, see `Sources`.
+
+    Where messages carry none (`serialized_take`), all are taken for the topic's own publisher's.
+    """
+
+    def __init__(
+        self, node: Node, topic: Topic, group: PolledCallbackGroup, depth: int = 0
+    ) -> None:
+        super().__init__(node, topic, group, depth)
+        self._sources = Sources(topic.name, GraphPublishers(node))
+
+    def take(self) -> bytes | None:
+        """Take the next message of the topic's own publisher, if there is one."""
+        is_ours = self._sources.take
+        for _ in range(MOST_REFUSED):
+            taken = self.take_with_source()
+            if taken is None:
+                return None
+            if is_ours(taken.publisher, taken.sequence):
+                return taken.data
+        return None
+
+    def counts(self, word: str) -> dict[str, int]:
+        """Count, for a node's health, the messages of others that were ``word``, if any."""
+        count = self._sources.foreign
+        return {f"{word}: another publisher's on {self.full_name}": count} if count else {}
