@@ -41,7 +41,6 @@ def cli() -> None:
       space-robot sweep --navigation filtered       laws over grades of sensors
       space-robot campaign run FILE --runs 1000     all is dispersed: verdicts with confidence
       space-robot reproduce                         the paper's Table V and figures, flown again
-      space-robot soak --minutes 5                  random flights with faults
     """
 
 

@@ -10,7 +10,7 @@ from threading import Event, Thread
 
 import psutil
 
-from ...processes.node_modules import MODULES
+from space_robot.processes.node_modules import MODULES
 
 SAMPLE_S = 0.25
 GRACE_S = 2.0
