@@ -22,7 +22,9 @@ from paths import CONFIG, DATA, DOCS
 
 SHORTER = {
     r"campaign run .*first": "--runs 12 --workers 0",  # row 11 is flown again
-    r"campaign run .*law_league_": "--runs 4 --workers 0",  # a grid of four
+    r"campaign run .*(law_league_|sensor_grades|three)": "--runs 4 --workers 0",  # a grid of four
+    r"campaign run .*base_actuators": "--runs 6 --workers 0",  # a grid of six
+    r"campaign run .*noise": "--runs 2 --workers 0",  # a grid of two
     r"campaign run": "--runs 1 --workers 0",
     r"fly .*--scenario": "--help",  # a scenario is read before
     r"fly .*(kill|stop)_": "--duration {}",
@@ -30,7 +32,6 @@ SHORTER = {
     r"reproduce": "--only tde_stc/1 --duration 0.5 --jobs 1",
     r"simulate": "--duration {}",
     r"stability": "--duration 2",
-    r"sweep": "--duration {} --draws 1 --jobs 1",
     r"view": "--no-open",
 }
 """What is added to a command that begins so; {} is half a second after the last time in it."""
@@ -281,7 +282,7 @@ def short_campaign(file: str) -> str:
     """A copy of a campaign whose flights last half a second; what is required, from their start."""
     path = Path(file) if file.endswith(".yaml") else CONFIG / f"campaigns/{file}.yaml"
     content = yaml.safe_load(path.read_text("utf-8"))
-    content["scenario"]["duration"] = 0.5
+    content.setdefault("scenario", {})["duration"] = 0.5
     for requirement in content.get("require", {}).values():
         requirement.pop("from_s", None)
     Path("short").mkdir(exist_ok=True)
