@@ -23,6 +23,7 @@ from space_robot.analysis import analyze
 from space_robot.flight.compilation import compile_kernels
 from space_robot.flight.graph.following import InterruptedFlightError
 from space_robot.flight.graph.orchestrator import fly
+from space_robot.flight.graph.processes import begin_loading
 from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.processes.interruption import Interrupted
 from space_robot_msgs_py.errors import SpaceRobotError
@@ -138,6 +139,7 @@ def soak(
     done, at_start = Soak(seed), shared_memory_files()
     try:
         compile_kernels(with_allocation=True)
+        begin_loading()  # one server forks the nodes of all flights: it is not left behind by one
         until = time.monotonic() + seconds
         for number in itertools.count(1):
             if time.monotonic() >= until:

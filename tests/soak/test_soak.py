@@ -90,6 +90,11 @@ def test_nodes_are_weighed(report: dict[str, Any]) -> None:
         assert flown["own_memory_mb"] > 10.0
 
 
+def test_no_process_is_left(report: dict[str, Any]) -> None:
+    wrong = [line for flown in report["each"] for line in flown["wrong"]]
+    assert not [line for line in wrong if line.startswith("left behind")]
+
+
 def test_bags_are_kept_where_that_is_wanted(report: dict[str, Any], bags: Path) -> None:
     kept = [Path(flown["bag"]) for flown in report["each"]]
     assert sorted(kept) == sorted(bags.iterdir())
