@@ -5,7 +5,7 @@ VENV := .venv
 # Versions that are known to work; `make newest` goes without.
 CONSTRAINTS := constraints.txt
 # Extras with versions in it. Not apt, which has ROS's own NumPy, and not bench: Basilisk holds others back.
-CONSTRAINED := campaign dask docs gym mutation notebooks parquet ros soak test view xacro
+CONSTRAINED := campaign dask docs gym mutation notebooks parquet ros test view xacro
 PACKAGES := space_robot space_robot_control space_robot_model space_robot_msgs_py space_robot_sim
 # A file's tests run in one process; tests/conftest.py has the files in an order that fills both.
 PYTEST := $(VENV)/bin/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
@@ -25,7 +25,7 @@ export PYTHONPYCACHEPREFIX := $(CURDIR)/$(VENV)/pycache
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export FASTDDS_BUILTIN_TRANSPORTS ?= UDPv4
 
-.PHONY: help setup fly test check quick coverage hooks lint kernels docs bench mutation notebooks \
+.PHONY: help setup fly test check quick coverage hooks lint kernels docs bench mutation soak notebooks \
   newest constraints clean
 
 help:
@@ -41,6 +41,7 @@ help:
 	@echo "make docs                docs/ as a site in site/, to be read without a network"
 	@echo "make bench [ARGS=...]    how fast it is, e.g. make bench ARGS='plant laws'; --help tells more"
 	@echo "make mutation [ARGS=...] small faults put in, one at a time: do the tests notice?"
+	@echo "make soak [ARGS=...]     random flights with faults, e.g. make soak ARGS='--minutes 5'"
 	@echo "make notebooks           run docs/notebooks and keep what they show"
 	@echo "make newest [ARGS=...]   make check with the newest versions of everything, in .venv-newest"
 	@echo "make constraints         write constraints.txt anew: the newest versions that fit together"
@@ -93,6 +94,9 @@ mutation: $(VENV)/.tests
 	@$(PIP_INSTALL) --editable '.[ros,test,mutation]'
 	$(VENV)/bin/python tests/mutation $(ARGS)
 
+soak: $(VENV)/.tests
+	$(VENV)/bin/python tests/soak $(ARGS)
+
 notebooks: $(VENV)/.tests
 	$(VENV)/bin/python docs/notebooks/execute.py
 
@@ -119,7 +123,7 @@ clean:
 # Stamps: what is installed in .venv, renewed when the packaging changes.
 $(VENV)/.flies: setup.py pyproject.toml $(CONSTRAINTS) | $(VENV)/.made
 	@echo "installing space_robot and ROS 2 into $(VENV): a minute or two, once"
-	@$(PIP_INSTALL) --no-compile --editable '.[ros,soak,campaign,view]'  # most modules are never imported
+	@$(PIP_INSTALL) --no-compile --editable '.[ros,campaign,view]'  # most modules are never imported
 	@touch $@
 
 $(VENV)/.tests: setup.py pyproject.toml $(CONSTRAINTS) | $(VENV)/.flies

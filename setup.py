@@ -81,7 +81,6 @@ setup(
             "ros-jazzy-rclpy",
             "ros-rmw-fastrtps-cpp==8.4.3",  # Jazzy's: newer ones belong to other distributions
         ],
-        "soak": ["psutil>=5.9"],  # `soak`
         "test": [
             "cvxpy",
             "distributed>=2024.1",

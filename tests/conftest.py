@@ -91,6 +91,7 @@ SLOW = (
     "test_examples.py",
     "test_tutorial.py",
     "msgs/bag/test_description_fuzz.py",
+    "soak/",
     "test_packaging.py",
     "test_pages.py",
     "test_shown_outputs.py",

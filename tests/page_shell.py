@@ -10,29 +10,28 @@ import subprocess
 import sys
 import traceback
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 from bags import entries_of, mcap_of, rosbags_bag, within
-from flights import space_robot, space_robot_here
+from flights import space_robot_here
 from pages import Item, files, items, name
 from paths import CONFIG, DATA, DOCS
 
 SHORTER = {
     r"campaign run .*first": "--runs 12 --workers 0",  # row 11 is flown again
-    r"campaign run .*law_league_": "--runs 4 --workers 0",  # a grid of four
+    r"campaign run .*(law_league_|sensor_grades|three)": "--runs 4 --workers 0",  # a grid of four
+    r"campaign run .*base_actuators": "--runs 6 --workers 0",  # a grid of six
+    r"campaign run .*noise": "--runs 2 --workers 0",  # a grid of two
     r"campaign run": "--runs 1 --workers 0",
     r"fly .*--scenario": "--help",  # a scenario is read before
     r"fly .*(kill|stop)_": "--duration {}",
     r"fly": "--composed --duration 0.5",
     r"reproduce": "--only tde_stc/1 --duration 0.5 --jobs 1",
     r"simulate": "--duration {}",
-    r"soak": "--minutes 0.001 --duration 0.5",
     r"stability": "--duration 2",
-    r"sweep": "--duration {} --draws 1 --jobs 1",
     r"view": "--no-open",
 }
 """What is added to a command that begins so; {} is half a second after the last time in it."""
@@ -40,7 +39,7 @@ TIME = re.compile(r"(?:@|--swap )([\d.]+)(?:-([\d.]+))?")
 LASTS_S = {"docs/manual/analysis.md": 16.0, "docs/manual/view.md": 15.0}
 """Flights of pages that look at a later time."""
 OF_GRAPHS = re.compile(
-    r"fly .*(--(composed|domain|realtime|restart-controller|scenario)|list|\w:[A-Z])|replay|soak"
+    r"fly .*(--(composed|domain|realtime|restart-controller|scenario)|list|\w:[A-Z])|replay"
 )
 """Commands that need a graph. All other options of `fly` are those of `simulate`, which flies the
 same bits (tests/laboratory/flight/graph holds it to that) and is asked in its place."""
@@ -253,9 +252,7 @@ class PageShell:
         command = shorter(given, LASTS_S.get(name(page), 0.0))
         if command in self.seen:
             return "", ""
-        # a soak ends what its flights have left behind: the shell, too, were it this process' child
-        start = partial(space_robot, timeout=500.0) if given[0] == "soak" else space_robot_here
-        ended = start(*command)
+        ended = space_robot_here(*command)
         if not any(Path(part).exists() for word in command for part in re.split("[=@]", word)):
             self.seen.add(command)
         line = " ".join(given)
@@ -285,7 +282,7 @@ def short_campaign(file: str) -> str:
     """A copy of a campaign whose flights last half a second; what is required, from their start."""
     path = Path(file) if file.endswith(".yaml") else CONFIG / f"campaigns/{file}.yaml"
     content = yaml.safe_load(path.read_text("utf-8"))
-    content["scenario"]["duration"] = 0.5
+    content.setdefault("scenario", {})["duration"] = 0.5
     for requirement in content.get("require", {}).values():
         requirement.pop("from_s", None)
     Path("short").mkdir(exist_ok=True)

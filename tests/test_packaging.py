@@ -46,7 +46,6 @@ OF_EXTRAS = {
     "distributed": "dask",
     "gymnasium": "gym",
     "pandas": "campaign",
-    "psutil": "soak",
     "pyarrow": "parquet",
     "trimesh": "view",
     "viser": "view",

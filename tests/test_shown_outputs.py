@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from shown import ROOT, block, check, differences, run
 
 from space_robot import load_bag
@@ -129,31 +130,40 @@ def test_the_first_difference_of_the_page_on_replay_is_that_of_the_two_gains(
     ]
 
 
-SWEPT = (
+METRICS = (
     "attitude_rms",
     "joints_1_3_rms",
     "joints_4_6_rms",
     "ripple_base_torque",
     "ripple_torque_4_6",
 )
-"""Metrics of the pages' tables of sweeps."""
+"""Columns of the page's tables."""
 
 
 def test_the_page_on_real_spacecraft_has_what_its_commands_give(tmp_path: Path) -> None:
-    """Two laws' rows of the first table, by its two commands."""
-    three = tmp_path / "three"
+    """Two laws' rows of the first table, by its commands."""
+    three, file, folder = (tmp_path / name for name in ("three", "three.yaml", "campaign"))
     tune = "gains tune --case 1 --case 4-2 --sensors fine --navigation filtered --bandwidth 3 -o"
     run(*tune.split(), str(three))
-    sweep = "sweep --navigation filtered --case 3 --draws 9 --spread 0.2 --sensors fine --json"
-    laws = ("ctc", "tde_stc")
-    report = json.loads(run(*sweep.split(), *(f"--law={law}={three}" for law in laws)))
+    content = yaml.safe_load((ROOT / "config/campaigns/sensor_grades.yaml").read_text("utf-8"))
+    content["laws"] = [f"{law}={three}" for law in ("ctc", "tde_stc")]
+    content["vary"]["scenario.sensors"] = {"grid": ["fine"]}
+    file.write_text(yaml.safe_dump(content), "utf-8")
+    run("campaign", "run", str(file), "--runs", "9", "--out", str(folder), "--workers", "0")
+    metrics = [f"--metric={name}" for name in METRICS]
+    report = json.loads(run("campaign", "report", str(folder), *metrics, "--json"))
     page = (ROOT / "docs/explanation/real_spacecraft.md").read_text("utf-8")
-    for cell in report["cells"]:
-        row = re.search(rf"^\| fine \| {cell['controller']} \|(.*)\|$", page, re.MULTILINE)
+    for law in content["laws"]:
+        row = re.search(rf"^\| fine \| {law.partition('=')[0]} \|(.*)\|$", page, re.MULTILINE)
         assert row is not None
+        medians = [
+            standing["median"]["value"]
+            for league in report["leagues"]
+            for standing in league["standings"]
+            if standing["law"] == law
+        ]
         shown = [float(text) for text in row.group(1).split("|")]
-        found = [cell["metrics"][name]["median"] for name in SWEPT]
-        np.testing.assert_allclose(shown, found, rtol=0.06)
+        np.testing.assert_allclose(shown, medians, rtol=0.06)
 
 
 def test_the_page_on_campaigns_has_what_its_commands_print(tmp_path: Path) -> None:

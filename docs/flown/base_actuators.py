@@ -7,7 +7,7 @@ from base_numbers import (
     DRIFT,
     LAWS,
     MOMENTA,
-    OF_SWEEPS,
+    OF_LAWS,
     PEAKS,
     attitude_error_at,
     first_at_limit,
@@ -19,7 +19,7 @@ from base_numbers import (
 from flown_tables import Number, Options, Page, Sentence, Table, Text
 
 ACTUATORS = ("ideal", "wheels", "small_wheels", "wheels_and_thrusters", "thrusters", "none")
-SWEEP_HEAD = (
+LAW_HEAD = (
     "actuators",
     "law",
     "attitude",
@@ -48,9 +48,9 @@ COMES_BACK: Options = {
 ROBUST_THRUSTERS: Options = {"actuators": "thrusters", "gains": "robust", "controller": "tde_stc"}
 
 
-def _swept(label: str, options: Options) -> list[str | Number]:
+def _law_row(label: str, options: Options) -> list[str | Number]:
     law = str(options["controller"])
-    return [label, law, *(Number(options, quantity) for quantity in OF_SWEEPS)]
+    return [label, law, *(Number(options, quantity) for quantity in OF_LAWS)]
 
 
 def _asked(label: str, options: Options) -> list[str | Number | Text]:
@@ -89,9 +89,9 @@ PAGE = Page(
         ),
         Table(
             "bases",
-            SWEEP_HEAD,
+            LAW_HEAD,
             [
-                _swept(name, {"actuators": name, "controller": law})
+                _law_row(name, {"actuators": name, "controller": law})
                 for name in ACTUATORS
                 for law in LAWS
             ],
@@ -103,9 +103,9 @@ PAGE = Page(
         ),
         Table(
             "robust",
-            SWEEP_HEAD,
+            LAW_HEAD,
             [
-                _swept("thrusters, `robust`", {**ROBUST_THRUSTERS, "controller": law})
+                _law_row("thrusters, `robust`", {**ROBUST_THRUSTERS, "controller": law})
                 for law in LAWS
             ],
         ),

@@ -70,7 +70,8 @@ def _help(command: click.Command, context: click.Context, level: int) -> Iterato
     if isinstance(command, click.Group):
         for name in command.list_commands(context):
             inner = command.commands[name]
-            yield from _help(inner, click.Context(inner, context, name), level + 1)
+            if not inner.hidden:
+                yield from _help(inner, click.Context(inner, context, name), level + 1)
 
 
 def rooms(package: Path) -> Iterator[Path]:

@@ -46,11 +46,6 @@ class Law(NamedTuple):
         controller, _, gains = text.partition("=")
         return cls(controller, gains or "default")
 
-    @property
-    def title(self) -> str:
-        """For a person."""
-        return f"{self.controller}, {self.gains.rstrip('/').rpartition('/')[2]}"
-
 
 def short_names(laws: Sequence[str]) -> dict[str, str]:
     """Return what tables call each law: without its gain set, if all laws have the same."""

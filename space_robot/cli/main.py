@@ -38,10 +38,9 @@ def cli() -> None:
       space-robot view flights/<bag>                the robot in 3-D with plots, as one page
       space-robot replay flights/<bag>              its states to a live controller, compared
       space-robot sim step --ticks 10               a graph that flies, paused and stepped
-      space-robot sweep --navigation filtered       laws over grades of sensors
+      space-robot campaign run sensor_grades        laws over grades of sensors
       space-robot campaign run FILE --runs 1000     all is dispersed: verdicts with confidence
       space-robot reproduce                         the paper's Table V and figures, flown again
-      space-robot soak --minutes 5                  random flights with faults
     """
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -223,18 +222,3 @@ def remarks_on(flight: Flight) -> list[str]:
     on_start = [f"warning: {sentence(step)}"] if step else []
     repaired = [f"repaired: {text}" for text in flight.robot.repairs]
     return [*repaired, *on_start, *on_gains, *on_limits]
-
-
-OUTPUT = file_option("--output", help="File to write the JSON to as well.")
-
-
-def put_json(report: Any, as_json: bool, output: Path | None) -> None:
-    """Write a report to ``output``, if given, and print it if JSON was asked for."""
-    text = json.dumps(report, indent=1, allow_nan=False)
-    if output:
-        from ..console.files import whole_file
-
-        with whole_file(output, replace=True) as file:
-            file.write(text.encode() + b"\n")
-    if as_json:
-        click.echo(text)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 from collections.abc import Iterator
@@ -12,7 +13,7 @@ from typing import Any
 
 import click
 
-from space_robot.cli.options import OUTPUT, put_json
+from space_robot.cli.options import file_option
 from space_robot.console.files import check_writable
 from space_robot_msgs_py.errors import SpaceRobotError
 
@@ -45,7 +46,7 @@ BESIDE_PEERS = {"peers", "growth"}
     help="Batches of each competitor [default: as many as the section thinks fit].",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print everything, all samples, as JSON.")
-@OUTPUT
+@file_option("--output", help="File to write the JSON to as well.")
 @click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), help="PNG of the growth.")
 @click.option("--cold", is_flag=True, help="Compile anew, to see how long first calls take.")
 def bench(
@@ -87,7 +88,11 @@ def bench(
             if cold:  # before any kernel is imported, and for the nodes, too
                 os.environ["NUMBA_CACHE_DIR"] = stack.enter_context(TemporaryDirectory())
             report, kept = _run(sections or SECTIONS, short, repetitions, plot, not as_json, cold)
-        put_json(report, as_json, output)
+        text = json.dumps(report, indent=1, allow_nan=False)
+        if output:
+            output.write_text(f"{text}\n", "utf-8")
+        if as_json:
+            click.echo(text)
     except SpaceRobotError as error:
         _say(f"error: {error}")
         sys.exit(error.exit_code)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+from paths import CONFIG
 
 from space_robot.campaign.draws import Draws
+from space_robot.campaign.flown.preparation import Preparation
 from space_robot.campaign.study import Law, Requirement, Study, read_study, short_names
 from space_robot_msgs_py.errors import InputError
 
@@ -160,6 +163,16 @@ def test_what_was_read_reads_again() -> None:
     assert again.model_dump() == study.model_dump()
     assert Law.parse("tde_stc=robust") == ("tde_stc", "robust")
     assert Law.parse("tde_stc") == ("tde_stc", "default")
+
+
+@pytest.mark.parametrize("file", sorted((CONFIG / "campaigns").iterdir()), ids=lambda f: f.stem)
+def test_a_shipped_campaign_can_be_flown(file: Path) -> None:
+    """Also at every point of its grid."""
+    study = read_study(file.stem)
+    assert Preparation.of(study, 0, None).manifest.runs == study.runs
+    draws = Draws(study, 0, study.runs_asked())
+    for run in range(math.prod(draws.grid.values())):
+        draws.scenario(run, study.laws[0]).check()
 
 
 def test_names_of_shipped_campaigns_are_told() -> None:

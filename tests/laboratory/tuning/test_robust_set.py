@@ -9,7 +9,9 @@ import pytest
 from click.testing import CliRunner
 from paths import CONFIG
 
-from space_robot.campaign.sweep import sweep, sweep_study
+from space_robot.campaign.row.fly import RowFlyer
+from space_robot.campaign.row.row import Task
+from space_robot.campaign.study import Study, read_study
 from space_robot.cli.main import cli
 from space_robot_control.laws import laws
 
@@ -48,13 +50,17 @@ def test_it_is_sound(robot: str) -> None:
 def test_all_laws_fly_all_cases_with_what_reality_brings(law: str, case: str) -> None:
     """Fine sensors, filtered navigation, masses within 20 %, 2 % too much or too little torque."""
     for seed, echo in ((1, 1.02), (2, 0.98)):
-        common = {
+        scenario = {
             "case": case,
+            "sensors": "fine",
             "navigation": "filtered",
             "duration": 10.0,
             "parameters": {"plant": {"echo_scale": [echo]}},
         }
-        (row,) = sweep(sweep_study([f"{law}=robust"], ["fine"], spread=0.2, common=common), seed)
+        off = {k: v for k, v in read_study("sensor_grades").vary.items() if k.startswith("robot.")}
+        laws = [f"{law}=robust"]
+        study = Study.model_validate({"scenario": scenario, "laws": laws, "vary": off})
+        row = RowFlyer.of(study, seed, 1)(Task(0, laws[0]))
         assert row.is_complete
         assert row.metrics["attitude_rms"] < 1e-3
         assert row.metrics["joints_4_6_rms"] < 0.05

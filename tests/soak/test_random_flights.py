@@ -6,12 +6,11 @@ import shlex
 
 import click
 import pytest
-from click.testing import CliRunner
+from flight_verdict import unplanned_deaths
 from hypothesis import given
 from hypothesis import strategies as st
-
-from space_robot.campaign.soak.process_monitor import node_of
-from space_robot.campaign.soak.sampling import (
+from process_monitor import node_of
+from random_flights import (
     ACTUATORS,
     BREAKING,
     CASES,
@@ -24,12 +23,11 @@ from space_robot.campaign.soak.sampling import (
     command_line,
     sample_flight,
 )
-from space_robot.campaign.soak.verdict import unplanned_deaths
+
 from space_robot.cli.main import cli
 from space_robot.flight.plan import Flight, FlightPlan
 from space_robot.scenario.faults import KINDS
 from space_robot_control.laws import laws
-from space_robot_msgs_py.errors import InputError
 from space_robot_sim.faults.axes import About
 from space_robot_sim.faults.grammar import Fault, parse_faults
 
@@ -165,13 +163,6 @@ def test_a_process_is_known_by_its_command_line() -> None:
     assert node_of(["python", "/ws/lib/space_robot/controller_node", "-p", wait]) == "controller"
     assert node_of(["ros2", "run", "space_robot", "mission_node"]) == "mission"
     assert node_of(["python", "-c", "pass", wait]) == ""
-
-
-def test_without_psutil_there_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("space_robot.cli.soak.find_spec", lambda name: None)
-    result = CliRunner().invoke(cli, ["soak", "--minutes", "0.01"])
-    assert isinstance(result.exception, InputError)
-    assert str(result.exception) == "soak needs psutil: pip install 'space_robot[soak]'"
 
 
 @pytest.mark.parametrize("actuators", ACTUATORS)

@@ -8,27 +8,25 @@ import shutil
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import psutil
+from flight_verdict import FlightVerdict, judge
+from process_monitor import ProcessMonitor, shared_memory_files
+from random_flights import breaks_tracking, command_line, sample_flight
 
-from space_robot_msgs_py.errors import InputError, SpaceRobotError
-
-from ...analysis import analyze
-from ...console.files import make_folder
-from ...flight.compilation import compile_kernels
-from ...flight.graph.following import InterruptedFlightError
-from ...flight.graph.orchestrator import fly, require_ros
-from ...flight.plan import Flight, FlightPlan
-from ...processes.interruption import Interrupted
-from ...processes.pool import run_many
-from .process_monitor import ProcessMonitor, shared_memory_files
-from .sampling import breaks_tracking, command_line, sample_flight
-from .verdict import FlightVerdict, judge
+from space_robot.analysis import analyze
+from space_robot.flight.compilation import compile_kernels
+from space_robot.flight.graph.following import InterruptedFlightError
+from space_robot.flight.graph.orchestrator import fly
+from space_robot.flight.graph.processes import begin_loading
+from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.processes.interruption import Interrupted
+from space_robot_msgs_py.errors import SpaceRobotError
 
 WARM_UP = 3
 """Flights after which this process should have what it needs."""
@@ -131,33 +129,23 @@ def soak(
         seconds: of the wall clock.
         seed: of the flights, see `sample_flight`.
         duration_s: of each flight, simulated.
-        bags: an empty or new folder that keeps all bags; None: those of failed flights are kept
-            below the system's folder for temporary files.
+        bags: a new folder that keeps all bags; None: those of failed flights are kept below the
+            system's folder for temporary files.
         say: told a line a flight.
-
-    Raises:
-        InputError: ``bags`` cannot be used.
-        FlightError: there is no ROS here.
     """
-    require_ros()
     if bags:
-        make_folder(bags)
-        if any(bags.iterdir()):
-            raise InputError(f"{bags}: is not empty; give a new folder for the bags")
+        bags.mkdir(parents=True)
     folder = bags or Path(tempfile.mkdtemp(prefix="space_robot_soak_"))
-    done = Soak(seed)
-    at_start = shared_memory_files()
+    done, at_start = Soak(seed), shared_memory_files()
     try:
         compile_kernels(with_allocation=True)
-        numbers = _numbers(time.monotonic() + seconds)
-
-        def fly_one(number: int) -> SoakedFlight:
-            plan = sample_flight(seed, number, duration_s)
-            return _fly(number, plan, folder / f"flight_{number:04d}", bool(bags))
-
-        # in this process: its memory is watched, and each flight is a graph of processes already
-        for flown in run_many(fly_one, numbers, workers=0):
-            done.flights.append(flown.value())
+        begin_loading()  # one server forks the nodes of all flights: it is not left behind by one
+        until = time.monotonic() + seconds
+        for number in itertools.count(1):
+            if time.monotonic() >= until:
+                break
+            bag = folder / f"flight_{number:04d}"
+            done.flights.append(_fly(number, sample_flight(seed, number, duration_s), bag, bags))
             say(done.flights[-1].line())
     except (InterruptedFlightError, Interrupted) as ended:
         done.interrupted_by = ended.number
@@ -170,12 +158,7 @@ def soak(
     return done
 
 
-def _numbers(until: float) -> Iterator[int]:
-    """Yield 1, 2, ... as long as the monotonic clock is before ``until``."""
-    return itertools.takewhile(lambda _: time.monotonic() < until, itertools.count(1))
-
-
-def _fly(number: int, plan: FlightPlan, bag: Path, keep: bool) -> SoakedFlight:
+def _fly(number: int, plan: FlightPlan, bag: Path, bags: Path | None) -> SoakedFlight:
     begin = time.monotonic()
     flight = Flight(plan)
     report, wrong = None, []
@@ -194,7 +177,7 @@ def _fly(number: int, plan: FlightPlan, bag: Path, keep: bool) -> SoakedFlight:
     verdict = judge(flight, report, bag)
     verdict.wrong[:0] = wrong
     verdict.wrong += [f"left behind: {process}" for process in process_monitor.left_behind]
-    if verdict.survived and not keep:
+    if verdict.survived and not bags:
         shutil.rmtree(bag)
     return SoakedFlight(
         number,

@@ -8,6 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from space_robot.analysis.metrics import tracking_error
+from space_robot.flight.plan import Flight
+from space_robot.processes.node_modules import MODULES
+from space_robot.scenario.faults import KINDS
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
@@ -17,11 +21,6 @@ from space_robot_msgs_py.samples import Array, Command, RobotState
 from space_robot_msgs_py.wire.cdr import header_stamp_ns
 from space_robot_msgs_py.wire.codecs import CommandCodec, StateCodec
 from space_robot_sim.faults.grammar import parse_faults
-
-from ...analysis.metrics import tracking_error
-from ...flight.plan import Flight
-from ...processes.node_modules import MODULES
-from ...scenario.faults import KINDS
 
 
 @dataclass

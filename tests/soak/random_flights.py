@@ -6,13 +6,12 @@ import random
 import shlex
 from collections.abc import Mapping
 
+from space_robot.flight.plan import FlightPlan
+from space_robot.scenario.faults import KINDS, NODE_OF
 from space_robot_control.laws import laws
 from space_robot_msgs_py.topics import BASE_AXES
 from space_robot_sim.faults.axes import About
 from space_robot_sim.faults.grammar import Argument, Kind, parse_faults
-
-from ...flight.plan import FlightPlan
-from ...scenario.faults import KINDS, NODE_OF
 
 CASES = ("1", "2", "3", "4-1", "4-2")
 JOINTS = 6
@@ -111,20 +110,8 @@ def breaks_tracking(plan: FlightPlan) -> bool:
 
 def command_line(plan: FlightPlan) -> str:
     """Return the command that flies a sampled flight again."""
-    words = [
-        "space-robot",
-        "fly",
-        "--controller",
-        plan.controller,
-        "--case",
-        plan.case,
-        "--actuators",
-        plan.actuators,
-        "--duration",
-        str(plan.duration),
-        "--seed",
-        str(plan.seed),
-    ]
+    words = f"space-robot fly --controller {plan.controller} --case {plan.case}".split()
+    words += f"--actuators {plan.actuators} --duration {plan.duration} --seed {plan.seed}".split()
     for option, texts in (("--swap", plan.swaps), ("--fault", plan.faults)):
         for text in texts:
             words += [option, text]

@@ -10,7 +10,7 @@ from threading import Event, Thread
 
 import psutil
 
-from ...processes.node_modules import MODULES
+from space_robot.processes.node_modules import MODULES
 
 SAMPLE_S = 0.25
 GRACE_S = 2.0
@@ -19,7 +19,7 @@ SHARED_MEMORY = Path("/dev/shm")
 
 
 class ProcessMonitor:
-    """Watches this process' descendants until the context is left."""
+    """Watches this process' descendants until the context is left, but those of before."""
 
     def __init__(self) -> None:
         self.peak_mb: dict[str, float] = {}
@@ -27,6 +27,8 @@ class ProcessMonitor:
         self.left_behind: list[str] = []
         """Processes that still ran when the flight was over (they are killed), with their pid."""
         self._seen: dict[psutil.Process, str] = {}
+        self._before = set(psutil.Process().children(recursive=True))
+        """Such as the server that forks the nodes of all flights."""
         self._over = Event()
         self._thread = Thread(target=self._watch, daemon=True)
 
@@ -46,7 +48,7 @@ class ProcessMonitor:
     def _watch(self) -> None:
         this = psutil.Process()
         while not self._over.wait(SAMPLE_S):
-            for process in this.children(recursive=True):
+            for process in set(this.children(recursive=True)) - self._before:
                 with suppress(psutil.Error):
                     self._weigh(process)
 
