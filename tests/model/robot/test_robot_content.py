@@ -14,6 +14,8 @@ from random_robots import random_robot
 from random_trees import random_bodies
 
 from space_robot_model.robot import Robot
+from space_robot_model.robot.document import document_of
+from space_robot_model.robot.tree.bodies import JointLimits
 from space_robot_msgs_py.errors import InputError
 
 KINDS = ("revolute", "prismatic", "fixed", "passive revolute", "passive prismatic", "revolute")
@@ -58,3 +60,17 @@ def test_wrong_numbers_are_refused(paper_robot: Robot, key: str, value: Any, sai
         Robot.from_dict(content)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_robot_file_made_of_a_robot_has_its_limits(paper_robot: Robot) -> None:
+    limits = [
+        JointLimits(-1.0, 2.0, 0.5, 30.0),
+        JointLimits(),
+        JointLimits(effort=7.0),
+        JointLimits(velocity=0.25),
+        *paper_robot.limits[4:],
+    ]
+    robot = replace(paper_robot, limits=tuple(limits))
+    again = Robot.from_dict(json.loads(json.dumps(document_of(robot))))
+    for before, after in zip(robot.limits, again.limits, strict=True):
+        assert after == pytest.approx(before)

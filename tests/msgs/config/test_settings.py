@@ -59,6 +59,18 @@ def test_a_file_may_speak_to_a_node_of_any_namespace(tmp_path: Path) -> None:
     assert node_parameters(path, "plant") == {}
 
 
+@pytest.mark.parametrize(
+    "below", ["{}", "3", "[ros__parameters]", "{a: 1}", "{z: 1}", "{ros__parameters: {}, z: 1}"]
+)
+def test_a_file_that_has_more_or_less_than_parameters_is_refused(
+    tmp_path: Path, below: str
+) -> None:
+    path = tmp_path / "case.yaml"
+    path.write_text(f"plant_node: {below}")
+    with pytest.raises(InputError, match="plant_node: 'ros__parameters' was expected below"):
+        node_parameters(path, "plant")
+
+
 def test_a_node_waits_for_listeners_to_what_it_sends_alone() -> None:
     assert PlantNodeSettings.resolve({"wait_for": ["a:/clock", "b", ""]}).wait_for[0] == "a:/clock"
     for schema, entry, sent in (

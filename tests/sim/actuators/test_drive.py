@@ -15,6 +15,7 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.samples import Command
 from space_robot_sim.actuators.drive import DRIVE_BIAS, DRIVE_SCALE, WrongDrive, judge
+from space_robot_sim.actuators.torque_limit import TorqueLimitSettings
 from space_robot_sim.faults.grammar import by_name, parse_faults
 from space_robot_sim.faults.schedule import Schedule
 from space_robot_sim.plant.plant import Plant, PlantSettings
@@ -181,3 +182,12 @@ def test_the_plant_flies_under_the_torque_given_and_tells_the_one_reported(
         sound.step(Command(tick, 0.5 * torque))
         np.testing.assert_array_equal(weak.state.applied_torque, torque)
     np.testing.assert_array_equal(weak.memory.x, sound.memory.x)
+
+
+@pytest.mark.parametrize("name", ["base_torque_limit", "joint_torque_limit"])
+def test_limits_have_a_range_with_both_ends(name: str) -> None:
+    for limit in (0.0, 1e9):
+        assert getattr(TorqueLimitSettings(**{name: limit}), name) == limit
+    for limit in (-1e-9, 1.0000001e9):
+        with pytest.raises(ValueError, match=name):
+            TorqueLimitSettings(**{name: limit})

@@ -21,7 +21,7 @@ from space_robot.campaign.store.journal_codec import JournalCodec
 from space_robot.campaign.store.journal_file import damage_of, whole_rows, write_journal
 from space_robot.campaign.store.manifest import Manifest, read_manifest
 from space_robot.campaign.store.schema import Schema
-from space_robot.campaign.store.software import source_digest
+from space_robot.campaign.store.software import file_digests, source_digest
 from space_robot.campaign.store.table import file_digest, read_table, table_rows, write_table
 from space_robot.campaign.study import Study
 from space_robot_msgs_py.errors import InputError
@@ -364,3 +364,15 @@ def test_a_begin_that_was_killed_is_begun_again(tmp_path: Path) -> None:
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {".lock", "campaign.yaml", "campaign.json"}
     assert (tmp_path / "campaign.yaml").read_text() == STUDY
+
+
+def test_of_the_names_in_a_file_those_of_settings_and_laws_are_digested(tmp_path: Path) -> None:
+    """Not a folder, and not a file of another kind that a text happens to name."""
+    settings_file, law, other = (tmp_path / name for name in ("a.yaml", "law.py", "notes.txt"))
+    for file in (settings_file, law, other):
+        file.write_text(file.name)
+    (tmp_path / "folder.yaml").mkdir()
+    names = [str(settings_file), f"{law}:Law", str(other), str(tmp_path / "folder.yaml"), "b.yaml"]
+    found = file_digests({"values": names})
+    assert set(found) == {str(settings_file), str(law)}
+    assert found[str(settings_file)] != found[str(law)]
