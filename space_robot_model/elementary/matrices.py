@@ -12,9 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-MOST_SWEEPS = 30
-"""Of Jacobi's method; it needs less than ten."""
-
 
 def product(a: ArrayLike, b: ArrayLike) -> Array:
     """Return ``a @ b`` of vectors, matrices, or a stack of them in ``a``."""
@@ -57,31 +54,3 @@ def solve(matrix: Array, right: Array) -> Array:
             x[k] -= a[k, j] * x[j]
         x[k] /= a[k, k]
     return x
-
-
-def principal_axes(tensor: Array) -> tuple[Array, Array]:
-    """Return the eigenvalues of a symmetric matrix (n, n), rising, and its axes as columns.
-
-    Jacobi's method: turn by turn in a plane until nothing is left off the diagonal.
-    """
-    a, axes = 0.5 * (tensor + tensor.T), np.eye(len(tensor))
-    pairs = [(p, q) for p in range(len(a)) for q in range(p + 1, len(a))]
-    for _ in range(MOST_SWEEPS):
-        if not any(a[p, q] for p, q in pairs):
-            break
-        for p, q in pairs:
-            if a[p, q] == 0.0:
-                continue
-            if abs(a[p, q]) < 1e-18 * min(abs(a[p, p]), abs(a[q, q])):
-                a[p, q] = a[q, p] = 0.0
-                continue
-            half = 0.5 * (a[q, q] - a[p, p]) / a[p, q]
-            tangent = math.copysign(1.0, half) / (abs(half) + math.sqrt(half * half + 1.0))
-            cosine = 1.0 / math.sqrt(tangent * tangent + 1.0)
-            turn = np.eye(len(a))
-            turn[p, p] = turn[q, q] = cosine
-            turn[p, q], turn[q, p] = tangent * cosine, -tangent * cosine
-            a, axes = rotate_tensor(turn.T, a), product(axes, turn)
-            a[p, q] = a[q, p] = 0.0
-    order = np.argsort(np.diagonal(a), kind="stable")
-    return np.diagonal(a)[order], axes[:, order]

@@ -90,10 +90,7 @@ AREAS = {
     "wire": _room("msgs/wire"),
     "actuators": _room("sim/actuators", "sim/plant/test_*.py", "control/allocation/test_*.py"),
     "dynamics": _room(
-        "model/dynamics",
-        "model/robot/test_*.py",
-        "sim/plant/test_conservation.py",
-        "sim/plant/test_plant.py",
+        "model/dynamics", "model/robot/test_*.py", "test_conservation.py", "sim/plant/test_plant.py"
     ),
     "elementary": _room("model/elementary"),
     "environment": _room("sim/environment", "sim/plant/test_*.py"),

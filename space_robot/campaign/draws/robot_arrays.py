@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from space_robot_model.robot import Robot
 
-from .principal import spread
+from .inertia_spread import spread
 
 Array = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class RobotArrays:
         """Build the robot."""
         inertia, shift = self.inertia.copy(), -self.com[0]
         for body, own in self.spreads.items():
-            inertia[body] = spread(inertia[body].tolist(), own.factors, own.turn)
+            inertia[body] = spread(inertia[body], own.factors, own.turn)
         changed = replace(
             self.nominal,
             mass=self.mass,

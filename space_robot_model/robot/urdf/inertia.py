@@ -7,7 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ...elementary.matrices import principal_axes, rotate_tensor
+from ...elementary.matrices import rotate_tensor
+from ...elementary.symmetric import principal_axes
 from ..tree import Visual
 
 Array = NDArray[np.float64]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conservation import momentum
 from passive_robot import PASSIVE_ROBOT
 
 from space_robot.analysis import analyze
@@ -21,7 +22,6 @@ from space_robot_control.laws import laws
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
-from space_robot_sim.plant.conservation import momentum
 
 SHORT = 1.2
 """s; the arm has begun to move, and the panel to bend."""

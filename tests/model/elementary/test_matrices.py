@@ -15,18 +15,13 @@ from scipy.spatial.transform import Rotation
 
 from space_robot_model.elementary.arctangent import angle_of, arctan2
 from space_robot_model.elementary.fourier import squared_spectrum
-from space_robot_model.elementary.matrices import (
-    norm,
-    principal_axes,
-    product,
-    rotate_tensor,
-    solve,
-)
+from space_robot_model.elementary.matrices import norm, product, rotate_tensor, solve
 from space_robot_model.elementary.rotations import (
     exact_sines_cosines,
     rotation_of_rpy,
     rpy_of_rotation,
 )
+from space_robot_model.elementary.symmetric import principal_axes
 
 Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)

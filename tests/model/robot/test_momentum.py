@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+from conservation import momentum
 from hypothesis import given
 from hypothesis import strategies as st
 from oracles import pinocchio_model, pinocchio_state, rotation_of
@@ -13,7 +14,6 @@ from random_robots import random_robot, random_state
 from space_robot_model.robot import Robot
 from space_robot_model.robot.momentum import Motion, robot_momentum
 from space_robot_msgs_py.samples import RobotState
-from space_robot_sim.plant.conservation import momentum
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conservation import kinetic_energy, momentum
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -22,7 +23,6 @@ from space_robot_msgs_py.samples import Command, RobotState
 from space_robot_sim.environment.disturbance import DisturbanceSettings
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.environment.payload import PayloadSettings
-from space_robot_sim.plant.conservation import kinetic_energy, momentum
 from space_robot_sim.plant.plant import Plant, PlantSettings, fastest_rate
 
 Array = NDArray[np.float64]

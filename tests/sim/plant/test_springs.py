@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conservation import damping_loss, kinetic_energy, momentum, spring_energy
 from numpy.typing import NDArray
 from paths import DATA
 
@@ -13,7 +14,6 @@ from space_robot_model.robot import Robot
 from space_robot_model.robot.dynamics import mass_matrix
 from space_robot_msgs_py.samples import Command
 from space_robot_sim.environment.friction import FrictionSettings
-from space_robot_sim.plant.conservation import damping_loss, kinetic_energy, momentum, spring_energy
 from space_robot_sim.plant.plant import Plant, PlantSettings
 
 Array = NDArray[np.float64]

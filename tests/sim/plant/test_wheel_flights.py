@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from conservation import kinetic_energy
 from numpy.typing import NDArray
 from oracles import pinocchio_mass_matrix, pinocchio_state
 from paths import DATA
@@ -26,7 +27,6 @@ from space_robot_model.robot import Robot
 from space_robot_msgs_py.samples import Command
 from space_robot_sim.environment.friction import FrictionSettings
 from space_robot_sim.environment.target import Target
-from space_robot_sim.plant.conservation import kinetic_energy
 from space_robot_sim.plant.plant import Plant, PlantSettings
 from space_robot_sim.plant.stick_slip import integrate
 

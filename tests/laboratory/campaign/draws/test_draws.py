@@ -16,8 +16,9 @@ from scipy.stats import qmc, truncnorm
 from space_robot.api import Scenario
 from space_robot.campaign.draws import Draws
 from space_robot.campaign.draws.designs import shifted
-from space_robot.campaign.draws.principal import principal, rotation, spread
+from space_robot.campaign.draws.inertia_spread import rotation, spread
 from space_robot.campaign.study import Study
+from space_robot_model.elementary.symmetric import principal_axes
 from space_robot_model.robot import Robot
 from space_robot_model.robot.find import find_robot
 from space_robot_msgs_py.bag.reader import read_flight
@@ -246,16 +247,13 @@ DRAWS: dict[str, Draws] = {}
 )
 def test_principal_axes_are_numpys(six: list[float], turn: list[float]) -> None:
     xx, yy, zz, xy, xz, yz = six
-    tensor = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
-    moments, axes = principal(tensor)
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    moments, axes = principal_axes(tensor)
     assert moments == pytest.approx(np.linalg.eigvalsh(tensor), abs=1e-14)
-    assert np.array(axes) @ np.diag(moments) @ np.array(axes).T == pytest.approx(
-        np.array(tensor), abs=1e-14
-    )
-    r = np.array(rotation(turn))
+    assert axes @ np.diag(moments) @ axes.T == pytest.approx(tensor, abs=1e-14)
+    r = rotation(turn)
     assert r @ r.T == pytest.approx(np.eye(3), abs=1e-15)
-    body = np.diag([2.0, 3.0, 4.0]).tolist()
-    turned = np.array(spread(body, [1.0, 1.0, 1.0], turn))
+    turned = spread(np.diag([2.0, 3.0, 4.0]), [1.0, 1.0, 1.0], turn)
     assert turned == pytest.approx(r @ np.diag([2.0, 3.0, 4.0]) @ r.T, abs=1e-13)
 
 

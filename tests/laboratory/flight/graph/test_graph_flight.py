@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conservation import kinetic_energy, momentum
 from flights import Flown, space_robot_here
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
@@ -26,7 +27,6 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.wire.definitions import jazzy
-from space_robot_sim.plant.conservation import kinetic_energy, momentum
 
 SHORT = ("--duration", "0.5")
 LONG = ("--duration", "3")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+from conservation import NO_WHEELS, generalised_velocity, kinetic_energy, momentum
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles import pinocchio_state, rotation_of
@@ -12,12 +13,6 @@ from random_robots import Case, State, cases
 from wheel_oracles import pinocchio_with_wheels, random_rotors, settings_of
 
 from space_robot_msgs_py.samples import RobotState
-from space_robot_sim.plant.conservation import (
-    NO_WHEELS,
-    generalised_velocity,
-    kinetic_energy,
-    momentum,
-)
 
 FEW = settings(max_examples=40)
 
