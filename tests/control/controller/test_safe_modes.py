@@ -55,7 +55,7 @@ def deaths(tmp_path_factory: pytest.TempPathFactory) -> Story:
         "12",
         "--restart-controller",
         "--set",
-        "plant.silence_timeout=0.5",
+        "plant.silence_timeout=0.2",
         "--set",
         "controller.reference_timeout=0.2",
         "--fault",
