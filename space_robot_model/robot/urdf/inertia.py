@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...elementary.matrices import rotate_tensor
-from ...elementary.symmetric import principal_axes
 from ..tree import Visual
 
 Array = NDArray[np.float64]
@@ -54,6 +53,8 @@ def nearest_inertia(inertia: Array) -> Array | None:
     nearest to a matrix that has some is the one with those raised to 0 (Higham 1988), here to a
     little above.
     """
+    from ...elementary.symmetric import principal_axes  # numba: slow to import
+
     moments, axes = principal_axes(inertia)
     second = 0.5 * np.sum(moments) - moments
     largest = float(np.max(second))
