@@ -72,7 +72,7 @@ def fly(context: LaunchContext) -> list:
             package=PACKAGE,
             executable=name,
             name=name,
-            namespace=flight.plan.namespace,
+            namespace=flight.scenario.options.namespace,
             parameters=[str(file)],
             output="screen",
             sigterm_timeout=RECORDER_S,

@@ -17,7 +17,7 @@ import space_robot_control.laws as room_of_laws
 import space_robot_msgs_py.wire as room_of_messages
 from space_robot import load_bag
 from space_robot.cli.main import cli, commands
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py import topics
@@ -52,8 +52,10 @@ def new_law(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 def test_a_law_is_one_file_in_laws_and_one_of_gains(new_law: Path) -> None:
     """It is found by its name, and flies in compiled code as the one it is a copy of."""
     assert "newest" in laws()
-    own = simulate(Flight(FlightPlan(controller="newest", gains=str(new_law), duration=0.01)))
-    model = simulate(Flight(FlightPlan(controller=MODEL, gains="tuned", duration=0.01)))
+    own = simulate(
+        Flight(resolve(FlightPlan(controller="newest", gains=str(new_law), duration=0.01)))
+    )
+    model = simulate(Flight(resolve(FlightPlan(controller=MODEL, gains="tuned", duration=0.01))))
     assert own.commanded_torque is not None
     assert model.commanded_torque is not None
     np.testing.assert_array_equal(own.commanded_torque, model.commanded_torque)
@@ -93,7 +95,7 @@ def test_a_message_is_one_file_in_wire_and_one_line_in_topics(
     monkeypatch.setitem(topics.BY_NAME, newest.full_name, newest)
     monkeypatch.setattr(room_of_messages, "__path__", [*room_of_messages.__path__, str(tmp_path)])
     (tmp_path / "newest.py").write_text(NEWEST)
-    flight = Flight(FlightPlan(duration=0.01))
+    flight = Flight(resolve(FlightPlan(duration=0.01)))
     described = description(newest)
     sys.modules.pop(f"{room_of_messages.__name__}.newest")
     assert described is not None
@@ -133,4 +135,4 @@ def test_a_robot_is_one_file(tmp_path: Path) -> None:
         gains=str(CONFIG / "gains/paper/tuned"),
         duration=0.001,
     )
-    assert simulate(Flight(plan)).ticks == 2
+    assert simulate(Flight(resolve(plan))).ticks == 2

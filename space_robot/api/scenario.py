@@ -16,7 +16,7 @@ from space_robot_msgs_py.errors import InputError
 
 from ..flight.bench import Bench
 from ..flight.compilation import compile_kernels
-from ..flight.plan import Flight
+from ..flight.plan import Flight, resolve
 from ..flight.start_step import sentence
 from ..scenario.options import FlightPlan
 from .flown_flight import FlownFlight
@@ -92,7 +92,7 @@ class Scenario(FlightPlan):
         Raises:
             InputError: something does not exist, or does not fit the rest; in one line.
         """
-        flight = Flight(self)
+        flight = Flight(resolve(self))
         flight.check_in_process()
         return flight
 
@@ -105,7 +105,7 @@ class Scenario(FlightPlan):
         Raises:
             InputError: see `check`.
         """
-        return self.check().resolved
+        return self.check().scenario.tree
 
     def fly(
         self,

@@ -49,11 +49,11 @@ def diff(first: Path, second: Path, as_json: bool) -> None:
 
 
 def _scenario_of(path: Path) -> dict[str, Any]:
-    from ..flight.plan import Flight
+    from ..flight.plan import Flight, resolve
     from ..scenario.comparison import recorded_scenario, written_options
 
     if path.suffix in (".yaml", ".yml"):
-        return Flight(written_options(path)).resolved
+        return Flight(resolve(written_options(path))).scenario.tree
     return recorded_scenario(path)
 
 

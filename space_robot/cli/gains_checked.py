@@ -14,7 +14,7 @@ from space_robot_model.dynamics.attitude import SINGULAR_ETA
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import FlightError, InputError
 
-from ..flight.plan import Flight, FlightPlan
+from ..flight.plan import Flight, FlightPlan, resolve
 from ..flight.simulate import simulate
 from ..scenario.node_settings import FlightSettings
 from ..tuning.gain_check import GainCheck, check_gains, pair_corner
@@ -52,7 +52,7 @@ def checked(options: dict[str, Any]) -> Checked:
     plan, every = validate(FlightPlan, options, "options"), options["controller"] == ALL
     if every:
         plan = plan.model_copy(update={"controller": _first_law(plan)})
-    flight = Flight(plan)
+    flight = Flight(resolve(plan))
     laws = flight.laws.values() if every else [flight.law]
     quaternion = flight.mission.chunk(0, 1).base[0, :4]
     if flight.controls_base and abs(quaternion[0]) <= SINGULAR_ETA:
@@ -82,7 +82,7 @@ def held_ripple(flight: Flight, plan: FlightPlan) -> Array | None:
     there = {"waypoint_times": [0.0], "waypoints_deg": first}
     held = plan.with_parameters("mission", there).model_copy(update={"duration": HELD})
     try:
-        log = simulate(Flight(held))
+        log = simulate(Flight(resolve(held)))
     except FlightError:
         return None
     assert log.commanded_torque is not None

@@ -122,7 +122,7 @@ def launched_flight(values: Mapping[str, str]) -> LaunchedFlight:
         launched: LaunchedFlight = _plan.main(words, "fly.launch.py", standalone_mode=False)
     except click.ClickException as error:
         raise InputError(error.format_message()) from None
-    if faults := launched.flight.orchestrator_faults:
+    if faults := launched.flight.scenario.process_faults:
         raise InputError(f"fault {faults[0]}: that needs `space-robot fly`")
     return launched
 

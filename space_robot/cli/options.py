@@ -187,9 +187,9 @@ def plan_flight(**options: Any) -> Flight:
     """
     from space_robot_msgs_py.config.validation import validate
 
-    from ..flight.plan import Flight, FlightPlan
+    from ..flight.plan import Flight, FlightPlan, resolve
 
-    return Flight(validate(FlightPlan, options, "options"))
+    return Flight(resolve(validate(FlightPlan, options, "options")))
 
 
 def remarks_on(flight: Flight) -> list[str]:
@@ -207,7 +207,9 @@ def remarks_on(flight: Flight) -> list[str]:
     corner = pair_corner(flight.controller_settings)
     names = flight.plant.names
     # the default gains of an ideal plant are the project's own choice: nobody is warned of them
-    tries_margin = flight.has_chosen_gains or bool(flight.faults) or bool(names.actuators)
+    tries_margin = (
+        flight.scenario.has_chosen_gains or bool(flight.scenario.faults) or bool(names.actuators)
+    )
     on_gains = margin_remarks(
         flown,
         flight.plant.robot,

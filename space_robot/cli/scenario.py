@@ -31,7 +31,7 @@ def scenario(as_json: bool, output: Path | None, **options: Any) -> None:
 
     from ..console.files import write_text
 
-    numbers = plan_flight(**options).resolved
+    numbers = plan_flight(**options).scenario.tree
     if as_json:
         text = json.dumps(numbers, indent=2)
     else:

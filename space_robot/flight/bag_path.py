@@ -19,7 +19,7 @@ def default_bag(flight: Flight) -> Path:
     """
     stamp = datetime.now(timezone.utc).strftime("%Y%m%d-%H%M%S")
     case = Path(flight.plant_settings.case).stem
-    where = flight.plan.namespace.lstrip("/").replace("/", "_")
+    where = flight.scenario.options.namespace.lstrip("/").replace("/", "_")
     return Path("flights") / "_".join(filter(None, (where, flight.law.name, f"case{case}", stamp)))
 
 

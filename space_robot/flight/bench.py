@@ -138,7 +138,7 @@ class Bench(RecordOwner):
         """
         controller, state = self.controller, self._plant.state
         tick = state.tick
-        if self.flight.plan.controller is None:
+        if self.flight.scenario.options.controller is None:
             raise InputError("controller is None: give every step a torque")
         if tick != self._answered:
             law = self._law_at(tick)

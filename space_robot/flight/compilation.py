@@ -22,7 +22,7 @@ from space_robot_msgs_py.wire.compiled_codec import read, write
 from ..console.progress import watching_progress
 from ..processes.child_process import child_process
 from .closed_loop import fly_ticks
-from .plan import Flight, FlightPlan
+from .plan import Flight, FlightPlan, resolve
 from .simulate import simulate
 
 MARK, ALLOCATION_MARK = "complete", "allocation"
@@ -53,11 +53,11 @@ def _compile_flights() -> None:
     own = [law.kernel for law in laws().values() if issubclass(law, CompiledLaw)]
     with _progress("the dynamics and the laws", fly_ticks, read, write, *own):
         with child_process(module_command(__name__), stdout=subprocess.DEVNULL) as helper:
-            _step_plant(Flight(FlightPlan()))
+            _step_plant(Flight(resolve(FlightPlan())))
             helper.wait()
         for law in laws():
-            simulate(Flight(FlightPlan(controller=law, duration=0.002)))
-        _step_plant(Flight(FlightPlan()))
+            simulate(Flight(resolve(FlightPlan(controller=law, duration=0.002))))
+        _step_plant(Flight(resolve(FlightPlan())))
         _answer_under_every_law()
     mark.touch()
 
@@ -72,7 +72,7 @@ def _progress(what: str, *kernels: Any) -> AbstractContextManager[None]:
 def load_kernels() -> None:
     """Read what nodes use from the cache, if it is there."""
     if (cache_directory() / MARK).exists():
-        flight = Flight(FlightPlan())
+        flight = Flight(resolve(FlightPlan()))
         _step_plant(flight)
         _answer_and_exchange(flight)
 
@@ -94,7 +94,7 @@ def _answer_and_exchange(flight: Flight) -> None:
 
 def _answer_under_every_law() -> None:
     for law in laws():
-        _answer_and_exchange(Flight(FlightPlan(controller=law, navigation="filtered")))
+        _answer_and_exchange(Flight(resolve(FlightPlan(controller=law, navigation="filtered"))))
 
 
 if __name__ == "__main__":

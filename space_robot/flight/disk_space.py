@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 from space_robot_msgs_py.errors import FlightError
 
-from .plan import Flight
+from .plan import Flight, resolve
 from .simulate import simulate
 
 SAMPLE_TICKS = 2000
@@ -26,10 +26,10 @@ def bag_bytes(flight: Flight) -> float:
     Raises:
         FlightError: it diverges in that.
     """
-    plan = flight.plan.model_copy(update={"duration": SAMPLE_TICKS * flight.period})
+    plan = flight.scenario.options.model_copy(update={"duration": SAMPLE_TICKS * flight.period})
     with TemporaryDirectory() as folder:
         bag = Path(folder) / "bag"
-        simulate(Flight(plan), bag)
+        simulate(Flight(resolve(plan)), bag)
         size = sum(file.stat().st_size for file in bag.iterdir())
     return size / SAMPLE_TICKS * flight.ticks
 

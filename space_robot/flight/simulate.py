@@ -121,7 +121,7 @@ def _recording(flight: Flight, bag: Path | None) -> Iterator[Messages | None]:
     if bag is None:
         yield None
         return
-    settings = flight.recorder_settings
+    settings = flight.scenario.recorder
     recorder = BagRecorder(
         bag, flight.description, flight.timebase, settings.compression, settings.split_size
     )

@@ -1,25 +1,35 @@
-"""The resolved scenario: the tree of options with every number in it and no file left to read.
-
-It is a mapping of options as `FlightPlan` takes them, so that a printed one can be flown. Equal
-trees fly equal bits.
-"""
+"""The resolved scenario: every number of a flight, and no file left to read."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from pydantic import BaseModel
 
 from space_robot_control.controller.plain_laws import NoLaw
+from space_robot_control.controller.settings import DEFAULT, ControllerNodeSettings
 from space_robot_control.guidance.mission import MissionSettings
+from space_robot_control.guidance.settings import MissionNodeSettings
 from space_robot_control.laws import ControlLaw
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.hardware.sensors import SensorSettings
+from space_robot_msgs_py.bag.recorder_settings import RecorderNodeSettings
 from space_robot_msgs_py.config.trees import Tree
+from space_robot_msgs_py.errors import InputError
 from space_robot_sim.actuators.actuators import ActuatorSettings
 from space_robot_sim.environment.environment import EnvironmentSettings
+from space_robot_sim.environment.friction import coefficients
+from space_robot_sim.faults.grammar import Fault
+from space_robot_sim.plant.description import actuators, plant_description
+from space_robot_sim.plant.faults import PLANT_KINDS
+from space_robot_sim.plant.plant import Plant
+from space_robot_sim.plant.settings import MOST_TICKS, PlantNodeSettings
 
+from .faults import PROCESS_KINDS
 from .node_settings import NODES, NOT_TO_BE_SET, FlightSettings
 from .options import FlightPlan
 from .robots import Robots
@@ -41,26 +51,147 @@ LABELS = ("robot", "mission", "case", "sensors", "actuators", "gains", "navigati
 """Names of files, which the numbers replace."""
 
 
-def resolved_options(
-    plan: FlightPlan,
-    settings: FlightSettings,
-    robots: Robots,
-    laws: Mapping[str, ControlLaw],
-    assumed: BaseActuatorSettings,
-    ticks: int,
-    faults: Sequence[str],
-) -> dict[str, Any]:
-    """Return the options of a flight with every number, as plain mappings, lists and texts.
+@dataclass(frozen=True)
+class ResolvedScenario:
+    """All that a flight is made from; `space_robot.scenario.resolve.resolve` makes it.
 
-    Args:
-        plan: as the user wrote it.
-        settings: of the nodes.
-        robots: of plant and flight software.
-        laws: that can be flown, by name.
-        assumed: what the flight software assumes of the base's actuators.
-        ticks: of the flight.
-        faults: the texts of all of them.
+    The settings count, not the options: single parameters come over those.
     """
+
+    options: FlightPlan
+    """As they were written."""
+    settings: FlightSettings
+    """Of every node."""
+    mission_name: str
+    """Of its file; the robot's where the mission is the robot's own."""
+    robots: Robots
+    """What the plant is, and what the flight software takes it for."""
+    laws: Mapping[str, ControlLaw]
+    """All that the gain set covers, by name: the first is in force at the start."""
+    swaps: list[tuple[int, ControlLaw]]
+    """Ticks and the laws in force from there on."""
+    assumed_actuators: BaseActuatorSettings
+    """The base's actuators as the flight software knows them."""
+    process_faults: list[Fault]
+    """Of the nodes' processes; the plant's are in its settings."""
+
+    @property
+    def plant(self) -> PlantNodeSettings:
+        """The settings of the plant's node."""
+        return self.settings.plant
+
+    @property
+    def controller(self) -> ControllerNodeSettings:
+        """The settings of the controller's node."""
+        return self.settings.controller
+
+    @property
+    def mission(self) -> MissionNodeSettings:
+        """The settings of the mission's node."""
+        return self.settings.mission
+
+    @property
+    def recorder(self) -> RecorderNodeSettings:
+        """The settings of the recorder's node."""
+        return self.settings.recorder
+
+    @property
+    def law(self) -> ControlLaw:
+        """In force at the start."""
+        return next(iter(self.laws.values()))
+
+    @property
+    def gains_used(self) -> dict[str, list[float]]:
+        """The numbers of the gains of the law in force at the start, an axis each."""
+        return {name: row.tolist() for name, row in self.law.gain_values.items()}
+
+    @property
+    def has_chosen_gains(self) -> bool:
+        """True unless the gains are the default set's."""
+        return self.controller.gains != DEFAULT or bool(self.settings.gains)
+
+    @cached_property
+    def parameters(self) -> dict[str, dict[str, Any]]:
+        """The parameters of every node over its files, by dotted name."""
+        return self.settings.parameters(self.laws)
+
+    @property
+    def ticks(self) -> int:
+        """Of the flight.
+
+        Raises:
+            InputError: it would be too long, or the mission does not say how long.
+        """
+        duration, period = self.options.duration, self.plant.period
+        if duration is None:
+            duration = self.mission.waypoint_times[-1]
+        if duration <= 0.0:
+            raise InputError("the mission has a single waypoint: give a duration")
+        ticks = max(1, math.floor(duration / period + 1e-6))
+        if ticks > MOST_TICKS:
+            raise InputError(
+                f"duration must be at most {MOST_TICKS * period:g} s "
+                f"({MOST_TICKS} ticks of {period:g} s), got {duration:g} s"
+            )
+        return ticks
+
+    @property
+    def faults(self) -> list[str]:
+        """The texts of all faults."""
+        in_plant = [text for text in self.plant.faults if text.strip()]
+        if in_plant == self.options.faults_of(PLANT_KINDS):
+            return self.options.faults
+        return [*in_plant, *self.options.faults_of(PROCESS_KINDS)]
+
+    @property
+    def has_friction(self) -> bool:
+        """True if the joints have friction."""
+        return bool(coefficients(self.robots.plant, self.plant.friction).any())
+
+    @cached_property
+    def tree(self) -> dict[str, Any]:
+        """The options with every number, as plain mappings, lists and texts.
+
+        It is a mapping of options as `FlightPlan` takes them, so that a printed one can be flown.
+        Equal trees fly equal bits.
+        """
+        return _tree(self)
+
+    def description(self, plant: Plant) -> dict[str, Any]:
+        """Return what a bag keeps of the scenario; enough to fly it again.
+
+        Args:
+            plant: made from it.
+        """
+        robots, controller = self.robots.description, self.controller
+        assumed = actuators(self.assumed_actuators)
+        is_other = self.plant.base_actuation != "ideal" and assumed != actuators(self.plant)
+        numbers = controller.filter_settings
+        swaps = [text for text in controller.swaps if text.strip()]
+        return {
+            "controller": self.law.name,
+            **plant_description(self.robots.plant, robots["robot_file"], plant, self.plant),
+            **({"controller_base_actuators": assumed} if is_other else {}),
+            "gains": controller.gains,
+            "mission": self.mission_name,
+            "ticks": self.ticks,
+            **(
+                {"navigation": "filtered", "navigation_filter": numbers.model_dump()}
+                if numbers
+                else {}
+            ),
+            **({"faults": self.faults} if self.faults else {}),
+            **({"swaps": swaps} if swaps else {}),
+            **({"restart_controller": True} if self.options.restart_controller else {}),
+            "parameters": self.parameters,
+            "scenario": {k: v for k, v in self.tree.items() if k not in ROBOTS},
+            "gains_used": self.gains_used,
+            **robots,
+        }
+
+
+def _tree(scenario: ResolvedScenario) -> dict[str, Any]:
+    settings, laws = scenario.settings, scenario.laws
     plant, controller = settings.plant, settings.controller
     numbers = plant.model_dump(mode="json")
     sections = {
@@ -71,7 +202,7 @@ def resolved_options(
     navigation: Tree = {}
     if (filtered := controller.filter_settings) is not None:
         navigation = {"navigation_filter": filtered.model_dump(mode="json")}
-    own = assumed.model_dump(mode="json")
+    own = scenario.assumed_actuators.model_dump(mode="json")
     differs = own != {key: sections["actuators"][key] for key in own}
     swaps = [text for text in controller.swaps if text.strip()]
     events = [text for text in plant.events if text.strip()]
@@ -82,19 +213,19 @@ def resolved_options(
             for name, law in laws.items()
             if name != NoLaw.name and law.gain_values
         },
-        **robots.options,
+        **scenario.robots.options,
         "mission": {**mission, **{name: numbers[name] for name in BY_THE_MISSION}},
         "events": events,
         **sections,
         **({"assumed_actuators": own} if differs else {}),
-        "duration": ticks * plant.period,
+        "duration": scenario.ticks * plant.period,
         **{name: numbers[name] for name in OF_PLANT},
         "navigation": controller.navigation,
         "seed": plant.fault_seed,
-        **({"faults": list(faults)} if faults else {}),
+        **({"faults": list(scenario.faults)} if scenario.faults else {}),
         **({"swaps": swaps} if swaps else {}),
         **{name: numbers[name] for name in OF_THE_GRAPH if numbers[name]},
-        **({"restart_controller": True} if plan.restart_controller else {}),
+        **({"restart_controller": True} if scenario.options.restart_controller else {}),
         "parameters": {
             node: {
                 **_rest(node, getattr(settings, node)),

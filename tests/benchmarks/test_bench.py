@@ -23,7 +23,7 @@ from benchmarks.measure import Options, interleave, repeated
 from benchmarks.result import Result, Target
 from benchmarks.sections import section
 from benchmarks.sections.laws import Recorded
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 
 COMMAND = [sys.executable, str(TESTS / "benchmarks")]
@@ -161,7 +161,7 @@ def test_all_laws_stand_beside_computed_torque(report: dict[str, Any]) -> None:
 def test_recorded_flight_is_flown_again_to_the_bit() -> None:
     """What is timed as a controller's tick is what the flight computed."""
     for law in ("tde_stc", "ctc"):
-        flight = Flight(FlightPlan(controller=law, case="3"))
+        flight = Flight(resolve(FlightPlan(controller=law, case="3")))
         flight.ticks = 20
         log = simulate(flight)
         assert log.commanded_torque is not None

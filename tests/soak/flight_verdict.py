@@ -50,7 +50,7 @@ def judge(flight: Flight, report: dict[str, Any] | None, bag: Path) -> FlightVer
     read is told.
     """
     verdict = FlightVerdict()
-    kinds = [fault.kind.name for fault in parse_faults(flight.faults, KINDS)]
+    kinds = [fault.kind.name for fault in parse_faults(flight.scenario.faults, KINDS)]
     if report is not None:
         verdict.restarts = report["graph"]["restarts"]
         verdict.wrong += unplanned_deaths(kinds, report["graph"]["events"])

@@ -24,7 +24,7 @@ from space_robot.flight.compilation import compile_kernels
 from space_robot.flight.graph.following import InterruptedFlightError
 from space_robot.flight.graph.orchestrator import fly
 from space_robot.flight.graph.processes import begin_loading
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.processes.interruption import Interrupted
 from space_robot_msgs_py.errors import SpaceRobotError
 
@@ -160,7 +160,7 @@ def soak(
 
 def _fly(number: int, plan: FlightPlan, bag: Path, bags: Path | None) -> SoakedFlight:
     begin = time.monotonic()
-    flight = Flight(plan)
+    flight = Flight(resolve(plan))
     report, wrong = None, []
     with (
         ProcessMonitor() as process_monitor,

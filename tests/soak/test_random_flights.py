@@ -25,7 +25,7 @@ from random_flights import (
 )
 
 from space_robot.cli.main import cli
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.scenario.faults import KINDS
 from space_robot_control.laws import laws
 from space_robot_sim.faults.axes import About
@@ -53,7 +53,7 @@ def faults(number: int) -> list[Fault]:
 @given(SEEDS, NUMBERS, DURATIONS)
 def test_every_drawn_plan_is_a_flight(seed: int, number: int, duration_s: float) -> None:
     plan = sample_flight(seed, number, duration_s)
-    flight = Flight(plan)
+    flight = Flight(resolve(plan))
     assert 1 <= len(plan.faults) <= MOST_FAULTS
     end_s = flight.ticks * flight.period
     assert all(tick * flight.period < end_s for tick, _ in flight.swaps)
@@ -169,6 +169,6 @@ def test_a_process_is_known_by_its_command_line() -> None:
 def test_actuators_have_as_many_wheels_and_thrusters_as_faults_are_drawn_for(
     actuators: str,
 ) -> None:
-    settings = Flight(FlightPlan(actuators=actuators)).plant_settings
+    settings = Flight(resolve(FlightPlan(actuators=actuators))).plant_settings
     counts = {About.WHEEL: settings.wheel_count, About.THRUSTER: settings.thruster_count}
     assert {about: count for about, count in counts.items() if count} == ACTUATORS[actuators]

@@ -43,7 +43,7 @@ class Nominal(NamedTuple):
             flight.plant.names,
             {node: dict(flatten(own.model_dump())) for node, own in settings.items()},
             flight.law.name,
-            flight.gains_used,
+            flight.scenario.gains_used,
         )
 
 

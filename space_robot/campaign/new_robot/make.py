@@ -16,7 +16,7 @@ from space_robot_model.robot.find import OWN_GAINS, OWN_MISSION
 from space_robot_msgs_py.errors import FlightError
 
 from ...analysis import Analysis
-from ...flight.plan import Flight, FlightPlan
+from ...flight.plan import Flight, FlightPlan, resolve
 from ...flight.simulate import fly_blocks
 from ...processes.pool import cores, run_all
 from ...tuning.method import TuningOptions
@@ -109,7 +109,7 @@ def make_robot(
 
 
 def _fly(folder: Path, law: str) -> Outcome:
-    flight = Flight(FlightPlan(controller=law, robot=str(folder), case=CASE))
+    flight = Flight(resolve(FlightPlan(controller=law, robot=str(folder), case=CASE)))
     analysis = Analysis()
     try:
         for block in fly_blocks(flight):

@@ -63,7 +63,7 @@ def follow(
         InputError: others publish its topics, or have its nodes' names.
         FlightError: it cannot go on.
     """
-    monitor = Monitor(domain, flight.plan.namespace, period=flight.period)
+    monitor = Monitor(domain, flight.scenario.options.namespace, period=flight.period)
     try:
         follower = _Follower(graph, flight, parameters, monitor, stopped)
         with flight_progress(follower.total_s, flight.controller.law.name) as show:
@@ -89,16 +89,18 @@ class _Follower:
         self._last_clock_s = self.total_s - flight.plant_settings.clock_decimation * flight.period
         self._graph, self._monitor, self._stopped = graph, monitor, stopped
         self._foreign = ForeignNodes(monitor.node, NODE_NAMES)
-        self._fault_kinds = frozenset(fault.kind.name for fault in flight.orchestrator_faults)
+        self._fault_kinds = frozenset(fault.kind.name for fault in flight.scenario.process_faults)
         self._realtime = flight.plant_settings.realtime
-        self._injector = Injector(flight.orchestrator_faults, graph)
+        self._injector = Injector(flight.scenario.process_faults, graph)
         self._watch = Watch(
             graph,
             monitor,
-            planned=frozenset(NODE_OF[fault.kind] for fault in flight.orchestrator_faults),
+            planned=frozenset(NODE_OF[fault.kind] for fault in flight.scenario.process_faults),
             restart_command=(
-                partial(_restart_command, parameters["controller"], flight.plan.namespace)
-                if flight.plan.restart_controller
+                partial(
+                    _restart_command, parameters["controller"], flight.scenario.options.namespace
+                )
+                if flight.scenario.options.restart_controller
                 else None
             ),
             last_tick=flight.ticks,

@@ -25,13 +25,13 @@ def with_files(parameters: Parameters, flight: Flight, folder: Path) -> dict[str
         folder: for the files.
     """
     named = {node: dict(values) for node, values in parameters.items()}
-    numbers = flight.resolved
+    numbers = flight.scenario.tree
     for node in ("plant", "controller", "mission"):
         if named[node].get("robot") == GIVEN:
             option = "plant_robot" if node == "plant" and "plant_robot" in numbers else "robot"
             named[node]["robot"] = _write(folder / f"{option}.yaml", numbers[option])
     if named["controller"].get("actuators") == GIVEN or "assumed_actuators" in numbers:
-        assumed = flight.assumed_actuators.model_dump(mode="json")
+        assumed = flight.scenario.assumed_actuators.model_dump(mode="json")
         content = {f"{OWNER}_node": {"ros__parameters": assumed}}
         named["controller"]["actuators"] = _write(folder / "assumed_actuators.yaml", content)
     return named

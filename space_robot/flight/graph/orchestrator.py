@@ -60,8 +60,8 @@ def fly(
     check_bag_path(bag)
     require_ros()
     compile_kernels(bool(flight.plant.names.actuators))
-    namespace = flight.plan.namespace
-    with ros_domain(flight.plan.domain, namespace) as domain, stop_signals() as stopped:
+    namespace = flight.scenario.options.namespace
+    with ros_domain(flight.scenario.options.domain, namespace) as domain, stop_signals() as stopped:
         nobody_is_there = is_quiet(domain)
         _claim(bag)
         begin = time.monotonic()
@@ -99,8 +99,8 @@ def _commands(
 ) -> Mapping[str, Command]:
     """The processes: one a node, or one for all; their files go to ``folder``."""
     started = {node: {**values, "autostart": False} for node, values in parameters.items()}
-    namespace = flight.plan.namespace
-    if flight.plan.composed:
+    namespace = flight.scenario.options.namespace
+    if flight.scenario.options.composed:
         return {NAME: composed_command(started, namespace, folder)}
     return {node: node_command(node, values, namespace) for node, values in started.items()}
 
@@ -144,7 +144,7 @@ def require_ros() -> None:
 
 def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
     """The parameters of every node of a flight that is recorded to ``bag``."""
-    parameters = {node: dict(values) for node, values in flight.parameters.items()}
+    parameters = {node: dict(values) for node, values in flight.scenario.parameters.items()}
     parameters["plant"] |= {
         "ticks": flight.ticks,
         "wait_for": wait_for("plant"),
@@ -152,7 +152,7 @@ def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
     }
     parameters["controller"] |= {"wait_for": wait_for("controller")}
     parameters["recorder"] |= {"bag": str(bag.absolute()), "flight": json.dumps(flight.description)}
-    if flight.plan.composed:
+    if flight.scenario.options.composed:
         parameters["recorder"].setdefault("drain_period", COMPOSED_DRAIN_S)
     return parameters
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from ...analysis.figures import chatter, desired_joints, junctions
 from ...analysis.figures.figure_set import FigureFolder, SavedFigure
 from ...analysis.plot_series import BaseTorque
-from ...flight.plan import Flight, FlightPlan
+from ...flight.plan import Flight, FlightPlan, resolve
 from ...flight.simulate import empty_log
 from .flights import ROBOT, Result, TableRow
 
@@ -42,7 +42,7 @@ def comparisons(
 
 
 def _draw_mission(duration: float | None, folder: FigureFolder) -> None:
-    log = empty_log(Flight(FlightPlan(robot=ROBOT, duration=duration)))
+    log = empty_log(Flight(resolve(FlightPlan(robot=ROBOT, duration=duration))))
     folder.save(desired_joints(log), MISSION)
 
 

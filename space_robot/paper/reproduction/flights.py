@@ -15,7 +15,7 @@ from ...analysis.figures import control_results
 from ...analysis.figures.figure_set import FigureFolder
 from ...analysis.metrics import Chatter, Rms, of_log
 from ...analysis.plot_series import BaseTorque
-from ...flight.plan import Flight, FlightPlan
+from ...flight.plan import Flight, FlightPlan, resolve
 from ...flight.simulate import simulate
 from .table_v import PRINTED
 
@@ -143,16 +143,18 @@ def fly(
     """Fly one row in one variant; if it is shown it is also drawn into ``figures``."""
     row, variant, _ = planned
     flight = Flight(
-        FlightPlan(
-            controller=row.controller,
-            case=row.case,
-            gains=variant.gains,
-            robot=ROBOT,
-            friction=variant.friction,
-            duration=duration,
-            sensors=equipment.sensors,
-            actuators=equipment.actuators,
-            navigation=None if equipment.navigation == "direct" else equipment.navigation,
+        resolve(
+            FlightPlan(
+                controller=row.controller,
+                case=row.case,
+                gains=variant.gains,
+                robot=ROBOT,
+                friction=variant.friction,
+                duration=duration,
+                sensors=equipment.sensors,
+                actuators=equipment.actuators,
+                navigation=None if equipment.navigation == "direct" else equipment.navigation,
+            )
         )
     )
     flown = parameters(flight)
@@ -182,7 +184,7 @@ def parameters(flight: Flight) -> dict[str, Any]:
         "period_s": flight.period,
         "navigation": navigation.model_dump() if navigation else "direct",
         "plant": flight.plant_settings.model_dump(exclude={"mission", "wait_for"}),
-        "gains": flight.gains_used,
+        "gains": flight.scenario.gains_used,
         "mission": {
             "waypoint_times_s": flight.mission_settings.waypoint_times,
             "waypoints_deg": flight.mission_settings.waypoints_deg,

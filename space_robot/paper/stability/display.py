@@ -26,7 +26,7 @@ def print_study(study: StabilityStudy, console: Console) -> None:
         console,
         f"{what['controller']}, case {what['case']}, gains {what['gains']}, robot "
         f"{what['robot']}: {flight.ticks * flight.period:g} s, "
-        f"joint friction {'on' if flight.has_friction else 'off'}",
+        f"joint friction {'on' if flight.scenario.has_friction else 'off'}",
     )
     print_table(_lemma_1(study), console)
     print_table(_time_delay_error(study), console)

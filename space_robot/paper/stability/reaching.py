@@ -51,7 +51,7 @@ def off_mission_plan(flight: Flight, initial_error: float) -> FlightPlan:
         "initial_quaternion": [float(eta), *eps.tolist()],
         "initial_joints_deg": flight.robot.to_degrees(start.joints[0, 0] - initial_error).tolist(),
     }
-    return flight.plan.with_parameters("plant", plant)
+    return flight.scenario.options.with_parameters("plant", plant)
 
 
 def ripple(s: Array) -> Array:

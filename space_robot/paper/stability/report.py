@@ -22,7 +22,7 @@ def report(study: StabilityStudy) -> dict[str, Any]:
     flight, lemma_1 = study.flight, study.lemma_1
     content = {
         **{key: flight.description[key] for key in ("controller", "case", "gains", "robot")},
-        "friction": flight.has_friction,
+        "friction": flight.scenario.has_friction,
         "duration_s": flight.ticks * flight.period,
         "axes": study.axis_names,
         "lemma_1": {

@@ -9,7 +9,7 @@ from space_robot_control.laws import laws
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
 
-from ...flight.plan import NO_FRICTION, Flight, FlightPlan
+from ...flight.plan import NO_FRICTION, Flight, FlightPlan, resolve
 from .lemma_1 import Contraction, contraction
 from .reaching import off_mission_plan, reaching, ripple
 from .super_twisting import SuperTwisting
@@ -71,7 +71,7 @@ def study(plan: FlightPlan, initial_error: float, fly: Fly) -> StabilityStudy:
         InputError: the plan's law has no time-delay estimate, or the flight is too short.
         FlightError: a flight diverged.
     """
-    flight = Flight(plan)
+    flight = Flight(resolve(plan))
     check_law(flight)
     gains, period = flight.controller.law.gain_values, flight.period
     h_bar = gains["h_bar"]
@@ -81,12 +81,12 @@ def study(plan: FlightPlan, initial_error: float, fly: Fly) -> StabilityStudy:
         return error_derivative(time_delay_error(of, h_bar), period)
 
     error, frictionless = derivative(log), None
-    if flight.has_friction:
+    if flight.scenario.has_friction:
         without = plan.with_parameters("plant", NO_FRICTION)
-        frictionless = derivative(fly(Flight(without), "without friction"))
+        frictionless = derivative(fly(Flight(resolve(without)), "without friction"))
     twisting = None
     if log.telemetry is not None and {"k_1", "k_2"} <= gains.keys():
-        off = fly(Flight(off_mission_plan(flight, initial_error)), "from an initial error")
+        off = fly(Flight(resolve(off_mission_plan(flight, initial_error))), "from an initial error")
         twisting = SuperTwisting(
             k_1=gains["k_1"],
             k_2=gains["k_2"],

@@ -12,7 +12,7 @@ from typing import Any
 from space_robot.analysis import analyze
 from space_robot.campaign.flown import Campaign
 from space_robot.campaign.study import Study
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.processes.pool import run_many
 
@@ -78,7 +78,7 @@ def _processor_s() -> float:
 def _plain(duration: float, number: int) -> None:
     """Fly and analyse, for a campaign's row has figures of merit, too."""
     for _ in range(number):
-        analyze(simulate(Flight(FlightPlan(controller=LAW, case="1", duration=duration))))
+        analyze(simulate(Flight(resolve(FlightPlan(controller=LAW, case="1", duration=duration)))))
 
 
 def _campaign(

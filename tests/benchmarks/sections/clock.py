@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 
 from ..graph_flights import WARM_UP_TICKS, GraphRun, fly_graph
 from ..measure import Options
@@ -25,7 +25,7 @@ def clock(options: Options) -> list[Result]:
     count = 1 if options.short else options.batches(usual=3)
     runs: dict[str, list[GraphRun]] = {"usual": [], "FIFO": []}
     flights = {
-        name: Flight(FlightPlan(duration=duration, realtime=True, fifo_priority=priority))
+        name: Flight(resolve(FlightPlan(duration=duration, realtime=True, fifo_priority=priority)))
         for name, priority in (("usual", 0), ("FIFO", FIFO_PRIORITY))
     }
     for k in range(count):

@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 from numpy.typing import NDArray
 
 from space_robot.flight.graph.orchestrator import fly
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_msgs_py import topics
 
 from ..graph_flights import WARM_UP_TICKS
@@ -95,7 +95,7 @@ def composed(options: Options) -> list[Result]:
 
 
 def _fly(plan: FlightPlan) -> Sent:
-    flight = Flight(plan)
+    flight = Flight(resolve(plan))
     with tempfile.TemporaryDirectory(prefix="space_robot_bench_") as folder:
         bag = Path(folder) / "bag"
         fly(flight, bag, lambda log: {"lost": log.lost, "ticks": log.ticks})

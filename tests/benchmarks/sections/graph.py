@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 
 from ..graph_flights import WARM_UP_TICKS, GraphRun, fly_graph, naive_ticks_per_s
 from ..measure import Options
@@ -18,7 +18,7 @@ def graph(options: Options) -> list[Result]:
 
     And beside two nodes written the usual way, which also tells how fast the machine is.
     """
-    flight = Flight(FlightPlan(duration=0.5 if options.short else DURATION_S))
+    flight = Flight(resolve(FlightPlan(duration=0.5 if options.short else DURATION_S)))
     full, empty, naive = [], [], []
     count = options.batches(usual=5)
     for k in range(count):

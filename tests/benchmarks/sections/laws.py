@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.controller.controller import Controller
 from space_robot_control.laws import CompiledLaw, Signals
@@ -46,7 +46,7 @@ class Recorded:
     @classmethod
     def of(cls, name: str, ticks: int) -> Recorded:
         """Fly ``ticks`` ticks."""
-        flight = Flight(FlightPlan(controller=name, case=CASE))
+        flight = Flight(resolve(FlightPlan(controller=name, case=CASE)))
         flight.ticks = ticks
         log = simulate(flight)
         law, period = flight.controller.law, flight.period

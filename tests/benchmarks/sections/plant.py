@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_msgs_py.samples import MOST_WHEELS, Command
 from space_robot_sim.plant.plant import Plant
 
@@ -18,7 +18,7 @@ CASE = "3"
 
 def moving_plant() -> Plant:
     """The plant of case 3 with every joint turning, so that everything acts."""
-    plant = Flight(FlightPlan(case=CASE, duration=1.0)).plant
+    plant = Flight(resolve(FlightPlan(case=CASE, duration=1.0))).plant
     n = plant.robot.n
     plant.block[0].x[13 + n : 13 + 2 * n] = 0.1
     return plant

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 
 from ..graph_flights import NodeUse, fly_graph
 from ..measure import Options
@@ -19,7 +19,7 @@ def recorder(options: Options) -> list[Result]:
     """10 minutes by the wall clock; processor and memory of every node, too."""
     duration = 1.5 if options.short else DURATION_S
     options.progress(f"{duration:g} s by the wall clock, recorded")
-    run = fly_graph(Flight(FlightPlan(duration=duration, realtime=True)), timed=False)
+    run = fly_graph(Flight(resolve(FlightPlan(duration=duration, realtime=True))), timed=False)
     lost = float(sum(run.lost.values()))
     own = run.use["recorder"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate as fly
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
@@ -42,4 +42,4 @@ def simulate(options: Options) -> list[Result]:
 
 
 def _flight(plan: FlightPlan) -> FlightLog:
-    return fly(Flight(plan))
+    return fly(Flight(resolve(plan)))

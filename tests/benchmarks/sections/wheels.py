@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_sim.plant.plant import Plant
 
 from ..kernels import plant_steps
@@ -48,7 +48,7 @@ def wheels(options: Options) -> list[Result]:
 
 def _stepped(actuators: str) -> Competitor:
     """Steps of the plant of case 3 with every joint and wheel turning."""
-    flight = Flight(FlightPlan(case=CASE, duration=1.0, actuators=actuators))
+    flight = Flight(resolve(FlightPlan(case=CASE, duration=1.0, actuators=actuators)))
     plant: Plant = flight.plant
     n, x = plant.robot.n, plant.memory.x
     x[13 + n : 13 + 2 * n] = 0.1
@@ -65,7 +65,7 @@ def _stepped(actuators: str) -> Competitor:
 def _beside_basilisk(seconds: int) -> list[Result]:
     from ..peers.basilisk_wheels import BasiliskGyrostat
 
-    start = Gyrostat.turning(Flight(FlightPlan(duration=1.0)).plant.robot, seconds)
+    start = Gyrostat.turning(Flight(resolve(FlightPlan(duration=1.0))).plant.robot, seconds)
     both = np.array([*apart(start, OurGyrostat(start), BasiliskGyrostat(start))])
     differences, motion = both.max(axis=0).tolist()
     flown = f"arm locked, four wheels, {seconds} s"

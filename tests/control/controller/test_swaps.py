@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_control.controller.swaps import Swap, parse_swaps
 from space_robot_msgs_py.errors import InputError
 
@@ -53,4 +53,4 @@ def test_two_swaps_on_one_tick_are_refused() -> None:
 
 def test_a_law_there_is_not_is_refused_before_the_flight() -> None:
     with pytest.raises(InputError, match="nonesuch"):
-        Flight(FlightPlan(swaps=["1:nonesuch"]))
+        Flight(resolve(FlightPlan(swaps=["1:nonesuch"])))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from space_robot.analysis.metrics import tracking_error
 from space_robot.flight.closed_loop import close_loop
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import empty_log
 from space_robot_control.controller.controller import Controller
 from space_robot_control.controller.gains import build_law
@@ -30,7 +30,11 @@ class CommonBeginning:
 
     def __init__(self, law: str, **plan: object) -> None:
         self.flight = Flight(
-            FlightPlan.model_validate({"controller": law, "gains": "tuned", "duration": 6, **plan})
+            resolve(
+                FlightPlan.model_validate(
+                    {"controller": law, "gains": "tuned", "duration": 6, **plan}
+                )
+            )
         )
         self.log = empty_log(self.flight)
         self._fly(self.flight.controller, 0, TAKEOVER)
@@ -51,7 +55,7 @@ class CommonBeginning:
             self.flight.robot,
             self._law(law),
             self.flight.period,
-            actuators=self.flight.assumed_actuators,
+            actuators=self.flight.scenario.assumed_actuators,
         )
         return self._fly(new, TAKEOVER, STOP)
 

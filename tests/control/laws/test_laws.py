@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from paths import ROOT
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import (
     CompiledLaw,
@@ -334,6 +334,6 @@ def test_the_law_of_ones_own_in_the_manual_flies(
     (tmp_path / "gains/tde.yaml").write_text(gains[1])
     monkeypatch.syspath_prepend(tmp_path)
     own = "my_laws:TimeDelayControl"
-    flight = Flight(FlightPlan(controller=own, gains=f"{tmp_path}/gains", duration=0.05))
+    flight = Flight(resolve(FlightPlan(controller=own, gains=f"{tmp_path}/gains", duration=0.05)))
     errors = simulate(flight).telemetry[:, 3]  # type: ignore[index]
     assert np.abs(errors).max() < 1e-6

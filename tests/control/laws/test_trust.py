@@ -13,7 +13,7 @@ from bags import redescribed
 from command import Run
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import find_law
@@ -35,7 +35,7 @@ class Stranger(TimeDelaySuperTwisting):
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("trust") / "bag"
-    simulate(Flight(FlightPlan(duration=0.05)), path)
+    simulate(Flight(resolve(FlightPlan(duration=0.05))), path)
     return path
 
 
@@ -50,7 +50,7 @@ def ran(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], bool]:
 
 
 def described(**changes: Any) -> dict[str, Any]:
-    description = json.loads(json.dumps(Flight(FlightPlan()).description))
+    description = json.loads(json.dumps(Flight(resolve(FlightPlan())).description))
     parameters = description["parameters"]["controller"] | changes.pop("controller_node", {})
     description["parameters"]["controller"] = parameters
     return {**description, **changes}

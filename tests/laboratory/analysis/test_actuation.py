@@ -14,7 +14,7 @@ from random_logs import random_log
 
 from space_robot.analysis import analyze
 from space_robot.analysis.actuation import Latency, MissedDeadlines, Saturation, TorqueLimits
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
@@ -24,7 +24,7 @@ SOME = TorqueLimits(2.0, 1.5)
 
 
 def flown(**options: Any) -> FlightLog:
-    return simulate(Flight(FlightPlan.model_validate({"duration": 0.2, **options})))
+    return simulate(Flight(resolve(FlightPlan.model_validate({"duration": 0.2, **options}))))
 
 
 def differing(log: FlightLog, latency_ticks: int, limits: TorqueLimits) -> tuple[int, int]:
@@ -107,7 +107,7 @@ def test_missed_deadlines_and_saturation_are_those_of_plain_loops(
 
 def test_saturation_is_the_plants() -> None:
     parameters = {"plant": {"base_torque_limit": 0.05, "joint_torque_limit": 0.02}}
-    flight = Flight(FlightPlan(duration=0.2, parameters=parameters))
+    flight = Flight(resolve(FlightPlan(duration=0.2, parameters=parameters)))
     log = simulate(flight)
     log.flight["parameters"] = {"plant": {"case": "1", **parameters["plant"]}}
     limits = TorqueLimits(0.05, 0.02)

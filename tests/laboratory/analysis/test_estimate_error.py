@@ -14,13 +14,13 @@ from space_robot.analysis import analyze, excerpt
 from space_robot.analysis.described import estimator
 from space_robot.analysis.estimate_error import DelayedEstimate, EstimateErrors
 from space_robot.analysis.generalised_motion import neglected_force
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 
 def flown(**options: Any) -> FlightLog:
-    return simulate(Flight(FlightPlan.model_validate({"duration": 0.3, **options})))
+    return simulate(Flight(resolve(FlightPlan.model_validate({"duration": 0.3, **options}))))
 
 
 def estimate_error(

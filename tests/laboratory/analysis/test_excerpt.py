@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot.analysis import analyze, excerpt
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
@@ -16,7 +16,7 @@ from space_robot_msgs_py.errors import InputError
 
 @pytest.fixture(scope="module")
 def log() -> FlightLog:
-    return simulate(Flight(FlightPlan(duration=0.3)))
+    return simulate(Flight(resolve(FlightPlan(duration=0.3))))
 
 
 @given(st.integers(0, 600), st.integers(0, 600), st.integers(0, 600))
@@ -48,7 +48,7 @@ def test_the_report_is_of_the_excerpt(log: FlightLog) -> None:
 
 
 def test_unanswered_ticks_are_those_of_the_excerpt() -> None:
-    log = simulate(Flight(FlightPlan(duration=0.1)))
+    log = simulate(Flight(resolve(FlightPlan(duration=0.1))))
     assert log.commanded_torque is not None
     log.commanded_torque[[3, 150, 151]] = np.nan
     log.unanswered = 3

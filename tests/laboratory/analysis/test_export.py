@@ -14,7 +14,7 @@ from space_robot.analysis import excerpt, tracking_error
 from space_robot.analysis.columns import BATCH, batches, column_names
 from space_robot.analysis.export import METADATA_KEY, dataframe, write_csv, write_parquet
 from space_robot.console.files import whole_file
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
@@ -23,7 +23,7 @@ from space_robot_msgs_py.samples import Timebase
 
 @pytest.fixture(scope="module")
 def log() -> FlightLog:
-    log = simulate(Flight(FlightPlan(duration=0.1, case="2")))
+    log = simulate(Flight(resolve(FlightPlan(duration=0.1, case="2"))))
     log.latency_s = np.full(200, 1e-4)
     log.latency_s[3] = np.nan
     return log

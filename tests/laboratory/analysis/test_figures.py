@@ -37,7 +37,7 @@ from space_robot.analysis.figures.base_torque import common_limits, power_spectr
 from space_robot.analysis.figures.style import LineStyle, house_style, thinned
 from space_robot.analysis.plot_series import BaseTorque
 from space_robot.analysis.waypoints import junction_ticks, waypoint_ticks
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.guidance.mission import Mission, MissionSettings
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -308,7 +308,7 @@ class TestControlResults:
         save_figure(figure, tmp_path / "diverged")
 
     def test_a_real_flight(self) -> None:
-        log = simulate(Flight(FlightPlan(duration=0.1)))
+        log = simulate(Flight(resolve(FlightPlan(duration=0.1))))
         axes = control_results(log, "x").axes[1]
         y = np.asarray(by_look(axes, 2).get_ydata())
         np.testing.assert_allclose(y, log.applied_torque[:, 2], rtol=1e-12)

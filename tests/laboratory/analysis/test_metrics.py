@@ -25,7 +25,7 @@ from space_robot.analysis.metrics import (
     torque_columns,
 )
 from space_robot.analysis.spectrum import PowerAbove
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.samples import Timebase
@@ -300,7 +300,7 @@ def test_error_is_measured_on_the_near_side_of_the_two_quaternions() -> None:
 
 
 def test_report_has_the_documented_keys() -> None:
-    report = analyze(simulate(Flight(FlightPlan(duration=0.1))))
+    report = analyze(simulate(Flight(resolve(FlightPlan(duration=0.1)))))
     six = ["attitude", "joints_1_3", "joints_4_6", "base_torque", "torque_1_3", "torque_4_6"]
     assert list(report["rms"]["mean_axis"]) == list(report["rms"]["eq64"]) == six
     assert list(report["maxima"]) == six

@@ -16,7 +16,7 @@ from space_robot.analysis import analyze
 from space_robot.analysis.described import momentum_of
 from space_robot.analysis.momentum import MomentumBudget, MomentumSeries, disturbance_impulse
 from space_robot.analysis.report_tables import comparison_table
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_model.hardware.base_actuators import BaseActuatorSettings
 from space_robot_model.robot import Robot
@@ -164,7 +164,7 @@ def test_the_disturbances_impulse_is_its_integral() -> None:
 
 def test_what_disturbs_a_flight_is_accounted_for() -> None:
     """A base that floats freely, disturbed and with a payload that its arm does not know of."""
-    log = simulate(Flight(FlightPlan(actuators="none", case="4-2", duration=0.5)))
+    log = simulate(Flight(resolve(FlightPlan(actuators="none", case="4-2", duration=0.5))))
     found = analyze(log)["momentum"]
     assert found["peak_n_m_s"]["outside"] > 1e-3
     assert found["peak_n_m_s"]["robot"] == pytest.approx(found["peak_n_m_s"]["outside"])

@@ -10,7 +10,7 @@ from random_logs import random_log
 from space_robot.analysis import analyze, tracking_error
 from space_robot.analysis.estimate_error import EstimateErrors
 from space_robot.analysis.report_tables import comparison_table, rms_table
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
@@ -18,14 +18,16 @@ Array = NDArray[np.float64]
 
 FLOWN = simulate(
     Flight(
-        FlightPlan(
-            faults=[
-                "noise_attitude@0:1e-5",
-                "noise_joint_position@0:2e-5",
-                "noise_gyro@0:1e-6",
-                "torque_scale@0:base=0.999",
-            ],
-            duration=1.5,
+        resolve(
+            FlightPlan(
+                faults=[
+                    "noise_attitude@0:1e-5",
+                    "noise_joint_position@0:2e-5",
+                    "noise_gyro@0:1e-6",
+                    "torque_scale@0:base=0.999",
+                ],
+                duration=1.5,
+            )
         )
     )
 )

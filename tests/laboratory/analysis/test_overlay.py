@@ -9,7 +9,7 @@ from space_robot.analysis import excerpt
 from space_robot.analysis.figures import errors_and_torques, latency_histogram, pointing
 from space_robot.analysis.figures.overlay import words
 from space_robot.analysis.plot_series import PlotSeries
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 
 
@@ -17,7 +17,7 @@ from space_robot.flight.simulate import simulate
 def flights() -> dict[str, PlotSeries]:
     found = {}
     for law in ("tde_stc", "ctc", "tde_smc"):
-        log = simulate(Flight(FlightPlan(controller=law, duration=0.3)))
+        log = simulate(Flight(resolve(FlightPlan(controller=law, duration=0.3))))
         log.latency_s = None if law == "ctc" else np.linspace(1e-4, 2e-3, log.ticks)
         found[law] = PlotSeries.of(excerpt(log, 0.1, None))
     return found

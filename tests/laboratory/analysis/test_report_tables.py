@@ -14,7 +14,7 @@ from space_robot.analysis import analyze
 from space_robot.analysis.metrics import unit_of
 from space_robot.analysis.report_tables import DEFINITIONS, Line, lines
 from space_robot.console.tables import NONE
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 
 GROUPS = {"base": "base", "1_3": "joints_1_3", "4_6": "joints_4_6"}
@@ -48,7 +48,7 @@ def numbered(value: Any, counter: itertools.count[int]) -> Any:
 
 @pytest.fixture(scope="module")
 def reports() -> list[dict[str, Any]]:
-    log = simulate(Flight(FlightPlan(duration=1.0, faults=["noise_gyro@0:1e-9"])))
+    log = simulate(Flight(resolve(FlightPlan(duration=1.0, faults=["noise_gyro@0:1e-9"]))))
     log.latency_s = np.linspace(1e-4, 3e-4, log.ticks)
     log.flight["parameters"]["plant"] |= {"base_torque_limit": 1.0, "joint_torque_limit": 1.0}
     report = analyze(log)

@@ -19,7 +19,7 @@ from space_robot.analysis.figures.style import LineStyle
 from space_robot.analysis.plot_series import PlotSeries
 from space_robot.analysis.ripple import desired_torque, ripple_spectrum
 from space_robot.analysis.spectrum import PowerSpectrum
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 PERIOD = 0.0005
 SIZES = np.array([0.01, 0.02, 0.03, 0.1, 0.2, 0.3, 1.0, 2.0, 3.0])
 COLUMNS = {"base_torque": slice(0, 3), "torque_1_3": slice(3, 6), "torque_4_6": slice(6, 9)}
-DESIRED = simulate(Flight(FlightPlan(duration=8.0, controller="ctc")))
+DESIRED = simulate(Flight(resolve(FlightPlan(duration=8.0, controller="ctc"))))
 
 
 def log_with(torque: Array) -> FlightLog:
@@ -43,7 +43,7 @@ def seconds(ticks: int) -> Array:
 
 
 def flown(h_bar: tuple[float, float, float] = (50.0, 5.0, 0.5), **options: Any) -> dict[str, Any]:
-    flight = Flight(FlightPlan(**options))
+    flight = Flight(resolve(FlightPlan(**options)))
     if flight.controller.law.h_bar.size:
         flight.controller.law.h_bar[:] = np.repeat(h_bar, 3)
     found: dict[str, Any] = analyze(simulate(flight))["ripple"]

@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 from space_robot.analysis import excerpt
 from space_robot.analysis.settling import BAND, Settling
 from space_robot.analysis.waypoints import Waypoints
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import empty_log
 from space_robot_msgs_py.bag.blocks import blocks_of
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -93,7 +93,7 @@ def test_a_flight_that_never_rests_settles_nowhere() -> None:
     ("duration", "expected"), [(30.0, 30_000), (31.0, 60_000), (14.0, 0), (0.5, 0), (0.05, None)]
 )
 def test_the_last_waypoint_has_flight_after_it(duration: float, expected: int | None) -> None:
-    assert last_waypoint(empty_log(Flight(FlightPlan(duration=duration)))) == expected
+    assert last_waypoint(empty_log(Flight(resolve(FlightPlan(duration=duration))))) == expected
 
 
 def test_the_shortest_watch() -> None:
@@ -104,7 +104,7 @@ def test_the_shortest_watch() -> None:
 
 
 def test_an_excerpt_without_rest_has_none() -> None:
-    log = empty_log(Flight(FlightPlan(duration=30.0)))
+    log = empty_log(Flight(resolve(FlightPlan(duration=30.0))))
     assert last_waypoint(excerpt(log, 5.0, 10.0)) is None
     assert last_waypoint(excerpt(log, 12.0, 20.0)) == 6000
 

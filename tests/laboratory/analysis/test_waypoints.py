@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from space_robot.analysis.waypoints import junction_ticks, waypoint_ticks
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import empty_log
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
 
 def log_with_speed(speed: np.ndarray) -> FlightLog:
     """One joint moves with the given speeds, the others rest."""
-    log = empty_log(Flight(FlightPlan(duration=len(speed) * 0.0005)))
+    log = empty_log(Flight(resolve(FlightPlan(duration=len(speed) * 0.0005))))
     log.reference_joints[:] = 0.0
     log.reference_joints[:, 1, 2] = speed
     return log

@@ -127,7 +127,7 @@ def test_a_scenario_may_be_drawn_at_every_reset() -> None:
     cases = set()
     for seed in range(6):
         env.reset(seed=seed)
-        cases.add(env.bench.flight.plan.case)
+        cases.add(env.bench.flight.scenario.options.case)
     assert len(cases) > 1
     changing = SpaceRobotEnv(lambda rng: SCENARIO)
     changing._draw = lambda rng: Scenario(controller=None, robot="seven_joint")

@@ -17,7 +17,7 @@ import space_robot
 from space_robot import FlownFlight, Scenario
 from space_robot.analysis import analyze
 from space_robot.cli.main import cli
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.guidance.mission import MissionSettings
 from space_robot_control.laws import Signals, find_law
@@ -70,7 +70,7 @@ def pd(signals: Signals) -> Any:
 
 
 def test_a_scenario_flies_the_plan_of_its_options(named: FlownFlight) -> None:
-    log = simulate(Flight(FlightPlan(**NAMED)))
+    log = simulate(Flight(resolve(FlightPlan(**NAMED))))
     assert same_bits(named.log, log)
     assert named.outcome == "complete"
     assert named.reason == ""

@@ -14,7 +14,7 @@ from PIL import Image
 
 from space_robot.analysis import analyze as report_of
 from space_robot.analysis import excerpt
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight
 
@@ -30,7 +30,7 @@ def bags(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     folder = tmp_path_factory.mktemp("bags")
     for law in ("tde_stc", "ctc"):
         plan = FlightPlan(controller=law, case="2", duration=0.3)
-        simulate(Flight(plan), folder / law)
+        simulate(Flight(resolve(plan)), folder / law)
     return folder / "tde_stc", folder / "ctc"
 
 
@@ -176,7 +176,7 @@ def test_a_bag_that_nobody_finished_is_analysed_and_said_so(
 
 
 def test_a_robot_that_is_not_here_costs_only_its_figures(analyze: Run, tmp_path: Path) -> None:
-    flight = Flight(FlightPlan(duration=0.05))
+    flight = Flight(resolve(FlightPlan(duration=0.05)))
     log = simulate(flight)
     log.flight.pop("robot_file", None)
     log.flight["robot"] = "elsewhere"

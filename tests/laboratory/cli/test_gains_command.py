@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from space_robot.cli.main import cli
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.laws import laws
@@ -121,7 +121,7 @@ def test_a_tuned_set_flies_and_is_sound(tmp_path: Path) -> None:
     names = {"ctc", "ctc_smc", "tde_smc", "tde_stc", "tde_tsmc", "controller"}
     assert {file.stem for file in folder.iterdir()} == names
     assert run("check", "--gains", str(folder)).exit_code == 0
-    flight = Flight(FlightPlan(gains=str(folder), duration=0.1))
+    flight = Flight(resolve(FlightPlan(gains=str(folder), duration=0.1)))
     assert flight.controller_settings.acceleration_filter_hz == pytest.approx(99.3, rel=0.01)
     assert list(flight.laws) == sorted(laws(), key=lambda name: (name != "tde_stc", name))
     simulate(flight)
@@ -131,11 +131,11 @@ def test_what_the_set_says_to_the_controller_is_in_the_bag_and_may_be_overruled(
     tmp_path: Path,
 ) -> None:
     tune(tmp_path)
-    flight = Flight(FlightPlan(gains=str(tmp_path)))
+    flight = Flight(resolve(FlightPlan(gains=str(tmp_path))))
     corner = flight.controller_settings.acceleration_filter_hz
     assert flight.description["parameters"]["controller"]["acceleration_filter_hz"] == corner > 0.0
     given = {"controller": {"acceleration_filter_hz": 7.0}}
-    over = Flight(FlightPlan(gains=str(tmp_path), parameters=given))
+    over = Flight(resolve(FlightPlan(gains=str(tmp_path), parameters=given)))
     assert over.controller_settings.acceleration_filter_hz == 7.0
     alone = ControllerNodeSettings.resolve({"gains": str(tmp_path)})  # as a node by itself has it
     assert alone.acceleration_filter_hz == corner
@@ -180,7 +180,7 @@ def test_a_set_for_sensors_keeps_the_ripple_it_is_allowed(tmp_path: Path) -> Non
     head = (tmp_path / "ctc.yaml").read_text().splitlines()[0]
     assert f"--sensors white_l1 --set {parameter} --ripple 0.05 -o" in head
     quiet, loud = (
-        simulate(Flight(FlightPlan(gains=str(tmp_path), sensors=sensors, duration=5.0)))
+        simulate(Flight(resolve(FlightPlan(gains=str(tmp_path), sensors=sensors, duration=5.0))))
         for sensors in ("ideal", "white_l1")
     )
     assert quiet.commanded_torque is not None

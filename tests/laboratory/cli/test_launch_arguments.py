@@ -62,13 +62,13 @@ def test_the_flight_is_the_one_of_the_command(tmp_path: Path) -> None:
         swaps=["1:ctc", "2:tde_smc"],
         duration=3.0,
     )
-    assert flight.plan == plan
+    assert flight.scenario.options == plan
     assert bag == tmp_path / "bag"
 
 
 def test_nothing_given_is_the_flight_without_options() -> None:
     given = {argument.name: "" for argument in launch_arguments()}
-    assert launched_flight(given).flight.plan == FlightPlan()
+    assert launched_flight(given).flight.scenario.options == FlightPlan()
 
 
 def test_a_parameter_file_goes_over_the_arguments_and_into_the_bag(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from paths import CONFIG, DATA
 from space_robot.campaign.new_robot import robot_texts
 from space_robot.campaign.new_robot.motion import mission_text, rest_to_rest
 from space_robot.cli.main import cli
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.guidance.mission import Mission
 from space_robot_control.laws import laws
@@ -46,7 +46,7 @@ def test_a_file_becomes_a_folder_that_flies(tmp_path: Path) -> None:
     for law in report["laws"].values():
         assert law["rms"]["attitude"] < 1e-6
     assert [entry.name for entry in tmp_path.iterdir()] == ["mine"]
-    log = simulate(Flight(FlightPlan(robot="mine", controller="ctc", duration=0.01)))
+    log = simulate(Flight(resolve(FlightPlan(robot="mine", controller="ctc", duration=0.01))))
     assert log.flight["mission"] == "mine"
     assert isinstance(new(FILE, "--out", "mine").exception, InputError), "it is there"
 
@@ -55,7 +55,7 @@ def test_a_law_that_cannot_fly_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     def blocks(flight: Flight) -> Iterator[FlightLog]:
         if flight.controller.law.name == "tde_smc":
             raise DivergedError(7, 0.0005, "too fast")
-        yield simulate(Flight(FlightPlan(robot=FILE, duration=0.01)))
+        yield simulate(Flight(resolve(FlightPlan(robot=FILE, duration=0.01))))
 
     monkeypatch.setattr("space_robot.campaign.new_robot.make.fly_blocks", blocks)
     result = new(FILE)

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from space_robot.cli import main as cli
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_msgs_py.config.validation import validate
 from space_robot_msgs_py.errors import InputError
 
@@ -132,8 +132,8 @@ def test_a_folder_of_gains_needs_no_slash(tmp_path: Path, monkeypatch: pytest.Mo
         "{h_bar: [50], lambda: [3], k_1: [0.02], k_2: [8.0e-5]}}}"
     )
     monkeypatch.chdir(tmp_path)
-    bare, slash = (Flight(FlightPlan(gains=gains)) for gains in ("g", "g/"))
-    assert bare.gains_used == slash.gains_used
+    bare, slash = (Flight(resolve(FlightPlan(gains=gains))) for gains in ("g", "g/"))
+    assert bare.scenario.gains_used == slash.scenario.gains_used
     assert bare.description == slash.description
 
 
@@ -209,7 +209,7 @@ def test_any_parameters_fly_or_are_refused_in_one_line(pairs: list[tuple[str, st
     try:
         for name, value in pairs:
             _set(tree, f"{name}={value}", "--set")
-        Flight(validate(FlightPlan, {"parameters": tree}, "options"))
+        Flight(resolve(validate(FlightPlan, {"parameters": tree}, "options")))
     except InputError as error:
         assert len(str(error).splitlines()) == 1  # noqa: PT017
 

@@ -13,7 +13,7 @@ import pytest
 from command import Run
 
 from space_robot.console.files import whole_file
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.errors import InputError
 
@@ -23,7 +23,7 @@ COMMAND = [sys.executable, "-m", "space_robot.cli.main"]
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("output") / "bag"
-    simulate(Flight(FlightPlan(duration=0.1)), path)
+    simulate(Flight(resolve(FlightPlan(duration=0.1))), path)
     return path
 
 

@@ -18,7 +18,7 @@ from scene_pages import Scene, plot_data
 
 from space_robot.analysis.metrics import tracking_error
 from space_robot.cli.main import main
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight
 
@@ -36,8 +36,8 @@ def view(space_robot: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> R
 def bags(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """A whole flight of 30 s, and a short one."""
     folder = tmp_path_factory.mktemp("bags")
-    simulate(Flight(FlightPlan(duration=30.0)), folder / "whole")
-    simulate(Flight(FlightPlan(controller="ctc", duration=0.3)), folder / "short")
+    simulate(Flight(resolve(FlightPlan(duration=30.0))), folder / "whole")
+    simulate(Flight(resolve(FlightPlan(controller="ctc", duration=0.3))), folder / "short")
     return folder / "whole", folder / "short"
 
 
@@ -212,7 +212,7 @@ def test_a_bag_has_no_shapes_of_a_urdf_until_it_is_named(view: Run, tmp_path: Pa
     plan = FlightPlan(
         robot=str(urdf), mission=str(mission), gains=str(gains), controller="ctc", duration=0.1
     )
-    simulate(Flight(plan), tmp_path / "flown")
+    simulate(Flight(resolve(plan)), tmp_path / "flown")
     hint = f"a bag has no robot's shapes: --robot {urdf} draws those of that file\n"
     without = view("flown", "--no-open", "--out", "without.html")
     assert without.code == 0, without.err

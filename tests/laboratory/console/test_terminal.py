@@ -15,7 +15,7 @@ from space_robot.analysis.report_tables import metrics_table, rms_table
 from space_robot.cli.report_display import print_comparison
 from space_robot.console.terminal import say, show, terminal
 from space_robot.console.terminal_tables import print_table
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 
 WIDTHS = (1, 10, 20, 33, 40, 60, 80, 100, 200)
@@ -23,7 +23,7 @@ WIDTHS = (1, 10, 20, 33, 40, 60, 80, 100, 200)
 
 @pytest.fixture(scope="module")
 def report() -> dict[str, Any]:
-    return analyze(simulate(Flight(FlightPlan(duration=0.05, case="2"))))
+    return analyze(simulate(Flight(resolve(FlightPlan(duration=0.05, case="2")))))
 
 
 def shown(width: int, *prints: Any) -> str:

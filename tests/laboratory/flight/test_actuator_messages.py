@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -37,13 +37,13 @@ def assert_same(one: FlightLog, other: FlightLog) -> None:
 @pytest.mark.parametrize("actuators", KINDS)
 def test_its_bag_and_its_messages_are_the_flight(actuators: str, law: str, tmp_path: Path) -> None:
     """To the last bit; a fault that never happens makes every message pass one by one."""
-    flight = Flight(plan(actuators, law))
+    flight = Flight(resolve(plan(actuators, law)))
     names = flight.plant.names
     log = simulate(flight, tmp_path / "bag")
     back = read_flight(tmp_path / "bag")
     assert_same(back, log)
     assert (back.damage, back.unanswered, set(back.lost.values())) == ((), 0, {0})
-    assert_same(simulate(Flight(plan(actuators, law, faults=[NOTHING]))), log)
+    assert_same(simulate(Flight(resolve(plan(actuators, law, faults=[NOTHING])))), log)
     sent = {name for name, _ in open_bag(tmp_path / "bag").messages(*topics.STATES)}
     assert (topics.WHEELS_STATE.full_name in sent) is bool(names.wheels)
     assert (topics.THRUSTERS_STATE.full_name in sent) is bool(names.thrusters)
@@ -58,7 +58,7 @@ def test_faults_of_messages_strike_all_parts_of_a_state_alike(
     actuators: str, tmp_path: Path
 ) -> None:
     faults = ["drop_state@0.01-0.06:0.2", "delay_state@0.06-0.07:3", "repeat_state@0.08-0.09"]
-    log = simulate(Flight(plan(actuators, faults=faults, seed=3)), tmp_path / "bag")
+    log = simulate(Flight(resolve(plan(actuators, faults=faults, seed=3))), tmp_path / "bag")
     assert log.filled > 0
     assert set(log.lost.values()) == {0}
     assert np.isfinite(log.wheel_velocities).all()
@@ -71,7 +71,7 @@ def test_faults_of_messages_strike_all_parts_of_a_state_alike(
 
 
 def test_thrusters_that_fire_are_in_the_bag(tmp_path: Path) -> None:
-    log = simulate(Flight(plan("thrusters", "ctc", duration=0.2)), tmp_path / "bag")
+    log = simulate(Flight(resolve(plan("thrusters", "ctc", duration=0.2))), tmp_path / "bag")
     assert log.actuator_commands.any()
     assert log.thrusts.any()
     assert_same(read_flight(tmp_path / "bag"), log)
@@ -79,15 +79,17 @@ def test_thrusters_that_fire_are_in_the_bag(tmp_path: Path) -> None:
 
 def test_late_commands_of_actuators_are_a_plant_that_applies_them_late() -> None:
     """All numbers of a command come late as one."""
-    late = simulate(Flight(plan("wheels_and_thrusters", faults=["delay_command@0:2"])))
-    slow = simulate(Flight(plan("wheels_and_thrusters", command_latency_ticks=2)))
+    late = simulate(Flight(resolve(plan("wheels_and_thrusters", faults=["delay_command@0:2"]))))
+    slow = simulate(Flight(resolve(plan("wheels_and_thrusters", command_latency_ticks=2))))
     assert_same(late, slow)
 
 
 def test_a_state_without_an_answer_has_no_command_to_any_actuator(tmp_path: Path) -> None:
     singular = {"plant": {"initial_quaternion": [0.0, 0.0, 1.0, 0.0]}}
     with pytest.raises(SingularAttitudeError) as caught:
-        simulate(Flight(plan("wheels_and_thrusters", parameters=singular)), tmp_path / "bag")
+        simulate(
+            Flight(resolve(plan("wheels_and_thrusters", parameters=singular))), tmp_path / "bag"
+        )
     log = caught.value.log
     assert log
     assert log.actuator_commands.shape == (1, 16)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 def fly(**options: Any) -> tuple[Flight, FlightLog]:
     allocation = {f"allocation.{k}": v for k, v in options.pop("allocation", {}).items()}
     parameters = {"controller": allocation}
-    flight = Flight(FlightPlan(**{"duration": 6.0, "parameters": parameters, **options}))
+    flight = Flight(resolve(FlightPlan(**{"duration": 6.0, "parameters": parameters, **options})))
     return flight, simulate(flight)
 
 

@@ -9,7 +9,7 @@ import pytest
 from pydantic import BaseModel
 
 from space_robot.cli.numbers import FiniteRange
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.scenario.faults import KINDS
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.controller.swaps import parse_swaps
@@ -31,7 +31,7 @@ PERIODS = (1e-5, 0.0005, 0.1)
 def is_refused(options: dict[str, Any]) -> bool:
     """Tell if a flight of these options is refused, in one line; any other error is one here."""
     try:
-        flight = Flight(validate(FlightPlan, options, "options"))
+        flight = Flight(resolve(validate(FlightPlan, options, "options")))
     except InputError as error:
         assert len(str(error).splitlines()) == 1  # noqa: PT017
         return True

@@ -15,7 +15,7 @@ from space_robot import Scenario
 from space_robot.analysis import analyze
 from space_robot.analysis.figures.single_flight import control_results
 from space_robot.analysis.words import remarks
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.reader import read_flight
@@ -38,7 +38,7 @@ COLUMNS = (
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, FlightLog]:
     folder = tmp_path_factory.mktemp("captures") / "bag"
-    return folder, simulate(Flight(FlightPlan(**PLAN)), folder)
+    return folder, simulate(Flight(resolve(FlightPlan(**PLAN))), folder)
 
 
 def mission_of(folder: Path, events: list[str]) -> Path:
@@ -61,7 +61,7 @@ def test_a_bag_tells_the_targets_numbers_and_flies_again(bag: tuple[Path, Flight
         "capture",
     ]
     assert all("_satellite" not in text.partition("{")[0] for text in described["events"])
-    again = Flight(FlightPlan(parameters=described["parameters"], duration=0.3))
+    again = Flight(resolve(FlightPlan(parameters=described["parameters"], duration=0.3)))
     assert again.description["events"] == described["events"]
     log = simulate(again)
     for column in COLUMNS:
@@ -69,7 +69,7 @@ def test_a_bag_tells_the_targets_numbers_and_flies_again(bag: tuple[Path, Flight
 
 
 def test_compiled_stretches_fly_as_single_ticks_do(bag: tuple[Path, FlightLog]) -> None:
-    flight, log = Flight(FlightPlan(**PLAN)), bag[1]
+    flight, log = Flight(resolve(FlightPlan(**PLAN))), bag[1]
     assert log.commanded_torque is not None
     reference, chunk = Reference.at_rest(flight.robot.n), flight.mission.chunk(0, flight.ticks)
     joints, base = Reference.parts(reference)
@@ -125,19 +125,21 @@ def test_a_file_that_a_bag_names_is_opened_only_if_it_is_trusted(
 
 def test_a_mission_has_events_and_files_beside_it(tmp_path: Path) -> None:
     mission = mission_of(tmp_path / "own", ["capture@0.1:mine.yaml"])
-    flight = Flight(FlightPlan(mission=str(mission)))
-    expected = Flight(FlightPlan(events=["capture@0.1:tumbling_satellite"]))
+    flight = Flight(resolve(FlightPlan(mission=str(mission))))
+    expected = Flight(resolve(FlightPlan(events=["capture@0.1:tumbling_satellite"])))
     assert flight.description["events"] == expected.description["events"]
     assert flight.plant.captures.next_tick(0) == 200
-    other = Flight(FlightPlan(mission=str(mission), events=["capture@1:small_satellite"]))
+    other = Flight(resolve(FlightPlan(mission=str(mission), events=["capture@1:small_satellite"])))
     (text,) = other.description["events"]
     assert text.startswith('capture@1:{"name": "small_satellite"')
-    without = Flight(FlightPlan(mission=str(mission), parameters={"plant": {"events": [""]}}))
+    without = Flight(
+        resolve(FlightPlan(mission=str(mission), parameters={"plant": {"events": [""]}}))
+    )
     assert "events" not in without.description
     lost = mission_of(tmp_path / "lost", ["capture@0.1:yours.yaml"])
     with pytest.raises(InputError, match=r"event 'capture@0.1:yours.yaml': yours.yaml: "):
-        Flight(FlightPlan(mission=str(lost)))
+        Flight(resolve(FlightPlan(mission=str(lost))))
 
 
 def test_no_event_changes_nothing() -> None:
-    assert "events" not in Flight(FlightPlan()).description
+    assert "events" not in Flight(resolve(FlightPlan())).description

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
@@ -18,7 +18,7 @@ OUTER = slice(3, 6)
 
 def fly(law: str, substeps: int) -> FlightLog:
     plan = FlightPlan(controller=law).with_parameters("plant", {"substeps": substeps})
-    return simulate(Flight(plan))
+    return simulate(Flight(resolve(plan)))
 
 
 def errors(log: FlightLog) -> Array:
@@ -74,6 +74,6 @@ def test_the_sign_inside_the_step_chatters_in_proportion_to_it(
 ) -> None:
     """Friction that is not set-valued, under TDE-STC: it nears the figures above step by step."""
     plan = FlightPlan(substeps=substeps).with_parameters("plant", {"friction.set_valued": False})
-    log = simulate(Flight(plan))
+    log = simulate(Flight(resolve(plan)))
     assert errors(log)[2] == pytest.approx(error, rel=0.01)
     assert variation_of_joint_6(log) == pytest.approx(variation, rel=0.01)

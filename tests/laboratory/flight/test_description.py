@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from paths import CONFIG, ROOT
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.processes import software
 from space_robot.processes.node_modules import MODULES
@@ -33,7 +33,7 @@ PLAN = FlightPlan(
 
 
 def test_bag_has_all_to_fly_it_again(tmp_path: Path) -> None:
-    flight = Flight(PLAN)
+    flight = Flight(resolve(PLAN))
     simulate(flight, tmp_path / "bag")
     said = read_flight(tmp_path / "bag").flight
     assert said == flight.description
@@ -51,18 +51,18 @@ def test_bag_has_all_to_fly_it_again(tmp_path: Path) -> None:
 def test_robot_is_told_though_its_file_is_gone(tmp_path: Path) -> None:
     source = CONFIG / "robots" / "paper.yaml"
     file = Path(shutil.copy(source, tmp_path / "paper.yaml"))
-    flight = Flight(FlightPlan(robot=str(file), duration=0.02))
+    flight = Flight(resolve(FlightPlan(robot=str(file), duration=0.02)))
     file.unlink()
     robot = Robot.from_dict(flight.description["robot_file"])
     np.testing.assert_array_equal(robot.com, flight.robot.com)
 
 
 def test_seed_is_told_without_faults() -> None:
-    assert Flight(FlightPlan()).description["seed"] == 0
+    assert Flight(resolve(FlightPlan())).description["seed"] == 0
 
 
 def test_description_is_json_and_the_same_every_time() -> None:
-    texts = {json.dumps(Flight(PLAN).description) for _ in range(2)}
+    texts = {json.dumps(Flight(resolve(PLAN)).description) for _ in range(2)}
     assert len(texts) == 1
 
 

@@ -12,7 +12,7 @@ import pytest
 from flights import space_robot, space_robot_here
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import fly_blocks, simulate
 from space_robot_control.laws import ControlLaw, LawGains, Signals, per_axis
 from space_robot_control.laws.checked import LawError
@@ -62,7 +62,7 @@ def fails() -> float:
 
 
 def flight_of(**options: Any) -> Flight:
-    return Flight(FlightPlan.model_validate({"duration": 2.0, **options}))
+    return Flight(resolve(FlightPlan.model_validate({"duration": 2.0, **options})))
 
 
 def failing(at: int, how: Callable[[], float]) -> Flight:

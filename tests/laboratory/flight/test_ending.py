@@ -9,7 +9,7 @@ import pytest
 
 from space_robot.flight.bag_path import check_bag_path, default_bag
 from space_robot.flight.ending import COMPLETE, DIVERGED, FAILED, UNANSWERED, Ending
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_msgs_py.errors import (
     DivergedError,
     FlightError,
@@ -50,13 +50,13 @@ def test_a_flight_to_its_end_has_no_reason() -> None:
 
 
 def test_a_bag_is_named_after_robot_law_case_and_time() -> None:
-    plain = default_bag(Flight(FlightPlan(controller="ctc", case="4-1")))
+    plain = default_bag(Flight(resolve(FlightPlan(controller="ctc", case="4-1"))))
     assert plain.parent == Path("flights")
     assert plain.name.startswith("ctc_case4-1_")
     law_case, date, time = plain.name.rpartition("_")[0], *plain.name[-15:].split("-")
     assert law_case == "ctc_case4-1"
     assert (len(date), len(time)) == (8, 6)
-    spaced = default_bag(Flight(FlightPlan(controller="ctc", namespace="/fleet/sat1")))
+    spaced = default_bag(Flight(resolve(FlightPlan(controller="ctc", namespace="/fleet/sat1"))))
     assert spaced.name.startswith("fleet_sat1_ctc_case1_")
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from space_robot import load_bag
 from space_robot.flight.closed_loop import close_loop
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import empty_log, simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py.errors import InputError
@@ -26,7 +26,7 @@ LOOK_TICKS = 100
 
 def flown(**plan: Any) -> tuple[Flight, Array, Array]:
     """A flight; true errors of attitude and joints now and then, (K, 9); commands (ticks, 9)."""
-    flight = Flight(FlightPlan(**plan))
+    flight = Flight(resolve(FlightPlan(**plan)))
     log, errors = empty_log(flight), []
     assert log.reference_base is not None
     assert log.reference_joints is not None
@@ -75,7 +75,11 @@ def test_a_delay_that_is_known_costs_nothing_and_one_that_is_not_does() -> None:
     for given in ({}, {"navigation_filter.tracker_delay": 0.0}):
         parameters = {"plant": {"initial_quaternion": [0.99, 0.14, 0.0, 0.0]}, "controller": given}
         flight = Flight(
-            FlightPlan(sensors="fine", navigation="filtered", duration=1.5, parameters=parameters)
+            resolve(
+                FlightPlan(
+                    sensors="fine", navigation="filtered", duration=1.5, parameters=parameters
+                )
+            )
         )
         log = empty_log(flight)
         close_loop(flight.plant, flight.controller, log, 0, 2000)
@@ -90,7 +94,7 @@ def test_a_delay_that_is_known_costs_nothing_and_one_that_is_not_does() -> None:
 
 def test_the_filter_is_for_the_flights_sensors_unless_told_otherwise() -> None:
     def believed(**plan: Any) -> dict[str, Any]:
-        found = Flight(FlightPlan(navigation="filtered", duration=0.1, **plan)).description
+        found = Flight(resolve(FlightPlan(navigation="filtered", duration=0.1, **plan))).description
         numbers: dict[str, Any] = found["navigation_filter"]
         return numbers
 
@@ -101,7 +105,7 @@ def test_the_filter_is_for_the_flights_sensors_unless_told_otherwise() -> None:
     assert believed(sensors="tactical", parameters=single)["tracker_across"] == 1e-3
     with pytest.raises(InputError, match="unknown sensor 'good'"):
         believed(parameters={"controller": {"navigation_sensors": "good"}})
-    assert "navigation_filter" not in Flight(FlightPlan(duration=0.1)).description
+    assert "navigation_filter" not in Flight(resolve(FlightPlan(duration=0.1))).description
 
 
 def test_graph_process_and_replay_have_the_same_bits(
@@ -124,7 +128,7 @@ def test_graph_process_and_replay_have_the_same_bits(
     plan = FlightPlan(
         sensors="fine", navigation="filtered", duration=0.8, swaps=["0.4:tde_smc"], seed=3
     )
-    alone = simulate(Flight(plan))
+    alone = simulate(Flight(resolve(plan)))
     np.testing.assert_array_equal(load_bag(graph.bag).commanded_torque, alone.commanded_torque)
     result = space_robot_here("replay", str(graph.bag))
     assert result.returncode == 0, result.stdout + result.stderr

@@ -23,7 +23,7 @@ from space_robot import Robot
 from space_robot.analysis import analyze
 from space_robot.analysis.attitude_drift import attitude_drift
 from space_robot.analysis.metrics import tracking_error
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_model.robot.dynamics import free_inverse_dynamics
@@ -149,7 +149,7 @@ def test_a_closed_path_of_a_planar_arm_turns_the_base_by_the_closed_form(
     """Through the whole loop: at the end the arm is where it was, and the base is not."""
     expected = turned_round()
     assert expected > np.radians(16.0)
-    log = simulate(Flight(closed_plan(tmp_path, law)))
+    log = simulate(Flight(resolve(closed_plan(tmp_path, law))))
     angle = base_angle(log.quaternion)
     assert angle[-1] == pytest.approx(expected, abs=TOLERANCES[law])
     # along the path as it was flown, without its errors
@@ -164,7 +164,7 @@ def test_a_closed_path_of_a_planar_arm_turns_the_base_by_the_closed_form(
 
 def test_the_plant_alone_turns_it_by_the_closed_form(tmp_path: Path) -> None:
     """No controller: inverse dynamics of the path, and springs and dampers that hold to it."""
-    flight = Flight(closed_plan(tmp_path, "ctc"))
+    flight = Flight(resolve(closed_plan(tmp_path, "ctc")))
     plant = Plant(PLANAR, flight.plant_settings, PERIOD)
     references = flight.mission.chunk(0, flight.ticks).references()
     torques = free_inverse_dynamics(PLANAR, references)
@@ -190,7 +190,7 @@ def test_the_plant_alone_turns_it_by_the_closed_form(tmp_path: Path) -> None:
 def case_1() -> FlightLog:
     """Flown for 30 s with viscous friction alone, which MuJoCo has, too."""
     plan = FlightPlan(actuators="none", parameters={"plant": {"friction.coulomb": 0.0}})
-    return simulate(Flight(plan))
+    return simulate(Flight(resolve(plan)))
 
 
 def test_mujoco_flies_case_1_to_the_same_attitude(case_1: FlightLog, paper_robot: Robot) -> None:
@@ -236,13 +236,13 @@ def test_half_a_turn_is_an_attitude_like_any_other(law: str) -> None:
     """There the laws refuse to hold a base; joints of a free one fly as ever."""
     turned = {"plant": {"initial_quaternion": [0.0, 0.0, 0.6, 0.8]}}
     plan = FlightPlan(controller=law, actuators="none", duration=1.0)
-    upright = simulate(Flight(plan))
-    log = simulate(Flight(plan.model_copy(update={"parameters": turned})))
+    upright = simulate(Flight(resolve(plan)))
+    log = simulate(Flight(resolve(plan.model_copy(update={"parameters": turned}))))
     errors = [tracking_error(flown)[:, 3:] for flown in (upright, log)]
     np.testing.assert_allclose(errors[1], errors[0], rtol=0, atol=1e-11)
     np.testing.assert_allclose(attitude_drift(log), attitude_drift(upright), rtol=0, atol=1e-9)
     with pytest.raises(SingularAttitudeError):
-        simulate(Flight(FlightPlan(controller=law, duration=0.01, parameters=turned)))
+        simulate(Flight(resolve(FlightPlan(controller=law, duration=0.01, parameters=turned))))
 
 
 @pytest.mark.parametrize(("scale", "flies"), [(0.98, True), (0.97, False)])
@@ -250,10 +250,10 @@ def test_the_margin_is_that_of_the_joints_alone(scale: float, flies: bool) -> No
     """2.37 % by ``gains check``; with the base held it is 0.31 %, and 98 % end in a second."""
     plan = FlightPlan(actuators="none", duration=3.0, faults=[f"torque_scale@0:all={scale}"])
     if flies:
-        assert np.abs(tracking_error(simulate(Flight(plan)))[:, 3:]).max() < 1e-3
+        assert np.abs(tracking_error(simulate(Flight(resolve(plan))))[:, 3:]).max() < 1e-3
         plan = plan.model_copy(update={"actuators": "ideal"})
     with pytest.raises(DivergedError):
-        simulate(Flight(plan))
+        simulate(Flight(resolve(plan)))
 
 
 @pytest.mark.parametrize("law", sorted(laws()))
@@ -261,15 +261,17 @@ def test_the_base_gets_no_torque_and_the_laws_no_error(law: str) -> None:
     """Sensors, faults and a filter between plant and law make no difference to that."""
     log = simulate(
         Flight(
-            FlightPlan(
-                controller=law,
-                actuators="none",
-                gains="robust",
-                sensors="fine",
-                navigation="filtered",
-                duration=0.5,
-                faults=["torque_scale@0.1:base=1.1"],
-                swaps=["0.3:ctc_smc"],
+            resolve(
+                FlightPlan(
+                    controller=law,
+                    actuators="none",
+                    gains="robust",
+                    sensors="fine",
+                    navigation="filtered",
+                    duration=0.5,
+                    faults=["torque_scale@0.1:base=1.1"],
+                    swaps=["0.3:ctc_smc"],
+                )
             )
         )
     )

@@ -13,7 +13,7 @@ import pytest
 from flights import COMMAND, ros_environment, space_robot
 
 from space_robot.flight import disk_space as room
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.processes import memory
 from space_robot_msgs_py.bag.reader import read_flight
@@ -73,7 +73,7 @@ def test_the_longest_flight_flies_and_can_be_interrupted(tmp_path: Path) -> None
 def test_a_whole_flight_in_memory_that_does_not_fit_is_refused() -> None:
     """Of those who need it whole: `stability`, and Python."""
     with pytest.raises(InputError, match=r"duration 1e\+06 s: the whole flight .* GB are free"):
-        simulate(Flight(FlightPlan(duration=1e6)))
+        simulate(Flight(resolve(FlightPlan(duration=1e6))))
     result = space_robot("stability", "--duration", "1e6")
     assert result.returncode == 2
     assert result.stderr.splitlines()[-1].startswith("space-robot: error: duration 1e+06 s")
@@ -83,10 +83,10 @@ def test_a_whole_flight_in_memory_that_does_not_fit_is_refused() -> None:
 def test_memory_that_is_there_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
     plan = FlightPlan(duration=0.01)
     monkeypatch.setattr(memory, "available_bytes", lambda: 20 * 1000)
-    simulate(Flight(plan))
+    simulate(Flight(resolve(plan)))
     monkeypatch.setattr(memory, "available_bytes", lambda: 20 * 800)
     with pytest.raises(InputError, match="fly a shorter one"):
-        simulate(Flight(plan))
+        simulate(Flight(resolve(plan)))
 
 
 def test_what_is_available_is_what_psutil_says() -> None:
@@ -95,7 +95,7 @@ def test_what_is_available_is_what_psutil_says() -> None:
 
 
 def test_a_bag_without_room_is_told_before(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    flight, usage = Flight(FlightPlan(duration=20.0)), namedtuple("usage", "free")
+    flight, usage = Flight(resolve(FlightPlan(duration=20.0))), namedtuple("usage", "free")
     bag = tmp_path / "not there yet" / "bag"
     monkeypatch.setattr(room.shutil, "disk_usage", lambda path: usage(10_000_000))
     said = room.disk_space_warning(flight, bag)
@@ -108,7 +108,7 @@ def test_a_bag_without_room_is_told_before(monkeypatch: pytest.MonkeyPatch, tmp_
 
 def test_the_estimate_of_a_bag_is_about_right(tmp_path: Path) -> None:
     """What does not fit uncompressed needs no estimate, so no bag may be larger than that."""
-    flight = Flight(FlightPlan(duration=5.0, compression="none"))
+    flight = Flight(resolve(FlightPlan(duration=5.0, compression="none")))
     estimate = room.bag_bytes(flight)
     simulate(flight, tmp_path / "bag")
     size = sum(file.stat().st_size for file in (tmp_path / "bag").iterdir())

@@ -11,7 +11,7 @@ from bags import COLUMNS, messages_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import fly_blocks, simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -25,7 +25,7 @@ TICKS = 200
 
 def flown(*faults: str, bag: Path | None = None, **options: Any) -> FlightLog:
     options = {"duration": TICKS * 5e-4, **options}
-    return simulate(Flight(FlightPlan(faults=list(faults), **options)), bag)
+    return simulate(Flight(resolve(FlightPlan(faults=list(faults), **options))), bag)
 
 
 def assert_same(one: FlightLog, other: FlightLog) -> None:
@@ -80,11 +80,11 @@ def test_processes_fail_in_a_graph_only(fault: str) -> None:
 def test_a_flight_that_diverges_hands_out_what_was_flown(tmp_path: Path) -> None:
     wild = {"plant": {"drive_scale": [-1.0]}}  # every torque the wrong way round
     options: dict[str, Any] = {"controller": "ctc", "duration": 5.0, "parameters": wild}
-    flight = Flight(FlightPlan(faults=[NOTHING], **options))
+    flight = Flight(resolve(FlightPlan(faults=[NOTHING], **options)))
     with pytest.raises(DivergedError) as caught:
         simulate(flight, tmp_path / "bag")
     assert caught.value.log.ticks == flight.plant.tick
-    blocks = fly_blocks(Flight(FlightPlan(faults=[NOTHING], **options)))
+    blocks = fly_blocks(Flight(resolve(FlightPlan(faults=[NOTHING], **options))))
     assert next(blocks).ticks == flight.plant.tick
     with pytest.raises(DivergedError):
         next(blocks)
@@ -134,6 +134,6 @@ def test_what_was_flown_here_is_trusted_and_its_progress_is_told(
     for bag in (None, tmp_path / "bag"):
         ticks: list[int] = []
         plan = FlightPlan(faults=[NOTHING], duration=TICKS * 5e-4)
-        assert simulate(Flight(plan), bag, ticks.append).trusted
+        assert simulate(Flight(resolve(plan)), bag, ticks.append).trusted
         assert ticks == [0, 75, 150, TICKS]
     assert flown().trusted

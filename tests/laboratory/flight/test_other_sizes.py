@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from numba.core import event
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py.samples import Reference, RobotState
@@ -38,7 +38,7 @@ def compiled_functions() -> Iterator[list[str]]:
 
 def fly(robot: str, **options: str) -> None:
     """Fly a few ticks in one loop, and one step by step as the nodes do."""
-    flight = Flight(FlightPlan(robot=robot, mission=robot, duration=0.002, **options))  # type: ignore[arg-type]
+    flight = Flight(resolve(FlightPlan(robot=robot, mission=robot, duration=0.002, **options)))  # type: ignore[arg-type]
     simulate(flight)
     names, n = flight.controller.names, flight.robot.n
     states = StateCodec(names, flight.timebase)
@@ -48,7 +48,7 @@ def fly(robot: str, **options: str) -> None:
         states.decode(topic, data, state)
     command = flight.build_controller(flight.law).update(state, Reference.at_rest(n))
     commands.decode(commands.encode(command), command)
-    Flight(flight.plan).plant.step(command)
+    Flight(resolve(flight.scenario.options)).plant.step(command)
 
 
 @pytest.mark.parametrize(
@@ -65,6 +65,6 @@ def test_another_number_of_joints_compiles_nothing(options: dict[str, str]) -> N
 
 
 def test_a_law_s_kernel_is_one_for_all_numbers_of_joints() -> None:
-    flights = [Flight(FlightPlan(robot=robot)) for robot in ("paper", "seven_joint")]
+    flights = [Flight(resolve(FlightPlan(robot=robot))) for robot in ("paper", "seven_joint")]
     one, other = (flight.law.function for flight in flights)  # type: ignore[attr-defined]
     assert one is other

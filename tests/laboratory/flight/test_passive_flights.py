@@ -16,7 +16,7 @@ from space_robot.analysis.described import robot_of
 from space_robot.analysis.figures.single_flight import control_results, desired_joints
 from space_robot.analysis.pointing import pointing_error
 from space_robot.analysis.report_tables import lines, rms_table
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_model.robot.momentum import Motion, robot_momentum
@@ -42,13 +42,13 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def log(bag: Path) -> FlightLog:
     """With sensors and a filter, so that truth and measurement differ."""
     plan = plan_of("tde_stc", sensors="fine", navigation="filtered", friction=True)
-    return simulate(Flight(plan), bag)
+    return simulate(Flight(resolve(plan)), bag)
 
 
 @pytest.mark.parametrize("law", sorted(laws()))
 def test_every_law_holds_attitude_and_moves_the_joints_with_motors(law: str) -> None:
     """The springs are felt, not commanded; the model that the law has knows them locked."""
-    flight = Flight(plan_of(law))
+    flight = Flight(resolve(plan_of(law)))
     flown = simulate(flight)
     assert flight.controller.block[0].model.joint_count == 6
     assert flight.plant.memory.model.joint_count == 9

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from space_robot.analysis import analyze
 from space_robot.flight.bag_path import default_bag
 from space_robot.flight.graph.orchestrator import flight_parameters
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import empty_log, simulate
 from space_robot.scenario.node_settings import NODES, NOT_TO_BE_SET, SCHEMAS
 from space_robot_control.allocation.assumed_actuators import assumed_actuators
@@ -50,7 +50,7 @@ def heavy_robot(folder: Path) -> Path:
 
 
 def flight_of(parameters: Parameters, **options: Any) -> Flight:
-    return Flight(FlightPlan(duration=0.05, parameters=parameters, **options))
+    return Flight(resolve(FlightPlan(duration=0.05, parameters=parameters, **options)))
 
 
 def test_a_parameter_is_the_same_as_its_option() -> None:
@@ -75,7 +75,7 @@ def test_a_parameter_is_the_same_as_its_option() -> None:
         assert one.description == other.description, options
         assert one.plant_settings == other.plant_settings
         assert one.controller_settings == other.controller_settings
-        assert one.recorder_settings == other.recorder_settings
+        assert one.scenario.recorder == other.recorder_settings
         assert topics_with_allowed_gaps(one.description) == topics_with_allowed_gaps(
             other.description
         )
@@ -86,9 +86,9 @@ def test_a_parameter_is_the_same_as_its_option() -> None:
 
 def test_gains_are_parameters_as_at_the_node() -> None:
     flight = flight_of({"controller": {"tde_stc.k_1": [0.5], "tde_smc": {"g": [1]}}})
-    assert flight.gains_used["k_1"] == [0.5] * 9
-    assert flight.parameters["controller"]["tde_stc.k_1"] == [0.5] * 9
-    assert flight.parameters["controller"]["tde_smc.g"] == [1.0] * 9
+    assert flight.scenario.gains_used["k_1"] == [0.5] * 9
+    assert flight.scenario.parameters["controller"]["tde_stc.k_1"] == [0.5] * 9
+    assert flight.scenario.parameters["controller"]["tde_smc.g"] == [1.0] * 9
     plain = simulate(flight_of({}))
     assert not np.array_equal(simulate(flight).applied_torque, plain.applied_torque)
 
@@ -132,10 +132,10 @@ def test_every_parameter_that_is_refused_is_one() -> None:
 
 
 def test_one_period_for_all_is_flown() -> None:
-    flight = Flight(FlightPlan(duration=0.05, period=0.001, substeps=4))
+    flight = Flight(resolve(FlightPlan(duration=0.05, period=0.001, substeps=4)))
     assert (flight.period, flight.ticks) == (0.001, 50)
     assert flight.description["period"] == 0.001
-    assert all(flight.parameters[node]["period"] == 0.001 for node in NODES)
+    assert all(flight.scenario.parameters[node]["period"] == 0.001 for node in NODES)
     assert flight.plant.memory.substeps == 4
 
 
@@ -143,8 +143,8 @@ def test_files_that_give_nodes_different_periods_are_refused(tmp_path: Path) -> 
     case = tmp_path / "slow.yaml"
     case.write_text("plant_node: {ros__parameters: {period: 0.001}}\n")
     with pytest.raises(InputError, match=r"got plant 0\.001, controller"):
-        Flight(FlightPlan(case=str(case)))
-    assert Flight(FlightPlan(case=str(case), period=0.0005, duration=1.0)).ticks == 2000
+        Flight(resolve(FlightPlan(case=str(case))))
+    assert Flight(resolve(FlightPlan(case=str(case), period=0.0005, duration=1.0))).ticks == 2000
 
 
 @pytest.mark.parametrize(
@@ -160,9 +160,9 @@ def test_simulate_refuses_what_needs_the_graph(parameters: Parameters, said: str
 
 
 def test_longer_than_a_flight_may_last() -> None:
-    assert Flight(FlightPlan(duration=1e6)).ticks == 2 * 10**9
+    assert Flight(resolve(FlightPlan(duration=1e6))).ticks == 2 * 10**9
     with pytest.raises(InputError, match="duration must be at most 100000 s"):
-        Flight(FlightPlan(duration=1e6, period=1e-5))
+        Flight(resolve(FlightPlan(duration=1e6, period=1e-5)))
 
 
 def test_a_heavy_plant_under_a_nominal_controller(tmp_path: Path) -> None:
@@ -303,7 +303,7 @@ def _any_parameters() -> st.SearchStrategy[Parameters]:
 def test_all_that_is_made_of_a_plan_agrees(parameters: Parameters) -> None:
     """Settings and objects as the nodes make them of what they are sent; labels; `simulate`."""
     flight = flight_of(parameters, actuators="wheels")
-    sent = json.loads(json.dumps(flight.parameters))
+    sent = json.loads(json.dumps(flight.scenario.parameters))
     for schema in SCHEMAS:
         for name in parameters.get(schema.node, {}):
             assert name in sent[schema.node]
@@ -332,7 +332,7 @@ def test_all_that_is_made_of_a_plan_agrees(parameters: Parameters) -> None:
     assert theirs.block.tobytes() == flight.plant.block.tobytes()
     assert theirs.command_delay_buffer.shape == flight.plant.command_delay_buffer.shape
     robot = Robot.from_yaml(named_file("robots", controller.robot))
-    assert assumed_actuators(controller.actuators, robot) == flight.assumed_actuators
+    assert assumed_actuators(controller.actuators, robot) == flight.scenario.assumed_actuators
     loop = Controller(
         robot,
         law,

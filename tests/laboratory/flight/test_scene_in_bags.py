@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from passive_robot import PASSIVE_ROBOT
 from rosbags.highlevel import AnyReader
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_model.robot import Robot
 from space_robot_model.robot.base_axes import base_axes
@@ -96,7 +96,7 @@ def test_bags_show_where_the_robot_truly_is(
     plan: FlightPlan, ticks_apart: int, tmp_path: Path
 ) -> None:
     """At most 100 times a second, from the first tick on; what does not change once."""
-    flight = Flight(plan)
+    flight = Flight(resolve(plan))
     log = simulate(flight, tmp_path / "bag")
     shown, step_ns = shown_by(tmp_path / "bag"), ticks_apart * flight.timebase.period_ns
     assert step_ns >= 10_000_000 > step_ns - flight.timebase.period_ns
@@ -108,7 +108,7 @@ def test_bags_show_where_the_robot_truly_is(
 
 def test_the_description_names_the_frames_of_the_transforms(tmp_path: Path) -> None:
     """So viewers find the links: read by our own reader of URDF, it is the robot again."""
-    simulate(Flight(FlightPlan(duration=0.01, robot=PASSIVE_ROBOT)), tmp_path / "bag")
+    simulate(Flight(resolve(FlightPlan(duration=0.01, robot=PASSIVE_ROBOT))), tmp_path / "bag")
     shown = shown_by(tmp_path / "bag")
     (tmp_path / "robot.urdf").write_text(shown.descriptions[0], "utf-8")
     read = frame_names(Robot.from_urdf(tmp_path / "robot.urdf"))
@@ -117,7 +117,7 @@ def test_the_description_names_the_frames_of_the_transforms(tmp_path: Path) -> N
 
 def test_nothing_of_it_changes_what_is_read(tmp_path: Path) -> None:
     """Flight logs have no such topic; the recorder's account of the flight has each."""
-    simulate(Flight(FlightPlan(duration=0.1)), tmp_path / "bag")
+    simulate(Flight(resolve(FlightPlan(duration=0.1))), tmp_path / "bag")
     assert set(read_flight(tmp_path / "bag").lost) == {t.full_name for t in topics.ALL}
     accounts = noted_accounts(open_bag(tmp_path / "bag").custom_data())
     counts = {name: (accounts[name].received, accounts[name].missing) for name in accounts}
@@ -127,7 +127,7 @@ def test_nothing_of_it_changes_what_is_read(tmp_path: Path) -> None:
 
 def test_players_are_told_to_latch_what_holds_for_the_flight(tmp_path: Path) -> None:
     """In the channels' metadata, as rosbag2 writes it."""
-    simulate(Flight(FlightPlan(duration=0.01)), tmp_path / "bag")
+    simulate(Flight(resolve(FlightPlan(duration=0.01))), tmp_path / "bag")
     (file,) = (tmp_path / "bag").glob("*.mcap")
     with file.open("rb") as stream:
         summary = make_reader(stream).get_summary()

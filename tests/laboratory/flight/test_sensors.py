@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.errors import InputError
@@ -42,7 +42,7 @@ COLUMNS = (
 
 
 def flown(**options: Any) -> FlightLog:
-    return simulate(Flight(FlightPlan(**{**PLAN, **options})))
+    return simulate(Flight(resolve(FlightPlan(**{**PLAN, **options}))))
 
 
 def numbers(log: FlightLog) -> Array:
@@ -73,7 +73,7 @@ def test_another_process_flies_the_same_bits() -> None:
 
 def test_compiled_stretches_fly_as_single_ticks_do() -> None:
     """Part faults begin and end, and random numbers run out, within the flight."""
-    flight, log = Flight(FlightPlan(**PLAN)), flown()
+    flight, log = Flight(resolve(FlightPlan(**PLAN))), flown()
     assert log.commanded_torque is not None
     told = log.as_measured()
     plant, chunk = flight.plant, flight.mission.chunk(0, flight.ticks)
@@ -92,8 +92,8 @@ def test_compiled_stretches_fly_as_single_ticks_do() -> None:
 @pytest.mark.parametrize("sensors", ["white_l1", "tactical", "coarse"])
 def test_the_truth_under_the_same_torque_does_not_know_of_sensors(sensors: str) -> None:
     """Errors are the sensors' own: of the order that their file says."""
-    ideal = Flight(FlightPlan()).plant
-    other = Flight(FlightPlan(sensors=sensors)).plant
+    ideal = Flight(resolve(FlightPlan())).plant
+    other = Flight(resolve(FlightPlan(sensors=sensors))).plant
     rng = np.random.default_rng(1)
     angles, turns = [], []
     for tick in range(600):
@@ -109,18 +109,18 @@ def test_the_truth_under_the_same_torque_does_not_know_of_sensors(sensors: str) 
 
 
 def test_a_flight_tells_its_sensors() -> None:
-    flight = Flight(FlightPlan(sensors="tactical"))
+    flight = Flight(resolve(FlightPlan(sensors="tactical")))
     assert flight.description["sensors"] == "tactical"
     assert flight.description["parameters"]["plant"]["sensors"] == "tactical"
-    again = Flight(FlightPlan(parameters=flight.description["parameters"]))
+    again = Flight(resolve(FlightPlan(parameters=flight.description["parameters"])))
     assert again.plant_settings == flight.plant_settings
     with pytest.raises(InputError, match="unknown sensor 'best': choose one of coarse, fine"):
-        Flight(FlightPlan(sensors="best"))
+        Flight(resolve(FlightPlan(sensors="best")))
 
 
 @pytest.mark.parametrize("fault", ["stop_controller@1", "kill_mission@1"])
 def test_what_fails_between_nodes_needs_them(fault: str) -> None:
-    flight = Flight(FlightPlan(faults=["noise_gyro@0:1e-6", fault], duration=0.01))
+    flight = Flight(resolve(FlightPlan(faults=["noise_gyro@0:1e-6", fault], duration=0.01)))
     with pytest.raises(InputError) as caught:
         simulate(flight)
     assert str(caught.value) == f"faults ['{fault}']: that needs the graph of nodes: use `fly`"

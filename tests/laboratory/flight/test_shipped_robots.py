@@ -11,7 +11,7 @@ from paths import CONFIG
 
 from space_robot.analysis import analyze
 from space_robot.cli.main import cli
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_model.robot.find import robot_names
@@ -24,7 +24,7 @@ SECONDS = 3.0
 @pytest.mark.parametrize("law", sorted(laws()))
 @pytest.mark.parametrize("robot", robot_names())
 def test_every_law_flies_it(robot: str, law: str) -> None:
-    log = simulate(Flight(FlightPlan(robot=robot, controller=law, duration=SECONDS)))
+    log = simulate(Flight(resolve(FlightPlan(robot=robot, controller=law, duration=SECONDS))))
     rms = analyze(log)["rms"]["mean_axis"]
     assert rms.pop("attitude") < 1e-6
     for name, value in rms.items():

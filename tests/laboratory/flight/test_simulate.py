@@ -11,7 +11,7 @@ from flights import space_robot, space_robot_here
 from paths import DOCS
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_control.laws import laws
 from space_robot_msgs_py.bag.reader import read_flight
@@ -19,7 +19,7 @@ from space_robot_msgs_py.errors import DivergedError, InputError
 
 
 def _rms(**options: object) -> dict[str, float]:
-    report = analyze(simulate(Flight(FlightPlan.model_validate(options))))
+    report = analyze(simulate(Flight(resolve(FlightPlan.model_validate(options)))))
     assert report["ticks"] == 60_000
     rms: dict[str, float] = report["rms"]["mean_axis"]
     return rms
@@ -53,12 +53,14 @@ def test_every_law_flies_case_1_with_tuned_gains(law: str) -> None:
 
 def test_ctc_with_printed_gains_diverges_within_ticks() -> None:
     with pytest.raises(DivergedError) as caught:
-        simulate(Flight(FlightPlan(controller="ctc", gains="printed")))
+        simulate(Flight(resolve(FlightPlan(controller="ctc", gains="printed"))))
     assert caught.value.tick < 20
 
 
 def test_two_flights_are_the_same_to_the_last_bit() -> None:
-    first, second = (simulate(Flight(FlightPlan(case="4-2", duration=0.5))) for _ in range(2))
+    first, second = (
+        simulate(Flight(resolve(FlightPlan(case="4-2", duration=0.5)))) for _ in range(2)
+    )
     np.testing.assert_array_equal(first.joint_positions, second.joint_positions)
     np.testing.assert_array_equal(first.applied_torque, second.applied_torque)
 
@@ -66,7 +68,7 @@ def test_two_flights_are_the_same_to_the_last_bit() -> None:
 def test_swaps_are_flown_at_their_ticks() -> None:
     """Up to the tick before it is the flight without a swap; a swap to the same law is none."""
     plain, swapped, same = (
-        simulate(Flight(FlightPlan(duration=0.3, swaps=swaps)))
+        simulate(Flight(resolve(FlightPlan(duration=0.3, swaps=swaps))))
         for swaps in ([], ["0.2:ctc", "0.1:tde_smc"], ["0.1:tde_stc"])
     )
     assert plain.commanded_torque is not None
@@ -81,14 +83,15 @@ def test_swaps_are_flown_at_their_ticks() -> None:
 
 def test_a_swap_after_the_end_changes_nothing() -> None:
     plain, swapped = (
-        simulate(Flight(FlightPlan(duration=0.1, swaps=swaps))) for swaps in ([], ["0.1:ctc"])
+        simulate(Flight(resolve(FlightPlan(duration=0.1, swaps=swaps))))
+        for swaps in ([], ["0.1:ctc"])
     )
     np.testing.assert_array_equal(swapped.applied_torque, plain.applied_torque)
 
 
 def test_faults_of_processes_need_the_graph() -> None:
     with pytest.raises(InputError, match="use `fly`"):
-        simulate(Flight(FlightPlan(faults=["kill_recorder@1"])))
+        simulate(Flight(resolve(FlightPlan(faults=["kill_recorder@1"]))))
 
 
 def test_simulate_prints_what_its_bag_says(tmp_path: Path) -> None:

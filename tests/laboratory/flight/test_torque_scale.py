@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.errors import FlightError
 
@@ -28,11 +28,13 @@ def flown(law: str, *faults: str, h_bar: bool = False, **plant: Any) -> tuple[in
     own = {f"{law}.h_bar": H_BAR} if h_bar else {}
     values = {k: [v] if isinstance(v, float) else v for k, v in plant.items()}
     flight = Flight(
-        FlightPlan(
-            controller=law,
-            gains=LAWS[law],
-            faults=list(faults),
-            parameters={"plant": values, "controller": own},
+        resolve(
+            FlightPlan(
+                controller=law,
+                gains=LAWS[law],
+                faults=list(faults),
+                parameters={"plant": values, "controller": own},
+            )
         )
     )
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 
 PERIOD = 5e-4
@@ -40,7 +40,7 @@ def test_they_move_as_in_mujoco_for_ten_seconds() -> None:
     plan = FlightPlan(
         robot="dual_arm", controller="ctc", actuators="none", friction=False, duration=10.0
     )
-    log = simulate(Flight(plan))
+    log = simulate(Flight(resolve(plan)))
     assert log.commanded_torque is not None
     model = mujoco.MjModel.from_xml_string(MODEL)
     data = mujoco.MjData(model)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.paper.stability.reaching import arrival, lyapunov_state, off_mission_plan, ripple
 
@@ -52,8 +52,8 @@ def test_psi_makes_the_paper_s_equations_true() -> None:
 
 @pytest.mark.parametrize("robot", ["paper", "seven_joint"])
 def test_flight_starts_with_the_same_error_on_every_axis(robot: str) -> None:
-    flight = Flight(FlightPlan(robot=robot, duration=0.001, gains="tuned"))
-    log = simulate(Flight(off_mission_plan(flight, 2e-3)))
+    flight = Flight(resolve(FlightPlan(robot=robot, duration=0.001, gains="tuned")))
+    log = simulate(Flight(resolve(off_mission_plan(flight, 2e-3))))
     assert log.telemetry is not None
     np.testing.assert_allclose(log.telemetry[0, 3], 2e-3, rtol=1e-9)
     np.testing.assert_allclose(log.telemetry[0, 0], 3.0 * 2e-3, rtol=1e-9)  # s = lambda e
@@ -61,7 +61,7 @@ def test_flight_starts_with_the_same_error_on_every_axis(robot: str) -> None:
 
 def test_further_parameters_of_the_plan_are_kept() -> None:
     parameters = {"plant": {"payload.mass": 7.0}, "controller": {"gains": "tuned"}}
-    plan = off_mission_plan(Flight(FlightPlan(parameters=parameters)), 1e-3)
+    plan = off_mission_plan(Flight(resolve(FlightPlan(parameters=parameters))), 1e-3)
     assert plan.parameters["plant"]["payload.mass"] == 7.0
     assert plan.parameters["controller"] == parameters["controller"]
-    assert Flight(plan).plant.robot.mass[-1] == 7.0
+    assert Flight(resolve(plan)).plant.robot.mass[-1] == 7.0

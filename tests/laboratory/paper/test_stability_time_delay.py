@@ -13,7 +13,7 @@ from oracles import rho_space_inertia
 from random_robots import Case, cases
 
 from space_robot.analysis.generalised_motion import mean_acceleration
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.paper.stability.lemma_1 import contraction
 from space_robot.paper.stability.time_delay_error import error_derivative, time_delay_error
@@ -23,7 +23,7 @@ from space_robot_msgs_py.bag.flight_log import FlightLog
 
 def desired(plan: FlightPlan, every: float) -> tuple[Flight, FlightLog]:
     """A log of the desired motion, a row each ``every`` seconds."""
-    flight = Flight(plan)
+    flight = Flight(resolve(plan))
     step = round(every / flight.period)
     rows = flight.mission.chunk(0, flight.ticks + 1)
     log = FlightLog.allocate(len(rows.base[::step]), flight.robot.joint_names, flight.timebase)
@@ -86,7 +86,7 @@ def test_error_is_what_the_paper_defines(law: str, robot: str) -> None:
     plan = FlightPlan(
         controller=law, case="2", robot=robot, duration=0.1, parameters={"plant": plant}
     )
-    flight = Flight(plan)
+    flight = Flight(resolve(plan))
     log, gains = simulate(flight), flight.controller.law.gain_values
     assert log.telemetry is not None
     error = time_delay_error(log, gains["h_bar"])
@@ -127,7 +127,7 @@ def test_beta_grows_with_the_gains_it_is_to_be_compared_with(tmp_path: Path) -> 
             yaml.safe_dump({"controller_node": {"ros__parameters": {"tde_stc": gains}}})
         )
         plan = FlightPlan(gains=str(path), friction=False, duration=1.0)
-        error = time_delay_error(simulate(Flight(plan)), np.array(H_BAR))
+        error = time_delay_error(simulate(Flight(resolve(plan))), np.array(H_BAR))
         beta.append(error_derivative(error, 5e-4).beta)
     assert np.all(beta[1] < 0.2 * beta[0])
     assert np.all(beta[0] > gains["k_2"])

@@ -13,7 +13,7 @@ import yaml
 from flights import space_robot_here
 
 from space_robot.api import Scenario
-from space_robot.flight.plan import Flight
+from space_robot.flight.plan import Flight, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.scenario.comparison import differences, recorded_scenario
 from space_robot.scenario.node_settings import FlightSettings
@@ -53,11 +53,11 @@ def run(*words: str, code: int = 0) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.parametrize("options", SCENARIOS.values(), ids=SCENARIOS)
 def test_resolved_numbers_as_yaml_fly_the_same_bits(options: dict[str, Any]) -> None:
-    flight = Flight(FlightPlan(duration=0.2, **options))
-    numbers = yaml.safe_load(yaml.safe_dump(flight.resolved))
-    again = Flight(FlightPlan(**numbers))
-    assert again.resolved == flight.resolved == json.loads(json.dumps(numbers))
-    assert differences(again.resolved, flight.resolved) == []
+    flight = Flight(resolve(FlightPlan(duration=0.2, **options)))
+    numbers = yaml.safe_load(yaml.safe_dump(flight.scenario.tree))
+    again = Flight(resolve(FlightPlan(**numbers)))
+    assert again.scenario.tree == flight.scenario.tree == json.loads(json.dumps(numbers))
+    assert differences(again.scenario.tree, flight.scenario.tree) == []
     assert again.ticks == flight.ticks
     one, other = simulate(again), simulate(flight)
     for name in ("quaternion", "joint_positions", "applied_torque", "commanded_torque"):

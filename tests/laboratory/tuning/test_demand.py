@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.tuning.demand import demand
 from space_robot.tuning.inertia import SAMPLING, sampled_reference
 from space_robot_control.guidance.mission import MissionSettings
@@ -27,7 +27,7 @@ def case(**parts: dict[str, float]) -> EnvironmentSettings:
 
 def mission(turned: Rotation | None = None) -> MissionSettings:
     """The paper's, its base held at another attitude."""
-    paper = Flight(FlightPlan(robot="paper")).mission_settings
+    paper = Flight(resolve(FlightPlan(robot="paper"))).mission_settings
     if turned is None:
         return paper
     x, y, z, w = turned.as_quat()

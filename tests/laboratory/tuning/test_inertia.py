@@ -10,7 +10,7 @@ from oracles import pinocchio_mass_matrix, rho_space_inertia
 from passive_robot import PASSIVE_ROBOT
 from random_robots import State, random_quaternion, random_robot
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.tuning.inertia import (
     free_inertia,
     inertia_along,
@@ -37,7 +37,7 @@ def test_it_is_pinocchios(seed: int, n: int) -> None:
 
 
 def test_both_ends_of_a_mission_are_looked_at() -> None:
-    flight = Flight(FlightPlan(robot="seven_joint"))
+    flight = Flight(resolve(FlightPlan(robot="seven_joint")))
     found = inertia_along(flight.robot, flight.mission_settings, step=7.0)
     assert found.shape == (6, 10, 10)  # 0, 7, ... 28 and beyond the end at 30 s
     waypoints = np.radians(flight.mission_settings.waypoints_deg).reshape(3, 7)
@@ -48,9 +48,11 @@ def test_both_ends_of_a_mission_are_looked_at() -> None:
 
 
 def test_a_mission_that_does_not_fit_is_refused() -> None:
-    flight = Flight(FlightPlan())
+    flight = Flight(resolve(FlightPlan()))
     with pytest.raises(ValueError, match="need 21"):
-        inertia_along(Flight(FlightPlan(robot="seven_joint")).robot, flight.mission_settings)
+        inertia_along(
+            Flight(resolve(FlightPlan(robot="seven_joint"))).robot, flight.mission_settings
+        )
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([1, 2, 6, 9]))
@@ -87,7 +89,7 @@ def test_a_free_base_takes_no_margin_away(seed: int, n: int) -> None:
 
 
 def test_along_a_mission_without_base_no_attitude_is_singular() -> None:
-    flight = Flight(FlightPlan(actuators="none"))
+    flight = Flight(resolve(FlightPlan(actuators="none")))
     found = inertia_along(flight.robot, flight.mission_settings, step=5.0, controls_base=False)
     turned = flight.mission_settings.model_copy(update={"base_quaternion": [0.0, 1.0, 0.0, 0.0]})
     again = inertia_along(flight.robot, turned, step=5.0, controls_base=False)
@@ -97,7 +99,7 @@ def test_along_a_mission_without_base_no_attitude_is_singular() -> None:
 
 def test_loose_joints_give_way_and_locked_ones_do_not() -> None:
     """The accelerations of attitude and motors under their forces alone, from the whole inertia."""
-    flight = Flight(FlightPlan(robot=PASSIVE_ROBOT))
+    flight = Flight(resolve(FlightPlan(robot=PASSIVE_ROBOT)))
     robot, rest = flight.robot, [spring.rest for spring in flight.robot.springs]
     theta = np.array([[0.3, 0.5, -0.8, 0.1, -0.4, 1.0], [-1.2, 1.1, 2.0, -0.7, 0.6, 0.2]])
     moved = range(3, 12)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.tuning.demand import ForceDemand, demand
 from space_robot.tuning.inertia import inertia_along
 from space_robot.tuning.method import Tuned, TuningOptions, axis_inertia, tune
@@ -25,7 +25,7 @@ PERIOD = 5e-4
 @functools.cache
 def scene(robot: str = "paper") -> tuple[Array, ForceDemand]:
     """H_S along the mission with the least and the largest payload, and what is asked for."""
-    flights = [Flight(FlightPlan(robot=robot, case=case)) for case in ("1", "4-2")]
+    flights = [Flight(resolve(FlightPlan(robot=robot, case=case))) for case in ("1", "4-2")]
     first = flights[0]
     inertias = [inertia_along(x.plant.robot, first.mission_settings) for x in flights]
     cases = [x.plant_settings for x in flights]
@@ -120,10 +120,10 @@ def test_demand_is_what_a_flight_commands() -> None:
     """CTC's torque along case 1 at a high gain is that of inverse dynamics."""
     from space_robot.flight.simulate import simulate
 
-    log = simulate(Flight(FlightPlan(controller="ctc")))
+    log = simulate(Flight(resolve(FlightPlan(controller="ctc"))))
     assert log.commanded_torque is not None
     asked = scene()[1]
-    flight = Flight(FlightPlan(controller="ctc"))
+    flight = Flight(resolve(FlightPlan(controller="ctc")))
     case_1 = demand(flight.robot, flight.mission_settings, [flight.plant_settings])
     peak = np.abs(log.commanded_torque).max(axis=0)
     peak[:3] *= 2.0  # J0 = E / 2

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.tuning.noise import Noise, listen
 
 PERIOD = 5e-4
@@ -21,7 +21,7 @@ def heard(sensors: str, navigation: Any = "direct", corner: float = 100.0) -> No
     plan = FlightPlan(
         sensors=sensors, navigation=navigation, case="3", parameters={"controller": own}
     )
-    flight = Flight(plan)
+    flight = Flight(resolve(plan))
     return listen(
         flight.robot,
         flight.plant_settings,

@@ -11,7 +11,7 @@ from closed_loop import H_BAR
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.tuning.inertia import inertia_along, semi_floating_inertia
 from space_robot.tuning.spectrum import Spectrum, eigenvalues, spectrum
@@ -81,7 +81,7 @@ def test_limits_are_where_an_error_neither_grows_nor_fades() -> None:
 @settings(max_examples=20, deadline=None)
 def test_wrong_masses_move_eigenvalues_no_further_than_said(seed: int, share: float) -> None:
     rng = np.random.default_rng(seed)
-    robot = Flight(FlightPlan()).robot
+    robot = Flight(resolve(FlightPlan())).robot
     factors = 1.0 + rng.uniform(-share, share, (2, robot.n + 1))
     wrong = replace(
         robot,
@@ -98,14 +98,14 @@ def test_wrong_masses_move_eigenvalues_no_further_than_said(seed: int, share: fl
 def fly(controller: str = "tde_stc", **plant: float) -> float:
     """The largest error of any axis in case 1, with parameters of the plant."""
     parameters = {"plant": {name: [value] for name, value in plant.items()}}
-    log = simulate(Flight(FlightPlan(controller=controller, parameters=parameters)))
+    log = simulate(Flight(resolve(FlightPlan(controller=controller, parameters=parameters))))
     assert log.telemetry is not None
     return float(np.max(np.abs(log.telemetry[:, 3])))
 
 
 def test_margin_of_table_iv() -> None:
     """Its size, by spec an eigenvalue of 0.0031 to 0.0079, and what it means in flight."""
-    flight = Flight(FlightPlan())
+    flight = Flight(resolve(FlightPlan()))
     every = eigenvalues(inertia_along(flight.robot, flight.mission_settings), np.array(H_BAR))
     assert every[:, 0].min() == pytest.approx(0.0031, abs=5e-5)
     assert every[:, 0].max() == pytest.approx(0.0079, abs=5e-5)

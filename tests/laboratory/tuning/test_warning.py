@@ -7,14 +7,14 @@ import time
 import pytest
 
 from space_robot.cli.options import remarks_on
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.tuning.gain_check import pair_corner
 from space_robot.tuning.warning import margin_remarks
 from space_robot_control.controller.settings import ControllerNodeSettings
 
 
 def remarks(plan: FlightPlan, corner: float = 0.0) -> list[str]:
-    flight = Flight(plan)
+    flight = Flight(resolve(plan))
     laws = [flight.law, *(law for _, law in flight.swaps)]
     return margin_remarks(
         laws, flight.plant.robot, flight.mission_settings, corner, flight.controls_base
@@ -50,16 +50,16 @@ def test_nobody_is_warned_of_the_default_gains_unless_the_flight_tries_their_mar
         (FlightPlan(faults=["torque_scale@2:base=0.99"]), 1),
         (FlightPlan(actuators="wheels"), 1),
     ):
-        assert len(remarks_on(Flight(plan))) == count, plan
-    (line,) = remarks_on(Flight(with_h_bar(*[50.0] * 3, *[5.0] * 3, *[1.0] * 3)))
+        assert len(remarks_on(Flight(resolve(plan)))) == count, plan
+    (line,) = remarks_on(Flight(resolve(with_h_bar(*[50.0] * 3, *[5.0] * 3, *[1.0] * 3))))
     assert "diverge" in line
 
 
 def test_thrusters_are_told_which_gains_are_for_them() -> None:
     for actuators, is_said in (("thrusters", True), ("wheels_and_thrusters", False)):
-        (line,) = remarks_on(Flight(FlightPlan(actuators=actuators)))
+        (line,) = remarks_on(Flight(resolve(FlightPlan(actuators=actuators))))
         assert ("thrusters' pulses" in line) is is_said
-    assert remarks_on(Flight(FlightPlan(actuators="thrusters", gains="robust"))) == []
+    assert remarks_on(Flight(resolve(FlightPlan(actuators="thrusters", gains="robust")))) == []
 
 
 def test_laws_with_a_model_have_no_margin_to_lack() -> None:
@@ -85,7 +85,7 @@ def test_it_is_about_the_robot_with_its_payload() -> None:
 
 @pytest.mark.parametrize("robot", ["paper", "seven_joint"])
 def test_nobody_waits_for_it(robot: str) -> None:
-    flight = Flight(FlightPlan(robot=robot))
+    flight = Flight(resolve(FlightPlan(robot=robot)))
     began = time.thread_time()
     margin_remarks([flight.law], flight.plant.robot, flight.mission_settings)
     assert time.thread_time() - began < 0.1  # 10 ms on an idle machine

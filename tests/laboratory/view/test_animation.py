@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from flights import space_robot_here
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.view import animation
 from space_robot.view.browser import NAMES
@@ -24,7 +24,7 @@ pytest.importorskip("viser")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A flight in which the arm is seen to move."""
     folder = tmp_path_factory.mktemp("flights") / "one"
-    simulate(Flight(FlightPlan(duration=3.0)), folder)
+    simulate(Flight(resolve(FlightPlan(duration=3.0))), folder)
     return folder
 
 

@@ -13,7 +13,7 @@ from random_trees import random_bodies
 from scene_pages import Scene, plot_data
 from tree_oracle import pinocchio_tree
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.view.film import FilmedFlight, film
 from space_robot.view.flights import ViewOptions, flights_page, shown_robot
@@ -71,7 +71,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory):  # type: ignore[no-untyped-
 
     def fly(name: str, **plan: object) -> FlightLog:
         if not (folder / name).exists():
-            simulate(Flight(FlightPlan(duration=1.0, **plan)), folder / name)  # type: ignore[arg-type]
+            simulate(Flight(resolve(FlightPlan(duration=1.0, **plan))), folder / name)  # type: ignore[arg-type]
         return read_flight(folder / name)
 
     return fly

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from space_robot.analysis import excerpt
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot.view.marks import Mark, marks_of, shared_marks
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -31,7 +31,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> FlightLog:
         events=["capture@0.1:small_satellite", "release@0.28"],
         faults=["stuck_joint@0.18:3=20", "drive_scale@0.15-0.2:all=0.9", "noise_gyro@2:1e-6"],
     )
-    simulate(Flight(plan), bag)
+    simulate(Flight(resolve(plan)), bag)
     return read_flight(bag)
 
 

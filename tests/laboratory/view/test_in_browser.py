@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from space_robot.cli.main import main
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 
 CHROMIUM = next(
@@ -73,7 +73,7 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Seen]:
     pytest.importorskip("viser")
     folder = tmp_path_factory.mktemp("page")
     plan = FlightPlan(duration=4.0, faults=["drive_scale@2-3:all=0.9"])
-    simulate(Flight(plan), folder / "bag")
+    simulate(Flight(resolve(plan)), folder / "bag")
     with pytest.raises(SystemExit):
         main(["view", str(folder / "bag"), "--no-open", "--out", str(folder / "page.html")])
     with playwright.sync_playwright() as started:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from paths import CONFIG
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_control.controller.gains import gain_files
 from space_robot_control.controller.settings import ControllerNodeSettings, set_file
 from space_robot_model.robot.find import (
@@ -48,7 +48,7 @@ def test_a_folder_is_a_robot(folder: Path, name: str, monkeypatch: pytest.Monkey
     assert found.name == "mine"
     assert mission_file(name).samefile(folder / "mission.yaml")
     assert gain_files(name, "default")["ctc"].samefile(folder / "gains/tuned/ctc.yaml")
-    assert Flight(FlightPlan(robot=name, duration=0.1)).description["mission"] == "mine"
+    assert Flight(resolve(FlightPlan(robot=name, duration=0.1))).description["mission"] == "mine"
 
 
 def test_a_folder_is_known_by_its_bare_name_on_the_command_line_alone(
@@ -56,7 +56,7 @@ def test_a_folder_is_known_by_its_bare_name_on_the_command_line_alone(
 ) -> None:
     monkeypatch.chdir(folder.parent)
     assert robot_as_path("mine") == "mine/"
-    assert Flight(FlightPlan(robot="mine", duration=0.1)).robot.n == 7
+    assert Flight(resolve(FlightPlan(robot="mine", duration=0.1))).robot.n == 7
     with pytest.raises(InputError, match=r"unknown robot 'mine': choose one of .*paper"):
         find_robot("mine")
     (folder.parent / "paper").mkdir()
@@ -64,7 +64,7 @@ def test_a_folder_is_known_by_its_bare_name_on_the_command_line_alone(
 
 
 def test_the_description_tells_all_of_a_robot_that_is_not_shipped(folder: Path) -> None:
-    said = Flight(FlightPlan(robot=str(folder), duration=0.1)).description
+    said = Flight(resolve(FlightPlan(robot=str(folder), duration=0.1))).description
     assert said["robot_file"]["robot"]["base"]["mass"] == 420.0
     assert said["parameters"]["plant"]["initial_joints_deg"][1] == 30.0
     assert said["parameters"]["mission"]["waypoint_times"] == [0.0, 12.0, 30.0]
@@ -75,7 +75,7 @@ def test_what_is_not_there_is_said_in_one_line(
 ) -> None:
     shutil.copy(folder / "robot.yaml", tmp_path / "arm.yaml")
     with pytest.raises(InputError, match=r"no mission of its own: `space-robot new .*arm.yaml`"):
-        Flight(FlightPlan(robot=str(tmp_path / "arm.yaml")))
+        Flight(resolve(FlightPlan(robot=str(tmp_path / "arm.yaml"))))
     with pytest.raises(InputError, match=r"no gains of its own: `space-robot new .*arm.yaml`"):
         gain_files(str(tmp_path / "arm.yaml"), "default")
     with pytest.raises(InputError, match=r"no such file or folder"):

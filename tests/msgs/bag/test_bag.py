@@ -11,7 +11,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import get_types_from_msg
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -31,7 +31,7 @@ TIMEBASE = Timebase(500_000)
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, FlightLog]:
     bag = tmp_path_factory.mktemp("bags") / "short"
-    return bag, simulate(Flight(FlightPlan(duration=0.2)), bag)
+    return bag, simulate(Flight(resolve(FlightPlan(duration=0.2))), bag)
 
 
 def _mcap(bag: Path) -> Path:
@@ -146,7 +146,7 @@ def test_of_two_recorders_for_one_bag_the_first_has_it(tmp_path: Path) -> None:
 
 def test_unreadable_bag_is_an_input_error(tmp_path: Path) -> None:
     bag = tmp_path / "bag"
-    simulate(Flight(FlightPlan(duration=0.01)), bag)
+    simulate(Flight(resolve(FlightPlan(duration=0.01))), bag)
     _mcap(bag).write_bytes(_mcap(bag).read_bytes()[:200])
     with pytest.raises(InputError, match=str(bag)):
         read_flight(bag)

@@ -35,7 +35,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import MCAP0_MAGIC
 from paths import DATA
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.writer import DESCRIPTION
 
@@ -205,7 +205,7 @@ def _differences(ours: Any, theirs: Any, path: str = "") -> Iterator[str]:
 @pytest.fixture(scope="module")
 def ours(tmp_path_factory: pytest.TempPathFactory) -> Path:
     bag = tmp_path_factory.mktemp("bags") / "ours"
-    simulate(Flight(FlightPlan(duration=0.08)), bag)  # one chunk
+    simulate(Flight(resolve(FlightPlan(duration=0.08))), bag)  # one chunk
     return bag
 
 

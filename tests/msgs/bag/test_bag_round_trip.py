@@ -11,7 +11,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
@@ -21,7 +21,7 @@ from space_robot_msgs_py.bag.reader import read_flight
 @pytest.fixture(scope="module", params=["paper", "seven_joint"])
 def bag(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("bags") / request.param
-    simulate(Flight(FlightPlan(robot=request.param, duration=0.1, sensors="fine")), folder)
+    simulate(Flight(resolve(FlightPlan(robot=request.param, duration=0.1, sensors="fine"))), folder)
     return folder
 
 

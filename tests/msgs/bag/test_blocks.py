@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from random_logs import random_log
 
 from space_robot.analysis import Analysis, analyze
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import fly_blocks, simulate
 from space_robot_msgs_py.bag import blocks
 from space_robot_msgs_py.bag.blocks import BLOCK_TICKS, block_bounds, blocks_of, joined, last_rows
@@ -49,7 +49,7 @@ def test_blocks_make_the_whole(n: int, seed: int, cuts: list[int]) -> None:
     assert_close(whole, analyzed(log, cuts))
 
 
-FLOWN = simulate(Flight(FlightPlan(duration=1.0, case="3")))
+FLOWN = simulate(Flight(resolve(FlightPlan(duration=1.0, case="3"))))
 
 
 @settings(max_examples=20)
@@ -110,8 +110,8 @@ def test_a_long_flight_in_memory_from_blocks_and_from_its_bag_is_the_same(
 ) -> None:
     """To the last bit, log and report."""
     plan = FlightPlan.model_validate({"duration": 0.3, **options})
-    whole, analysis = simulate(Flight(plan)), Analysis()
-    parts = list(fly_blocks(Flight(plan), tmp_path / "bag"))
+    whole, analysis = simulate(Flight(resolve(plan))), Analysis()
+    parts = list(fly_blocks(Flight(resolve(plan)), tmp_path / "bag"))
     assert [block.first_tick for block in parts] == [0, 150, 300, 450]
     for block in parts:
         analysis.add(block)
@@ -127,9 +127,9 @@ def test_a_long_flight_in_memory_from_blocks_and_from_its_bag_is_the_same(
 
 def test_blocks_are_flown_as_the_whole_is(monkeypatch: pytest.MonkeyPatch) -> None:
     plan = FlightPlan(duration=0.3, case="3", command_latency_ticks=2)
-    whole = simulate(Flight(plan))
+    whole = simulate(Flight(resolve(plan)))
     monkeypatch.setattr(blocks, "BLOCK_TICKS", 70)
-    parts = simulate(Flight(plan))
+    parts = simulate(Flight(resolve(plan)))
     assert [b.ticks for b in blocks_of(parts)][-2:] == [70, 40]
     for name in (*STATE_FIELDS, *REFERENCE, "commanded_torque", "telemetry"):
         np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))

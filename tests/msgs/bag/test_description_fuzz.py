@@ -26,7 +26,7 @@ from space_robot.analysis.report_tables import metrics_table, rms_table
 from space_robot.cli.report_display import print_comparison
 from space_robot.console.terminal import terminal
 from space_robot.console.terminal_tables import print_table
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.replay.recording import Recording
 from space_robot.flight.simulate import simulate
@@ -105,14 +105,14 @@ edits = st.tuples(
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("described") / "bag"
-    simulate(Flight(PLAN), path)
+    simulate(Flight(resolve(PLAN)), path)
     return path
 
 
 @cache
 def description() -> str:
     """That of the flight in the bag, as JSON."""
-    return json.dumps(Flight(PLAN).description)
+    return json.dumps(Flight(resolve(PLAN)).description)
 
 
 def places(value: Any) -> list[tuple[Any, Any]]:

@@ -11,7 +11,7 @@ from space_robot.analysis import analyze
 from space_robot.analysis.described import estimator
 from space_robot.analysis.estimate_error import EstimateErrors, HBar
 from space_robot.analysis.excerpt import excerpt
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.laws import RecordedLaws
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -94,7 +94,7 @@ def test_laws_are_put_in_force_before_their_states(states: list[int], done: list
 @pytest.fixture(scope="module")
 def swapped() -> FlightLog:
     """TDE-STC, then CTC, then TDE-SMC, whose h_bar is halved in the record."""
-    return simulate(Flight(FlightPlan(duration=0.3, swaps=["0.1:ctc", "0.2:tde_smc"])))
+    return simulate(Flight(resolve(FlightPlan(duration=0.3, swaps=["0.1:ctc", "0.2:tde_smc"]))))
 
 
 def test_the_report_has_all_laws_that_flew(swapped: FlightLog) -> None:

@@ -12,7 +12,7 @@ import pytest
 from paths import DOCS
 
 from space_robot import load_bag
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.flight_log import FlightLog
 
@@ -22,7 +22,7 @@ DOCUMENT = DOCS / "manual/bags.md"
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("bags") / "flights" / "one"
-    simulate(Flight(FlightPlan(duration=0.2)), folder)
+    simulate(Flight(resolve(FlightPlan(duration=0.2))), folder)
     return folder
 
 

@@ -18,7 +18,7 @@ from mcap.records import MessageIndex
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.chunk import OpenChunk
@@ -73,7 +73,7 @@ def _record(bag: Path, messages: Messages, split_size: int = SPLIT) -> BagRecord
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
     bag = tmp_path_factory.mktemp("plain") / "bag"
-    simulate(Flight(FlightPlan(duration=0.3)), bag)
+    simulate(Flight(resolve(FlightPlan(duration=0.3))), bag)
     return bag
 
 
@@ -120,7 +120,7 @@ def test_compressions_hold_the_same_messages(
     plain: Path, compression: Compression, tmp_path: Path
 ) -> None:
     bag = tmp_path / "bag"
-    simulate(Flight(FlightPlan(duration=0.3, compression=compression)), bag)
+    simulate(Flight(resolve(FlightPlan(duration=0.3, compression=compression))), bag)
     assert _read(bag) == _read(plain)
     with Reader(bag) as reader:
         assert [bytes(raw) for *_, raw in reader.messages()] == [
@@ -136,7 +136,7 @@ def test_compression_saves_room(tmp_path: Path) -> None:
     sizes = []
     for compression in ("none", "lz4", "zstd"):
         bag = tmp_path / compression
-        simulate(Flight(FlightPlan(duration=0.3, compression=compression)), bag)
+        simulate(Flight(resolve(FlightPlan(duration=0.3, compression=compression))), bag)
         sizes.append(_files(bag)[0].stat().st_size)
     assert sizes == sorted(sizes, reverse=True)
 
@@ -144,7 +144,7 @@ def test_compression_saves_room(tmp_path: Path) -> None:
 def test_two_simulated_bags_are_the_same_bytes(tmp_path: Path) -> None:
     for folder in ("a", "b"):
         plan = FlightPlan.model_validate({"duration": 0.3, "split_size": "100K"})
-        simulate(Flight(plan), tmp_path / folder / "bag")
+        simulate(Flight(resolve(plan)), tmp_path / folder / "bag")
     first, second = (sorted((tmp_path / folder / "bag").iterdir()) for folder in ("a", "b"))
     assert [file.name for file in first] == [file.name for file in second]
     assert len(first) > 2
@@ -298,7 +298,7 @@ def test_bag_without_a_message_is_one(tmp_path: Path) -> None:
 )
 def test_bad_options_are_named(parameter: str, value: object, said: str) -> None:
     with pytest.raises(InputError, match=said):
-        Flight(FlightPlan(parameters={"recorder": {parameter: value}}))
+        Flight(resolve(FlightPlan(parameters={"recorder": {parameter: value}})))
 
 
 @pytest.mark.parametrize(
@@ -306,4 +306,4 @@ def test_bad_options_are_named(parameter: str, value: object, said: str) -> None
 )
 def test_sizes_as_people_write_them(given: str, size: int) -> None:
     plan = FlightPlan.model_validate({"split_size": given})
-    assert Flight(plan).recorder_settings.split_size == size
+    assert Flight(resolve(plan)).scenario.recorder.split_size == size

@@ -14,7 +14,7 @@ import pytest
 from mcap.opcode import Opcode
 from mcap.stream_reader import StreamReader
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.recorder import BagRecorder
 from space_robot_msgs_py.samples import Timebase
@@ -46,7 +46,7 @@ def file(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     if request.param == "nothing":
         BagRecorder(bag, {"period": 0.0005}, Timebase(500_000)).close()
     else:
-        simulate(Flight(FlightPlan(duration=0.6)), bag)
+        simulate(Flight(resolve(FlightPlan(duration=0.6))), bag)
     return bag / "bag_0.mcap"
 
 

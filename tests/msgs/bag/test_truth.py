@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from sensor_bench import Bench
 
 from space_robot.analysis import Analysis, analyze, excerpt
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import fly_blocks, simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag import blocks
@@ -36,12 +36,12 @@ TICKS = 400
 def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[FlightLog, Path]:
     bag = tmp_path_factory.mktemp("truth") / "bag"
     plan = FlightPlan(faults=FAULTS, duration=TICKS * 0.0005, case="2")
-    return simulate(Flight(plan), bag), bag
+    return simulate(Flight(resolve(plan)), bag), bag
 
 
 def recorded_anew(bag: Path, folder: Path, keep: Callable[[Topic, int], bool]) -> FlightLog:
     """The flight of some of a bag's messages, by topic and stamp in ticks."""
-    flight = Flight(FlightPlan(faults=FAULTS, duration=TICKS * 0.0005, case="2"))
+    flight = Flight(resolve(FlightPlan(faults=FAULTS, duration=TICKS * 0.0005, case="2")))
     recorder = BagRecorder(folder, flight.description, flight.timebase)
     for topic, data in messages_of(bag):
         if not topic.has_stamp or keep(topic, header_stamp_ns(data) // 500_000):
@@ -92,7 +92,7 @@ def test_measured_is_what_the_sensors_make_of_the_truth(flown: tuple[FlightLog, 
 
 def test_sensors_that_tell_the_truth_need_no_second_word(tmp_path: Path) -> None:
     """Nor is a bag without it incomplete."""
-    log = simulate(Flight(FlightPlan(duration=0.02)), tmp_path / "bag")
+    log = simulate(Flight(resolve(FlightPlan(duration=0.02))), tmp_path / "bag")
     recorded = read_flight(tmp_path / "bag")
     for one in (log, recorded):
         assert one.measured is None
@@ -163,12 +163,12 @@ def test_blocks_make_the_whole(cuts: list[int]) -> None:
             assert other[key][kind] == pytest.approx(values, rel=1e-11), (key, kind)
 
 
-WHOLE = simulate(Flight(FlightPlan(faults=FAULTS, duration=TICKS * 0.0005)))
+WHOLE = simulate(Flight(resolve(FlightPlan(faults=FAULTS, duration=TICKS * 0.0005))))
 
 
 def test_a_flight_in_blocks_is_the_flight(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(blocks, "BLOCK_TICKS", 150)
-    flight = Flight(FlightPlan(faults=FAULTS, duration=TICKS * 0.0005))
+    flight = Flight(resolve(FlightPlan(faults=FAULTS, duration=TICKS * 0.0005)))
     whole: FlightLog | None = None
     for block in fly_blocks(flight):
         whole = joined(whole, block)

@@ -23,7 +23,7 @@ from rich.console import Console
 from space_robot.analysis import analyze
 from space_robot.analysis.report_tables import rms_table
 from space_robot.console.terminal_tables import print_table
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -58,7 +58,7 @@ def _file(bag: Path) -> Path:
 def messages(tmp_path_factory: pytest.TempPathFactory) -> Messages:
     """What the nodes send in 200 ticks."""
     bag = tmp_path_factory.mktemp("flown") / "bag"
-    simulate(Flight(FlightPlan(duration=0.1)), bag)
+    simulate(Flight(resolve(FlightPlan(duration=0.1))), bag)
     with _file(bag).open("rb") as file:
         sent = make_reader(file).iter_messages(log_time_order=False)
         return [as_sent(channel.topic, message.data) for _, channel, message in sent]
@@ -228,7 +228,7 @@ def test_full_disk_at_the_end_loses_no_message(messages: Messages, tmp_path: Pat
 
 def test_simulated_flight_onto_a_full_disk_fails_in_the_end(tmp_path: Path) -> None:
     with _file_size_limit(50_000), pytest.raises(FlightError, match="last tick kept"):
-        simulate(Flight(FlightPlan(duration=0.1)), tmp_path / "bag")
+        simulate(Flight(resolve(FlightPlan(duration=0.1))), tmp_path / "bag")
 
 
 def test_removed_folder_is_noticed_and_nothing_written_in_its_place(

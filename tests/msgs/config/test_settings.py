@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot_control.controller.gains import build_law, gain_files, read_gains
 from space_robot_control.controller.settings import ControllerNodeSettings
 from space_robot_control.guidance.settings import MissionNodeSettings
@@ -164,7 +164,7 @@ def test_file_that_is_no_parameter_file(tmp_path: Path) -> None:
 
 def test_mission_of_another_robot_does_not_fit() -> None:
     with pytest.raises(InputError, match="7 values, robot 'paper' has 6 joints"):
-        Flight(FlightPlan(mission="seven_joint"))
+        Flight(resolve(FlightPlan(mission="seven_joint")))
 
 
 def test_names_of_files_and_paths(tmp_path: Path) -> None:

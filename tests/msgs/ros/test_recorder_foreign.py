@@ -15,7 +15,7 @@ from bags import COLUMNS, messages_of, read_accounts
 from flights import Start, ros_environment
 from paths import TESTS
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.reader import read_flight
@@ -97,7 +97,7 @@ def test_the_bag_is_the_flight_and_nothing_else(
 ) -> None:
     """Before the flight, in its midst, and after it; half-way our publishers are started again."""
     flown, bag = tmp_path / "flown", tmp_path / "bag"
-    original = simulate(Flight(FlightPlan(duration=0.3)), flown)
+    original = simulate(Flight(resolve(FlightPlan(duration=0.3))), flown)
     messages = list(messages_of(flown))
     recorder = start("recorder", bag=bag)
     wait(lambda: size(bag) > 0, "the recorder")

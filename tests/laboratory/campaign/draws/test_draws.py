@@ -76,7 +76,7 @@ def test_all_laws_fly_the_same_robot_and_noise() -> None:
     assert flight.plant_settings.initial_joints_deg == [
         a + float(b) for a, b in zip(begins, start, strict=True)
     ]
-    assert flight.faults == [f"torque_scale@0:all={values['faults.torque_scale@0:all']!r}"]
+    assert flight.scenario.faults == [f"torque_scale@0:all={values['faults.torque_scale@0:all']!r}"]
     assert draws.nominal("ctc").given == {"duration": 0.05, "controller": "ctc"}
 
 
@@ -99,7 +99,7 @@ def test_settings_and_gains_change_from_their_nominal_values() -> None:
         if law == "tde_stc":
             assert flight.law.h_bar.tolist() == (1.5 * nominal.law.h_bar).tolist()
         else:
-            assert flight.gains_used == nominal.gains_used
+            assert flight.scenario.gains_used == nominal.scenario.gains_used
     assert draws.values(0)["scenario.case"] == 3.0
     assert draws.values(0)["scenario.navigation"] == "filtered"
 

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from flights import COMMAND, Flown, ros_environment, space_robot, space_robot_here
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
@@ -60,7 +60,7 @@ def test_it_is_the_flight_of_four_processes_and_of_none(fly: Callable[..., Flown
     for topic in STATES_AND_COMMANDS:
         assert messages(composed.bag, topic) == messages(processes.bag, topic), topic.full_name
     swaps = ["0.1:ctc", "0.3:tde_smc"]
-    log = simulate(Flight(FlightPlan(swaps=swaps, duration=0.5)))
+    log = simulate(Flight(resolve(FlightPlan(swaps=swaps, duration=0.5))))
     assert_same_columns(read_flight(composed.bag), log)
     here, there = dict(composed.bag_report), dict(processes.bag_report)
     for report in (here, there):
@@ -106,7 +106,7 @@ def test_what_needs_processes_is_refused_in_one_line(
 
 def test_plans_are_refused_likewise() -> None:
     with pytest.raises(InputError, match=re.escape("kill_mission@1")):
-        Flight(FlightPlan(composed=True, faults=["kill_mission@1"]))
+        Flight(resolve(FlightPlan(composed=True, faults=["kill_mission@1"])))
 
 
 def test_a_flight_that_diverges_ends_with_the_tick(tmp_path: Path) -> None:

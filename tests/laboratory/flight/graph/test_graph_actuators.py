@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from flights import Flown
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.outcome import ReplayOptions
 from space_robot.flight.replay.run import replay
 from space_robot.flight.simulate import simulate
@@ -54,7 +54,7 @@ def flown(request: pytest.FixtureRequest, fly: Callable[..., Flown]) -> tuple[Fl
 
 
 def test_actuators_fly_in_the_graph_as_in_one_process(flown: tuple[Flown, FlightPlan]) -> None:
-    log, expected = read_flight(flown[0].bag), simulate(Flight(flown[1]))
+    log, expected = read_flight(flown[0].bag), simulate(Flight(resolve(flown[1])))
     for one, other in ((log, expected), (log.as_measured(), expected.as_measured())):
         for column in COLUMNS:
             np.testing.assert_array_equal(getattr(one, column), getattr(other, column), column)
@@ -68,7 +68,7 @@ def test_a_flight_with_actuators_is_replayed_to_the_bit(
     flown: tuple[Flown, FlightPlan], domain: int
 ) -> None:
     """The controller has all of its actuators' numbers from the bag."""
-    names = Flight(flown[1]).plant.names
+    names = Flight(resolve(flown[1])).plant.names
     done = replay(ReplayOptions(flown[0].bag, domain=domain))
     report = done.report()
     assert done.has_passed, report["first_difference"]

@@ -19,7 +19,7 @@ from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_model.dynamics.attitude import rotation_matrix
 from space_robot_msgs_py import topics
@@ -49,7 +49,7 @@ def test_graph_and_in_process_flights_agree_to_the_last_bit(
     fly: Callable[..., Flown], law: str, how: tuple[str, ...]
 ) -> None:
     flown = fly("--controller", law, "--case", "3", *SHORT, *how)
-    log = simulate(Flight(FlightPlan(controller=law, case="3", duration=0.5)))
+    log = simulate(Flight(resolve(FlightPlan(controller=law, case="3", duration=0.5))))
     recorded = read_flight(flown.bag)
     for column in STATE_COLUMNS:
         np.testing.assert_array_equal(getattr(recorded, column), getattr(log, column), column)
@@ -64,7 +64,7 @@ def test_all_laws_are_swapped_at_the_same_ticks_in_both(
 ) -> None:
     swaps = ["0.1:ctc", "0.2:ctc_smc", "0.3:tde_smc", "0.4:tde_tsmc"]
     flown = fly(*SHORT, *(word for swap in swaps for word in ("--swap", swap)), COMPOSED)
-    log = simulate(Flight(FlightPlan(swaps=swaps, duration=0.5)), tmp_path / "bag")
+    log = simulate(Flight(resolve(FlightPlan(swaps=swaps, duration=0.5))), tmp_path / "bag")
     recorded = read_flight(flown.bag)
     for column in STATE_COLUMNS:
         np.testing.assert_array_equal(getattr(recorded, column), getattr(log, column), column)
@@ -132,7 +132,7 @@ def _rotations(log: FlightLog) -> np.ndarray:
 def test_momentum_on_the_bag(fly: Callable[..., Flown]) -> None:
     """No force acts on the whole: P stays zero, L is the impulse of the base torque alone."""
     log = read_flight(fly(*LONG).bag)
-    robot = Flight(FlightPlan()).robot
+    robot = Flight(resolve(FlightPlan())).robot
     rotation, period = _rotations(log), log.timebase.period
     mean_rotation = 0.5 * (rotation[:-1] + rotation[1:])
     impulse = period * np.einsum("kij,kj->ki", mean_rotation, log.applied_torque[1:, :3])
@@ -147,7 +147,7 @@ def test_momentum_on_the_bag(fly: Callable[..., Flown]) -> None:
 def test_energy_on_the_bag(fly: Callable[..., Flown]) -> None:
     """Kinetic energy is the actuators' work less what friction took."""
     log = read_flight(fly(*LONG).bag)
-    flight = Flight(FlightPlan())
+    flight = Flight(resolve(FlightPlan()))
     friction, period = flight.plant_settings.friction, log.timebase.period
     torque, rate = log.applied_torque[1:], log.joint_velocities
     mean_omega = 0.5 * (log.omega_base[:-1] + log.omega_base[1:])
@@ -166,7 +166,7 @@ def test_late_commands_are_applied_late_in_the_graph(fly: Callable[..., Flown]) 
     log = read_flight(flown.bag)
     assert np.all(log.applied_torque[:3] == 0.0)
     assert flown.report["rms"]["mean_axis"]["attitude"] < 1e-6
-    in_process = simulate(Flight(FlightPlan(duration=0.5, command_latency_ticks=2)))
+    in_process = simulate(Flight(resolve(FlightPlan(duration=0.5, command_latency_ticks=2))))
     np.testing.assert_array_equal(log.joint_positions, in_process.joint_positions)
 
 

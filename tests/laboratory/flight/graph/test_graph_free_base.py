@@ -10,7 +10,7 @@ import pytest
 from flights import Flown
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight
 
@@ -32,7 +32,7 @@ def test_a_free_base_drifts_in_the_graph_as_in_one_process(fly: Callable[..., Fl
     options = ("--actuators", "none", "--case", "3", "--swap", "0.3:ctc", "--duration", "0.5")
     flown = fly(*options, "--composed")
     plan = FlightPlan(actuators="none", case="3", swaps=["0.3:ctc"], duration=0.5)
-    log, recorded = simulate(Flight(plan)), read_flight(flown.bag)
+    log, recorded = simulate(Flight(resolve(plan))), read_flight(flown.bag)
     for column in COLUMNS:
         np.testing.assert_array_equal(getattr(recorded, column), getattr(log, column), column)
     assert recorded.flight == log.flight

@@ -9,7 +9,7 @@ import pytest
 from flights import Flown
 from passive_robot import PASSIVE_ROBOT
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.outcome import ReplayOptions
 from space_robot.flight.replay.run import replay
 from space_robot.flight.simulate import simulate
@@ -34,7 +34,7 @@ def test_passive_joints_swing_in_the_graph_as_in_one_process(
     """Under a law with a model and one without; a replay gives the same commands to the bit."""
     flown = fly("--robot", PASSIVE_ROBOT, "--swap", "0.3:ctc", "--duration", "0.5", "--composed")
     plan = FlightPlan(robot=PASSIVE_ROBOT, swaps=["0.3:ctc"], duration=0.5)
-    log, recorded = simulate(Flight(plan)), read_flight(flown.bag)
+    log, recorded = simulate(Flight(resolve(plan))), read_flight(flown.bag)
     assert recorded.flight == log.flight
     for column in COLUMNS:
         np.testing.assert_array_equal(getattr(recorded, column), getattr(log, column), column)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from flights import Flown
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py.bag.reader import read_flight
 
@@ -42,7 +42,7 @@ def test_sensors_and_failing_parts_fly_in_the_graph_as_in_one_process(
     bag = fly("--sensors", "fine", "--seed", "5", "--duration", "0.5", "--composed", *words).bag
     log = read_flight(bag)
     plan = FlightPlan(sensors="fine", seed=5, duration=0.5, faults=list(FAULTS))
-    expected = simulate(Flight(plan))
+    expected = simulate(Flight(resolve(plan)))
     assert log.flight["sensors"] == "fine"
     for one, other in ((log, expected), (log.as_measured(), expected.as_measured())):
         for column in COLUMNS:

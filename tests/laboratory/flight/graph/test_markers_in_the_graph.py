@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 from flights import Start
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_model.robot import Robot
 from space_robot_model.robot.markers import RobotMarkers
@@ -37,7 +37,7 @@ def test_markers_are_those_of_the_states(start: Start, ground: Ground, paper_rob
     output, _ = plant.communicate(timeout=90)
     assert plant.returncode == 0, output
     found = list(iter(seen.take, None))
-    log = simulate(Flight(FlightPlan(duration=0.3)))
+    log = simulate(Flight(resolve(FlightPlan(duration=0.3))))
     poses, markers = RobotPoses(paper_robot), RobotMarkers(paper_robot, Timebase(500_000))
     expected = [
         markers.encode(tick, poses.at(log.state(tick))) for tick in range(0, log.ticks, EVERY)

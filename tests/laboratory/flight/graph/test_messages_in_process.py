@@ -13,7 +13,7 @@ import pytest
 from bags import messages_of
 from flights import Flown
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_sim.plant.faults import MESSAGE_KINDS
@@ -95,7 +95,7 @@ def test_one_process_sends_what_the_graph_sends(
             **given,
         }
     )
-    simulate(Flight(plan), tmp_path / "bag")
+    simulate(Flight(resolve(plan)), tmp_path / "bag")
     words = [word for fault in faults for word in ("--fault", fault)]
     for node in hold:
         words += ["--set", f"{node}.hold_ticks=100"]

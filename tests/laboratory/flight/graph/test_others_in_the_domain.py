@@ -15,7 +15,7 @@ from flights import COMMAND, ros_environment, space_robot_here
 from space_robot.analysis import analyze
 from space_robot.flight.bag_path import check_bag_path
 from space_robot.flight.graph import orchestrator
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.processes.node_modules import MODULES
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.errors import InputError
@@ -120,5 +120,5 @@ def test_a_bag_that_another_flight_was_quicker_to_make_stays(
 
     monkeypatch.setattr(orchestrator, "check_bag_path", look)
     with pytest.raises(InputError, match="exists already"):
-        orchestrator.fly(Flight(FlightPlan(duration=0.2)), bag, analyze)
+        orchestrator.fly(Flight(resolve(FlightPlan(duration=0.2))), bag, analyze)
     assert other.exists()

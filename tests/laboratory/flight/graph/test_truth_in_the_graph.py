@@ -11,7 +11,7 @@ import pytest
 from flights import Flown, space_robot_here
 
 from space_robot.analysis import analyze
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.reader import read_flight
@@ -32,7 +32,7 @@ def test_truth_measured_and_believed_are_those_of_one_process(
     faults = [*FAULTS, *lost]
     given = [word for fault in faults for word in ("--fault", fault)]
     flown = fly("--duration", "0.5", *given, *how)
-    log = simulate(Flight(FlightPlan(faults=faults, duration=0.5)))
+    log = simulate(Flight(resolve(FlightPlan(faults=faults, duration=0.5))))
     recorded = read_flight(flown.bag)
     assert recorded.lost == {topic.full_name: 0 for topic in topics.ALL}
     assert recorded.measured is not None
@@ -52,6 +52,6 @@ def test_truth_measured_and_believed_are_those_of_one_process(
 def test_a_replay_plays_what_was_measured(tmp_path: Path) -> None:
     """The controller answers it as in flight, to the last bit: it never sees the truth."""
     plan = FlightPlan(faults=FAULTS, duration=0.4, sensors="fine", navigation="filtered")
-    simulate(Flight(plan), tmp_path / "bag")
+    simulate(Flight(resolve(plan)), tmp_path / "bag")
     replayed = space_robot_here("replay", str(tmp_path / "bag"), "--json")
     assert replayed.returncode == 0, replayed.stderr

@@ -15,7 +15,7 @@ from flights import COMMAND, ros_environment, space_robot_here
 from paths import CONFIG
 
 from space_robot.flight.graph.domain import ros_domain
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.simulate import simulate
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.folder import open_bag
@@ -99,7 +99,7 @@ def test_both_fly_at_once_and_each_as_simulated(tmp_path: Path, free_domain: int
     laws = {"/sat1": "ctc", "/fleet/sat2": "tde_stc"}
     for namespace, robot in robots.items():
         plan = FlightPlan(controller=laws[namespace], robot=robot, duration=0.3)
-        here, flown = simulate(Flight(plan)), read_flight(bags[namespace])
+        here, flown = simulate(Flight(resolve(plan))), read_flight(bags[namespace])
         for column in COLUMNS:
             np.testing.assert_array_equal(getattr(flown, column), getattr(here, column), column)
         assert flown.laws == here.laws

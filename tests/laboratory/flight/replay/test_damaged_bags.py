@@ -14,7 +14,7 @@ from flights import space_robot_here
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.commands import Form, ReplayedCommands
 from space_robot.flight.replay.comparison import Comparison
 from space_robot.flight.replay.recording import COMPARED, Recording
@@ -31,7 +31,7 @@ TICKS = 900
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("whole") / "bag"
-    simulate(Flight(FlightPlan(controller="ctc", duration=TICKS * 0.0005)), path)
+    simulate(Flight(resolve(FlightPlan(controller="ctc", duration=TICKS * 0.0005))), path)
     return path
 
 

@@ -17,7 +17,7 @@ import pytest
 from command import Run
 from flights import COMMAND, Flown, ros_environment, space_robot_here
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.outcome import Replay, ReplayOptions
 from space_robot.flight.replay.run import replay
 from space_robot.flight.simulate import simulate
@@ -43,7 +43,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
         if key not in flown:
             flown[key] = tmp_path_factory.mktemp("recorded") / "bag"
             plan = FlightPlan.model_validate({"duration": TICKS * 0.0005, **options})
-            simulate(Flight(plan), flown[key])
+            simulate(Flight(resolve(plan)), flown[key])
         return flown[key]
 
     return fly
@@ -62,7 +62,7 @@ def play(domain: int) -> Callable[..., Replay]:
 def altered(bag: Path, copy: Path, change: Callable[[str, int, bytes], bytes | None]) -> Path:
     """A copy of a bag in which ``change`` has seen every message: topic, number, bytes."""
     flight = json.loads(open_bag(bag).custom_data()["space_robot.flight"])
-    recorder = BagRecorder(copy, flight, Flight(FlightPlan()).timebase)
+    recorder = BagRecorder(copy, flight, Flight(resolve(FlightPlan())).timebase)
     counts = dict.fromkeys(topics.BY_NAME, -1)
     for name, data in open_bag(bag).messages(*topics.ALL):
         counts[name] += 1
@@ -167,7 +167,9 @@ def test_another_law_is_shown_and_not_judged(recorded: Callable[..., Path], tmp_
 def test_one_altered_command_is_found_exactly(
     recorded: Callable[..., Path], play: Callable[..., Replay], tmp_path: Path
 ) -> None:
-    codec = CommandCodec(Flight(FlightPlan()).robot.axis_names, Flight(FlightPlan()).timebase)
+    codec = CommandCodec(
+        Flight(resolve(FlightPlan())).robot.axis_names, Flight(resolve(FlightPlan())).timebase
+    )
 
     def alter(name: str, number: int, data: bytes) -> bytes:
         if (name, number) != ("/command", 123):

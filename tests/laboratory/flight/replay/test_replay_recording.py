@@ -11,7 +11,7 @@ import pytest
 import yaml
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from space_robot.flight.plan import Flight, FlightPlan
+from space_robot.flight.plan import Flight, FlightPlan, resolve
 from space_robot.flight.replay.choice import ControllerChoice
 from space_robot.flight.replay.recording import Recording
 from space_robot.flight.simulate import simulate
@@ -31,7 +31,7 @@ STATES = (topics.JOINT_STATES, topics.BASE_STATE)
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("replay") / "bag"
-    simulate(Flight(FlightPlan(duration=0.2)), path)
+    simulate(Flight(resolve(FlightPlan(duration=0.2))), path)
     return path
 
 
@@ -97,19 +97,19 @@ def test_topics_of_other_names_are_remapped(bag: Path, tmp_path: Path) -> None:
     remapped = Recording(tmp_path / "bag", {f"/arm{name}_1": name for name in topics.BY_NAME})
     here = Recording(bag)
     assert list(remapped.states(STATES)) == list(here.states(STATES))
-    axes = Flight(FlightPlan()).robot.axis_names
+    axes = Flight(resolve(FlightPlan())).robot.axis_names
     np.testing.assert_array_equal(remapped.commands(axes).torque, here.commands(axes).torque)
 
 
 def described(**options: Any) -> dict[str, Any]:
     """A flight's description with all a bag may hold."""
-    flight = Flight(FlightPlan.model_validate(options))
+    flight = Flight(resolve(FlightPlan.model_validate(options)))
     law = flight.controller.law
     return {
         **flight.description,
-        "parameters": {"controller": flight.parameters["controller"]},
+        "parameters": {"controller": flight.scenario.parameters["controller"]},
         "gains_used": {name: row.tolist() for name, row in law.gain_values.items()},
-        "robot_file": read_yaml(named_file("robots", flight.plan.robot)),
+        "robot_file": read_yaml(named_file("robots", flight.scenario.options.robot)),
     }
 
 

@@ -1,0 +1,104 @@
+"""From the options of a flight to the scenario with every number in it, checked."""
+
+from __future__ import annotations
+
+from space_robot_control.allocation.assumed_actuators import assumed_actuators
+from space_robot_control.controller.gains import build_laws
+from space_robot_control.controller.plain_laws import NoLaw
+from space_robot_control.controller.swaps import parse_swaps
+from space_robot_control.laws import ControlLaw
+from space_robot_model.hardware.base_actuators import BaseActuatorSettings
+from space_robot_model.robot import Robot
+from space_robot_model.robot.find import robot_files
+from space_robot_msgs_py.config.files import GIVEN
+from space_robot_msgs_py.config.validation import one_of, validate
+from space_robot_msgs_py.errors import InputError
+from space_robot_sim.faults.grammar import parse_faults
+
+from .faults import KINDS, PROCESS_KINDS
+from .node_settings import FlightSettings
+from .objects import resolve_law
+from .options import FlightPlan
+from .resolved import ResolvedScenario
+from .robots import Robots
+
+
+def resolve(plan: FlightPlan) -> ResolvedScenario:
+    """Read everything that the options name, and check that it fits together.
+
+    Args:
+        plan: options; single parameters of nodes come over the others.
+
+    Raises:
+        InputError: anything named does not exist or does not fit the rest.
+    """
+    settings = FlightSettings.resolve(plan.options(), plan.parameters)
+    robots = Robots(settings, plan.robot, plan.plant_robot)
+    laws = _laws(plan, settings, robots.plant.n + 3)
+    scenario = ResolvedScenario(
+        plan,
+        settings,
+        settings.mission.mission or robot_files(settings.mission.robot).name,
+        robots,
+        laws,
+        [
+            (tick, laws[one_of(name, laws, "controller", " of swaps")])
+            for tick, name in parse_swaps(settings.controller.swaps, settings.plant.period)
+        ],
+        _assumed_actuators(plan, settings, robots.controller),
+        parse_faults(plan.faults_of(PROCESS_KINDS), KINDS),
+    )
+    _check_composed(plan)
+    _check_actuators(scenario)
+    return scenario
+
+
+def _laws(plan: FlightPlan, settings: FlightSettings, axes: int) -> dict[str, ControlLaw]:
+    if plan.controller is None:
+        return {NoLaw.name: NoLaw({}, settings.plant.period, axes)}
+    own = resolve_law(plan.controller)
+    return build_laws(settings.controller, axes, settings.gains, own or "")
+
+
+def _assumed_actuators(
+    plan: FlightPlan, settings: FlightSettings, robot: Robot
+) -> BaseActuatorSettings:
+    name = settings.controller.actuators
+    if plan.assumed_actuators is not None:
+        own, option = plan.assumed_actuators, "assumed_actuators"
+    elif name != GIVEN:
+        return assumed_actuators(name, robot)
+    else:
+        numbers = plan.actuators if isinstance(plan.actuators, dict) else {}
+        own = {key: numbers[key] for key in BaseActuatorSettings.model_fields if key in numbers}
+        option = "actuators"
+    assumed = validate(BaseActuatorSettings, own, option)
+    assumed.check(robot, GIVEN)
+    return assumed
+
+
+def _check_composed(plan: FlightPlan) -> None:
+    if not plan.composed:
+        return
+    asked = [f"fault {fault}" for fault in plan.faults_of(PROCESS_KINDS)]
+    if plan.restart_controller:
+        asked.append("restart_controller")
+    if asked:
+        raise InputError(
+            f"{', '.join(asked)}: that needs a process for each node: fly without --composed"
+        )
+
+
+def _check_actuators(scenario: ResolvedScenario) -> None:
+    both = [
+        (s.base_actuation, s.wheel_count, s.thruster_count)
+        for s in (scenario.plant, scenario.assumed_actuators)
+    ]
+    if both[0] != both[1]:
+        kinds = "; ".join(
+            f"{node} {actuation}, {wheels} wheels, {thrusters} thrusters"
+            for node, (actuation, wheels, thrusters) in zip(
+                ("plant", "controller"), both, strict=True
+            )
+        )
+        raise InputError(f"plant and controller must have the same actuators, got {kinds}")
