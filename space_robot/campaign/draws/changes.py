@@ -36,7 +36,7 @@ class Nominal(NamedTuple):
             InputError: it cannot be flown.
         """
         flight = scenario.check()
-        settings = {node: getattr(flight, f"{node}_settings") for node in NODES}
+        settings = {node: getattr(flight.scenario, node) for node in NODES}
         return cls(
             scenario,
             flight.robot,
