@@ -1,4 +1,4 @@
-"""What passes between a plant and its controller in a tick, in order or with faults. Knows no ROS.
+"""Messages between plant and controller in a tick, with or without faults. Independent of ROS.
 
 In the order of a tick: `PlantMessages.send` the state, `PlantMessages.take` the commands that come
 for it, `PlantMessages.end`; then `CommandGuard.act` says which command acts.
