@@ -18,7 +18,7 @@ from .endpoints import full_name_of
 from .locks import FileLock, HeldError, look, node_lock, topic_lock
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
-"""Name that discovery gives to a publisher's node until its participant has told its own."""
+"""Name that discovery gives to a node until its participant has announced its own."""
 
 
 class TopicClaim:

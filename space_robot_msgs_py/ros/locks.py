@@ -138,7 +138,7 @@ def _holders(paths: Iterable[Path]) -> list[Holder]:
 
 
 def look(path: Path) -> tuple[bool, list[str]]:
-    """Tell if somebody holds a lock, and the notes of those who took it, the newest last."""
+    """Return True if somebody holds a lock, and the notes of those who took it, the newest last."""
     try:
         descriptor = _open(path)
     except InputError:

@@ -22,7 +22,7 @@ class PausedOutput:
         self._told: bool | None = None
 
     def tell(self, is_paused: bool) -> None:
-        """Tell whether the simulation is paused, if that is news."""
+        """Return whether the simulation is paused, if that is news."""
         if is_paused is not self._told:
             self._told = is_paused
             self._publisher.publish(serialize_message(Bool(data=is_paused)))

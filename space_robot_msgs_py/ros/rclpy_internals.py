@@ -22,7 +22,7 @@ VERSIONS = ("7.",)
 
 
 def is_known_version() -> bool:
-    """Tell whether rclpy is one of `VERSIONS`, with its rcl and rmw."""
+    """Return whether rclpy is one of `VERSIONS`, with its rcl and rmw."""
     try:
         return metadata.version("rclpy").startswith(VERSIONS)
     except metadata.PackageNotFoundError:
@@ -30,7 +30,7 @@ def is_known_version() -> bool:
 
 
 def tells_pointers() -> bool:
-    """Tell whether `pointer` works here."""
+    """Return whether `pointer` works here."""
     return hasattr(_rclpy.Subscription, "pointer")
 
 
