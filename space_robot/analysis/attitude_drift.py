@@ -1,7 +1,7 @@
 """Attitude drift: how far the base turned while nothing held it.
 
 The arm's motion turns a base without actuators by momentum exchange. No law may be measured by
-that attitude, so it has no error: what is told is the angle from where the base was.
+that attitude, so it has no error: the metric is the angle from the initial attitude.
 """
 
 from __future__ import annotations

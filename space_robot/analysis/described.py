@@ -80,7 +80,7 @@ def robot_of(log: FlightLog) -> Robot:
 
 
 def check_joints(robot: Robot, log: FlightLog) -> None:
-    """See that a robot has the joints of a bag.
+    """Check that a robot has the joints of a bag.
 
     Raises:
         NotDescribedError: it has others.
@@ -293,7 +293,7 @@ def _described_h_bar(log: FlightLog) -> Array:
 
 
 def _check_files(log: FlightLog, parameters: Mapping[str, Any]) -> None:
-    """See that nothing but what is shipped is read, unless the bag is trusted."""
+    """Check that nothing but what is shipped is read, unless the bag is trusted."""
     if not log.trusted:
         for what in ("robot", "case", "mission", "gains", "sensors", "actuators"):
             check_file(what, str(parameters.get(what, "")))

@@ -175,7 +175,7 @@ class Draws:
         return kind(self.seed, draws)
 
     def _check(self) -> None:
-        """See that each variable by itself can be flown at its ends."""
+        """Check that each variable by itself can be flown at its ends."""
         for variable in self._variables:
             if variable.is_of_plant_robot:
                 continue

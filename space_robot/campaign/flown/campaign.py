@@ -1,7 +1,7 @@
 """Campaigns from Python: a file, and what comes of flying it.
 
-found = Campaign.load("my.yaml").run(runs=10_000, seed=7, out="campaigns/a")
-found.table, found.verdicts, found.rerun(4711).log
+campaign = Campaign.load("my.yaml").run(runs=10_000, seed=7, out="campaigns/a")
+campaign.table, campaign.verdicts, campaign.rerun(4711).log
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ class Flights:
         """Fly what is missing; each row is in the journal as soon as it is there.
 
         Args:
-            on_progress: told at the beginning and after every flight.
+            on_progress: called at the beginning and after every flight.
             options: of `run_many`.
 
         Raises:

@@ -11,7 +11,7 @@ CAMPAIGN = "campaign"
 
 
 def check_study(study: Study) -> None:
-    """See that a study imports no module and opens no file but those that are shipped.
+    """Check that a study imports no module and opens no file but those that are shipped.
 
     Raises:
         NotTrustedError: it names one.

@@ -69,7 +69,7 @@ class Finder:
         return f"ROS domain {self._domain} has {seen}"
 
     def is_there(self, place: FlightPlace) -> bool:
-        """Tell whether a plant that was found still is."""
+        """Return whether a discovered plant still runs."""
         if self._domain is not None:
             return place.namespace in self._publishing()
         return any(PLANT in node.name for node in nodes_in(place.domain, place.namespace))

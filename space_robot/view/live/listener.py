@@ -46,7 +46,7 @@ class Sample(NamedTuple):
     torque: Array
     """(n+3,) N m applied over the last tick; base, then joints."""
     error: Array | None
-    """(n+3,) tracking error as the law sees it; None: not told yet."""
+    """(n+3,) tracking error as the law sees it; None: not received yet."""
 
 
 class Listener:
@@ -61,7 +61,7 @@ class Listener:
             check: called while waiting for the plant; raises to give up.
 
         Raises:
-            InputError: its robot is not to be found here.
+            InputError: the files of its robot do not exist on this machine.
             FlightError: the plant does not answer.
         """
         from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
@@ -86,7 +86,7 @@ class Listener:
         self._stamp_ns: int | None = None
         """The newest sample's time."""
         self.law = ""
-        """The law that commands; empty: not told yet."""
+        """Name of the law in force; empty: not received yet."""
 
     def _ask_plant(self, robot: str, check: Callable[[], None]) -> tuple[Robot, float]:
         name = period = None

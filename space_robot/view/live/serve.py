@@ -60,11 +60,11 @@ def serve(options: LiveOptions, say: Callable[[str], None], ready: Callable[[str
 
     Args:
         options: what is asked.
-        say: told what happens, a line each.
-        ready: told the page's address.
+        say: called with a line for each event.
+        ready: called with the page's address.
 
     Raises:
-        InputError: viser is not installed, or a robot is not to be found.
+        InputError: viser is not installed, or the files of a robot do not exist.
         Interrupted: the user has ended it.
     """
     with (
@@ -114,12 +114,12 @@ class Follower:
 
         Args:
             place: where it is.
-            say: told what is waited for.
+            say: called with a description of the wait.
 
         Raises:
             OverError: it is over.
             FlightError: its plant does not answer.
-            InputError: its robot is not to be found here.
+            InputError: the files of its robot do not exist on this machine.
         """
 
         def check() -> None:
