@@ -1,4 +1,4 @@
-"""The columns of a flight for other programs: each number of a tick has a name with its unit.
+"""Columns of a flight for export, named with their units.
 
 Names are ``what_axis_unit``. Quaternions are ``[w, x, y, z]`` and have no unit.
 """

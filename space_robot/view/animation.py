@@ -1,4 +1,4 @@
-"""An animated picture of a flight: the scene, drawn by a browser, with a few curves that grow."""
+"""Animated picture of a flight: the scene, drawn by a browser, with a few curves."""
 
 from __future__ import annotations
 

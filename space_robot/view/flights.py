@@ -1,4 +1,4 @@
-"""The page of some flights: which robot each was flown with, then scene, plots and marks."""
+"""Page of several flights: robots, scene, plots and marks."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ PICTURED, MOST_PLOTS = ("attitude", "base torque", "torque"), 3
 
 @dataclass(frozen=True)
 class ViewOptions:
-    """What may be asked of a page."""
+    """Options of a page."""
 
     side_by_side: bool = False
     """A place for each robot, even if all are the same."""
@@ -123,7 +123,7 @@ def shown_robot(log: FlightLog, name: str = "") -> Robot:
 
 
 def remarks_on(logs: Mapping[str, FlightLog], robots: Mapping[str, Robot]) -> list[str]:
-    """Return what is wrong with the recordings and the shapes of the robots, a line each."""
+    """Return problems of the recordings and the robots' shapes, one line each."""
     lines = [f"{name}: {text}" for name, log in logs.items() for text in log.defects]
     lines += [line for robot in robots.values() for line in shown_shapes(robot).remarks]
     for name, log in logs.items():

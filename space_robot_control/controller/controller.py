@@ -50,7 +50,7 @@ class ControllerSnapshot(NamedTuple):
     law: str
     """Name of the law in force."""
     saved_law: dict[str, Any]
-    """See `ControlLaw.save`."""
+    """State of the law, made by `ControlLaw.save`."""
     tick: int
     torque: Array
     """Torque of the last command."""

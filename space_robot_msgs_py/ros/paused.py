@@ -1,4 +1,4 @@
-"""/simulation/paused: tells all nodes that time stands still, so that none takes it for silence."""
+"""/simulation/paused: publishes a pause to all nodes, so that watchdogs ignore it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .endpoints import PolledCallbackGroup, RawPublisher, RawSubscription
 
 
 class PausedOutput:
-    """Tells the others, also those who join later."""
+    """Publisher of the pause, also for late subscribers."""
 
     def __init__(self, node: Node) -> None:
         self._publisher = RawPublisher(node, topics.SIMULATION_PAUSED)
@@ -29,7 +29,7 @@ class PausedOutput:
 
 
 class PausedInput:
-    """Hears whether the simulation is paused."""
+    """Subscriber to the pause of the simulation."""
 
     def __init__(self, node: Node) -> None:
         self._input = RawSubscription(node, topics.SIMULATION_PAUSED, PolledCallbackGroup())

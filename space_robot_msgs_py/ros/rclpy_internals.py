@@ -1,4 +1,4 @@
-"""The one module that touches what is private to rclpy: 7.1 of ROS 2 Jazzy, `VERSIONS`.
+"""Access to private parts of rclpy, of the `VERSIONS` 7.1 of ROS 2 Jazzy.
 
 What is used, and for want of which public way: wait sets (the executor's own costs more than a
 loop's whole work), messages taken by hand, the parameters that the user gave for a node,

@@ -89,7 +89,7 @@ class PlantSnapshot(NamedTuple):
     command_delay_buffer: Array
     next_change: float
     drawn: tuple[int, int]
-    """See `NoiseDraws`."""
+    """Seed and block of the random numbers, see `NoiseDraws`."""
     part_faults: PartFaults
 
 

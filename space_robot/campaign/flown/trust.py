@@ -1,4 +1,4 @@
-"""What a campaign's study may name when its folder is not trusted: only what is shipped."""
+"""Check that an untrusted study names only shipped files and modules."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a flying robot tells of itself, as often as it is asked and no oftener."""
+"""Listener to the state of a running robot."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ TRUE: tuple[type[MessageDescription], ...] = (TruthJoints, TruthBase)
 
 
 class Sample(NamedTuple):
-    """The newest that is known of the robot."""
+    """Newest known state of the robot."""
 
     time: float
     """s, simulated."""
@@ -50,7 +50,7 @@ class Sample(NamedTuple):
 
 
 class Listener:
-    """Listens to the newest state only: the truth where it is sent, else what the sensors tell."""
+    """Subscriber of the newest state: the true one if published, else the measured one."""
 
     def __init__(self, place: FlightPlace, robot: str, check: Callable[[], None]) -> None:
         """Join the graph; ask the plant which robot it is, and for its period.
@@ -141,7 +141,7 @@ class Listener:
         return {**faults, **self._monitor.complaints}
 
     def _choose_topics(self, with_states: bool) -> None:
-        """Listen to the truth where it is sent, else to what the sensors tell, or to neither."""
+        """Subscribe to the true states if they are published, else to the measured ones."""
         for topic in self._topics.values():
             topic.take()
         heard = TruthBase in self._topics and bool(self._topics[TruthBase].rows)

@@ -1,4 +1,4 @@
-"""Serving the scene of what flies now, one flight after the other, until the user ends it."""
+"""Server of live scenes, one flight after the other, until the user ends it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MISSED = "the flight was over before it could be shown; view shows its bag"
 
 @dataclass(frozen=True)
 class LiveOptions:
-    """What may be asked of a live scene."""
+    """Options of a live scene."""
 
     domain: int | None = None
     """ROS domain; None: ROS_DOMAIN_ID, or that of the flight on this machine that began last."""
@@ -52,7 +52,7 @@ class LiveOptions:
 
 
 class OverError(FlightError):
-    """The flight that was followed is over."""
+    """The followed flight is over."""
 
 
 def serve(options: LiveOptions, say: Callable[[str], None], ready: Callable[[str], None]) -> None:
