@@ -59,8 +59,8 @@ class ControllerSnapshot(NamedTuple):
 class Controller(RecordOwner):
     """Controller with one law on a nominal robot model; laws can be swapped between ticks.
 
-    The time-delay pair is kept whatever the law, and a law takes over from the force it finds
-    applied: neither a swap nor a controller that starts in the middle of a flight gives a jolt.
+    The time-delay pair is kept for all laws, and a law takes over from the applied force, so
+    neither a swap nor a start in the middle of a flight causes a jump of the torque.
     A copy, also one by `pickle`, has a copy of the law in force and answers the same.
     """
 

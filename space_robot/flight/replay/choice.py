@@ -158,7 +158,7 @@ class ControllerChoice:
         return {"actuators": str(path)}
 
     def _gains_folder(self, law: type[ControlLaw], recorded: Mapping[str, Any]) -> str:
-        """The recorded gains, beside those of the other laws as far as they are found here."""
+        """The recorded gains, and those of other laws that exist on this machine."""
         folder = self._folder / "gains"
         folder.mkdir()
         files: dict[str, Path] = {}
