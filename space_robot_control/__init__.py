@@ -1,4 +1,4 @@
-"""The flight software: laws, controller, navigation, allocation and guidance."""
+"""Flight software: control laws, controller, navigation, allocation and guidance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""mission_node: streams the desired motion in chunks, ahead of need."""
+"""mission_node: streams the desired motion in chunks, in advance."""
 
 from __future__ import annotations
 

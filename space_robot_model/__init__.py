@@ -1,1 +1,1 @@
-"""The robot as data, its equations of motion, its hardware, and arithmetic that is exact."""
+"""Robot model, equations of motion, hardware data sheets, reproducible arithmetic."""

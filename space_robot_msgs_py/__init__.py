@@ -1,4 +1,4 @@
-"""What the nodes share: samples, their wire form, topics, settings, errors, bags.
+"""Code shared by the nodes: samples, serialization, topics, settings, errors, bags.
 
-Knows no dynamics and no control law; only `space_robot_msgs_py.ros` needs ROS.
+Independent of dynamics and control laws; only `space_robot_msgs_py.ros` needs ROS.
 """

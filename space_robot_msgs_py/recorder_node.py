@@ -105,7 +105,7 @@ class RecorderLoop:
         self._from_ns = 0
         """When recording was taken up again, by the senders' clock; 0: it never paused."""
         self._until_ns: int | None = None
-        """When this recorder was told to stop; None while it records."""
+        """Time when this recorder was requested to stop; None while it records."""
         of_whom = "" if namespace == topics.ROOT else f" the topics in {namespace}"
         node.log(f"recording{of_whom} to {path}")
         if serialized_take() is take_by_rclpy:
@@ -213,7 +213,7 @@ class RecorderLoop:
                 timely += 1
                 if taken.sent_ns >= begin_ns:
                     self._recorder.record(entry.topic, *taken)
-            if self._gives_way and self._until_ns is None:  # once told to stop, it is in a hurry
+            if self._gives_way and self._until_ns is None:  # no yielding after a stop request
                 os.sched_yield()  # Linux may make a waking thread wait until we enter the kernel
         return TURN, timely
 

@@ -11,7 +11,7 @@ LATEST_S = 1e9
 
 
 def check_time(seconds: float, name: str = "T") -> None:
-    """See that a time can be that of something that happens in a flight.
+    """Check that a time can be that of something that happens in a flight.
 
     Raises:
         InputError: it is negative, or later than any flight lasts.

@@ -77,7 +77,7 @@ THRUSTERS_STATE = Topic(
     "thrusters/state", "sensor_msgs/msg/JointState", 10_000, per_tick=True, is_optional=True
 )
 COMMAND = Topic("command", "sensor_msgs/msg/JointState", 10_000, per_tick=True)
-# Reference and clock are not transient local: a late joiner would be told the past, and that a
+# Reference and clock are not transient local: a late joiner would receive the past, and that a
 # message was lost if one is pushed out meanwhile; at depth 1 a slow one would lose some. The
 # mission says again what is still needed when somebody joins, a plant that waits its time.
 REFERENCE_JOINTS = Topic("reference/joints", "trajectory_msgs/msg/JointTrajectory", 200)
@@ -165,4 +165,4 @@ PLANT_DESCRIPTION = Topic(
     is_event=True,
     has_stamp=False,
 )
-"""What the plant flies, as JSON: the recorder notes it with the bag, beside what it was told."""
+"""Description of the plant as JSON, which the recorder stores in the bag."""

@@ -1,4 +1,4 @@
-"""The simulated world: environment, sensors, actuators, faults, and the plant."""
+"""Simulation: environment, sensors, actuators, faults, and the plant."""
 
 from __future__ import annotations
 

@@ -1,17 +1,17 @@
-"""Metrics, tables and figures of flights: those of Table V, and those that who flies asks for.
+"""Metrics, tables and figures of flights: those of Table V and further ones.
 
 | module | metrics |
 |---|---|
 | `metrics` | RMS in both definitions, maxima, chatter |
 | `spectrum` | power above 100 Hz |
-| `ripple` | torque that the task does not ask for, and its spectrum |
+| `ripple` | torque beyond the needs of the task, and its spectrum |
 | `settling` | time until the error stays small after a motion |
 | `actuation` | saturation, latency, commands that were not applied |
 | `estimate_error` | error of the time-delay estimate |
 | `pointing` | end effector's pointing in the inertial frame |
 | `report` | all of them, as a dictionary |
 
-All are summed up over blocks of a flight (`blocks`), so that it may be longer than memory.
+All are accumulated over blocks of a flight (`blocks`), which may be longer than memory.
 """
 
 from .excerpt import excerpt

@@ -30,7 +30,7 @@ class TorqueLimits(NamedTuple):
 
 
 class Saturation(Metric):
-    """Counts the ticks at which the torque applied on some axis was at its limit.
+    """Number of ticks at which the torque applied on some axis was at its limit.
 
     The plant clips to the limit, so "at" is exact but for the rounding of whoever recorded. It is
     the torque as reported, behind the limits and before what the drives make of it.
@@ -59,7 +59,7 @@ class Saturation(Metric):
 
 
 class Latency(Metric):
-    """Takes percentiles of the wall-clock time from a state's sending to its command's."""
+    """Percentiles of the wall-clock time from sending a state to sending its command."""
 
     def __init__(self, period: float) -> None:
         """Begin without rows; ``period`` is that of a tick, s."""
@@ -86,7 +86,7 @@ class Latency(Metric):
 
 
 class MissedDeadlines(Metric):
-    """Counts the ticks that did not get their own command, one that came too late included.
+    """Number of ticks without their own command, or with a late one.
 
     The plant's diagnostics count them all as they happen (``missed_deadlines``); a recording tells
     two kinds apart: ticks that no command was ever recorded for (``unanswered_ticks``), and ticks

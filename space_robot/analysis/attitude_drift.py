@@ -1,7 +1,7 @@
-"""Attitude drift: how far the base turned while nothing held it.
+"""Attitude drift of a base without attitude control.
 
 The arm's motion turns a base without actuators by momentum exchange. No law may be measured by
-that attitude, so it has no error: what is told is the angle from where the base was.
+that attitude, so it has no error: the metric is the angle from the initial attitude.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ UNAVAILABLE = {
 
 
 def controls_base(log: FlightLog) -> bool:
-    """Return whether anything turned the base; else it floated freely."""
+    """Return whether the base had actuators; else it floated freely."""
     described = log.flight.get("base_actuators")
     return not (isinstance(described, dict) and described.get("base_actuation") == "none")
 
 
 class AttitudeDrift(Metric):
-    """The largest and the last angle of the base from where it was at the first tick, degrees."""
+    """Largest and final rotation angle of the base since the first tick, degrees."""
 
     def __init__(self, log: FlightLog) -> None:
         """``log``: the first rows."""

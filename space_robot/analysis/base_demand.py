@@ -1,4 +1,4 @@
-"""What a flight asks of its base, tick by tick: torque, and momentum that wheels must hold.
+"""Demand of a flight on its base, tick by tick: torque, and momentum of wheels.
 
 Wheels that turn the base by a torque ``tau`` take up what they give: their momentum on inertial
 axes falls by ``integral R tau dt`` whatever does the turning in this flight. So an ideal torque
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 class Demand(NamedTuple):
-    """Rows of what is asked of the base, in the base frame."""
+    """Demand on the base in the base frame, one row per tick."""
 
     torque: Array
     """(N, 3) N m asked over the interval that ended at the tick: commanded, or given where no
@@ -33,7 +33,7 @@ class Demand(NamedTuple):
 
 
 class BaseDemand:
-    """Follows the demand through a flight, block by block."""
+    """Computes the demand of a flight, block by block."""
 
     def __init__(self, flown: BaseActuatorSettings) -> None:
         """``flown``: what turned the base; the momentum of its wheels is known."""
@@ -46,7 +46,7 @@ class BaseDemand:
         """N m s, inertial axes: what the base was given so far."""
 
     def add(self, log: FlightLog) -> Demand:
-        """Take further rows of the flight and return what is asked in them."""
+        """Add further rows of the flight and return their demand."""
         axes = axes_of(log)
         torque = self._asked(log)
         momentum = (

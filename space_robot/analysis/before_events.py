@@ -1,4 +1,4 @@
-"""The state just before a capture or release, which follows from the one after it."""
+"""State just before a capture or release, computed from the state after it."""
 
 from __future__ import annotations
 

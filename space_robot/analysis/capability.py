@@ -1,4 +1,4 @@
-"""What a set of actuators can give: torque and momentum about an axis, propellant for a torque.
+"""Capability of actuators: torque and momentum about an axis, propellant for a torque.
 
 Wheels give torques along their axes either way, thrusters theirs one way; each has its limit.
 """

@@ -1,4 +1,4 @@
-"""The columns of a flight for other programs: each number of a tick has a name with its unit.
+"""Columns of a flight for export, named with their units.
 
 Names are ``what_axis_unit``. Quaternions are ``[w, x, y, z]`` and have no unit.
 """
@@ -40,12 +40,12 @@ def batches(log: FlightLog) -> Iterator[tuple[NDArray[np.int64], Array]]:
 
 
 def metadata(log: FlightLog) -> dict[str, Any]:
-    """Describe what was flown, lost and found damaged, ready for JSON."""
+    """Describe the flight, lost messages and damage, ready for JSON."""
     return {"flight": log.flight, "laws": as_data(laws_of(log), log.timebase), **recording(log)}
 
 
 def recording(log: FlightLog) -> dict[str, Any]:
-    """Describe what is missing of a flight or was found wrong with its bag."""
+    """Describe missing parts of a flight and damage of its bag."""
     return {
         "lost": log.lost,
         "unanswered_ticks": log.unanswered,

@@ -41,15 +41,15 @@ Array = NDArray[np.float64]
 
 
 IDEAL = "ideal"
-"""The sensors that tell the truth."""
+"""Name of the sensors without error."""
 MOST_LETTERS = 400
 """Of the joints' names in an error."""
 DIRECT = "direct"
-"""The navigation that takes the states for what they are."""
+"""Name of the navigation without filter."""
 
 
 class NotDescribedError(InputError):
-    """The bag does not say what a metric needs; the message says what is missing."""
+    """The description in a bag lacks data that a metric needs."""
 
 
 def start_step_of(log: FlightLog) -> dict[str, Any] | None:
@@ -80,7 +80,7 @@ def robot_of(log: FlightLog) -> Robot:
 
 
 def check_joints(robot: Robot, log: FlightLog) -> None:
-    """See that a robot has the joints of a bag.
+    """Check that a robot has the joints of a bag.
 
     Raises:
         NotDescribedError: it has others.
@@ -105,7 +105,7 @@ def torque_limits(log: FlightLog) -> TorqueLimits:
 
 
 def environment_of(log: FlightLog) -> EnvironmentSettings:
-    """Find what acted on the robot beside its actuators.
+    """Return the environment of the flight.
 
     Raises:
         InputError: not even the case is named, or it is not here.
@@ -114,7 +114,7 @@ def environment_of(log: FlightLog) -> EnvironmentSettings:
 
 
 def momentum_of(log: FlightLog) -> MomentumSeries:
-    """Return what follows the momentum of a flight from its first rows ``log`` on.
+    """Return the momentum tracker of a flight from its first rows ``log`` on.
 
     Raises:
         InputError: the robot, its actuators or its environment are not known.
@@ -126,7 +126,7 @@ def momentum_of(log: FlightLog) -> MomentumSeries:
 
 
 def events_of(log: FlightLog) -> list[Event]:
-    """Return what was captured and released, by time.
+    """Return the captures and releases, by time.
 
     Raises:
         InputError: what the bag tells cannot be, or names a file and the bag is not trusted.
@@ -213,17 +213,17 @@ def estimator(log: FlightLog) -> tuple[HBar, float]:
 
 
 def sensors_of(log: FlightLog) -> str:
-    """Name the sensors that flew, as far as the bag tells."""
+    """Return the name of the sensors, as far as the bag records it."""
     return str(_parameters(log, PlantNodeSettings.node).get("sensors", "")) or IDEAL
 
 
 def actuators_of(log: FlightLog) -> str:
-    """Name the base's actuators that flew, as far as the bag tells."""
+    """Return the name of the base's actuators, as far as the bag records it."""
     return str(log.flight.get("actuators", "")) or IDEAL
 
 
 def base_actuators_of(log: FlightLog) -> BaseActuatorSettings:
-    """Return the base's actuators that flew: ideal ones if the bag tells of none.
+    """Return the base's actuators: ideal ones if the bag records none.
 
     Raises:
         InputError: what the bag tells cannot be.
@@ -251,7 +251,7 @@ def flown_actuators(log: FlightLog) -> BaseActuatorSettings:
 
 
 def navigation_of(log: FlightLog) -> str:
-    """Name the navigation that flew, as far as the bag tells."""
+    """Return the name of the navigation, as far as the bag records it."""
     return str(_parameters(log, ControllerNodeSettings.node).get("navigation", "")) or DIRECT
 
 
@@ -293,7 +293,7 @@ def _described_h_bar(log: FlightLog) -> Array:
 
 
 def _check_files(log: FlightLog, parameters: Mapping[str, Any]) -> None:
-    """See that nothing but what is shipped is read, unless the bag is trusted."""
+    """Check that nothing but what is shipped is read, unless the bag is trusted."""
     if not log.trusted:
         for what in ("robot", "case", "mission", "gains", "sensors", "actuators"):
             check_file(what, str(parameters.get(what, "")))

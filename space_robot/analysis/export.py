@@ -40,7 +40,7 @@ def dataframe(log: FlightLog) -> DataFrame:
 
 
 def check_parquet() -> None:
-    """See that Parquet files can be written, before any work is done for them.
+    """Check that Parquet files can be written, before any work is done for them.
 
     Raises:
         InputError: pyarrow is not installed.

@@ -53,6 +53,6 @@ def _recorded(reports: Mapping[str, Report]) -> Table:
 
 
 def _whole(report: Report) -> bool:
-    """Tell whether the bag holds the flight without loss, gap or damage."""
+    """Return whether the bag holds the flight without loss, gap or damage."""
     missing = any(report["lost"].values()) or report["filled_ticks"]
     return not (missing or report["unfinished"] or report["damage"])

@@ -5,7 +5,7 @@ From the torque applied is taken away what inverse dynamics of the nominal robot
 left has a slow part that every law must give: friction, disturbances (0.25 to 0.75 Hz in the
 paper), an unknown payload's share of the motion. Ripple is what is left above `SLOWEST`. It is
 summed up in the spectrum (`spectrum.PowerSpectrum`), so that limit cycle, noise and switching are
-told apart by their frequency.
+distinguished by their frequency.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Waypoints, where a mission's segments meet and the arm shall rest, found in the reference."""
+"""Waypoints between the segments of a mission, detected in the reference."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Many flights, and a verdict on all of them."""
+"""Campaigns of many flights, with verdicts."""

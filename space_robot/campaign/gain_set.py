@@ -37,7 +37,7 @@ def tuned_set(
         options: of a `FlightPlan`: robot (the nominal one), mission, sensors, navigation.
         cases: names or paths of the environments to be flown in.
         wishes: of the user.
-        step: told what is being done.
+        step: called with a description of each step.
 
     Raises:
         InputError: something named is not there, or the wishes do not go together.

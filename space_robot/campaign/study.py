@@ -87,7 +87,7 @@ class Requirement(StrictModel):
         return 1.0 if self.above is None else -1.0
 
     def is_met(self, value: float) -> bool:
-        """Tell whether a flight's value meets the bound; NaN does not."""
+        """Return whether a flight's value meets the bound; NaN does not."""
         return self.sign * value < self.sign * self.bound
 
 
@@ -199,7 +199,7 @@ class Study(StrictModel):
 
 
 def check_option(name: str) -> None:
-    """See that a study may give an option of `Scenario`.
+    """Check that a study may give an option of `Scenario`.
 
     Raises:
         ValueError: says what does it instead, or which options there are.

@@ -1,1 +1,1 @@
-"""Subcommands of ``space-robot`` with a file of their own."""
+"""Subcommands of ``space-robot``, one file each."""

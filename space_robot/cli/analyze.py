@@ -1,4 +1,4 @@
-"""``space-robot analyze``."""
+"""The command ``space-robot analyze``."""
 
 from __future__ import annotations
 
@@ -66,9 +66,8 @@ def analyze(
     """Metrics of recorded flights: one bag, or several side by side.
 
     RMS, maxima, settling, chatter, saturation, latency, the error of the time-delay estimate,
-    where the end effector pointed, and what was asked of the base. docs/manual/analysis.md says
-    what each means.
-    Modules and files that a bag names are not opened without --trust.
+    end effector pointing, and the loads on the base. docs/manual/analysis.md explains each
+    metric. Modules and files that a bag names are not opened without --trust.
 
     \b
     Examples:
@@ -132,10 +131,10 @@ def analyze(
 
 
 def _set(log: FlightLog, name: str | None) -> ActuatorSet | None:
-    """Read the base's actuators that a flight is held beside.
+    """Read the set of base actuators to compare a flight with.
 
     Raises:
-        InputError: there are none of that name, or they do not fit its robot.
+        InputError: the set does not exist or does not fit the robot.
     """
     if name is None:
         return None
@@ -171,7 +170,7 @@ def _print(reports: dict[str, dict[str, Any]], as_json: bool) -> None:
 
 
 def bag_names(bags: Sequence[Path]) -> list[str]:
-    """Name the bags: by their folders' names, with as much before them as tells apart."""
+    """Name each bag by its folder, with as many parent folders as make names unique."""
     paths = [Path(printable(str(bag.absolute()))) for bag in bags]
     if len(set(paths)) < len(paths):
         raise click.BadParameter("the same bag was given twice", param_hint="BAG...")
@@ -183,7 +182,7 @@ def bag_names(bags: Sequence[Path]) -> list[str]:
 
 
 def _files(where: Path, names: Sequence[str], suffix: str) -> list[Path]:
-    """Name the file of each bag: ``where`` itself if it is a file's name, else one below it."""
+    """Return a file per bag: ``where`` itself if it names a file, else files in it."""
     if where.suffix != suffix or where.is_dir():
         return [where / f"{name}{suffix}" for name in names]
     if len(names) > 1:

@@ -1,4 +1,4 @@
-"""``space-robot campaign``: thousands of flights to a table, and any of them again."""
+"""The command ``space-robot campaign``: run many flights, repeat one, report."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @click.group()
 def campaign() -> None:
-    """Disperse everything, fly thousands, say what is met with which confidence.
+    """Fly thousands of dispersed flights and test requirements with confidence.
 
     \b
     Examples:
@@ -70,11 +70,11 @@ def run(
     timeout_s: float | None,
     as_json: bool,
 ) -> None:
-    """Fly a campaign into a folder; the same line again goes on where it was interrupted.
+    """Fly a campaign into a folder; the same command resumes an interrupted one.
 
-    FILE is a YAML file, or a name of config/campaigns; docs/manual/campaigns.md has what is in it.
-    The table in the folder depends on file, seed, runs and software alone. Exit code 0 also if
-    flights fail: the table says which, and why. More --runs extend a campaign without fixed_runs.
+    FILE is a YAML file, or a name of config/campaigns; docs/manual/campaigns.md has its format.
+    The table depends only on file, seed, runs and software. Exit code 0 even if
+    flights fail: the table says why. More --runs extend a campaign without fixed_runs.
 
     \b
     Examples:
@@ -95,7 +95,7 @@ def run(
     try:
         with rated_progress("flights") as show:
 
-            def told(progress: Progress) -> None:
+            def show(progress: Progress) -> None:
                 if not latest and progress.kept:
                     said = f"{out}: {progress.kept} of {progress.total} flights are there"
                     click.echo(f"{said}; going on", err=True)
@@ -110,7 +110,7 @@ def run(
                 workers,
                 scheduler,
                 timeout_s,
-                progress=told,
+                progress=show,
                 warn=lambda text: click.echo(text, err=True),
             )
     except KeyboardInterrupt:
@@ -140,7 +140,7 @@ def run(
 def rerun(
     folder: Path, run: int, law: str | None, bag: Path | None, trust: bool, as_json: bool
 ) -> None:
-    """Fly a row's flight again, to the same bits, and see that it is the same.
+    """Repeat the flight of a row and check that it is bit-identical.
 
     DIR is the campaign's folder, RUN the number of the run. Exit code 1 if the flight differs from
     the row in a single bit; it then says what may be the reason. Modules and files that the

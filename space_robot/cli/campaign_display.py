@@ -1,4 +1,4 @@
-"""What ``space-robot campaign run`` says at its end."""
+"""Summary that ``space-robot campaign run`` prints at its end."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 SHOWN = ("attitude_rms", "joints_4_6_rms", "ripple_base_torque")
-"""Metrics whose medians are shown, of those that there are."""
+"""Metrics whose medians are shown if they were computed."""
 
 
 def as_record(flown: FlownCampaign) -> dict[str, Any]:
-    """Return what there is to say of a campaign, ready for JSON."""
+    """Return the summary of a campaign, ready for JSON."""
     table = flown.table
     return {
         "folder": str(flown.folder),
@@ -45,7 +45,7 @@ def as_record(flown: FlownCampaign) -> dict[str, Any]:
 
 
 def print_summary(flown: FlownCampaign, console: Console) -> None:
-    """Print how many flights came to their end, medians, verdicts, and how to go on."""
+    """Print the number of completed flights, medians, verdicts, and next steps."""
     findings = Findings(subject_of(flown))
     names = findings.names
     print_table(medians(flown.table, names, flown.seed), console)
@@ -82,7 +82,7 @@ def print_summary(flown: FlownCampaign, console: Console) -> None:
 
 
 def medians(table: DataFrame, names: dict[str, str], seed: int) -> Table:
-    """Tabulate each law's medians; a flight that failed counts as worse than any number."""
+    """Tabulate the medians of each law; a failed flight ranks below all others."""
     shown = [name for name in SHOWN if is_known(table, f"metric.{name}")]
     rows = []
     for law in laws_of(table):

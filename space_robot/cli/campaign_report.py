@@ -1,4 +1,4 @@
-"""``space-robot campaign report``."""
+"""The command ``space-robot campaign report``."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ def report(
     study: Path | None,
     as_json: bool,
 ) -> None:
-    """What a campaign's flights say: requirements, laws, what drives the error, worst runs.
+    """Report a campaign: requirements, laws, causes of error, worst runs.
 
-    DIR is the folder of `campaign run`, finished or not. docs/manual/campaigns.md says what the
-    numbers mean. Files that are damaged are named.
+    DIR is the folder of `campaign run`, finished or not. docs/manual/campaigns.md explains
+    the numbers. Damaged files are listed.
 
     \b
     Examples:

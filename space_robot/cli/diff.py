@@ -1,4 +1,4 @@
-"""``space-robot diff``: the numbers in which two flights differ."""
+"""The command ``space-robot diff``: list the settings in which two flights differ."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import click
 from .options import flight_option
 
 LONGEST = 60
-"""Letters of a value that are shown on a terminal; --json has all."""
+"""Maximum characters of a value on a terminal; --json shows all."""
 
 
 @click.command()
@@ -18,7 +18,7 @@ LONGEST = 60
 @click.argument("second", type=click.Path(path_type=Path))
 @flight_option("json")
 def diff(first: Path, second: Path, as_json: bool) -> None:
-    """Say in which numbers two flights differ.
+    """List the settings in which two flights differ.
 
     FIRST and SECOND are bags, or scenario files as `space-robot scenario` prints them; names of
     files in a scenario are looked up here. Exit code 0 if all numbers are the same, 1 if not.

@@ -1,4 +1,4 @@
-"""``space-robot fly``: a mission flown on a ROS 2 graph."""
+"""The command ``space-robot fly``: fly a mission on a ROS 2 graph."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from .options import ON_A_GRAPH, flight_options, plan_flight, remarks_on
 def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
     """Fly a mission on a ROS 2 graph, record it, and print the RMS table.
 
-    Starts plant, controller, mission and recorder as processes of their own (through `ros2 run`
-    where that is installed), or with --composed in one; configures and activates them, follows
-    the flight, stops them, checks the bag. Set ROS_DOMAIN_ID or --domain to watch the flight from
-    another terminal.
+    Starts plant, controller, mission and recorder as separate processes (through `ros2 run`
+    where it is installed), or with --composed in one process; configures and activates them,
+    monitors the flight, stops them, checks the bag. Set ROS_DOMAIN_ID or --domain to watch the
+    flight from another terminal.
 
     \b
     Examples:
@@ -65,7 +65,7 @@ def fly(as_json: bool, bag: Path | None, **options: Any) -> None:
 
 
 def _metrics_of(bag: Path) -> dict[str, Any]:
-    """Return the metrics of a flight that ended early; none if its bag has not one whole tick."""
+    """Return the metrics of a flight that ended early; none if no tick is complete."""
     from space_robot_msgs_py.bag.reader import read_flight
     from space_robot_msgs_py.errors import InputError
 

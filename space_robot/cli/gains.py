@@ -1,4 +1,4 @@
-"""``space-robot gains``."""
+"""The command ``space-robot gains``: check and tune gain sets."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .options import flight_options
 
 @click.group()
 def gains() -> None:
-    """Look at a gain set before it flies, or make one."""
+    """Check a gain set before a flight, or make one."""
 
 
 @gains.command()
@@ -30,7 +30,7 @@ def gains() -> None:
     "case", "gains", "robot", "mission", "sensors", "actuators", "navigation", "seed", "set", "json"
 )
 def check(as_json: bool, **options: Any) -> None:
-    """Tell which margin and noise gain the laws of a gain set have along a mission.
+    """Compute the margin and noise gain of each law of a gain set along a mission.
 
     For laws with time-delay estimation: the eigenvalues of H_S^-1 h_bar, the radius of
     E - H_S^-1 h_bar, the share by which the torque reported may exceed the one commanded. For all
@@ -111,12 +111,12 @@ def check(as_json: bool, **options: Any) -> None:
 )
 @click.pass_context
 def tune(context: click.Context, /, output: Path, **options: Any) -> None:
-    """Make a gain set for all five laws, by a method without search or luck.
+    """Make a gain set for all five laws by a deterministic method.
 
     h_bar from the inertia along the mission, so that the time-delay estimate contracts with the
     margin asked for, whichever of the masses are wrong; a low-pass for it; poles below its lag;
     switching gains from the errors that are left. Sensors and navigation are listened to on a robot
-    at rest; nothing is flown. The method is told in the docs, its numbers in the files.
+    at rest; nothing is flown. docs/manual/control_laws.md describes the method.
 
     \b
     Examples:
@@ -141,7 +141,7 @@ def tune(context: click.Context, /, output: Path, **options: Any) -> None:
 
 
 def _command(context: click.Context) -> str:
-    """Return the command line with the options that were given."""
+    """Return the command line with the options that the user set."""
     words = []
     for option in context.command.params:
         name = str(option.name)

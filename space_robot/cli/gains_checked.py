@@ -1,4 +1,4 @@
-"""The findings of ``space-robot gains check``: made from a flight that is only planned."""
+"""Results of ``space-robot gains check``, computed from a planned flight."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ HELD = 6.0
 
 @dataclass(frozen=True)
 class Checked:
-    """The laws looked at on a flight's robot and mission."""
+    """Results for the laws checked on the robot and mission of a flight."""
 
     flight: Flight
     checks: list[GainCheck]
@@ -39,15 +39,15 @@ class Checked:
 
     @property
     def is_sound(self) -> bool:
-        """True if every law is."""
+        """True if every law passes its check."""
         return all(check.is_sound for check in self.checks)
 
 
 def checked(options: dict[str, Any]) -> Checked:
-    """Look at the laws that a command's options name.
+    """Check the laws that the options of a command name.
 
     Raises:
-        InputError: they name what there is not, or a base that no law can hold.
+        InputError: a name is unknown, or no law can control the base.
     """
     plan, every = validate(FlightPlan, options, "options"), options["controller"] == ALL
     if every:

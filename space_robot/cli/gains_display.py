@@ -1,4 +1,4 @@
-"""The findings of ``space-robot gains check`` as tables."""
+"""Tables of the results of ``space-robot gains check``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .gains_checked import Checked
 
 
 def print_checks(checks: Checked, console: Console) -> None:
-    """Print margins, noise gains and what they mean."""
+    """Print margins and noise gains with an explanation."""
     what = checks.flight.description
     say(
         console,

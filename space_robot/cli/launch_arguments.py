@@ -22,7 +22,7 @@ from ..scenario.option_table import OPTIONS
 from .options import flight_options, plan_flight
 
 PARAMS_FILE = "params_file"
-"""Not an option of `fly`, but what launch files call a ROS parameter file."""
+"""Argument for a ROS parameter file, as launch files name it; not an option of `fly`."""
 _TRUTH = {"true": True, "false": False}
 
 
@@ -32,11 +32,11 @@ class LaunchArgument(NamedTuple):
     name: str
     description: str
     choices: tuple[str, ...] = ()
-    """Empty: any text."""
+    """Allowed values; empty: any text."""
 
 
 class LaunchedFlight(NamedTuple):
-    """What is to be launched."""
+    """Flight to be launched."""
 
     flight: Flight
     bag: Path
@@ -75,7 +75,7 @@ def _name(option: click.Option) -> str:
 
 
 def refuse_unknown(command_line: Sequence[str], file: str, names: Iterable[str]) -> None:
-    """See that a launch file is not started with an argument that it does not have.
+    """Check that a launch file is not started with an unknown argument.
 
     launch itself takes any. Arguments of another launch file that includes this one are that one's
     own.
@@ -110,7 +110,7 @@ def launched_flight(values: Mapping[str, str]) -> LaunchedFlight:
         values: of each argument, by name; empty for its default.
 
     Raises:
-        InputError: they do not fit together, name what there is not, or need `space-robot fly`.
+        InputError: values conflict, a name is unknown, or one needs `space-robot fly`.
     """
     words = []
     for option in _plan.params:

@@ -29,23 +29,23 @@ def cli() -> None:
       space-robot fly                               case 1 under TDE-STC, as a graph of nodes
       space-robot fly --controller ctc --case 3     another law, another case
       space-robot simulate --json                   the same flight without ROS
-      space-robot robot my.urdf                     what was read of a robot's file
+      space-robot robot my.urdf                     contents of a robot's file
       space-robot urdf paper                        a robot as a URDF, for RViz and others
       space-robot new my.urdf                       a folder for it: mission, gains, a first flight
-      space-robot gains check                       what margin and noise gain a gain set has
-      space-robot gains tune -o my_gains            a set for a robot and a mission, by a method
+      space-robot gains check                       margin and noise gain of a gain set
+      space-robot gains tune -o my_gains            a gain set for a robot and a mission
       space-robot analyze flights/<bag>...          metrics of recorded flights
       space-robot view flights/<bag>                the robot in 3-D with plots, as one page
-      space-robot replay flights/<bag>              its states to a live controller, compared
-      space-robot sim step --ticks 10               a graph that flies, paused and stepped
+      space-robot replay flights/<bag>              recorded states to a live controller
+      space-robot sim step --ticks 10               a running graph, paused and stepped
       space-robot campaign run sensor_grades        laws over grades of sensors
-      space-robot campaign run FILE --runs 1000     all is dispersed: verdicts with confidence
-      space-robot reproduce                         the paper's Table V and figures, flown again
+      space-robot campaign run FILE --runs 1000     dispersed flights: verdicts with confidence
+      space-robot reproduce                         the paper's Table V and figures
     """
 
 
 def commands() -> Iterator[click.Command]:
-    """Yield the commands of this folder: each has its file's name, without an underscore."""
+    """Yield the commands of this folder; each is named as its file."""
     folder = import_module(__package__)
     for module in pkgutil.iter_modules(folder.__path__):
         if "_" not in module.name and module.name != "main":
@@ -74,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 
 def _node_module(word: str) -> str | None:
-    """Return the module of the node that is called so, if there is one."""
+    """Return the module of the node with this name, or None."""
     return MODULES.get(word.removesuffix(SUFFIX)) if word.endswith(SUFFIX) else None
 
 
@@ -99,7 +99,7 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 
 def _lost(error: OSError) -> int:
-    """Say what could not be written or read, unless nobody reads; return the exit code."""
+    """Report a failed read or write, unless the pipe is closed; return the exit code."""
     if not is_of_output(error):
         _complain(f"{error.filename or 'the system'}: {error.strerror or error}")
     elif not isinstance(error, BrokenPipeError):

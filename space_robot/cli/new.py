@@ -1,4 +1,4 @@
-"""``space-robot new``: a folder for a robot that has none, flown once."""
+"""The command ``space-robot new``: make a folder for a robot and fly it once."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from .options import BASE, REPAIR, flight_options
 def new(
     robot: str, out: Path | None, base: str | None, repair: bool, force: bool, as_json: bool
 ) -> None:
-    """Make a folder for a robot: its numbers, a mission, gains for all laws; fly each law once.
+    """Make a folder for a robot: model, mission, gains for all laws; fly each law once.
 
     ROBOT is a URDF, a xacro (where xacro is installed), or a YAML file. The mission goes from rest
     to rest within the limits of the joints, the gains are those of `gains tune`. Exit code 1 if a
-    law could not fly its gains; the folder is made all the same.
+    law could not fly with its gains; the folder is made nevertheless.
 
     \b
     Examples:

@@ -1,4 +1,4 @@
-"""Numbers as values of options."""
+"""Types of options with numeric values."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import click
 
 
 class FiniteRange(click.FloatRange):
-    """A `click.FloatRange` that refuses nan, which compares with no bound, and infinities."""
+    """A `click.FloatRange` that refuses nan and infinities."""
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
-        """Return the number that a text stands for."""
+        """Convert a text to a number."""
         number: float = super().convert(value, param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value} is not a finite number.", param, ctx)

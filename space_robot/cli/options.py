@@ -1,4 +1,4 @@
-"""Options that say what to fly, the same for every command."""
+"""Options that define a flight, shared by all commands."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _list_faults(
 
 
 def _robot_options(function: Any) -> Any:
-    """Give a command --robot, with --base and --repair, which are a part of a URDF's name."""
+    """Give a command --robot, with --base and --repair, which apply to a URDF."""
 
     @functools.wraps(function)
     def with_choice_of_urdf(*args: Any, base: str | None, repair: bool, **options: Any) -> Any:
@@ -98,12 +98,12 @@ def _robot_options(function: Any) -> Any:
 
 BASE = click.option("--base", metavar="LINK", help="The satellite, of a URDF [default: its root].")
 REPAIR = click.option(
-    "--repair", is_flag=True, help="Repair the defects of a URDF that can be; each is told."
+    "--repair", is_flag=True, help="Repair and list the repairable defects of a URDF."
 )
 
 
 def _click_option(entry: Option) -> Decorator:
-    """Return an option of the table as a command takes it."""
+    """Return a click option made from an option of the table."""
     dashed = f"--{entry.name.replace('_', '-')}"
     flag = entry.flag or dashed
     settings: dict[str, Any] = {"help": entry.help_text, "default": entry.default}
@@ -156,13 +156,13 @@ OTHERS: dict[str, Decorator] = {
     ),
     "json": click.option("--json", "as_json", is_flag=True, help="Print the report as JSON."),
 }
-"""Options of commands that fly which do not say what is flown."""
+"""Options of flying commands that do not define the flight."""
 ON_A_FLIGHT = (*names(needs_graph=False), *OTHERS)
 ON_A_GRAPH = (*names(), *OTHERS)
 
 
 def flight_option(name: str) -> Decorator:
-    """Return an option by its name: of the table, or of `OTHERS`."""
+    """Return an option of the table, or of `OTHERS`, by its name."""
     if name in OTHERS:
         return OTHERS[name]
     return _robot_options if name == "robot" else _click_option(option(name))
@@ -180,10 +180,10 @@ def flight_options(*names: str) -> Decorator:
 
 
 def plan_flight(**options: Any) -> Flight:
-    """Return the flight that a command's options ask for.
+    """Return the flight plan defined by the options of a command.
 
     Raises:
-        InputError: they do not fit together, or name what there is not.
+        InputError: options conflict, or a name is unknown.
     """
     from space_robot_msgs_py.config.validation import validate
 
@@ -193,9 +193,9 @@ def plan_flight(**options: Any) -> Flight:
 
 
 def remarks_on(flight: Flight) -> list[str]:
-    """Return what there is to say of a flight before it begins.
+    """Return the warnings to print before a flight begins.
 
-    Of a robot's file that was repaired, of a start away from the mission's, of gains with too
+    On a repaired robot file, a start away from the mission's, gains with too
     little margin (of default gains only where hardware or a fault tries the margin), of joints
     that are asked too much.
     """

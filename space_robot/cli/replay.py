@@ -1,4 +1,4 @@
-"""``space-robot replay``."""
+"""The command ``space-robot replay``."""
 
 from __future__ import annotations
 
@@ -58,17 +58,17 @@ def replay(
     as_json: bool,
     **options: Any,
 ) -> None:
-    """Play a recorded flight to a live controller, and compare its commands with the recorded.
+    """Play a recorded flight to a live controller and compare the commands.
 
-    Starts a controller node with what the bag says that flew, sends it the recorded states and
+    Starts a controller node with the recorded law and gains, sends it the recorded states and
     references through the middleware, byte by byte, in lockstep, and compares every command to
-    the last bit. Exit code 0: all are equal and none is missing; 1: not so, and the first that
-    differs is shown; 2: bad input.
+    the last bit. Exit code 0: all are equal and none is missing; 1: a command differs or is
+    missing, and the first difference is shown; 2: invalid input.
 
-    With another --controller or other --gains there is nothing to be equal to: shown is what
-    they would have commanded on the same history (open loop), with exit code 0.
+    With another --controller or other --gains, equality is not expected: the command shows
+    what they would have commanded on the same history (open loop), with exit code 0.
 
-    A bag may be anybody's: modules and files that it names are not opened without --trust.
+    Modules and files that a bag names are not opened without --trust.
 
     \b
     Examples:

@@ -1,4 +1,4 @@
-"""A replay on a terminal: counts, the first difference, the differences by axis."""
+"""Terminal output of a replay: counts, first difference, differences by axis."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ COUNTS = {
 }
 ALWAYS = ("played", "compared", "equal")
 MOST_STRETCHES = 10
-"""Of a damaged bag that are shown."""
+"""Maximum number of stretches of a damaged bag that are shown."""
 
 
 def print_replay(report: dict[str, Any], console: Console) -> None:
@@ -46,7 +46,7 @@ def print_replay(report: dict[str, Any], console: Console) -> None:
 
 
 def title(report: dict[str, Any]) -> str:
-    """Say what was replayed, by whom."""
+    """Return a title: the bag replayed and the law that answered."""
     now = report["replayed"]
     pace = "in lockstep" if report["lockstep"] else f"at {report['rate']:g} times real time"
     law, swaps = now["controller"], ""
@@ -60,7 +60,7 @@ def title(report: dict[str, Any]) -> str:
 
 
 def counts(report: dict[str, Any]) -> list[tuple[str, str]]:
-    """List name and number of each line of the table; what is zero and rare is left out."""
+    """Return name and value of each row of the table; rare rows are left out if zero."""
     rows = [(words, str(report[k])) for k, words in COUNTS.items() if k in ALWAYS or report[k]]
     for key, words in (("recorded", "in the bag"), ("replayed", "now")):
         if number := report["unreadable"][key]:
@@ -70,7 +70,7 @@ def counts(report: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def verdict(report: dict[str, Any]) -> str:
-    """Say the outcome in a line."""
+    """Return the outcome in one line."""
     flown, first = report["recorded"], report["first_difference"]
     if not report["has_commands"]:
         return "the bag has no commands to compare with"

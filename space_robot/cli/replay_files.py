@@ -1,4 +1,4 @@
-"""Recorded and replayed torques as files: a table for other tools, a figure for people."""
+"""Recorded and replayed torques as CSV file and as figure."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ COLUMNS = 3
 
 
 def write_csv(comparison: Comparison, period: float, path: Path) -> None:
-    """Write a row a tick: tick, time, s, and the torques of each axis, N m, or N (empty: none)."""
+    """Write a row per tick: tick, time in s, torque of each axis in N m or N."""
     ticks, recorded, replayed = comparison.table()
     names = [
         f"{axis}_{which}" for which in ("recorded", "replayed") for axis in comparison.axis_names
@@ -36,7 +36,7 @@ def write_csv(comparison: Comparison, period: float, path: Path) -> None:
 
 
 def write_plot(comparison: Comparison, period: float, title: str, path: Path) -> tuple[Path, ...]:
-    """Draw ``path`` as PNG and as SVG, whatever its ending; return the files."""
+    """Draw PNG and SVG files named as ``path``; return the files."""
     return save_figure(torques(comparison, period, title), path.with_suffix(""))
 
 

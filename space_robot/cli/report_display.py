@@ -1,4 +1,4 @@
-"""Reports on a terminal: the table of a flight, or of several bags side by side."""
+"""Terminal tables of the report on one flight, or on several side by side."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from ..console.terminal import echo_json, say, terminal
 from ..console.terminal_tables import print_table
 
 LABELS = 44
-"""Columns of the terminal that names and units take beside the metrics of several bags."""
+"""Terminal width of names and units beside the metrics of several bags."""
 NARROWEST = 17
-"""Columns of one bag."""
+"""Least terminal width of one bag."""
 
 
 def show_report(report: dict[str, Any], as_json: bool) -> None:
@@ -33,13 +33,13 @@ def show_report(report: dict[str, Any], as_json: bool) -> None:
 
 
 def show_next_steps(bag: Path) -> None:
-    """Say on standard error what can be done with a bag."""
+    """Print on standard error the commands that can follow for a bag."""
     name = shlex.quote(str(bag))
     click.echo(f"next: space-robot view {name}\n      space-robot analyze {name}", err=True)
 
 
 def print_comparison(reports: dict[str, dict[str, Any]], console: Console) -> None:
-    """Print all metrics of several bags, in as many tables as the width asks for."""
+    """Print all metrics of several bags, in as many tables as the width needs."""
     every = max(1, (console.width - LABELS) // NARROWEST)
     remaining = iter(reports.items())
     while shown := dict(islice(remaining, every)):

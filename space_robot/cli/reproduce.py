@@ -1,4 +1,4 @@
-"""``space-robot reproduce``."""
+"""The command ``space-robot reproduce``."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def reproduce(
     jobs: int | None,
     as_json: bool,
 ) -> None:
-    """Fly Table V of the paper and compare: tables, Figures 5 to 9, one page with it all.
+    """Fly Table V of the paper and compare; write tables, Figures 5 to 9, and a report.
 
     Every row is flown with the printed gains and the tuned ones, with the printed friction and
     without. Writes table_v.md, .csv and .json, figures/ (PNG and SVG) and report.html.

@@ -1,4 +1,4 @@
-"""A robot's bodies, joints, tools and shapes as tables."""
+"""Tables of a robot's bodies, joints, tools and shapes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..console.terminal_tables import print_table
 
 
 def print_robot(description: dict[str, Any], findings: Sequence[Finding], console: Console) -> None:
-    """Print what `space_robot_model.robot.described.describe` tells of a robot."""
+    """Print the description made by `space_robot_model.robot.described.describe`."""
     passive = len(description["passive_names"])
     say(
         console,
@@ -84,7 +84,7 @@ def _joints(description: dict[str, Any]) -> Table:
     heads = [Column(name, is_label=name in ("joint", "kind", "parent")) for name in shown]
     note = (
         "In this order in all arrays. deg and N m, or m and N of prismatic joints; friction: "
-        "Coulomb and viscous; spring: stiffness, damping and rest; - is not told."
+        "Coulomb and viscous; spring: stiffness, damping and rest; -: not given."
     )
     return Table("Joints", heads, [Group(list(zip(*shown.values(), strict=True)))], [note])
 
@@ -134,7 +134,7 @@ def _shapes(description: dict[str, Any]) -> Table:
             seen["body"],
             seen["shape"],
             _vector(seen["size"]),
-            seen.get("mesh", "") + ("" if seen.get("found", True) else " (not there)"),
+            seen.get("mesh", "") + ("" if seen.get("found", True) else " (missing)"),
         ]
         for seen in description["shapes"]
     ]

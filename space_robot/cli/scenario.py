@@ -1,4 +1,4 @@
-"""``space-robot scenario``: the numbers of a flight, without flying it."""
+"""The command ``space-robot scenario``: print the settings of a flight."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from .options import ON_A_GRAPH, file_option, flight_options, plan_flight
 @flight_options(*(name for name in ON_A_GRAPH if name != "bag"))
 @file_option("--output", help="File to write to [default: standard output].")
 def scenario(as_json: bool, output: Path | None, **options: Any) -> None:
-    """Print the resolved scenario: every number of a flight, and no name of a file.
+    """Print the resolved scenario: every setting of a flight, independent of files.
 
-    The YAML (or, with --json, JSON) is a scenario file itself: `--scenario` flies it to the same
-    bits, wherever the files are that it was made from.
+    The YAML (or, with --json, JSON) is itself a scenario file: `--scenario` repeats the flight
+    bit by bit, without the files that it was made from.
 
     \b
     Examples:

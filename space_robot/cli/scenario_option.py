@@ -1,4 +1,4 @@
-"""The options ``--scenario`` and ``--set``: a scenario's file, and single parameters of nodes."""
+"""The options ``--scenario`` and ``--set``: scenario file and single node parameters."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _SCENARIO_PARAMETERS = f"{__name__}.parameters"
 
 
 class NameOrNumbers(click.ParamType[Any]):
-    """A name or a path; in a scenario file also the numbers themselves, as a mapping."""
+    """A name or a path; in a scenario file also a mapping of the numbers."""
 
     name = "text"
 
     def convert(
         self, value: Any, param: click.Parameter | None, context: click.Context | None
     ) -> Any:
-        """Return the value as it is."""
+        """Return the value unchanged."""
         return value
 
 
@@ -54,7 +54,7 @@ def _set(tree: dict[str, dict[str, Any]], text: str, where: str) -> None:
 
 
 def scenario(context: click.Context, option: click.Parameter, path: Path | None) -> None:
-    """Take a scenario's values as the options' defaults."""
+    """Use the values of a scenario as defaults of the options."""
     if path is None:
         return
     from space_robot_msgs_py.config.validation import one_of, read_yaml
@@ -96,10 +96,10 @@ def _scenario_parameters(content: Any, where: str) -> dict[str, dict[str, Any]]:
 
 
 def _scenario_value(option: click.Parameter, value: Any, where: str) -> Any:
-    """Return a scenario's value, if it is of the type that its option takes.
+    """Return a value of a scenario after checking its type.
 
     Raises:
-        InputError: it is of another.
+        InputError: the type does not fit the option.
     """
     from space_robot_msgs_py.config.validation import short
     from space_robot_msgs_py.errors import InputError

@@ -11,10 +11,9 @@ from .options import Decorator
 
 @click.group()
 def sim() -> None:
-    """Pause, step, resume or reset a graph of nodes that flies.
+    """Pause, step, resume or reset a running graph of nodes.
 
-    The services of its plant do it, which `ros2 service call` reaches as well; this is for those
-    without the ros2 command.
+    The commands call services of the plant node, for users without `ros2 service call`.
 
     \b
     Examples:
@@ -25,7 +24,7 @@ def sim() -> None:
 
 
 def where(function: Any) -> Any:
-    """Give a command the options that say which graph is meant."""
+    """Give a command the options that select a graph."""
     options: list[Decorator] = [
         click.option(
             "--domain",
@@ -42,14 +41,14 @@ def where(function: Any) -> Any:
 @sim.command()
 @where
 def pause(**options: Any) -> None:
-    """Hold the plant at its present tick; no watchdog takes that for silence."""
+    """Hold the plant at its present tick; watchdogs ignore the pause."""
     _call("pause", **options)
 
 
 @sim.command()
 @where
 def resume(**options: Any) -> None:
-    """Let a paused plant go on."""
+    """Resume a paused plant."""
     _call("resume", **options)
 
 
@@ -57,17 +56,17 @@ def resume(**options: Any) -> None:
 @click.option("--ticks", type=int, default=1, show_default=True, help="Ticks to go on.")
 @where
 def step(**options: Any) -> None:
-    """Let a paused plant go some ticks on; return when it is paused again."""
+    """Advance a paused plant by some ticks; return when it is paused again."""
     _call("step", **options)
 
 
 @sim.command()
 @where
 def reset(**options: Any) -> None:
-    """Take the whole graph back to its start; what is paused stays paused.
+    """Reset the whole graph to tick 0; a paused graph stays paused.
 
-    Plant, controller, mission and recorder are made anew. The recorder closes its bag and renames
-    it to BAG_before_reset_1; the flight that begins is recorded to BAG, from tick 0.
+    Plant, controller, mission and recorder start again. The recorder closes its bag and renames
+    it to BAG_before_reset_1; the new flight is recorded to BAG, from tick 0.
     """
     _call("reset", **options)
 

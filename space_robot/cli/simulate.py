@@ -1,4 +1,4 @@
-"""``space-robot simulate``: a mission flown in this process, without ROS."""
+"""The command ``space-robot simulate``: fly a mission in this process, without ROS."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .options import ON_A_FLIGHT, flight_options, plan_flight, remarks_on
 @click.command()
 @flight_options(*ON_A_FLIGHT)
 def simulate(as_json: bool, bag: Path | None, **options: Any) -> None:
-    """Fly the same mission in this process, without ROS; the numbers are those of `fly`.
+    """Fly a mission in this process, without ROS, with the same numbers as `fly`.
 
     \b
     Examples:

@@ -1,4 +1,4 @@
-"""``space-robot stability``."""
+"""The command ``space-robot stability``."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def stability(initial_error: float, as_json: bool, plot: Path | None, **options:
     """Check the paper's stability conditions on a flight: Section III-C, Appendices A and B.
 
     Flies the case as planned, without friction, and from an initial error; measures the
-    time-delay error and its derivative, and says of every condition whether it holds.
+    time-delay error and its derivative, and reports whether each condition holds.
 
     \b
     Examples:

@@ -1,4 +1,4 @@
-"""``space-robot sweep``, for one more version: names the campaign that flies the same."""
+"""The removed command ``space-robot sweep``: names its replacement."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 POINTS = {"sensor_grades": 4, "base_actuators": 6}
-"""Of the grid of each campaign: so many runs are one draw."""
+"""Grid points of each campaign: one draw is this many runs."""
 
 
 @click.command(hidden=True, context_settings={"ignore_unknown_options": True})
@@ -26,7 +26,7 @@ def sweep(
     out: Path | None,
     others: tuple[str, ...],
 ) -> None:
-    """Say which campaign to run instead of this command."""
+    """Name the campaign that replaces this command."""
     from space_robot_msgs_py.config.files import named_file
     from space_robot_msgs_py.errors import InputError
 

@@ -1,4 +1,4 @@
-"""``space-robot urdf``: a robot as a URDF."""
+"""The command ``space-robot urdf``: export a robot as a URDF."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .options import BASE, REPAIR, file_option
 @REPAIR
 @file_option("--out", help="Write it to a file, in place of standard output.")
 def urdf(robot: str, base: str | None, repair: bool, out: Path | None) -> None:
-    """Show a robot as a URDF, for RViz, Pinocchio, MuJoCo and whatever else reads one.
+    """Export a robot as a URDF, for RViz, Pinocchio, MuJoCo and other tools.
 
     ROBOT is a name, a URDF, a xacro (where xacro is installed), a YAML file or a folder. Frames
     are those of /tf: the base's is at its centre of mass, those of joints have the axis as z. What

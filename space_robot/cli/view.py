@@ -1,4 +1,4 @@
-"""``space-robot view``: flights in 3-D with plots that follow, as one page."""
+"""The command ``space-robot view``: show flights in 3-D with plots on one page."""
 
 from __future__ import annotations
 
@@ -78,12 +78,12 @@ def view(
     domain: int | None,
     port: int,
 ) -> None:
-    """Show recorded flights: the robot in 3-D, with plots that follow it, on one HTML page.
+    """Show recorded flights in 3-D with synchronised plots on one HTML page.
 
-    The page needs nothing but a browser, no network: send it to a colleague. Play, scrub, click a
-    plot or a mark to go there. Several bags are drawn over one another, or side by side.
+    The page needs only a browser and no network. Play, scrub, or click a plot or a mark to go to
+    that time. Several bags are drawn over one another, or side by side.
 
-    Named .webp, .gif or .png the file is an animated picture, for which Chromium must be here.
+    With the ending .webp, .gif or .png the file is an animated picture, which needs Chromium.
     With --live and no bag the same scene is served from a running graph, one flight after another.
 
     \b
@@ -133,4 +133,4 @@ def view(
         written.write(data)
     click.echo(f"wrote {page} ({page.stat().st_size / 1e6:.1f} MB)", err=True)
     if opens and not webbrowser.open(page.absolute().as_uri()):
-        click.echo("no browser was found here: open the page in one", err=True)
+        click.echo("no browser available: open the page in one yourself", err=True)

@@ -1,4 +1,4 @@
-"""``space-robot view --live``: the scene of what flies now, served to browsers."""
+"""Live view of a running flight, served to browsers."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from collections.abc import Collection
 import click
 
 NICENESS = 10
-"""The graph comes first: a frame may be late, a tick may not."""
+"""Niceness of the viewer, so that it does not delay the graph."""
 OF_LIVE = ("domain", "port")
 OF_BOTH = ("live", "opens", "robot", "light", "namespace")
 
 
 def check_options(context: click.Context, live: bool, bags: Collection[object]) -> None:
-    """See that what was given fits recorded flights, or a live one.
+    """Check that the options fit a recorded or a live flight.
 
     Raises:
-        InputError: it is for the other.
+        InputError: an option is for the other kind of flight.
     """
     from click.core import ParameterSource
 

@@ -19,7 +19,7 @@ from space_robot_msgs_py.errors import InputError
 
 
 def check_free(path: Path) -> None:
-    """See that a file can be made there, before any work is done for it.
+    """Check that a file can be made there, before any work is done for it.
 
     Raises:
         InputError: it exists, or its folder cannot be made or written.
@@ -44,7 +44,7 @@ def make_folder(path: Path) -> None:
 
 
 def check_writable(path: Path) -> None:
-    """See that a file can be written or replaced, before any work is done for it.
+    """Check that a file can be written or replaced, before any work is done for it.
 
     Raises:
         InputError: it cannot.

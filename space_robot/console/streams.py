@@ -24,7 +24,7 @@ def standard_streams() -> Iterator[None]:
 
 
 def is_of_output(error: OSError) -> bool:
-    """Tell if standard output could not be written; what it has not taken is then dropped.
+    """Return True if standard output could not be written; what it has not taken is then dropped.
 
     Errors of files name them.
     """

@@ -68,7 +68,7 @@ def show(table: Table, console: Console) -> None:
 
 
 def _has_room(table: Table, numbers: list[Column], console: Console) -> bool:
-    """Tell if every word of the numbers is shown in one piece, and the start of each label's."""
+    """Return True if no number is wrapped and the start of each label fits."""
     padding = table.padding[1] + table.padding[3]
     longest = (max((len(word) for word in _words(column)), default=0) for column in numbers)
     if sum(length + padding for length in longest) > console.width:  # that is known at once

@@ -1,1 +1,1 @@
-"""Flying: one plan, in this process (`simulate`) or as a graph of nodes (`orchestrator`)."""
+"""Flights of a scenario: in this process (`simulate`) or as ROS nodes (`orchestrator`)."""

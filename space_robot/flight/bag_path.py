@@ -24,10 +24,10 @@ def default_bag(flight: Flight) -> Path:
 
 
 def check_bag_path(path: Path) -> None:
-    """See that a bag can be made there, without making anything.
+    """Check that a bag can be made at a path, without creating it.
 
     Raises:
-        InputError: it exists, or its nearest existing folder cannot be written.
+        InputError: the path exists, or its nearest existing folder cannot be written.
     """
     if _is_taken(path):
         raise InputError(f"{path}: exists already; a bag is never overwritten")
@@ -43,10 +43,10 @@ def check_bag_path(path: Path) -> None:
 
 
 def _is_taken(path: Path) -> bool:
-    """Tell whether something has this name.
+    """Return whether the path exists.
 
     Raises:
-        InputError: nothing can have it, which `Path.exists` does not tell.
+        InputError: the name is not valid, which `Path.exists` does not report.
     """
     try:
         path.lstat()

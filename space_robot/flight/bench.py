@@ -1,10 +1,10 @@
-"""A flight step by step, for laws under development and for learning.
+"""Bench: a flight step by step, to develop and learn control laws.
 
     state = bench.reset(seed=1)
     while not bench.done:
         state = bench.step(torque_of(state))
 
-The bits are those of the flight flown whole.
+Results are bit-identical to an uninterrupted flight.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ REFERENCE_TICKS = 1000
 
 
 class Snapshot(NamedTuple):
-    """A bench at a tick: plant, random numbers, faults, controller and law. It can be pickled."""
+    """State of a bench at a tick: plant, random numbers, faults, controller, law. Picklable."""
 
     plant: PlantSnapshot
     controller: ControllerSnapshot
@@ -44,7 +44,7 @@ class Snapshot(NamedTuple):
 
 
 class Bench(RecordOwner):
-    """Flies a plant tick by tick under torques from anywhere, or under the flight's own law.
+    """Plant flown tick by tick under external torques, or under the flight's law.
 
     States are views of the memory of one flight, overwritten by every step: `RobotState.copy`
     keeps one. A fresh bench stands at tick 0, with the seed of its flight. A copy, by `copy` or
@@ -57,7 +57,7 @@ class Bench(RecordOwner):
         """Put a flight on the bench.
 
         Raises:
-            InputError: it needs a graph of nodes, or its messages fail: here are none.
+            InputError: the flight needs a graph of nodes or has faults of messages.
         """
         flight.check_in_process()
         if flight.plant_settings.has_message_faults:
@@ -101,7 +101,7 @@ class Bench(RecordOwner):
         self._answered = -1
         self._ending: Ending | None = None
         self.done = False
-        """True once the flight is over: `outcome` says how."""
+        """True once the flight is over; see `outcome`."""
         return self._plant.state
 
     def step(self, torque: ArrayLike | None = None) -> RobotState:
@@ -113,7 +113,7 @@ class Bench(RecordOwner):
                 each of these A actuators. None: what the flight's law commands.
 
         Raises:
-            InputError: not as many numbers, or none; no law to command; the flight is over.
+            InputError: wrong number of values; no law to command; the flight is over.
         """
         if self.done:
             raise InputError(f"the flight is over ({self.outcome}): reset or restore the bench")
@@ -128,7 +128,7 @@ class Bench(RecordOwner):
         return plant.state
 
     def command(self) -> Command:
-        """Return what the flight's law commands at this tick; ``torque`` (m+A,) is overwritten.
+        """Return the command of the flight's law at this tick, overwriting ``torque`` (m+A,).
 
         Asked again it answers the same. It takes over anew after ticks that it has not answered.
 
@@ -152,14 +152,14 @@ class Bench(RecordOwner):
         return controller.last_command
 
     def save(self) -> Snapshot:
-        """Copy all that the rest of the flight depends on."""
+        """Save the complete state of the flight."""
         return Snapshot(self._plant.save(), self.controller.save(), self._answered, self._ending)
 
     def restore(self, snapshot: Snapshot) -> RobotState:
-        """Go back, or on, to a snapshot of this scenario, whatever its seed; the same bits follow.
+        """Restore a snapshot of this scenario; the flight continues bit-identically.
 
         Raises:
-            InputError: it is no snapshot, or of another robot or scenario.
+            InputError: no snapshot, or a snapshot of another robot or scenario.
         """
         if not isinstance(snapshot, Snapshot):
             raise InputError(f"snapshot: what `save` returned was expected, got {short(snapshot)}")
@@ -215,7 +215,7 @@ class Bench(RecordOwner):
 
     @property
     def reason(self) -> str:
-        """Why the flight ended before its time, in a line; empty if it did not."""
+        """Reason of an early end, in one line; empty otherwise."""
         return self._ending.reason if self._ending else ""
 
     def __repr__(self) -> str:
@@ -226,7 +226,7 @@ class Bench(RecordOwner):
         self._ending, self.done = ending, True
 
     def _command_of(self, torque: ArrayLike) -> Command:
-        """Return the command of numbers that somebody else gives."""
+        """Return the command for numbers given by the user."""
         numbers, torques = as_numbers(torque, "torque"), self._given
         if numbers.shape == self._shape:
             torques.torque[:] = numbers
@@ -239,7 +239,7 @@ class Bench(RecordOwner):
         return self.controller.allocate_torque(self._plant.state, numbers)
 
     def _law_at(self, tick: int) -> ControlLaw:
-        """Return the law in force: the one swapped to last."""
+        """Return the law in force at this tick, after swaps."""
         law = self._law
         for swapped_at, other in self._swaps:
             if swapped_at <= tick:
@@ -247,7 +247,7 @@ class Bench(RecordOwner):
         return law
 
     def _look_up(self, tick: int) -> None:
-        """Put the reference of a tick into its block."""
+        """Write the reference of a tick into its block."""
         row = tick - self._first
         if not 0 <= row < len(self._desired):
             self._first = tick - tick % REFERENCE_TICKS

@@ -1,4 +1,4 @@
-"""Plant and controller closed in one process, tick by tick, into a log."""
+"""Closed loop of plant and controller in one process, logged tick by tick."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 def close_loop(plant: Plant, controller: Controller, log: FlightLog, start: int, stop: int) -> None:
     """Fly the ticks ``start`` to ``stop``, all of them in ``log``, whose reference is filled in.
 
-    A law with a kernel flies in compiled code; any other at the speed of Python. Both run the
+    A law with a kernel runs in compiled code, any other at the speed of Python. Both run the
     same kernels, as the nodes do.
 
     Raises:
@@ -41,7 +41,7 @@ def close_loop(plant: Plant, controller: Controller, log: FlightLog, start: int,
 def _close_loop_compiled(
     plant: Plant, controller: Controller, law: CompiledLaw, log: FlightLog, start: int, stop: int
 ) -> None:
-    """Fly ticks in which nothing but compiled code has to do anything, and begin ``stop``."""
+    """Fly ticks that need only compiled code, and begin ``stop``."""
     rows = log.rows(start - log.first_tick, stop - log.first_tick)
     assert rows.telemetry is not None
     states = np.empty(rows.ticks, plant.state.block.dtype)
@@ -78,8 +78,8 @@ def _close_loop_compiled(
 def measured_ticks(plant: Plant, error: Exception) -> int:
     """Count the states ``plant`` had sent when `close_loop` raised ``error``.
 
-    A state that the law could not answer was sent; one that the plant itself found to be beyond
-    all physics was not. `Plant.tick` is how many of them were answered.
+    A state that the law could not answer was sent; a state that the plant rejected as diverged
+    was not. `Plant.tick` is the number of answered states.
     """
     return plant.tick + (not isinstance(error, DivergedError))
 

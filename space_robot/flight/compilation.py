@@ -1,4 +1,4 @@
-"""Compiling everything a flight needs before it starts, once an installation."""
+"""Compilation of all kernels before a flight, once per installation."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MARK, ALLOCATION_MARK = "complete", "allocation"
 
 
 def compile_kernels(with_allocation: bool = False) -> None:
-    """Compile all that flights need, unless that has been done since the last change.
+    """Compile all kernels of flights that have changed since the last compilation.
 
     Else the nodes would compile the same functions side by side in their first tick. The allocation
     is for bases whose actuators are hardware.
@@ -63,14 +63,14 @@ def _compile_flights() -> None:
 
 
 def _progress(what: str, *kernels: Any) -> AbstractContextManager[None]:
-    """Say what is compiled, and show how many kernels are; other processes compile them, too."""
+    """Show the progress of compilation, including other processes."""
     click.echo(f"compiling {what} (once an installation, a minute or two) ...", err=True)
     files = index_files(kernels)
     return watching_progress("kernels", len(files), lambda: count_compiled(files))
 
 
 def load_kernels() -> None:
-    """Read what nodes use from the cache, if it is there."""
+    """Load the kernels used by nodes from the cache, if it exists."""
     if (cache_directory() / MARK).exists():
         flight = Flight(resolve(FlightPlan()))
         _step_plant(flight)
@@ -82,7 +82,7 @@ def _step_plant(flight: Flight) -> None:
 
 
 def _answer_and_exchange(flight: Flight) -> None:
-    """The controller's entry, and the messages."""
+    """Compile the controller's entry point and the messages."""
     states = StateCodec(flight.plant.names, flight.timebase)
     commands = CommandCodec(flight.plant.names.commanded, flight.timebase)
     state = RobotState.allocate(flight.robot.n)

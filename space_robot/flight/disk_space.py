@@ -1,4 +1,4 @@
-"""The size of a long flight's bag, beside the room on the disk."""
+"""Estimated size of a bag compared with the free disk space."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from .plan import Flight, resolve
 from .simulate import simulate
 
 SAMPLE_TICKS = 2000
-"""Ticks that are recorded, and thrown away, to learn how large a tick is."""
+"""Ticks recorded and discarded to measure the size of a tick."""
 
 
 def largest_tick(joints: int) -> int:
-    """Return the bytes of a tick that no bag exceeds, uncompressed: else an estimate is needed."""
+    """Return an upper bound of the uncompressed size of a tick, bytes."""
     return 2000 + 200 * joints
 
 
@@ -24,7 +24,7 @@ def bag_bytes(flight: Flight) -> float:
     """Estimate the bytes of the bag of ``flight`` from its first second.
 
     Raises:
-        FlightError: it diverges in that.
+        FlightError: the flight diverges in that second.
     """
     plan = flight.scenario.options.model_copy(update={"duration": SAMPLE_TICKS * flight.period})
     with TemporaryDirectory() as folder:
@@ -35,7 +35,7 @@ def bag_bytes(flight: Flight) -> float:
 
 
 def disk_space_warning(flight: Flight, bag: Path) -> str:
-    """Return a line that says that ``bag`` will not have room; empty if it will."""
+    """Return a warning if the disk has no room for ``bag``; empty if it has."""
     free = shutil.disk_usage(next(p for p in bag.absolute().parents if p.exists())).free
     if flight.ticks * largest_tick(flight.robot.joint_count) <= free:
         return ""

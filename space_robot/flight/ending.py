@@ -1,4 +1,4 @@
-"""How a flight ended: at its planned end, or before, and why."""
+"""End of a flight: complete, or early with a reason."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ class Ending(NamedTuple):
     outcome: str
     """`COMPLETE`, `DIVERGED`, `UNANSWERED` or `FAILED`."""
     reason: str
-    """Why it ended before its time, in a line; empty if it did not."""
+    """Reason of an early end, in one line; empty otherwise."""
     tick: int | None
-    """Tick of the end; None: not known."""
+    """Tick of the end; None: unknown."""
     ended_at_s: float | None
-    """The same in simulated seconds."""
+    """Simulated time of the end, s."""
     error: FlightError | None = None
-    """What was raised."""
+    """Exception that ended the flight."""
 
     @classmethod
     def complete(cls, ticks: int, period: float) -> Ending:
-        """A flight of ``ticks`` of ``period`` s came to its end."""
+        """Return the end of a complete flight of ``ticks`` of ``period`` s."""
         return cls(COMPLETE, "", ticks, _seconds(ticks, period))
 
     @classmethod
     def early(cls, error: FlightError, period: float) -> Ending:
-        """A flight was ended by ``error``; of a graph's only the words tell how."""
+        """Return the end of a flight stopped by ``error``; for a graph, from its message."""
         outcome, tick = FAILED, None
         if isinstance(error, UnusableStateError):
             outcome, tick = UNANSWERED, error.tick
@@ -45,14 +45,14 @@ class Ending(NamedTuple):
         return cls(outcome, str(error), tick, _seconds(tick, period), error)
 
     def as_record(self) -> dict[str, Any]:
-        """Return what a report tells of it."""
+        """Return the end as a record for reports."""
         return {"outcome": self.outcome, "reason": self.reason, "ended_at_s": self.ended_at_s}
 
     def check(self) -> None:
-        """See that the flight came to its end.
+        """Check that the flight is complete.
 
         Raises:
-            FlightError: it did not.
+            FlightError: the flight ended early.
         """
         if self.error is not None:
             raise self.error

@@ -1,4 +1,4 @@
-"""Plant, mission and controller in this process, closed message by message.
+"""Closed loop of plant, mission and controller in this process, by messages.
 
 So a flight whose messages fail is that of a graph in lockstep, by the same classes. Where the
 nodes' timing would matter, the graph's flight need not repeat: here the controller takes every
@@ -26,7 +26,7 @@ Record = Callable[[topics.Topic, bytes], object]
 
 
 class MessageLoop:
-    """Flies tick by tick; every message is handed to ``record``, as it is sent."""
+    """Loop that flies tick by tick and hands every message to ``record``."""
 
     def __init__(
         self, flight: Flight, record: Record, update_true_state: Callable[[RobotState], None]
@@ -49,10 +49,10 @@ class MessageLoop:
         )
         self._state = RobotState.allocate(robot.n)
         self._streamed = 0
-        """The first tick that the mission has not sent yet."""
+        """First tick that the mission has not sent yet."""
 
     def fly_tick(self) -> None:
-        """Let mission and controller do what the plant's tick asks for, and step the plant.
+        """Run mission and controller for the plant's tick, and step the plant.
 
         Raises:
             DivergedError: see `Plant.step`.
@@ -69,7 +69,7 @@ class MessageLoop:
         plant.step(self._guard.act(tick))
 
     def _stream(self, tick: int) -> None:
-        """Let the controller have the reference as far ahead as the mission sends it."""
+        """Send the reference to the controller as far ahead as the mission does."""
         settings, mission = self._flight.mission_settings, self._flight.mission
         while self._streamed < tick + settings.lead_ticks:
             chunk = mission.chunk(self._streamed, settings.chunk_ticks)

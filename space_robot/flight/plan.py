@@ -21,13 +21,13 @@ __all__ = ["NO_FRICTION", "Flight", "FlightPlan", "resolve"]
 
 
 class Flight:
-    """The objects that fly a scenario; nothing but the scenario is read for them."""
+    """Plant, controller and mission built from a scenario alone."""
 
     def __init__(self, scenario: ResolvedScenario) -> None:
-        """Make the plant, the mission and the controller.
+        """Build the plant, the mission and the controller.
 
         Raises:
-            InputError: the numbers do not fit together.
+            InputError: settings conflict.
         """
         self.scenario = scenario
         self.plant_settings = scenario.plant
@@ -36,17 +36,17 @@ class Flight:
         self.period = scenario.plant.period
         self.timebase = scenario.plant.timebase
         self.robot = scenario.robots.plant
-        """The plant's."""
+        """Robot of the plant."""
         self.laws, self.swaps = scenario.laws, scenario.swaps
         self.law = scenario.law
-        """In force at the start."""
+        """Law in force at the start."""
         self.plant = Plant(self.robot, scenario.plant, self.period)
         self.mission = Mission(self.robot, scenario.mission, self.period)
         self.controller = self.build_controller(self.law)
         self.ticks = scenario.ticks
 
     def build_controller(self, law: ControlLaw) -> Controller:
-        """Build a controller that remembers nothing, with ``law`` in force."""
+        """Build a controller without memory, with ``law`` in force."""
         settings = self.controller_settings
         return Controller(
             self.scenario.robots.controller,
@@ -60,14 +60,14 @@ class Flight:
 
     @property
     def controls_base(self) -> bool:
-        """True if anything turns the base; else it floats freely."""
+        """True if the base has actuators; else it floats freely."""
         return self.plant_settings.controls_base
 
     def check_in_process(self) -> None:
-        """See that the flight does without a graph of nodes.
+        """Check that the flight can run in one process.
 
         Raises:
-            InputError: it asks for something that only nodes have.
+            InputError: an option needs a graph of nodes.
         """
         if self.scenario.process_faults:
             asked = f"faults {[str(fault) for fault in self.scenario.process_faults]}"
@@ -83,9 +83,9 @@ class Flight:
 
     @cached_property
     def start_step(self) -> dict[str, Any] | None:
-        """What a start away from the mission's asks of the law; None: nothing worth a remark.
+        """Demand on the law by a start away from the mission's; None: small.
 
-        See `space_robot.flight.start_step.StartStep`.
+        Returned as a `space_robot.flight.start_step.StartStep`.
         """
         step = start_step(
             self.robot,
@@ -100,9 +100,9 @@ class Flight:
 
     @property
     def description(self) -> dict[str, Any]:
-        """The flight as a bag tells it; enough to fly it again.
+        """Description of the flight for its bag, sufficient to repeat it.
 
-        The same plan with the same software gives the same one: it tells no time and no machine.
+        It depends only on plan and software, not on time or machine.
         """
         return {
             **self.scenario.description(self.plant),

@@ -1,4 +1,4 @@
-"""A flight in this process: the same plant, mission and controller, without ROS.
+"""Flights in this process, without ROS, with the same plant, mission and controller.
 
 It is flown in blocks, so that one of any length needs the memory of one block (`fly_blocks`).
 `simulate` is for those who need the whole flight as one log.
@@ -58,7 +58,7 @@ class Messages:
         self._record_all(self._scene.lasting())
 
     def begin_tick(self, tick: int) -> None:
-        """Write what comes now and then: the reference from ``tick`` on, and the clock."""
+        """Write the periodic messages: the reference from ``tick`` on, and the clock."""
         flight = self._flight
         chunk_ticks = flight.mission_settings.chunk_ticks
         if tick % chunk_ticks == 0:
@@ -73,12 +73,12 @@ class Messages:
         self._record_all(self._truth.add(state))
 
     def show(self, tick: int, state_of: Callable[[int], RobotState]) -> None:
-        """Write the poses of a tick's true state, if they are told."""
+        """Write the poses of a tick's true state, if they are due."""
         if self._scene.is_due(tick):
             self._record_all(self._scene.poses(state_of(tick)))
 
     def end(self) -> None:
-        """Write what is kept back."""
+        """Write the buffered messages."""
         self._record_all(self._truth.flush())
 
     def _record_all(self, messages: Iterable[tuple[topics.Topic, bytes]]) -> None:
@@ -134,7 +134,7 @@ def _recording(flight: Flight, bag: Path | None) -> Iterator[Messages | None]:
 
 
 def empty_log(flight: Flight, start: int = 0, stop: int | None = None) -> FlightLog:
-    """The log of the ticks ``start`` to ``stop`` (None: the last) before they are flown.
+    """Return the log of the ticks ``start`` to ``stop`` (None: the last) before the flight.
 
     The reference alone is known.
     """
@@ -160,7 +160,7 @@ def fly_blocks(
     progress: Callable[[int], None] = lambda tick: None,
     block_of: Callable[[int, int], FlightLog] | None = None,
 ) -> Generator[FlightLog, None, None]:
-    """Fly every tick of ``flight`` and hand out what happened, block by block.
+    """Fly every tick of ``flight`` and yield the logs, block by block.
 
     A flight that ends early hands out the block it ended in, up to the last state that was
     measured, before the error is raised; a state that was not answered has a command of NaN. All
@@ -204,7 +204,7 @@ def fly_blocks(
 def simulate(
     flight: Flight, bag: Path | None = None, progress: Callable[[int], None] = lambda tick: None
 ) -> FlightLog:
-    """`fly_blocks` into one log.
+    """Fly a flight into one log; see `fly_blocks`.
 
     Raises:
         FlightError: as there; its ``log`` is what was flown.
@@ -240,7 +240,7 @@ def _fly_by_messages(
 def _flown_by_messages(
     flight: Flight, bag: Path | None, progress: Callable[[int], None]
 ) -> FlightLog:
-    """Fly by `MessageLoop` into a bag, and read that."""
+    """Fly by `MessageLoop` into a bag, and read the bag."""
     with ScratchFolder() as folder:
         path = bag or Path(folder) / "bag"
         try:
@@ -289,7 +289,7 @@ def _fly_block(
 
 
 def _note_beliefs(flight: Flight, block: FlightLog, start: int, stop: int) -> None:
-    """Note the error that the law told in its telemetry in the ticks ``start`` to ``stop``."""
+    """Copy the errors in the law's telemetry of the ticks ``start`` to ``stop``."""
     if block.believed_error is None:
         return
     assert block.telemetry is not None
@@ -310,10 +310,10 @@ def _ended_early(block: FlightLog, measured: int, answered: int) -> FlightLog:
 
 
 def _check_memory(flight: Flight) -> None:
-    """See that a log of the whole flight has room.
+    """Check that a log of the whole flight fits into memory.
 
     Raises:
-        InputError: it has not.
+        InputError: the log does not fit.
     """
     from ..processes.memory import available_bytes
 

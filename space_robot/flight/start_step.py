@@ -1,4 +1,4 @@
-"""A flight whose robot does not stand where its mission begins: what that step asks of the law."""
+"""Step from the robot's start to the start of its mission, and its demand on the law."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ Array = NDArray[np.float64]
 ROUNDING = 1e-6
 """rad or m; what differs by less is the same place."""
 MOST_TIMES = 3.0
-"""A demand of so many times that of the mission is worth a remark."""
+"""Ratio to the mission's demand from which a warning is given."""
 REHEARSAL_S = 0.1
-"""Simulated time that is flown to see what the law commands."""
+"""Simulated time flown to measure the commands of the law, s."""
 SAMPLES = 300
 """Points of the mission whose torque is computed."""
 
 
 class StartStep(NamedTuple):
-    """A step from the robot's place at tick 0 to the mission's."""
+    """Step from the robot's configuration at tick 0 to the mission's."""
 
     attitude_deg: float
     """Angle between the base's attitude and the desired one; 0 of a base that floats freely."""
@@ -46,7 +46,7 @@ class StartStep(NamedTuple):
     unit: str
     """Of ``joint_error``: "rad" or "m"."""
     law: str
-    """In force at the start."""
+    """Law in force at the start."""
     axis: str
     """The axis with the largest torque of those that are asked too much."""
     demand: float
@@ -58,7 +58,7 @@ class StartStep(NamedTuple):
 
 
 def sentence(step: Mapping[str, Any]) -> str:
-    """Return a `StartStep`, as a mapping, in words."""
+    """Return a sentence that describes a `StartStep`, given as a mapping."""
     error, unit = (
         (math.degrees(step["joint_error"]), "deg")
         if step["unit"] == "rad"

@@ -1,1 +1,1 @@
-"""Processes: what starts them, ends them, and says which software runs in them."""
+"""Start, end and identify processes."""

@@ -1,4 +1,4 @@
-"""A process of this project that a command starts beside its own work."""
+"""A child process of a command."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from space_robot_msgs_py.ros.run_module import clean_environment
 
 @contextmanager
 def child_process(command: Sequence[str], **options: Any) -> Iterator[subprocess.Popen[bytes]]:
-    """A process that does not outlive the context, nor this process; ``options``: of `Popen`.
+    """Start a process that ends with the context or this process; ``options``: of `Popen`.
 
     It must be one that holds to its standard input, see `lifeline`.
     """

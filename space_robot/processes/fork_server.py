@@ -1,4 +1,4 @@
-"""A process that forks others from what it knows, and tells how they ended.
+"""Fork server: forks preloaded child processes and reports their exit codes.
 
 It has imported the modules and compiled kernels that they need, so that one begins within a few
 milliseconds. A process with threads must not fork: a lock that a thread holds stays locked in the
@@ -30,20 +30,20 @@ from space_robot_msgs_py.ros.run_module import clean_environment, module_command
 from .interruption import SIGNALS
 
 TIMEOUT_S = 60.0
-"""For an answer of the server, which takes milliseconds: then something is very wrong."""
+"""Longest wait for an answer of the server, which normally takes milliseconds."""
 CHECK_S = 5.0
-"""Time between two looks of the server whether the process that it serves is still there."""
+"""Interval in which the server checks that its client process still runs."""
 UNKNOWN = b"?"
 """The exit code of a child that another server had forked."""
 RUNS = b"-"
 """The exit code of a child that has not ended."""
 MOST_DESCRIPTORS = 4
 Target = Callable[[Connection, Sequence[int], int], None]
-"""What a child does: its connection to the user's process, more open files, pid of the server."""
+"""Function of a child: takes its connection to the client, open files, server pid."""
 
 
 class ForkServer:
-    """The server as the user's process sees it: it forks children and ends them."""
+    """Client side of the fork server: forks children and ends them."""
 
     def __init__(self, start: Callable[[socket.socket, socket.socket], int]) -> None:
         """``start``: starts the server with its end of a socket, see `serve`; returns its pid.
@@ -144,7 +144,7 @@ class ForkServer:
 
 
 def serve_standard_input(target: Target) -> None:
-    """Be the server that `ForkServer.of_module` has started."""
+    """Run the server that `ForkServer.of_module` has started."""
     starter = os.getppid()
     with socket.socket(fileno=os.dup(0)) as end:
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
@@ -199,7 +199,7 @@ def _forked_child(
 
 
 def _exit_code(children: dict[int, int | None], pid: int, *, is_killed: bool) -> bytes:
-    """Return the exit code of a child, kept from the first time that it was asked for."""
+    """Return the exit code of a child, kept from the first query."""
     if pid not in children:
         return UNKNOWN
     if children[pid] is None:

@@ -1,4 +1,4 @@
-"""Signals that end a command: with its files and processes put away, and a shell's exit code."""
+"""Signals that end a command, with cleanup and the exit code of a shell."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 QUIET_S = 2.0
-"""A signal that comes twice, as from ``timeout``, must not disturb the putting away."""
+"""Time in which a repeated signal, as from ``timeout``, must not disturb the cleanup."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -29,7 +29,7 @@ def exit_code(number: int) -> int:
 
 @contextmanager
 def raising_signals() -> Iterator[None]:
-    """In the context each of `SIGNALS` raises `Interrupted` in the main thread."""
+    """Raise `Interrupted` in the main thread on each of `SIGNALS`, within the context."""
     quiet_until = 0.0
 
     def raise_interrupted(number: int, frame: object) -> None:
@@ -44,7 +44,7 @@ def raising_signals() -> Iterator[None]:
 
 @contextmanager
 def handled_signals(handler: Callable[[int, Any], None]) -> Iterator[None]:
-    """In the context a handler for `SIGNALS`, but not for a SIGHUP that is ignored (``nohup``)."""
+    """Handle `SIGNALS` in the context, except a SIGHUP that is ignored (``nohup``)."""
     numbers = [
         number
         for number in SIGNALS

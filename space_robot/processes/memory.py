@@ -1,4 +1,4 @@
-"""The memory that is left."""
+"""Available memory."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from pathlib import Path
 
 
 def available_bytes() -> float:
-    """Memory that a process can still have without swapping, as Linux estimates it.
+    """Return the memory available without swapping, in bytes, as Linux estimates it.
 
-    Infinite where that is not told.
+    Infinite where the estimate is not available.
     """
     try:
         lines = Path("/proc/meminfo").read_text("ascii").splitlines()

@@ -1,4 +1,4 @@
-"""Temporary folders that do not stay when their process is killed: the next one removes them."""
+"""Temporary folders. Folders of killed processes are removed by the next process."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from pathlib import Path
 
 PREFIX = "space_robot_scratch_"
 NEW_S = 60.0
-"""A folder that is younger may be about to be locked by its process."""
+"""Age below which a folder may not be locked by its process yet, s."""
 
 
 class ScratchFolder(tempfile.TemporaryDirectory[str]):
-    """A `TemporaryDirectory` that is locked by its process, and its children, while they run."""
+    """`TemporaryDirectory` locked by its process and its children while they run."""
 
     def __init__(self) -> None:
         """Make a folder, and remove those of processes that were killed."""

@@ -1,4 +1,4 @@
-"""The software that flies: the commit it was started from, and the versions of what it uses."""
+"""Commit and package versions of the running software."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The numbers in which two flights differ."""
+"""Comparison of the settings of two flights."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .options import FlightPlan
 
 
 class ChangedNumber(NamedTuple):
-    """A number, or a text, that two flights do not share."""
+    """A setting with different values in two flights."""
 
     key: str
-    """Its path in the resolved scenario, with dots."""
+    """Dotted path in the resolved scenario."""
     first: Any
-    """Its value in the first flight; None if it is missing there."""
+    """Value in the first flight; None if it is missing there."""
     second: Any
 
 
@@ -56,7 +56,7 @@ def written_options(file: Path) -> FlightPlan:
 
 
 def differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[ChangedNumber]:
-    """Return where two resolved scenarios differ, in the order of the first one's keys."""
+    """Return the differences of two resolved scenarios, in the order of the first's keys."""
     return list(_compared("", first, second))
 
 

@@ -1,4 +1,4 @@
-"""The catalogue of all kinds of faults of a flight, with those of the nodes' processes.
+"""Catalogue of all kinds of faults, including faults of node processes.
 
 The plant's faults stand beside what they spoil; a process is killed or stopped by the orchestrator
 (`space_robot.flight.graph.injection`).
@@ -18,7 +18,7 @@ KILLS = {
     node: Kind(f"kill_{node}", None, None, f"the {node}'s process is killed", lasts=False)
     for node in _NODES
 }
-"""By node."""
+"""Kinds of faults that kill a process, by node."""
 STOPS = {
     node: Kind(
         f"stop_{node}",
@@ -29,11 +29,11 @@ STOPS = {
     )
     for node in _NODES
 }
-"""By node."""
+"""Kinds of faults that stop a process for a while, by node."""
 NODE_OF = {kind: node for kinds in (KILLS, STOPS) for node, kind in kinds.items()}
-"""The node that a kind of fault is about."""
+"""Node affected by each kind of fault."""
 
 PROCESS_KINDS = by_name(*(kinds[node] for node in _NODES for kinds in (KILLS, STOPS)))
-"""All kinds that the orchestrator brings about, by name."""
+"""All kinds that the orchestrator causes, by name."""
 KINDS = by_name(*PLANT_KINDS.values(), *PROCESS_KINDS.values())
 """All kinds by name: the plant's, then the orchestrator's."""

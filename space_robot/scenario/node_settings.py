@@ -1,4 +1,4 @@
-"""The settings of all nodes of a flight, resolved once: nodes, `simulate` and labels agree."""
+"""Settings of all nodes of a flight, resolved once for nodes, `simulate` and labels."""
 
 from __future__ import annotations
 
@@ -42,30 +42,30 @@ NOT_TO_BE_SET = {
     **{f"{node}.autostart": "the flight starts its nodes together" for node in NODES},
     **{f"{node}.period": "use --period, which is for all nodes" for node in NODES},
 }
-"""Parameters that the flight itself gives, and what to do instead."""
+"""Parameters set by the flight itself, and the option to use instead."""
 
 Given = Mapping[str, Mapping[str, Any]]
 """Parameters by node and dotted name."""
 
 
 class FlightSettings(NamedTuple):
-    """The settings of every node, and the gains that were given by themselves."""
+    """Settings of every node, and gains given directly by the user."""
 
     plant: PlantNodeSettings
     controller: ControllerNodeSettings
     mission: MissionNodeSettings
     recorder: RecorderNodeSettings
     gains: dict[str, Tree]
-    """Gains by law; they come over those of the gain set."""
+    """Gains by law, which override the gain set."""
     overrides: dict[str, tuple[str, ...]]
-    """Dotted names of the settings given to each node, over its files."""
+    """Dotted names of the settings of each node that override its files."""
 
     @classmethod
     def resolve(cls, options: Given, parameters: Given) -> FlightSettings:
-        """Take settings from the files, the options over them, and single parameters over all.
+        """Resolve settings: options override files, single parameters override both.
 
         Raises:
-            InputError: a parameter that is wrong, or that cannot be set so.
+            InputError: a parameter is invalid or cannot be set this way.
         """
         check_may_be_set(parameters)
         overrides = {
@@ -116,7 +116,7 @@ class FlightSettings(NamedTuple):
         return settings
 
     def parameters(self, laws: Mapping[str, ControlLaw]) -> dict[str, dict[str, Any]]:
-        """Return the resolved values of what was given to each node, by dotted name."""
+        """Return the resolved values of the parameters set for each node, by dotted name."""
         gains = {
             f"{name}.{gain}": values.tolist()
             for name, law in laws.items()
@@ -139,10 +139,10 @@ class FlightSettings(NamedTuple):
 
 
 def check_may_be_set(parameters: Given) -> None:
-    """See that parameters are for nodes there are, and are not the flight's own.
+    """Check that the nodes exist and that no parameter is set by the flight itself.
 
     Raises:
-        InputError: names what does it instead.
+        InputError: a parameter cannot be set; the message names the alternative.
     """
     for node, values in parameters.items():
         one_of(node, NODES, "node", " in parameters")

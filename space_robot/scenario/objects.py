@@ -1,4 +1,4 @@
-"""Objects in the place of names in a flight's options: robot, law, gains, settings.
+"""Objects and numbers as values of flight options: robot, law, gains, settings.
 
 An option's value is kept as it was given; the functions here turn it into what the nodes'
 parameters are to be. Numbers that are given stand over no file: its name is `GIVEN` then.
@@ -29,7 +29,7 @@ from space_robot_sim.environment.environment import EnvironmentSettings
 from space_robot_sim.environment.events import Capture, Release
 
 OF_PLANT = ("initial_joints_deg", "initial_quaternion", "events")
-"""What a mission says to the plant: how it begins, and what it captures and releases."""
+"""Keys of a mission for the plant: its initial state, captures and releases."""
 
 
 def _name(value: Any, otherwise: str) -> str:
@@ -41,7 +41,7 @@ def _name(value: Any, otherwise: str) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return a copy as files have it: mappings, lists, numbers, texts."""
+    """Return a copy made of mappings, lists, numbers and texts, as in a file."""
     if isinstance(value, BaseModel):
         return value.model_dump()
     if isinstance(value, (Capture, Release)):
@@ -96,7 +96,7 @@ def _gains(value: Any) -> str | Tree:
 
 
 def _listed(gains: Tree) -> Tree:
-    """Let a number stand for a list of one, which counts for all axes."""
+    """Convert a number to a list of one, which applies to all axes."""
     return {
         name: _listed(value)
         if isinstance(value, dict)
@@ -119,10 +119,10 @@ EventText = Annotated[str, BeforeValidator(_plain)]
 
 
 def robot_setting(robot: str | Robot | Tree) -> str:
-    """Return what the parameter ``robot`` says.
+    """Return the value of the parameter ``robot``.
 
     A robot in memory has the mission and gains of the shipped one of its name, if there is one;
-    one that is told by its numbers has none.
+    a robot given by its numbers has none.
     """
     if isinstance(robot, str):
         return robot_as_path(robot)
@@ -132,7 +132,7 @@ def robot_setting(robot: str | Robot | Tree) -> str:
 
 
 def resolve_law(law: Any) -> str | type[ControlLaw] | ControlLaw | None:
-    """Return a law as it was given, a function as the law that it is."""
+    """Return a law unchanged, or a function wrapped as a law."""
     is_function = callable(law) and not isclass(law) and not isinstance(law, ControlLaw)
     return law_of(law) if is_function else law
 
@@ -148,12 +148,12 @@ def law_parameter(law: str | type[ControlLaw] | ControlLaw | None) -> str:
 
 
 def numbers_of(value: str | Tree) -> tuple[str, Tree]:
-    """Return the file's name and the numbers beside it."""
+    """Return the name of the file and the numbers that override it."""
     return (value, {}) if isinstance(value, str) else (GIVEN, value)
 
 
 def mission_of(mission: str | Tree) -> tuple[str, Tree, Tree]:
-    """Return the file's name, and what is given to the mission and to the plant.
+    """Return the file's name, and the settings for mission and plant.
 
     Unless it is given too, the plant begins at the first waypoint.
     """
@@ -172,10 +172,10 @@ def mission_of(mission: str | Tree) -> tuple[str, Tree, Tree]:
 def gains_of(
     gains: str | Tree, law: str | type[ControlLaw] | ControlLaw | None
 ) -> tuple[str, Tree]:
-    """Return the set's name, and the gains given over it as ``<law>.<gain>``.
+    """Return the name of the set, and the gains that override it as ``<law>.<gain>``.
 
     Raises:
-        InputError: they are of a law that is not there.
+        InputError: the law does not exist.
     """
     if isinstance(gains, str):
         return gains, {}

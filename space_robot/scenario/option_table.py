@@ -25,7 +25,7 @@ class Option:
     """``{names}`` stands for the names of the files in `folder`."""
     default: Any = None
     default_text: str = ""
-    """What a default of None or "" means; empty: the default itself is shown."""
+    """Text shown for a default of None or ""; empty: the default itself is shown."""
     low: float | None = None
     high: float | None = None
     above: float | None = None
@@ -34,15 +34,15 @@ class Option:
     """On the command line (empty: --name)."""
     metavar: str = ""
     folder: str = ""
-    """Folder of config/ whose files can be named."""
+    """Folder of config/ with the files that can be named."""
     needs_graph: bool = False
-    """Only a graph of nodes has it."""
+    """True if the option applies only to a graph of nodes."""
     is_launched: bool = True
-    """Also an argument of the launch file."""
+    """True if the option is also an argument of the launch file."""
 
     @property
     def help_text(self) -> str:
-        """The help with the names of the files and the default."""
+        """Return the help with the names of the files and the default."""
         from space_robot_msgs_py.config.directory import config_directory
 
         text = self.help
@@ -219,5 +219,5 @@ def option(name: str) -> Option:
 
 
 def names(needs_graph: bool | None = None) -> Iterator[str]:
-    """Yield the options' names; those that (do not) need a graph, or all."""
+    """Yield the names of options that (do not) need a graph, or of all."""
     yield from (o.name for o in OPTIONS if needs_graph in (None, o.needs_graph))

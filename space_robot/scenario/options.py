@@ -1,4 +1,4 @@
-"""The options of a flight: names and paths, or the objects themselves."""
+"""Options of a flight, as names, paths or objects."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ class FlightPlan(StrictModel):
     """Also numbers by gain (or by law, then gain), over the default set."""
     sensors: Sensors = of("sensors")
     actuators: Actuators = of("actuators")
-    """Of the base."""
+    """Actuators of the base."""
     assumed_actuators: AssumedActuators | None = None
-    """What the flight software assumes of them (None: what their file says)."""
+    """Actuators that the flight software assumes (None: as in their file)."""
     robot: RobotGiven = of("robot")
     plant_robot: RobotGiven | None = None
-    """What the plant is in truth; controller and mission know ``robot`` (None: that it is)."""
+    """True robot of the plant; controller and mission know ``robot`` (None: the same)."""
     mission: MissionGiven = of("mission")
     duration: float | None = of("duration")
     period: float | None = of("period")
@@ -85,15 +85,15 @@ class FlightPlan(StrictModel):
     """Further parameters by node, dotted names."""
 
     def faults_of(self, kinds: Kinds) -> list[str]:
-        """Return the texts of the faults that are of some ``kinds``.
+        """Return the texts of the faults of the given ``kinds``.
 
         Raises:
-            InputError: a fault that cannot be.
+            InputError: a fault is invalid.
         """
         return [str(f) for f in parse_faults(self.faults, KINDS) if f.kind.name in kinds]
 
     def options(self) -> dict[str, dict[str, Any]]:
-        """Return what the options, without ``parameters``, say to each node, by dotted name."""
+        """Return the parameters of each node set by the options, by dotted name."""
         robot = robot_setting(self.robot)
         mission, waypoints, start = mission_of(self.mission)
         (case, world), (sensors, errors), (actuators, hardware) = (

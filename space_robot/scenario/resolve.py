@@ -1,4 +1,4 @@
-"""From the options of a flight to the scenario with every number in it, checked."""
+"""Resolution of the options of a flight to a checked scenario with every number."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from .robots import Robots
 
 
 def resolve(plan: FlightPlan) -> ResolvedScenario:
-    """Read everything that the options name, and check that it fits together.
+    """Read all files that the options name, and check that they fit together.
 
     Args:
-        plan: options; single parameters of nodes come over the others.
+        plan: options; single parameters of nodes override the others.
 
     Raises:
-        InputError: anything named does not exist or does not fit the rest.
+        InputError: a name does not exist, or settings conflict.
     """
     settings = FlightSettings.resolve(plan.options(), plan.parameters)
     robots = Robots(settings, plan.robot, plan.plant_robot)

@@ -1,4 +1,4 @@
-"""The resolved scenario: every number of a flight, and no file left to read."""
+"""The resolved scenario: every number of a flight, independent of files."""
 
 from __future__ import annotations
 
@@ -41,39 +41,39 @@ SECTIONS: Mapping[str, type[BaseModel]] = {
 }
 """Options that hold numbers of the plant."""
 BY_THE_MISSION = ("initial_joints_deg", "initial_quaternion")
-"""What a mission says to the plant."""
+"""Options that a mission sets for the plant."""
 OF_PLANT = ("period", "substeps", "command_latency_ticks")
 OF_THE_GRAPH = ("realtime", "paused", "fifo_priority")
-"""Options of the plant's node; those of the graph only where they are set."""
+"""Options of the plant's node; options of the graph only where they are set."""
 ROBOTS = ("robot", "plant_robot")
-"""Options that a bag tells as ``robot_file`` and ``controller_robot_file``."""
+"""Options recorded in a bag as ``robot_file`` and ``controller_robot_file``."""
 LABELS = ("robot", "mission", "case", "sensors", "actuators", "gains", "navigation_sensors")
 """Names of files, which the numbers replace."""
 
 
 @dataclass(frozen=True)
 class ResolvedScenario:
-    """All that a flight is made from; `space_robot.scenario.resolve.resolve` makes it.
+    """Complete definition of a flight, made by `space_robot.scenario.resolve.resolve`.
 
-    The settings count, not the options: single parameters come over those.
+    The settings are decisive, not the options: single parameters override options.
     """
 
     options: FlightPlan
-    """As they were written."""
+    """Options as the user wrote them."""
     settings: FlightSettings
-    """Of every node."""
+    """Settings of every node."""
     mission_name: str
-    """Of its file; the robot's where the mission is the robot's own."""
+    """Name of the mission's file; the robot's name if the mission belongs to the robot."""
     robots: Robots
-    """What the plant is, and what the flight software takes it for."""
+    """Robot of the plant, and robot assumed by the flight software."""
     laws: Mapping[str, ControlLaw]
-    """All that the gain set covers, by name: the first is in force at the start."""
+    """All laws of the gain set, by name; the first is in force at the start."""
     swaps: list[tuple[int, ControlLaw]]
-    """Ticks and the laws in force from there on."""
+    """Ticks, and the law in force from each."""
     assumed_actuators: BaseActuatorSettings
     """The base's actuators as the flight software knows them."""
     process_faults: list[Fault]
-    """Of the nodes' processes; the plant's are in its settings."""
+    """Faults of the nodes' processes; faults of the plant are in its settings."""
 
     @property
     def plant(self) -> PlantNodeSettings:
@@ -97,12 +97,12 @@ class ResolvedScenario:
 
     @property
     def law(self) -> ControlLaw:
-        """In force at the start."""
+        """Law in force at the start."""
         return next(iter(self.laws.values()))
 
     @property
     def gains_used(self) -> dict[str, list[float]]:
-        """The numbers of the gains of the law in force at the start, an axis each."""
+        """Gains of the law in force at the start, one value per axis."""
         return {name: row.tolist() for name, row in self.law.gain_values.items()}
 
     @property
@@ -117,10 +117,10 @@ class ResolvedScenario:
 
     @property
     def ticks(self) -> int:
-        """Of the flight.
+        """Number of ticks of the flight.
 
         Raises:
-            InputError: it would be too long, or the mission does not say how long.
+            InputError: the flight is too long, or the mission defines no duration.
         """
         duration, period = self.options.duration, self.plant.period
         if duration is None:
@@ -158,7 +158,7 @@ class ResolvedScenario:
         return _tree(self)
 
     def description(self, plant: Plant) -> dict[str, Any]:
-        """Return what a bag keeps of the scenario; enough to fly it again.
+        """Return the description kept in a bag, sufficient to repeat the flight.
 
         Args:
             plant: made from it.
@@ -240,7 +240,7 @@ _ELSEWHERE = ("events", *OF_PLANT)
 
 
 def _rest(node: str, settings: BaseModel) -> dict[str, Any]:
-    """The settings of a node that no other option of the tree holds."""
+    """Settings of a node that are not in another option of the tree."""
     held = {
         *(key for schema in SECTIONS.values() for key in schema.model_fields),
         *MissionSettings.model_fields,

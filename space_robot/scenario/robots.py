@@ -1,4 +1,4 @@
-"""The robots of a flight: what the plant is, and what the controller takes it for."""
+"""The robots of a flight: the true robot, and the robot assumed by the controller."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from .objects import robot_setting
 
 
 class Robots:
-    """The robots that plant and controller are told; their joints are the same.
+    """The robots of plant and controller, which have the same joints.
 
     Raises:
-        InputError: a robot that is not there, or has other joints than the plant's.
+        InputError: a robot does not exist, or its joints differ from the plant's.
     """
 
     def __init__(
@@ -26,12 +26,12 @@ class Robots:
         robot: str | Robot | Tree,
         plant_robot: str | Robot | Tree | None = None,
     ) -> None:
-        """Read them.
+        """Read the robots.
 
         Args:
             settings: of the nodes, which name the robots.
             robot: option of the flight.
-            plant_robot: option of the flight; what the plant is, whatever its settings say.
+            plant_robot: option of the flight; the plant's robot, overriding its settings.
         """
         sources = {} if isinstance(robot, str) else {robot_setting(robot): _source(robot)}
 
@@ -54,7 +54,7 @@ class Robots:
 
     @property
     def description(self) -> dict[str, Any]:
-        """The numbers of the plant's robot, and of the controller's where that is another."""
+        """Numbers of the plant's robot, and of the controller's if it differs."""
         plant, controller = self._plant_content, self._controller_content
         own = {"controller_robot": self.controller.name, "controller_robot_file": controller}
         return {"robot_file": plant, **({} if controller == plant else own)}
@@ -69,7 +69,7 @@ class Robots:
 class _Source(NamedTuple):
     robot: Robot
     content: dict[str, Any]
-    """The numbers as its file has them."""
+    """The numbers in the robot's file."""
 
 
 def _source(robot: str | Robot | Tree) -> _Source:

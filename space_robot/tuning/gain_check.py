@@ -1,6 +1,6 @@
-"""A law's gains looked at along a mission, without flying it: does it stand what reality brings?
+"""Check of a law's gains along a mission, without flying it: stability margin and noise gain.
 
-Two things are told of each law. Its **margin** against a wrong torque scale, if it estimates by
+Each law gets two results. Its **margin** against a wrong torque scale, if it estimates by
 time delay (see `spectrum`). And its **noise gain** an axis: the torque that a unit of noise of the
 measured rate of that axis becomes in the same tick, N m s, with the noise of every tick its own.
 

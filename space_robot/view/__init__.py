@@ -1,1 +1,1 @@
-"""Flights to be looked at: a robot in 3-D with plots that follow it, as a page or live."""
+"""Views of flights: a robot in 3-D with synchronised plots, as a page or live."""

@@ -1,4 +1,4 @@
-"""An animated picture of a flight: the scene, drawn by a browser, with a few curves that grow."""
+"""Animated picture of a flight: the scene, drawn by a browser, with a few curves."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def animate(
         flight: to be shown.
         plots: whose curves grow beside the robot.
         caption: one line.
-        advance: told how many frames there will be, then called after each.
+        advance: called with the number of frames, then after each frame.
 
     Raises:
         InputError: there is no browser, or the flight has no state.

@@ -57,7 +57,7 @@ def film(
         times: (K,) s, of the frames.
         side_by_side: whether each robot has a place of its own; else they are drawn over another.
         dark: whether the page is.
-        advance: told how many frames there will be, then called after each.
+        advance: called with the number of frames, then after each frame.
 
     Raises:
         InputError: viser is not installed, or a flight has no state.

@@ -1,4 +1,4 @@
-"""The page of some flights: which robot each was flown with, then scene, plots and marks."""
+"""Page of several flights: robots, scene, plots and marks."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ PICTURED, MOST_PLOTS = ("attitude", "base torque", "torque"), 3
 
 @dataclass(frozen=True)
 class ViewOptions:
-    """What may be asked of a page."""
+    """Options of a page."""
 
     side_by_side: bool = False
     """A place for each robot, even if all are the same."""
@@ -57,7 +57,7 @@ def flights_page(
         logs: by name, at least one.
         robots: that flew, by the same names.
         options: what is asked of it.
-        advance: told how many frames there will be, then called after each.
+        advance: called with the number of frames, then after each frame.
 
     Raises:
         InputError: viser is not installed, or a flight has no state.
@@ -95,7 +95,7 @@ def picture_of(
         robots: that flew, by the same names.
         title: caption; empty: law, robot and case.
         file: whose ending tells the format, one of `animation.FORMATS`.
-        advance: told how many frames there will be, then called after each.
+        advance: called with the number of frames, then after each frame.
 
     Raises:
         InputError: there are several flights, there is no browser, or the flight has no state.
@@ -113,7 +113,7 @@ def shown_robot(log: FlightLog, name: str = "") -> Robot:
     """Return the robot of a flight: the one given, or the one that the bag tells.
 
     Raises:
-        InputError: it is not there, not told, or has other joints than the bag.
+        InputError: the robot does not exist, is unknown, or has other joints than the bag.
     """
     if not name:
         return robot_of(log)
@@ -123,7 +123,7 @@ def shown_robot(log: FlightLog, name: str = "") -> Robot:
 
 
 def remarks_on(logs: Mapping[str, FlightLog], robots: Mapping[str, Robot]) -> list[str]:
-    """Return what is wrong with the recordings and the shapes of the robots, a line each."""
+    """Return problems of the recordings and the robots' shapes, one line each."""
     lines = [f"{name}: {text}" for name, log in logs.items() for text in log.defects]
     lines += [line for robot in robots.values() for line in shown_shapes(robot).remarks]
     for name, log in logs.items():

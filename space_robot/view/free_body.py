@@ -1,4 +1,4 @@
-"""The motion of a target before it is captured: nothing acts on it."""
+"""Free motion of a target before its capture."""
 
 from __future__ import annotations
 

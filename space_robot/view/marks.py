@@ -1,4 +1,4 @@
-"""What happened in a flight and when: events, faults, changes of law."""
+"""Marks of a flight: events, faults, changes of law."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..scenario.faults import KINDS
 
 
 class Mark(NamedTuple):
-    """Something to be seen beside the flight's curves."""
+    """A mark beside the flight's curves."""
 
     start: float
     """s."""

@@ -1,4 +1,4 @@
-"""Meshes of a robot's file, made small enough for a page."""
+"""Meshes of a robot's file, simplified for a page."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)
 
 
 def check_viser() -> None:
-    """See that viser is installed.
+    """Check that viser is installed.
 
     Raises:
         InputError: it is not; says how to install it.

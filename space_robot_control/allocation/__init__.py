@@ -1,1 +1,1 @@
-"""Allocation: the torque that a law asks of the base, shared out to wheels and thrusters."""
+"""Allocation of the commanded base torque to wheels and thrusters."""

@@ -1,4 +1,4 @@
-"""The flight software between a law and the base's actuators, a tick of it.
+"""Allocation of the base torque to its actuators in one tick.
 
     demand --+--> wheels --> motors' torques (and null motion)
              |      ^ less the torque expected of the thrusters
@@ -45,15 +45,15 @@ class Allocation(Record):
     of_thrusters: Array = shaped(lambda n: (3,))
     """Torque demanded of the thrusters, N m."""
     expected: Array = shaped(lambda n: (3,))
-    """Torque that they are expected to give from the present tick to the next, N m."""
+    """Torque expected of the thrusters from the present tick to the next, N m."""
     of_wheels: Array = shaped(lambda n: (3,))
     """Torque demanded of the wheels, N m."""
     demand: Array = shaped(lambda n: (3,))
     """Torque demanded of the base, N m, base frame."""
     reported_speeds: Array = shaped(lambda n: (MOST_WHEELS,))
-    """Of the wheels at the present tick, rad/s."""
+    """Speeds of the wheels at the present tick, rad/s."""
     reported_torques: Array = shaped(lambda n: (MOST_WHEELS,))
-    """Those that the wheels' motors gave since the last tick, N m."""
+    """Torques of the wheels' motors since the last tick, N m."""
     command: Array = shaped(lambda n: (MOST_WHEELS + MOST_THRUSTERS,))
     """Torque of each wheel's motor, N m, then force of each thruster, N."""
 
@@ -61,7 +61,7 @@ class Allocation(Record):
     def build(
         cls, n: int, assumed: BaseActuatorSettings, settings: AllocationSettings, period: float
     ) -> Allocation:
-        """Read the settings for a robot of ``n`` joints and ticks of ``period``, s."""
+        """Build from the settings for a robot of ``n`` joints and ticks of ``period``, s."""
         allocation = cls.allocate(n)
         thrusters = AssumedThrusters.build(n, assumed.thrusters, settings, period)
         assign(
@@ -120,12 +120,12 @@ def _allocate_thrusters(allocation: Allocation, tick: int) -> None:
 
 @kernel
 def _leave_alone(allocation: Allocation, tick: float) -> None:
-    """Do what there is to do without hardware: nothing."""
+    """Do nothing: allocation of a base without actuator hardware."""
 
 
 @cache
 def allocation_code(is_used: bool) -> RecordFunction:
-    """Return `allocate`, or without hardware nothing, as compiled loops take it.
+    """Return `allocate`, or an empty function without hardware, for compiled loops.
 
     Given as a value it is compiled once, and not into every loop; without hardware not at all.
     """

@@ -1,7 +1,7 @@
-"""The base's actuators as the flight software knows them: the hardware of its own actuators' file.
+"""Base actuators assumed by the flight software, from its own actuators' file.
 
-Numbers given to the plant beside its file (a wheel that is misaligned, a thruster that is weak)
-are not in there, so that the controller does not know of them.
+Parameters of the plant alone (a misaligned wheel, a weak thruster)
+are not included, so the controller does not know them.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from space_robot_msgs_py.config.files import named_file, node_parameters
 from space_robot_msgs_py.config.validation import validate
 
 OWNER = "plant"
-"""The node whose parameters the hardware in the actuators' files is."""
+"""Node whose parameters are in the actuators' files."""
 
 
 def assumed_actuators(name: str, robot: Robot) -> BaseActuatorSettings:
@@ -20,7 +20,7 @@ def assumed_actuators(name: str, robot: Robot) -> BaseActuatorSettings:
 
     Args:
         name: of the file, or its path.
-        robot: that the controller believes to fly.
+        robot: assumed by the controller.
 
     Raises:
         InputError: there is no such file, or it is wrong.

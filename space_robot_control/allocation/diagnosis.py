@@ -1,4 +1,4 @@
-"""How the base's actuators are doing, as the flight software tells it."""
+"""Diagnosis of the base's actuators by the flight software."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ AXES = 3
 
 
 class Diagnosis(NamedTuple):
-    """What the allocation has found."""
+    """Health of the base's actuators, as the allocation sees it."""
 
     failed: tuple[str, ...]
-    """Names of the wheels that have been taken out."""
+    """Names of the wheels excluded from the allocation."""
     summary: str
-    """One line; empty if all is well."""
+    """One-line summary; empty without problems."""
     values: dict[str, float | int | str]
-    """Numbers worth telling; none where there is nothing to allocate."""
+    """Values for diagnostics; empty without allocation."""
 
 
 def diagnose(allocation: Allocation) -> Diagnosis:
-    """Read the allocation's memory."""
+    """Return the diagnosis from the allocation's memory."""
     if allocation.is_used == 0.0:
         return Diagnosis((), "", {})
     wheels, thrusters = allocation.wheels, allocation.thrusters

@@ -1,4 +1,4 @@
-"""Torque shared among wheels so that the largest load is least.
+"""Torque distribution among wheels that minimises the largest load.
 
 Markley, Reynolds, Liu & Lebsock, "Maximum Torque and Momentum Envelopes for Reaction-Wheel Arrays",
 J. Guidance 33(5), 2010. The torques within reach of loads up to d fill a polyhedron that grows with
@@ -51,7 +51,7 @@ def least_largest(wheels: WheelSet, count: int, wanted: Array, torque: Array) ->
 
 @subroutine
 def _is_along(part: float, whole: float) -> bool:
-    """Tell a component along a direction from one of rounding."""
+    """Return True if a component along a direction exceeds rounding errors."""
     return abs(part) > LEAST_SINE * whole
 
 
@@ -66,7 +66,7 @@ def _share_in_plane(
     z: float,
     torque: Array,
 ) -> None:
-    """Give (x, y, z) N m, in the plane of a facet, to the wheels whose axes lie in it."""
+    """Distribute (x, y, z) N m, in the plane of a facet, to the wheels with axes in it."""
     column, full_load = wheels.column, wheels.full_load
     largest, best, side = 0.0, -1, 1.0
     best_x, best_y, best_z = 0.0, 0.0, 0.0
@@ -114,7 +114,7 @@ def _share_in_plane(
 
 @subroutine
 def _is_in_plane(wheels: WheelSet, k: int, normal: Array, size: float) -> bool:
-    """Tell if a wheel of the set turns about an axis across ``normal``."""
+    """Return True if a wheel of the set has its axis perpendicular to ``normal``."""
     if wheels.takes_part[k] == 0.0:
         return False
     column = wheels.column[k]
@@ -124,7 +124,7 @@ def _is_in_plane(wheels: WheelSet, k: int, normal: Array, size: float) -> bool:
 
 @subroutine
 def _correct(wheels: WheelSet, count: int, wanted: Array, torque: Array) -> None:
-    """Add what ``A torque`` lacks of what is wanted, by least squares."""
+    """Correct ``A torque`` to the wanted torque by least squares."""
     x, y, z = wanted[0], wanted[1], wanted[2]
     for k in range(count):
         if wheels.takes_part[k] == 1.0:

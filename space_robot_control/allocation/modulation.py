@@ -1,12 +1,12 @@
-"""Pulses whose mean torque is the one demanded.
+"""Pulse modulation of thrusters with the demanded mean torque.
 
 The impulse that is owed, demanded less given, is kept as a vector e, so opposite demands cancel
 before a valve opens, and what no pulse could be made of is carried over. Torques that a thruster
 makes about other axes than the one it is fired for are owed, too. The force on the base is owed
 as well (zero is demanded), but forgotten with `FORCE_TIME`: not every layout can pay it back.
 
-- Pulse width (`pwm`): at the beginning of each period the times are found that pay what is owed
-  and will be demanded until its end, by non-negative least squares; each thruster opens once.
+- Pulse width (`pwm`): at the beginning of each period, non-negative least squares give the times
+  for the impulse owed and demanded until its end; each thruster opens once.
 - Sigma-delta (`sigma_delta`): slots as long as the longest of the shortest pulses; for each the
   thrusters are opened that bring e nearest to zero, the best first.
 - Schmitt trigger (`schmitt`): a thruster opens when e, less what others are about to give, is
@@ -35,11 +35,11 @@ Array = NDArray[np.float64]
 PWM, SIGMA_DELTA, SCHMITT = range(3)
 MODULATIONS = ("pwm", "sigma_delta", "schmitt")
 NEAREST = 0.5
-"""A pulse of which at least this share is owed brings what is owed nearer to zero."""
+"""Share of a pulse that must be owed so that firing it reduces the impulse owed."""
 FORCE_TIME = 2.0
-"""s in which a force on the base is forgotten."""
+"""Time constant in which an owed force on the base is forgotten, s."""
 ROUNDING = 1e-9
-"""Relative; so little below a threshold is at it."""
+"""Relative tolerance of thresholds."""
 
 
 class Modulation(Record):
@@ -56,11 +56,11 @@ class Modulation(Record):
     forget: float = shaped(lambda n: ())
     """Share of the force owed that is forgotten in a tick."""
     tick: float = shaped(lambda n: ())
-    """The last one; -1: none."""
+    """Last tick; -1: none."""
     slot_left: float = shaped(lambda n: ())
     """Ticks until the next decision."""
     reach: float = shaped(lambda n: ())
-    """Share of the demand that the thrusters can give, as it was at the last decision."""
+    """Share of the demand that the thrusters can give, at the last decision."""
     demand: Array = shaped(lambda n: (6,))
     """N m; see `AssumedThrusters.wrench`. No force is demanded."""
     owed: Array = shaped(lambda n: (6,))
@@ -70,7 +70,7 @@ class Modulation(Record):
     impulse: Array = shaped(lambda n: (6,))
     """Scratch."""
     pulses: Array = shaped(lambda n: (MOST_THRUSTERS,))
-    """Opened so far."""
+    """Number of pulses so far."""
 
     @classmethod
     def build(
@@ -98,7 +98,7 @@ class Modulation(Record):
 
 @kernel
 def modulate(modulation: Modulation, thrusters: AssumedThrusters, tick: int, demand: Array) -> None:
-    """Write the thrusters that are to be open from ``tick`` on, for a ``demand`` (3,) N m."""
+    """Write which thrusters are open from ``tick`` on, for a ``demand`` (3,) N m."""
     count, owed, open_for = int(thrusters.count), modulation.owed, modulation.open_for
     if tick != modulation.tick + 1.0:  # nobody knows what was given meanwhile
         owed[:] = 0.0
@@ -128,7 +128,7 @@ def modulate(modulation: Modulation, thrusters: AssumedThrusters, tick: int, dem
 
 @subroutine
 def _decide(modulation: Modulation, thrusters: AssumedThrusters) -> None:
-    """Set for how long each valve stays open."""
+    """Set the opening time of each valve."""
     impulse, open_for, period = modulation.impulse, modulation.open_for, thrusters.period
     for i in range(6):
         ahead = modulation.reach * modulation.demand[i] * modulation.slot * period
@@ -166,7 +166,7 @@ def _trigger(modulation: Modulation, thrusters: AssumedThrusters) -> None:
 
 @kernel
 def owed_ticks(modulation: Modulation, thrusters: AssumedThrusters, j: int) -> float:
-    """Return for how many ticks a thruster should be open to bring ``impulse`` nearest to zero."""
+    """Return the opening time of a thruster that minimises ``impulse``, in ticks."""
     square = thrusters.problem.gram[j, j] * thrusters.period
     ticks: float = along(thrusters, j, modulation.impulse) / square if square > 0.0 else 0.0
     return ticks
@@ -176,7 +176,7 @@ def owed_ticks(modulation: Modulation, thrusters: AssumedThrusters, j: int) -> f
 def _open_best(
     modulation: Modulation, thrusters: AssumedThrusters, threshold: float, slot: float
 ) -> bool:
-    """Open the thruster of which most is owed, if that is ``threshold`` pulses or more.
+    """Open the thruster with the largest owed impulse, if ``threshold`` pulses or more.
 
     A pulse is a ``slot`` of ticks (0: the thruster's shortest). ``impulse`` is then less by it.
     """
@@ -204,7 +204,7 @@ def _open(modulation: Modulation, thrusters: AssumedThrusters, j: int, ticks: fl
 
 @subroutine
 def _cut(modulation: Modulation, thrusters: AssumedThrusters) -> None:
-    """Cut the times to a period, and what is owed with them."""
+    """Limit the times to a period, and the impulse owed accordingly."""
     excess, longest = 1.0, modulation.slot * thrusters.period
     for j in range(int(thrusters.count)):
         excess = max(excess, thrusters.problem.x[j] / longest)

@@ -1,4 +1,4 @@
-"""Momentum that wheels hold against one another, which the base does not feel.
+"""Null motion: wheel momenta that cancel one another without effect on the base.
 
 The wheels' momenta h fall into ``A^+ A h``, which is what they store for the base, and z in the
 null space of A. The null motion takes z to ``c n``, n the null vector of `WheelSet`, and all other
@@ -31,11 +31,11 @@ from .wheels import FULL, AssumedWheels, momentum_room
 Array = NDArray[np.float64]
 
 BEYOND = 1.1
-"""A new c keeps this much more than the least speed, so that it is not changed again at once."""
+"""Margin of a new c over the least speed, so that it is not changed again at once."""
 BETTER = 0.8
-"""Where no c will do, another one is taken if it is this much better."""
+"""Improvement required to change c where no value satisfies the limits."""
 FULL_COUNTS = 10.0
-"""A wheel beyond its largest momentum counts as so many that stand still."""
+"""Weight of a wheel beyond its largest momentum, in wheels that stand still."""
 
 
 class NullMotion(Record):
@@ -44,7 +44,7 @@ class NullMotion(Record):
     gain: float = shaped(lambda n: ())
     """1/s; 0: there is none."""
     share: float = shaped(lambda n: ())
-    """Of a motor's largest torque that it may take."""
+    """Share of a motor's largest torque available to the null motion."""
     least_speed: float = shaped(lambda n: ())
     """rad/s."""
     c: float = shaped(lambda n: ())
@@ -110,7 +110,7 @@ def _find_stored(motion: NullMotion, wheels: AssumedWheels) -> None:
 
 @subroutine
 def _choose(motion: NullMotion, wheels: AssumedWheels) -> None:
-    """Change c if it leaves a wheel too near to zero, or beyond its largest momentum."""
+    """Change c if a wheel is too near to zero speed or beyond its largest momentum."""
     if motion.least_speed == 0.0:
         return
     present = badness(motion, wheels, motion.c)

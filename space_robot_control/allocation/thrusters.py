@@ -1,4 +1,4 @@
-"""Thrusters: what the flight software knows of them, and the pulses that make an impulse.
+"""Thrusters as the flight software knows them, and pulses for an impulse.
 
 Pulses t_j s of thrusters with wrenches b_j give the base an impulse ``sum b_j t_j``. Those wanted
 for an angular impulse are the non-negative least squares of it, the linear impulse beside it
@@ -23,11 +23,11 @@ from .settings import AllocationSettings
 Array = NDArray[np.float64]
 
 LONGEST_DELAY = 256
-"""Ticks; later valves are taken to be this late."""
+"""Longest modelled delay of a valve, ticks."""
 
 
 class AssumedThrusters(Record):
-    """The thrusters of one base as the flight software believes them to be."""
+    """Thrusters of one base as assumed by the flight software."""
 
     count: float = shaped(lambda n: ())
     period: float = shaped(lambda n: ())
@@ -49,7 +49,7 @@ class AssumedThrusters(Record):
     is_open: Array = shaped(lambda n: (MOST_THRUSTERS,))
     """1 for each thruster that is to be open from the present tick to the next, else 0."""
     expected: Array = shaped(lambda n: (LONGEST_DELAY, 3))
-    """Ring of the torque that will come of the commands so far, by tick, N m."""
+    """Ring buffer of the torque expected from commands so far, by tick, N m."""
 
     @classmethod
     def build(
@@ -121,7 +121,7 @@ def within_reach(thrusters: AssumedThrusters, demand: Array) -> float:
 
 @kernel
 def expect_torque(thrusters: AssumedThrusters, tick: int, torque: Array) -> None:
-    """Take the valves commanded at ``tick``; write the ``torque`` (3,) N m that acts from there."""
+    """Record the valves commanded at ``tick``; write the ``torque`` (3,) N m from then on."""
     for j in range(int(thrusters.count)):
         if thrusters.is_open[j] == 1.0:
             row = thrusters.expected[(tick + int(thrusters.delay[j])) % LONGEST_DELAY]
@@ -135,7 +135,7 @@ def expect_torque(thrusters: AssumedThrusters, tick: int, torque: Array) -> None
 
 @kernel
 def forget_missed(thrusters: AssumedThrusters, last: int, tick: int) -> None:
-    """Clear the torque expected between the ``last`` tick and ``tick``, for nobody took it.
+    """Clear the unused torque expected between the ``last`` tick and ``tick``.
 
     What is commanded and comes later stays; of a clock that goes back all is cleared.
     """

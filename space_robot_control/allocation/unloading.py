@@ -1,4 +1,4 @@
-"""Thrusters take momentum out of the wheels.
+"""Momentum unloading of wheels by thrusters.
 
 From the moment that a wheel has more than ``unload_above`` of its largest momentum until all have
 less than ``unload_to``, thrusters are asked for the torque ``-H / unload_time``, H the wheels'
@@ -19,7 +19,7 @@ from .wheels import AssumedWheels
 Array = NDArray[np.float64]
 
 WHEELS_SHARE = 0.5
-"""Of the wheels' torque that unloading may take."""
+"""Share of the wheels' torque available to unloading."""
 
 
 class Unloading(Record):
@@ -27,7 +27,7 @@ class Unloading(Record):
 
     above: float = shaped(lambda n: ())
     to: float = shaped(lambda n: ())
-    """Shares of the largest momentum."""
+    """Share of the largest momentum at which unloading stops."""
     rate: float = shaped(lambda n: ())
     """1/s."""
     is_active: float = shaped(lambda n: ())
@@ -48,7 +48,7 @@ class Unloading(Record):
 
 @kernel
 def find_unloading(unloading: Unloading, wheels: AssumedWheels, torque: Array) -> None:
-    """Write the ``torque`` (3,) N m asked of the thrusters, zero unless wheels are unloaded."""
+    """Write the unloading ``torque`` (3,) N m for the thrusters, zero if inactive."""
     fullest, x, y, z = 0.0, 0.0, 0.0, 0.0
     for k in range(int(wheels.count)):
         h, axis = wheels.momentum[k], wheels.axis[k]

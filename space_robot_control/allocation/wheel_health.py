@@ -1,4 +1,4 @@
-"""Failed wheels are found by what they report: the torque given against the torque asked for."""
+"""Detection of failed wheels by comparing reported and commanded torque."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from .wheels import FULL, AssumedWheels
 Array = NDArray[np.float64]
 
 LEAST_ASKED = 1e-3
-"""Share of full load below which nothing is concluded."""
+"""Share of full load below which commands are not evaluated."""
 LEAST_GIVEN = 0.2
-"""A wheel that gives less than this share of what was asked for is silent."""
+"""Share of the commanded torque below which a wheel counts as silent."""
 
 
 class WheelHealth(Record):
-    """The silence of each wheel."""
+    """State of the failure detection of each wheel."""
 
     failure_ticks: float = shaped(lambda n: ())
     """Ticks of silence in a row until a wheel has failed; 0: never."""
     tick: float = shaped(lambda n: ())
-    """At which `asked` was asked for; -1: never."""
+    """Tick of the command `asked`; -1: never."""
     asked: Array = shaped(lambda n: (MOST_WHEELS,))
     """Motors' torques at that tick, N m."""
     silent_ticks: Array = shaped(lambda n: (MOST_WHEELS,))
-    """So far, in a row, of the ticks in which there was something to be heard."""
+    """Consecutive silent ticks, of the ticks with a sufficient command."""
 
     @classmethod
     def build(cls, n: int, settings: AllocationSettings) -> WheelHealth:
@@ -45,7 +45,7 @@ class WheelHealth(Record):
 def observe_wheels(
     health: WheelHealth, wheels: AssumedWheels, tick: float, speeds: Array, torques: Array
 ) -> None:
-    """Take the wheels' speeds and torques at ``tick``; take failed ones out of the allocation.
+    """Evaluate the wheels' speeds and torques at ``tick``; exclude failed wheels.
 
     A wheel counts as silent by size alone: with a sign, commands that are some ticks late would
     make any wheel look wrong. Where several wheels are asked and none answers, it is the commands
@@ -82,7 +82,7 @@ def observe_wheels(
 
 @subroutine
 def _is_asked(health: WheelHealth, wheels: AssumedWheels, k: int) -> bool:
-    """Tell if a wheel that has not failed, and is not full, should have given something."""
+    """Return True if a healthy wheel below its largest momentum was commanded a torque."""
     return bool(
         wheels.healthy.takes_part[k] == 1.0
         and abs(health.asked[k]) > LEAST_ASKED * wheels.healthy.full_load[k]
@@ -92,7 +92,7 @@ def _is_asked(health: WheelHealth, wheels: AssumedWheels, k: int) -> bool:
 
 @kernel
 def remember_asked(health: WheelHealth, wheels: AssumedWheels, tick: float) -> None:
-    """Remember what is asked for at ``tick``."""
+    """Store the command of ``tick``."""
     health.tick = tick
     for k in range(int(wheels.count)):
         health.asked[k] = wheels.torque[k]

@@ -1,8 +1,8 @@
-"""The wheels that share a torque, and the tables that follow from their axes.
+"""Set of wheels that share a torque, with tables computed from their axes.
 
 Motor torques u (W,) on wheels with unit axes a_k turn the base with ``-sum a_k u_k = -A u``. Which
-u gives a torque is a matter of choice where there are more than three wheels; the tables are
-computed anew only when a wheel is taken out.
+u gives a torque is not unique with more than three wheels. The tables are computed again only
+when a wheel is excluded.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ LEAST_PART = 0.05
 
 
 class WheelSet(Record):
-    """Some of the wheels, and their tables."""
+    """A subset of the wheels, with its tables."""
 
     takes_part: Array = shaped(lambda n: (MOST_WHEELS,))
-    """1 for each wheel of the set, else 0."""
+    """1 for each wheel in the set, else 0."""
     column: Array = shaped(lambda n: (MOST_WHEELS, 3))
     """Axis times full load, N m; 0 for a wheel that takes no part."""
     full_load: Array = shaped(lambda n: (MOST_WHEELS,))

@@ -1,4 +1,4 @@
-"""Wheels: what the flight software knows of them, and how it shares a torque among them.
+"""Wheels as the flight software knows them, and the distribution of a torque.
 
 A demand beyond the motors' torques is scaled as a whole: it keeps its direction. A wheel that has
 its largest momentum cannot speed up any more: it gives what it can, and the others take the rest
@@ -26,7 +26,7 @@ FULL = 0.99
 
 
 class AssumedWheels(Record):
-    """The wheels of one base as the flight software believes them to be."""
+    """Wheels of one base as assumed by the flight software."""
 
     count: float = shaped(lambda n: ())
     period: float = shaped(lambda n: ())
@@ -36,7 +36,7 @@ class AssumedWheels(Record):
     axis: Array = shaped(lambda n: (MOST_WHEELS, 3))
     """Unit vectors, base frame."""
     inertia: Array = shaped(lambda n: (MOST_WHEELS,))
-    """Of the rotors, kg m2."""
+    """Inertia of each rotor about its axis, kg m2."""
     max_torque: Array = shaped(lambda n: (MOST_WHEELS,))
     """N m; inf: no limit."""
     max_momentum: Array = shaped(lambda n: (MOST_WHEELS,))
@@ -44,11 +44,11 @@ class AssumedWheels(Record):
     momentum: Array = shaped(lambda n: (MOST_WHEELS,))
     """Inertia times speed at the present tick, N m s; 0 for a wheel that has failed."""
     healthy: WheelSet = nested(WheelSet)
-    """All that have not failed."""
+    """Wheels that have not failed."""
     free: WheelSet = nested(WheelSet)
-    """Those that are not at their largest momentum, where some are."""
+    """Wheels below their largest momentum, if any wheel has reached it."""
     torque: Array = shaped(lambda n: (MOST_WHEELS,))
-    """Of the motors, asked for at the present tick, N m."""
+    """Torque of the motors commanded at the present tick, N m."""
     wanted: Array = shaped(lambda n: (3,))
     """Scratch: ``A torque`` that is wanted, N m."""
     is_scaled: float = shaped(lambda n: ())
@@ -134,7 +134,7 @@ def least_squares(wheels: WheelSet, count: int, wanted: Array, torque: Array) ->
 
 @kernel
 def scale_down(wheels: AssumedWheels, torque: Array) -> bool:
-    """Scale all torques to what the motors can give; return whether they could not.
+    """Scale all torques to the motors' limits; return whether a limit was exceeded.
 
     No torque is above its limit by so much as a rounding, and the largest one is exactly at it.
     """
@@ -173,7 +173,7 @@ def _is_any_full(wheels: AssumedWheels) -> bool:
 
 @subroutine
 def _take_out_full(wheels: AssumedWheels) -> bool:
-    """Leave each wheel that has no room what it has, out of the `free`; tell if there were any."""
+    """Exclude full wheels from `free` at their torque; return whether there were any."""
     is_any = False
     for k in range(int(wheels.count)):
         side = 1.0 if wheels.torque[k] > 0.0 else -1.0

@@ -1,1 +1,1 @@
-"""The controller: tracking errors, time-delay estimate, laws and their supervision."""
+"""Controller: tracking errors, time-delay estimate, laws and supervision."""

@@ -1,4 +1,4 @@
-"""The controller: measured state and reference in, torque out, every tick. Knows no ROS."""
+"""The controller: measured state and reference in, torque out, every tick. Independent of ROS."""
 
 from __future__ import annotations
 
@@ -39,28 +39,28 @@ from .kernels import (
 Array = NDArray[np.float64]
 
 TRANSFER_S = 0.02
-"""Time in which a law that takes over passes from the force it found to its own, s."""
+"""Time in which a new law changes over from the applied force to its own, s."""
 
 
 class ControllerSnapshot(NamedTuple):
-    """A controller between two ticks, see `Controller.save`."""
+    """Saved state of a controller between two ticks; made by `Controller.save`."""
 
     block: Block
-    """Of a `ControllerMemory`."""
+    """Record of a `ControllerMemory`."""
     law: str
     """Name of the law in force."""
     saved_law: dict[str, Any]
-    """See `ControlLaw.save`."""
+    """State of the law, made by `ControlLaw.save`."""
     tick: int
     torque: Array
-    """Of the last command."""
+    """Torque of the last command."""
 
 
 class Controller(RecordOwner):
-    """Runs one law on a robot's nominal model; the law can be swapped between ticks.
+    """Controller with one law on a nominal robot model; laws can be swapped between ticks.
 
-    The time-delay pair is kept whatever the law, and a law takes over from the force it finds
-    applied: neither a swap nor a controller that starts in the middle of a flight gives a jolt.
+    The time-delay pair is kept for all laws, and a law takes over from the applied force, so
+    neither a swap nor a start in the middle of a flight causes a jump of the torque.
     A copy, also one by `pickle`, has a copy of the law in force and answers the same.
     """
 
@@ -92,7 +92,7 @@ class Controller(RecordOwner):
         """
         actuators = actuators or BaseActuatorSettings()
         self.names = actuators.robot_names(robot)
-        """Those of all that the controller is told of the robot and asks of it."""
+        """Names of all measured and commanded quantities."""
         self.period = period
         self.block = ControllerMemory.block(robot.n)
         """The controller's `ControllerMemory`, for compiled loops."""
@@ -108,7 +108,7 @@ class Controller(RecordOwner):
             assign(memory, allocation=Allocation.build(robot.n, actuators, how, period))
         self._look_into_blocks()
         self.last_command = Command(-1, np.zeros(len(self.names.commanded)))
-        """That of the last tick, overwritten by the next."""
+        """Command of the last tick, overwritten by the next."""
         self.valves = slice(robot.n + 3 + actuators.wheel_count, None)
         """The part of a command that opens thrusters."""
         self.law = law
@@ -118,12 +118,12 @@ class Controller(RecordOwner):
         allocated: Block = self.block["allocation"]
         self._address = allocated.ctypes.data
         self._actuators: Array = allocated["command"][0, : len(self.names.actuators)]
-        """What is asked of each of them."""
+        """Command for each actuator."""
         self.signals = Signals.view(self.block["signals"])
         """The signals that the law saw at the last tick."""
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take over attributes, and look into the block among them."""
+        """Restore attributes, and create views of the block."""
         ControllerMemory.dtype(len(state["names"].joints))  # that compiled code knows its layout
         super().__setstate__(state)
 
@@ -138,20 +138,20 @@ class Controller(RecordOwner):
         self.engage()
 
     def engage(self) -> None:
-        """Let the law forget its past and take over, at the next tick, from the applied force."""
+        """Reset the law and let it take over from the applied force at the next tick."""
         self._law.reset()
         self.signals.n_hat[:] = 0.0
         assign(self._memory, transfer_left=-1.0)
 
     def save(self) -> ControllerSnapshot:
-        """Copy what the controller and its law know and remember."""
+        """Save the state of the controller and its law."""
         command = self.last_command
         return ControllerSnapshot(
             self.block.copy(), self._law.name, self._law.save(), command.tick, command.torque.copy()
         )
 
     def restore(self, snapshot: ControllerSnapshot, laws: Mapping[str, ControlLaw]) -> None:
-        """Be again what was saved; ``laws`` by name hold the one that was in force."""
+        """Restore a saved state; ``laws`` holds laws by name, including the saved one."""
         self.block[:] = snapshot.block
         self._law = laws[snapshot.law]
         self._law.restore(snapshot.saved_law)
@@ -159,7 +159,7 @@ class Controller(RecordOwner):
         self.last_command.torque[:] = snapshot.torque
 
     def update(self, state: RobotState, reference: Block) -> Command:
-        """The torque that answers a measured state.
+        """Return the torque for a measured state.
 
         Args:
             state: the plant's measurements, with the torque it applied since the last tick.
@@ -185,7 +185,7 @@ class Controller(RecordOwner):
         return self._allocate(state.tick)
 
     def allocate_torque(self, state: RobotState, torque: Array) -> Command:
-        """The command for a torque (m,), N m, that no law asked for; see `update`."""
+        """Return the command for a torque (m,), N m, without a law; see `update`."""
         allocation = self._memory.allocation
         assign(
             allocation,
@@ -197,7 +197,7 @@ class Controller(RecordOwner):
         return self._allocate(state.tick)
 
     def _allocate(self, tick: int) -> Command:
-        """Ask the base's actuators, if it has any, for the torque demanded of the base."""
+        """Allocate the base torque to the base's actuators, if it has any."""
         command = self.last_command
         if self._actuators.size:
             self.allocate.call(self._address, 0, tick)  # its layout is that of any n
@@ -212,11 +212,11 @@ class Controller(RecordOwner):
 
     @property
     def allocation(self) -> Diagnosis:
-        """How the base's actuators are doing."""
+        """Diagnosis of the base's actuators."""
         return diagnose(self._memory.allocation)
 
     def telemetry(self) -> tuple[Array, Array, Array, Array]:
-        """s, u, N_hat and e of the last tick, (m,) each."""
+        """Telemetry of the last tick: s, u, N_hat and e, (m,) each."""
         memory, signals = self._law.memory, self.signals
         return memory.s, memory.u, signals.n_hat, signals.error
 

@@ -1,4 +1,4 @@
-"""Gain sets: which files they are, how their numbers are checked, and the laws built from them."""
+"""Gain sets: files, validation, and the laws built from them."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from .settings import DEFAULT, DEFAULT_SETS, OF_THE_SET, ControllerNodeSettings
 Array = NDArray[np.float64]
 
 STRICTLY_POSITIVE = ("h_bar", "delta")
-"""Gains that divide or invert something; the others may be zero."""
+"""Gains used as divisors; other gains may be zero."""
 PARAMETERS = "controller parameters"
 
 
 def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
-    """The file of each law's gains by the law's name, for a robot (name or path) and a set.
+    """Return the gain file of each law, by name, for a robot (name or path) and a set.
 
     ``gain_set`` is ``default``, a folder's name among the robot's gains (``config/gains/<robot>``,
     or ``gains`` in its own folder), or a path to a folder of ``<law>.yaml`` or to one such file.
 
     Raises:
-        InputError: there is no such set; names the ones there are.
+        InputError: the set does not exist; the message lists the available sets.
     """
     path = Path(gain_set)
     if gain_set.endswith((".yaml", ".yml")):
@@ -62,7 +62,7 @@ def gain_files(robot: str, gain_set: str) -> dict[str, Path]:
 
 
 def gains_as_path(gain_set: str, robot: str) -> str:
-    """What a user means by the name of a gain set: ``g`` is ``g/``, a folder, where no set is so.
+    """Resolve a user's gain set: ``g`` is the folder ``g/`` if no set has that name.
 
     Not for names out of bags: these open no folder of the user's.
     """
@@ -91,7 +91,7 @@ def _files(folder: Path) -> dict[str, Path]:
 
 
 def read_gains(path: Path, law: type[ControlLaw], axes: int) -> dict[str, Array]:
-    """A law's gains from its section in a ROS parameter file of the controller.
+    """Read a law's gains from its section in a ROS parameter file of the controller.
 
     Raises:
         InputError: naming file, key, value given and values allowed.
@@ -103,7 +103,7 @@ def read_gains(path: Path, law: type[ControlLaw], axes: int) -> dict[str, Array]
 
 
 def check_gains(content: Tree, law: type[ControlLaw], axes: int, where: str) -> dict[str, Array]:
-    """Gains as (axes,) arrays; a list of one value counts for all axes.
+    """Return gains as (axes,) arrays; a list of one value applies to all axes.
 
     Raises:
         InputError: a gain is missing, unknown, of the wrong length or out of its range.
@@ -131,17 +131,17 @@ def check_gains(content: Tree, law: type[ControlLaw], axes: int, where: str) -> 
 
 
 def gain_range(name: str) -> str:
-    """The values a gain may have, in words."""
+    """Return the allowed values of a gain, in words."""
     return f"finite values {'above 0' if name in STRICTLY_POSITIVE else '0 or more'}"
 
 
 def gain_lengths(axes: int) -> str:
-    """How many values a gain may have, in words."""
+    """Return the allowed number of values of a gain, in words."""
     return f"{axes} values (base x, y, z and the joints) or 1"
 
 
 def _numbers(value: Any) -> Array | None:
-    """A list of numbers; None if it is anything else: truth values and texts are no numbers."""
+    """Return a list of numbers; None for other values, booleans and texts included."""
     if isinstance(value, np.ndarray):
         return value
     if not isinstance(value, (list, tuple)):
@@ -160,7 +160,7 @@ def build_law(
     axes: int,
     overrides: Mapping[str, Any] | None = None,
 ) -> ControlLaw:
-    """A law by name (or as `find_law` takes it) with the gains that the settings choose.
+    """Build a law by name (or as `find_law` takes it) with the gains of the settings.
 
     Args:
         name: of the law, or its class.
@@ -201,7 +201,7 @@ def build_laws(
     overrides: Mapping[str, Tree] | None = None,
     own: str | type[ControlLaw] | ControlLaw = "",
 ) -> dict[str, ControlLaw]:
-    """The laws a controller can fly, by name: the one in force first, then those of the gain set.
+    """Build all laws of a controller, by name: the law in force first, then the gain set's.
 
     Args:
         settings: they choose the law in force and the gains.
@@ -210,7 +210,7 @@ def build_laws(
         own: the law in force as a class or an object, which brings its gains; it is copied.
 
     Raises:
-        InputError: a law that is not there, or gains that do not fit.
+        InputError: a law does not exist, or its gains do not fit.
     """
     overrides = overrides or {}
     first = own if not isinstance(own, str) else find_law(settings.controller)
@@ -235,10 +235,10 @@ def _copy_of(
     axes: int,
     overrides: Mapping[str, Any] | None,
 ) -> ControlLaw:
-    """A law of its own memory, with the gains of ``law`` and those ``overrides`` over them.
+    """Return a copy of ``law`` with its own memory and the gains ``overrides``.
 
     Raises:
-        InputError: it is for another robot or another period.
+        InputError: the law is for another robot or another period.
     """
     if len(law.memory.s) != axes or law.period != settings.period:
         raise InputError(
@@ -253,7 +253,7 @@ def _copy_of(
 
 
 def _gain_files(settings: ControllerNodeSettings, may_lack: bool) -> dict[str, Path]:
-    """The files of the chosen gains; none where there ``may_lack`` any."""
+    """Return the files of the chosen gains; empty if they are missing and ``may_lack``."""
     try:
         return gain_files(settings.robot, settings.gains)
     except InputError:
@@ -263,7 +263,7 @@ def _gain_files(settings: ControllerNodeSettings, may_lack: bool) -> dict[str, P
 
 
 def split_gains(parameters: Mapping[str, Any]) -> tuple[Tree, dict[str, Tree]]:
-    """The controller's own parameters, and the gains ``<law>.<gain>`` by law."""
+    """Split the parameters into the controller's own and gains ``<law>.<gain>`` by law."""
     own, gains = Tree(), {}
     for name, value in nest(parameters).items():
         if isinstance(value, dict) and name not in ControllerNodeSettings.model_fields:
@@ -274,6 +274,6 @@ def split_gains(parameters: Mapping[str, Any]) -> tuple[Tree, dict[str, Tree]]:
 
 
 def available_laws(settings: ControllerNodeSettings, may_lack: bool = False) -> list[str]:
-    """Names of the laws of this project that the chosen gains cover; there ``may_lack`` any."""
+    """Return the names of this project's laws covered by the gains, which ``may_lack``."""
     files = _gain_files(settings, may_lack and settings.gains == DEFAULT)
     return sorted(set(files) & set(laws()))

@@ -1,4 +1,4 @@
-"""A tick of the controller as kernels: errors, estimate or model, law, transfer, torque."""
+"""Compiled kernels of a controller tick: errors, estimate or model, law, transfer, torque."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from .tracking import (
 Array = NDArray[np.float64]
 
 NORM_TOLERANCE = 1e-3
-"""How far the square of a quaternion's norm may be from 1."""
+"""Tolerance of the squared norm of a quaternion."""
 LARGEST = 1e30
 """No number of a state or reference is larger: far beyond any flight, yet no law's products of
 such numbers overflow."""
@@ -39,14 +39,14 @@ USABLE, NOT_FINITE, TOO_LARGE, NOT_UNIT, SINGULAR = range(5)
 
 
 class ControllerMemory(Record):
-    """What the controller knows and remembers, apart from its law."""
+    """Memory of the controller, without its law."""
 
     model: Model = nested(Model)
     """The nominal robot."""
     controls_base: float = shaped(lambda n: ())
     """1; 0: nothing turns the base, so its axes have no signals and no force."""
     signals: Signals = nested(Signals)
-    """Those of the last tick."""
+    """Signals of the last tick."""
     pair: TimeDelayPair = nested(TimeDelayPair)
     quaternion: Array = shaped(lambda n: (4,))
     """The measured one or its negative: the same attitude, but rho must not jump."""
@@ -63,7 +63,7 @@ class ControllerMemory(Record):
     force: Array = shaped(lambda n: (n + 3,))
     """F_S commanded."""
     transfer: Array = shaped(lambda n: (n + 3,))
-    """What the law in force lacked of the applied force when it took over."""
+    """Applied force minus force of the law in force when it took over."""
     transfer_ticks: float = shaped(lambda n: ())
     """Length of a transfer."""
     transfer_left: float = shaped(lambda n: ())
@@ -83,7 +83,7 @@ def controller_tick(
     torque: Array,
     period: float,
 ) -> int:
-    """A whole tick of the controller under a law in compiled code.
+    """Run a whole tick of the controller with a compiled law.
 
     Args:
         block: of the `ControllerMemory`.
@@ -120,7 +120,7 @@ def compute_signals(
     uses_model: bool,
     period: float,
 ) -> int:
-    """Turn a measured state, or what navigation makes of it, and its reference into signals.
+    """Compute the signals from a measured or estimated state and its reference.
 
     Without a base to control all of them are zero on its axes, and none asks for J0^-1.
 
@@ -184,7 +184,7 @@ def compute_signals(
 
 @kernel
 def status_of(state: State, controls_base: bool) -> int:
-    """`USABLE`, or why no law may see the state."""
+    """Return `USABLE`, or the reason why a state is not usable."""
     quaternion, total = state.quaternion, 0.0
     for k in range(4):
         total += quaternion[k] * quaternion[k]

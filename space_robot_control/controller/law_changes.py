@@ -1,4 +1,4 @@
-"""The law in force from tick to tick, as it goes on record."""
+"""Changes of law and gains, for the record of a flight."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from ..laws import ControlLaw
 
 
 class LawChanges:
-    """Tells when a controller is given another law, or its law other gains."""
+    """Detector of changes of a controller's law or gains."""
 
     def __init__(self) -> None:
         self._last: LawInForce | None = None
 
     def at(self, tick: int, law: ControlLaw) -> LawChange | None:
-        """The change if ``tick``, the next to be answered, is answered otherwise than the last."""
+        """Return the change at ``tick``, the next to be answered, if there is one."""
         before, now = self._last, law.in_force(tick, is_first=self._last is None)
         if before and same(before, now):
             return None

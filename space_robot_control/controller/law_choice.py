@@ -1,4 +1,4 @@
-"""The law in force: the one chosen last, by hand or by a swap that is due."""
+"""Choice of the law in force, by the user or by planned swaps."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from .law_changes import LawChanges
 
 
 class LawChoice:
-    """Keeps the law to be flown from tick to tick. Knows no ROS."""
+    """The law in force from tick to tick. Independent of ROS."""
 
     def __init__(self, chosen: ControlLaw, swaps: Iterable[tuple[int, ControlLaw]] = ()) -> None:
-        """Begin with a law; ``swaps`` are ticks, rising, and the laws from there on."""
+        """Begin with a law; ``swaps`` are increasing ticks with the laws in force from each."""
         self._chosen = chosen
         self._swaps = list(swaps)
         self._changes = LawChanges()
         self._may_differ = True
-        """True if law or gains may be others than at the last tick answered."""
+        """True if law or gains may differ from the last tick answered."""
         self.was_swapped = False
-        """True once a swap was due; whoever has told it may take that back."""
+        """True after a swap; to be cleared by the caller that reports it."""
 
     @property
     def chosen(self) -> ControlLaw:
@@ -29,11 +29,11 @@ class LawChoice:
         return self._chosen
 
     def choose(self, law: ControlLaw) -> None:
-        """Answer with ``law`` from now on, whose gains may have been changed."""
+        """Choose ``law`` from now on; its gains may have changed."""
         self._chosen, self._may_differ = law, True
 
     def change_at(self, tick: int) -> LawChange | None:
-        """Choose the law of the swaps that are due; what is in force, if not as before.
+        """Apply the swaps that are due; return the law in force if it changed.
 
         Called once for each tick that is answered.
         """

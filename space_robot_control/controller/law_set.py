@@ -1,4 +1,4 @@
-"""The laws a controller node can fly, with their gains as parameters."""
+"""Laws of a controller node, with their gains as parameters."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class LawSet:
         """Build all laws and declare their gains.
 
         Raises:
-            InputError: a law, a gain or a swap that cannot be.
+            InputError: a law, a gain or a swap is invalid.
         """
         self._node, self._settings, self._axes = node, settings, axes
         self._laws = build_laws(settings, axes)
@@ -50,7 +50,7 @@ class LawSet:
         node.add_on_set_parameters_callback(self._on_set)
 
     def warm_up(self, robot: Robot, actuators: BaseActuatorSettings) -> None:
-        """Load all compiled code, every law's too, so that no first tick and no swap comes late."""
+        """Load all compiled code, for all laws, so that first ticks and swaps are not late."""
         rest = RobotState.allocate(robot.n)
         for law in self._laws.values():
             controller = Controller(robot, law, self._settings.period, actuators=actuators)
@@ -68,11 +68,11 @@ class LawSet:
             self._node.set_parameters([name])
 
     def close(self) -> None:
-        """Take no more changes."""
+        """Stop accepting changes."""
         self._node.remove_on_set_parameters_callback(self._on_set)
 
     def _declare(self, law: ControlLaw) -> None:
-        """Declare a law's gains, and take those given as parameters over those of its file."""
+        """Declare the gains of a law; parameters override its file."""
         node, descriptions = self._node, law.gain_descriptions()
         overridden = overrides(node, [f"{law.name}.{gain}" for gain in descriptions])
         tree = {**law.gain_values, **nest(overridden).get(law.name, {})}

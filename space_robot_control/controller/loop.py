@@ -28,11 +28,11 @@ LOOK_AHEAD_S = 0.02
 """The reference is looked for this often though it is not needed yet, so that no flood of others'
 messages pushes it out of its queue."""
 STAND_DOWN_S = 0.1
-"""How long a controller that stands down waits for a state to answer."""
+"""Longest wait of a deactivated controller for a state to answer, s."""
 
 
 class ControllerLoop:
-    """Takes the newest state, waits for its reference, answers; never answers a tick anew."""
+    """Loop that answers the newest state once its reference has arrived, each tick once."""
 
     is_complete = False
 
@@ -81,7 +81,7 @@ class ControllerLoop:
 
     @property
     def wait_for(self) -> Sequence[str]:
-        """See `Loop.wait_for`; nobody once ``listener_timeout`` is over."""
+        """Return the topics to wait for; none after ``listener_timeout``. See `Loop.wait_for`."""
         timeout, waited = self._settings.listener_timeout, time.monotonic() - self._made_at
         return () if timeout and waited > timeout else self._settings.wait_for
 
@@ -90,7 +90,7 @@ class ControllerLoop:
         self._unanswered = -1
 
     def step(self) -> Wait | None:
-        """Take a state and answer it, if it and its reference are there."""
+        """Answer a state if it and its reference have arrived."""
         tick = self._unanswered
         if tick < 0:
             received = self._states.take()
@@ -119,7 +119,7 @@ class ControllerLoop:
         return None
 
     def deactivate(self) -> None:
-        """Answer one more state, with no torque: the plant holds that."""
+        """Answer one more state with zero torque, which the plant holds."""
         answering, answered = self._answering, self._answering.answered
         if answered >= 0 and self._node.count_publishers(self._states.inputs[0].full_name):
             until = time.monotonic() + STAND_DOWN_S
@@ -134,11 +134,11 @@ class ControllerLoop:
         flush(self.outputs, FLUSH_S)
 
     def close(self) -> None:
-        """Leave the parameters alone."""
+        """Stop reacting to parameters."""
         self._laws.close()
 
     def health(self) -> Health:
-        """Tell the mode, the law, and what was rejected."""
+        """Report the mode, the law, and rejected messages."""
         supervisor, references = self._answering.supervisor, self._references
         rejected = self._states.rejected + references.rejected + supervisor.rejected
         silence = time.monotonic() - max(self._state_at, self._paused.running_since)
@@ -169,7 +169,7 @@ class ControllerLoop:
         return Health("nominal", values=values)
 
     def _look_ahead(self, now: float) -> None:
-        """Take references now and then though none is needed yet."""
+        """Read references periodically, before they are needed."""
         if now > self._look_ahead_at:
             self._references.take()
             self._look_ahead_at = now + LOOK_AHEAD_S
@@ -185,7 +185,7 @@ class ControllerLoop:
             self._laws.tell(answering.change)
 
     def _believe(self, tick: int, last: int) -> None:
-        """Take a state whose stamp is believed; it may begin a new time."""
+        """Accept a state with a plausible stamp, which may begin a new time."""
         if self._answering.stamps.is_new_time and last >= 0:
             self._node.log(f"a new time begins at tick {tick}, after {last}")
         self._state_at = time.monotonic()

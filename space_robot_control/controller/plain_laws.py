@@ -1,4 +1,4 @@
-"""Laws without gains: one that is a function from anywhere, and none at all."""
+"""Laws without gains: a user's function, or no law."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Force = Callable[[Signals], ArrayLike]
 
 
 class FunctionLaw(ControlLaw):
-    """A law that is a function of the signals and the nominal model; see `law_of`."""
+    """Law given by a function of the signals and the nominal model; see `law_of`."""
 
     gains_type: ClassVar[type[LawGains]] = LawGains
     uses_model: ClassVar[bool] = True
@@ -28,7 +28,7 @@ class FunctionLaw(ControlLaw):
         """Call the function.
 
         Raises:
-            InputError: it returned something else than one number an axis.
+            InputError: the function did not return one number per axis.
         """
         force: Array = self.memory.force
         value = np.asarray(type(self).function(signals))
@@ -42,19 +42,19 @@ class FunctionLaw(ControlLaw):
 
 
 class NoLaw(ControlLaw):
-    """Commands no torque: every one comes from elsewhere, as on the bench."""
+    """Law that commands zero torque, for torques from outside, as on the bench."""
 
     name: ClassVar[str] = "none"
     gains_type: ClassVar[type[LawGains]] = LawGains
 
     def force(self, signals: Signals) -> Array:
-        """Zero (m,)."""
+        """Return zeros (m,)."""
         force: Array = self.memory.force
         return force
 
 
 def law_of(function: Force) -> type[FunctionLaw]:
-    """Make a law of a function, which gives it its name."""
+    """Make a law from a function and its name."""
     name = getattr(function, "__name__", type(function).__name__)
     content: dict[str, Any] = {
         "name": name,

@@ -1,4 +1,4 @@
-"""The desired motion as it arrives in chunks, kept until its tick has come."""
+"""Buffer of the desired motion, received in chunks."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ Array = NDArray[np.float64]
 EMPTY = np.iinfo(np.int64).min
 """Tick of a row that holds nothing; older than any."""
 PAST_SHARE = 4
-"""One row in so many is kept for ticks that are over."""
+"""Share of rows kept for past ticks, as 1 in this number."""
 MOST_PUT_ASIDE = 256
 
 
 class ReferenceBuffer:
-    """A ring of reference rows by tick; the joints' and the base's part may come apart.
+    """Ring buffer of reference rows by tick; joint and base parts may arrive separately.
 
-    Once it has been told what is `now`, it holds rows around that: a part of the ring's length
-    behind, the rest ahead. Others are put aside for the case that `begin` tells another time.
+    Once `now` is set, it holds rows around that tick: a part of the ring's length before it, the
+    rest after it. Other rows are kept aside in case `begin` sets another time.
     Before that, newer rows push out older ones.
     Rows with a number not finite, or beyond `LARGEST`, are refused with a `MessageError`.
     """
@@ -34,13 +34,13 @@ class ReferenceBuffer:
     def __init__(self, n: int, capacity: int = 32_768) -> None:
         """``capacity``: rows; a mission's lead and one chunk of it (20,000) must find place."""
         self.now = EMPTY
-        """The tick that is needed; `EMPTY` while it is not known."""
+        """Current tick; `EMPTY` while it is unknown."""
         self._references: Block = np.zeros(capacity, Reference.dtype(n))
         self._joints, self._base = map(_Ring, Reference.parts(self._references))
         self._aside: deque[tuple[_Ring, int, Array]] = deque(maxlen=MOST_PUT_ASIDE)
 
     def begin(self, tick: int) -> None:
-        """A new time begins at ``tick``: what was put aside may fit now."""
+        """Begin a new time at ``tick``, and take rows kept aside."""
         self.now = tick
         aside = list(self._aside)
         self._aside.clear()
@@ -48,32 +48,32 @@ class ReferenceBuffer:
             self._store(ring, start, rows)
 
     def add(self, chunk: ReferenceChunk) -> None:
-        """Take both parts of a chunk."""
+        """Add both parts of a chunk."""
         self.add_joints(chunk.start, chunk.joints)
         self.add_base(chunk.start, chunk.base)
 
     def add_joints(self, start: int, rows: Array) -> None:
-        """Take (k, 3, n) rows from tick ``start`` on."""
+        """Add (k, 3, n) rows from tick ``start`` on."""
         self._store(self._joints, start, rows)
 
     def add_base(self, start: int, rows: Array) -> None:
-        """Take (k, 10) rows from tick ``start`` on."""
+        """Add (k, 10) rows from tick ``start`` on."""
         self._store(self._base, start, rows)
 
     def covers(self, tick: int) -> bool:
-        """Tell if both parts of a tick's row are here."""
+        """Return True if both parts of a tick's row have arrived."""
         i = tick % len(self._joints.ticks)
         return bool(self._joints.ticks[i] == tick and self._base.ticks[i] == tick)
 
     def at(self, tick: int) -> Block:
-        """The `Reference` of a tick that `covers`."""
+        """Return the `Reference` of a covered tick."""
         i = tick % len(self._references)
         return self._references[i : i + 1]
 
     def hold(self, tick: int) -> Block | None:
-        """The `Reference` for a ``tick`` that is not covered: the last point before it, at rest.
+        """Return a `Reference` at rest in the last point before a ``tick`` that is not covered.
 
-        None if nothing has come yet.
+        None if nothing has arrived yet.
         """
         ticks = self._joints.ticks
         whole = np.where(ticks == self._base.ticks, ticks, EMPTY)
@@ -106,7 +106,7 @@ class ReferenceBuffer:
 
 
 class _Ring:
-    """One part of the references by tick modulo their number, and whose tick each is."""
+    """Ring buffer of one part of the reference, with the tick of each row."""
 
     def __init__(self, rows: Array) -> None:
         self.rows = rows

@@ -1,4 +1,4 @@
-"""The mission's reference as it comes, and what stands in for it while it stays away."""
+"""Input of the mission's reference, and its substitute while it is missing."""
 
 from __future__ import annotations
 
@@ -26,27 +26,27 @@ Array = NDArray[np.float64]
 
 QUEUE_DEPTH = 10_000
 MOST_AT_ONCE = 100
-"""Messages looked at before other work goes on: somebody may flood a topic."""
+"""Messages read before other work continues, in case of a flood."""
 DRAIN_S = 0.01
-"""How long a reference is looked for among those that have come already."""
+"""Longest search for a reference among received messages, s."""
 TIMEOUT_S = 0.02
 WAIT_TOLD_S = 0.5
-"""A wait that lasts longer is told."""
+"""Wait from which it is reported, s."""
 
 
 class ReferenceInput:
-    """Takes both halves of the reference into a `ReferenceBuffer`, without waiting for them."""
+    """Reader of both halves of the reference into a `ReferenceBuffer`, without waiting."""
 
     def __init__(self, node: Node, robot: Robot, timebase: Timebase, timeout_s: float) -> None:
-        """``timeout_s``: how long the mission is waited for."""
+        """``timeout_s``: longest wait for the mission."""
         self._timeout_s = timeout_s
         self.buffer = ReferenceBuffer(robot.n)
         self.rejected: Counter[str] = Counter()
         """Messages not used, by reason."""
         self.held = 0
-        """Ticks for which a point before was held."""
+        """Ticks for which an earlier point was held."""
         self.is_missing = False
-        """True if the last one was."""
+        """True if the reference of the last tick was held."""
         self._until = 0.0
         """How long the reference that is needed now is waited for; 0: none is."""
         self._waits_since = 0.0
@@ -71,16 +71,16 @@ class ReferenceInput:
 
     @property
     def is_waited_for(self) -> bool:
-        """True if a reference has been waited for in vain, for so long that it is worth a word."""
+        """True if a reference has been missing long enough to be reported."""
         return bool(self._waits_since) and time.monotonic() - self._waits_since > WAIT_TOLD_S
 
     @property
     def is_awaited(self) -> bool:
-        """True if the tick that `at` had no row for may still get one."""
+        """True if the row missing in `at` may still arrive."""
         return self._until > 0.0
 
     def at(self, tick: int) -> Block | None:
-        """The `Reference` of ``tick``, or its last point where the mission stays away.
+        """Return the `Reference` of ``tick``, or the last point if the mission is silent.
 
         None if they have not come yet (`is_awaited`), or if nothing has come that could be held.
         """
@@ -97,11 +97,11 @@ class ReferenceInput:
         return held
 
     def take(self) -> bool:
-        """Take the next good message of each half; whether there was any."""
+        """Take the next valid message of each half; return whether there was any."""
         return any([half.take(self.rejected) for half in self._halves])
 
     def _look_for(self, tick: int) -> bool:
-        """Take what has come until it covers ``tick``; give up once it has stayed away too long."""
+        """Take messages until ``tick`` is covered or the timeout is over."""
         now = time.monotonic()
         self._waits_since = self._waits_since or now
         self._until = self._until or now + (0.0 if self.is_missing else self._timeout_s)

@@ -1,4 +1,4 @@
-"""The plant's states as they come, in parts."""
+"""Input of the plant's states, which arrive in parts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TIMEOUT_S = 0.02
 
 
 class StateInput:
-    """Takes whole states off the topics of their parts, without waiting for them.
+    """Reader of whole states from the topics of their parts, without waiting.
 
     The joints' part is sent first: it is decoded while the others are on their way.
     """
@@ -44,17 +44,17 @@ class StateInput:
         self._tick = -1
         """Tick of the first part in `state`, of which others have not come yet; -1: none."""
         self._lacking: deque[_LaterPart] = deque()
-        """The parts that have not come yet."""
+        """Parts that have not arrived yet."""
         self._until = 0.0
         """How long they are waited for; 0: none has been looked for in vain yet."""
 
     @property
     def wait(self) -> Wait:
-        """The wait when `take` has found no whole state."""
+        """Wait after `take` returned no whole state."""
         return self._waits[self._first if self._tick < 0 else self._lacking[0].input]
 
     def take(self) -> int | None:
-        """Take the newest whole state into `state`; its tick, or None if there is none yet."""
+        """Read the newest whole state into `state`; return its tick, or None."""
         if self._tick < 0 and not self._take_first():
             return None
         tick = self._tick
@@ -79,11 +79,11 @@ class StateInput:
         return tick
 
     def reject(self, reason: str) -> None:
-        """Count the state last taken as not good."""
+        """Count the state taken last as rejected."""
         self.rejected[reason] += 1
 
     def _take_first(self) -> bool:
-        """Take the newest joints' part, if one has come."""
+        """Take the newest joints' part, if one has arrived."""
         first, data = self._first, None
         while (newer := first.take()) is not None:
             data = newer
@@ -103,7 +103,7 @@ class StateInput:
 
 
 class _LaterPart:
-    """A part of the state that is looked for once the first one is there."""
+    """A part of the state that is read after the first part."""
 
     def __init__(self, entry: TrustedSubscription, codec: StateCodec, timebase: Timebase) -> None:
         self.input, self._codec, self._timebase = entry, codec, timebase
@@ -128,5 +128,5 @@ class _LaterPart:
         return None
 
     def forget(self) -> None:
-        """Forget what came ahead: a new time begins."""
+        """Discard parts of later ticks, since a new time begins."""
         self._ahead = None

@@ -1,4 +1,4 @@
-"""What a controller does with a state that has come: answer it, once, or leave it alone."""
+"""Decision whether a received state is answered, and the answer."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from .supervisor import Supervisor
 
 
 class StampStatus(Enum):
-    """How a state stands by its stamp."""
+    """Status of a received state by its stamp."""
 
     ANSWERED = "answered"
-    """It was the last one answered: the plant asks again."""
+    """The state was answered last; the plant repeats its request."""
     NEW = "new"
-    """It is to be answered."""
+    """The state is to be answered."""
     REFUSED = "refused"
-    """Its stamp is not believed."""
+    """The stamp of the state is not plausible."""
 
 
 class StateResponder:
-    """Answers states, never a tick anew, with the messages of the controller. Knows no ROS."""
+    """Answers each state once with the messages of the controller. Independent of ROS."""
 
     def __init__(
         self,
@@ -46,7 +46,7 @@ class StateResponder:
     ) -> None:
         """Answer with ``controller`` under the laws chosen, as the node's settings say.
 
-        ``references`` are told what is now; ``node`` is the node's full name.
+        ``references`` receive the current tick; ``node`` is the node's full name.
         """
         self._controller, self._laws, self._references = controller, laws, references
         names = controller.names
@@ -58,14 +58,14 @@ class StateResponder:
         self._law = LawCodec(settings.timebase, node)
         self._telemetry_decimation = settings.telemetry_decimation
         self.answered = -1
-        """The tick answered last; -1: none."""
+        """Last tick answered; -1: none."""
         self.answer = b""
-        """The command for it, as it was sent."""
+        """Command for that tick, as it was sent."""
         self.change: LawChange | None = None
         """The change of law or gains that came with it, if any."""
 
     def judge(self, tick: int) -> StampStatus:
-        """Tell how a state of ``tick`` that has come stands."""
+        """Return the status of a received state of ``tick``."""
         if tick == self.answered:
             return StampStatus.ANSWERED
         if tick == self.stamps.last:
@@ -100,5 +100,5 @@ class StateResponder:
             yield topics.SIGNALS, self._signals.encode(tick, e, s, n_hat)
 
     def encode(self, command: Command) -> bytes:
-        """Return a command's message."""
+        """Encode a command as a message."""
         return self._commands.encode(command)

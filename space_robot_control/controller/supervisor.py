@@ -1,4 +1,4 @@
-"""Safe mode: what the controller commands while its inputs are bad, and how it comes back.
+"""Safe mode of the controller while its inputs are bad, and its recovery.
 
     nominal --bad state--> holding --hold_ticks of them--> safe --good state--> nominal
     nominal --attitude near 180 degrees--> safe
@@ -34,7 +34,7 @@ NOMINAL_FROM_ETA = 0.05
 
 
 class Mode(Enum):
-    """The kind of command that is given."""
+    """Mode of the controller's commands."""
 
     NOMINAL = "nominal"
     HOLDING = "holding"
@@ -42,13 +42,13 @@ class Mode(Enum):
 
 
 class Supervisor:
-    """Answers every state, with the controller's command where that can be trusted."""
+    """Supervisor that answers every state, with the controller's command if it is safe."""
 
     def __init__(self, controller: Controller, axes: int, hold_ticks: int) -> None:
         self.controller = controller
         self.mode = Mode.NOMINAL
         self.reason = ""
-        """Why the mode is not nominal."""
+        """Reason why the mode is not nominal."""
         self.rejected: Counter[str] = Counter()
         """States not used, by reason."""
         self._hold_ticks = hold_ticks
@@ -57,7 +57,7 @@ class Supervisor:
         self._held_since = 0
 
     def answer(self, state: RobotState, reference: Block) -> Command:
-        """The command for a state, of the law or a safe one; see `Controller.update`."""
+        """Return the command for a state, from the law or safe; see `Controller.update`."""
         controller = self.controller
         if self.mode is Mode.SAFE or not 0 < state.tick - self._last_tick <= LONGEST_GAP:
             controller.engage()
@@ -74,7 +74,7 @@ class Supervisor:
         return self._command
 
     def deactivate(self, tick: int) -> Command:
-        """The command of no torque that ends a flight."""
+        """Return the zero-torque command that ends a flight."""
         self._command = Command(tick, np.zeros_like(self._command.torque))
         self._last_tick = -1
         return self._command
@@ -95,6 +95,6 @@ class Supervisor:
 
 
 def _is_unit(quaternion: Array) -> bool:
-    """Tell if the controller would take it for an attitude."""
+    """Return True if the quaternion is close enough to unit norm."""
     length = norm(quaternion)
     return abs(length * length - 1.0) <= NORM_TOLERANCE

@@ -1,4 +1,4 @@
-"""Laws to be swapped to in flight, as text: ``T:LAW``, T in simulated seconds."""
+"""Planned swaps of laws, as text: ``T:LAW``, T in simulated seconds."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from space_robot_msgs_py.simulated_time import check_time, tick_from
 
 
 class Swap(NamedTuple):
-    """From ``tick`` on the law ``name`` is in force."""
+    """Swap to the law ``name`` at ``tick``."""
 
     tick: int
     name: str
 
 
 def parse_swaps(texts: Iterable[str], period: float) -> list[Swap]:
-    """The swaps of several texts in the order of their ticks; empty ones are none.
+    """Parse swaps and sort them by tick; empty texts are ignored.
 
     Raises:
-        InputError: a text is not ``T:LAW``, or two swaps fall on one tick.
+        InputError: a text is not ``T:LAW``, or two swaps have the same tick.
     """
     swaps = sorted(_parse(text, period) for text in texts if text.strip())
     for one, other in itertools.pairwise(swaps):

@@ -26,7 +26,7 @@ class TimeDelayPair(Record):
     """The last applied force and the acceleration it caused, per axis."""
 
     seen: float = shaped(lambda n: ())
-    """Whether any tick has been observed, 0 or 1."""
+    """1 if any tick has been observed, else 0."""
     smoothing: float = shaped(lambda n: ())
     """Weight of a new pair in the low-pass, see `low_pass_weight`; 0: no low-pass."""
     tick: float = shaped(lambda n: ())
@@ -41,7 +41,7 @@ class TimeDelayPair(Record):
 
 @kernel
 def follows(pair: TimeDelayPair, tick: int) -> bool:
-    """Whether ``tick`` makes a pair with the last tick observed."""
+    """Return whether ``tick`` makes a pair with the last tick observed."""
     elapsed = tick - pair.tick
     return bool(pair.seen == 1.0 and 1.0 <= elapsed <= LONGEST_GAP)
 
@@ -78,6 +78,6 @@ def observe(
 
 @kernel
 def time_delay_estimate(pair: TimeDelayPair, h_bar: Array, n_hat: Array) -> None:
-    """(36) for a constant diagonal inertia ``h_bar`` (m,)."""
+    """Compute the estimate (36) for a constant diagonal inertia ``h_bar`` (m,)."""
     for i in range(n_hat.size):
         n_hat[i] = pair.applied_force[i] - h_bar[i] * pair.acceleration[i]

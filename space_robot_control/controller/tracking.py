@@ -1,4 +1,4 @@
-"""From measured and desired motion to the coordinates ``rho = [eps, theta]`` of the laws."""
+"""Tracking errors in the coordinates ``rho = [eps, theta]`` of the laws."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def tracking_errors(
 
 @kernel
 def leave_base_out(signals: Signals, rate: Array, applied_force: Array) -> None:
-    """Zero the base's axes in what `tracking_errors` writes, in ``rate`` and in the force (m,)."""
+    """Zero the base's axes in the signals of `tracking_errors`, ``rate`` and force (m,)."""
     for k in range(3):
         signals.error[k] = signals.error_rate[k] = signals.acceleration_desired[k] = 0.0
         rate[k] = applied_force[k] = 0.0
@@ -73,7 +73,7 @@ def leave_base_out(signals: Signals, rate: Array, applied_force: Array) -> None:
 
 @kernel
 def torque_from_force(jacobian: Array, force: Array, torque: Array) -> None:
-    """``tau = J^T F_S``: torque in the base frame and on the joints from the generalised force.
+    """Compute ``tau = J^T F_S``: base and joint torque from the generalised force.
 
     What ``torque`` has behind them, for actuators of the base, is left alone.
     """
@@ -83,6 +83,6 @@ def torque_from_force(jacobian: Array, force: Array, torque: Array) -> None:
 
 @kernel
 def force_from_torque(jacobian_inverse: Array, torque: Array, force: Array) -> None:
-    """``F_S = J^-T tau``, the inverse of `torque_from_force`."""
+    """Compute ``F_S = J^-T tau``, the inverse of `torque_from_force`."""
     rotate_back(jacobian_inverse, torque[:3], force[:3])
     force[3:] = torque[3:]

@@ -1,1 +1,1 @@
-"""The desired motion: quintic segments through waypoints, streamed ahead of need."""
+"""Guidance: quintic segments through waypoints, streamed in advance."""

@@ -1,4 +1,4 @@
-"""A mission held against the limits of a robot's joints.
+"""Check of a mission against the limits of a robot's joints.
 
 A leg of a mission stays between its waypoints, so that positions are within the limits if those of
 the waypoints are. The desired velocity is largest halfway, ``15/8`` of the mean one.
@@ -23,7 +23,7 @@ HALFWAY = 15.0 / 8.0
 
 
 class Beyond(NamedTuple):
-    """A number of a mission that a joint cannot follow."""
+    """A value of a mission beyond the limit of a joint."""
 
     joint: str
     asked: float
@@ -32,7 +32,7 @@ class Beyond(NamedTuple):
 
 
 def check_positions(robot: Robot, waypoints: Array) -> None:
-    """See that all ``waypoints`` (K, n), rad or m, are within the joints' limits.
+    """Check that all ``waypoints`` (K, n), rad or m, are within the joints' limits.
 
     Raises:
         InputError: naming the first one beyond.

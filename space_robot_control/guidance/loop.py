@@ -1,4 +1,4 @@
-"""The mission node's loop: streams the desired motion in chunks, ahead of need."""
+"""The mission node's loop: streams the desired motion in chunks, in advance."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MOST_OWED_S = 60.0
 
 
 class MissionLoop:
-    """Follows /clock and keeps the stream a lead ahead of it."""
+    """Loop that follows /clock and streams the reference ahead of it."""
 
     wait_for = ()
     is_complete = False
@@ -56,10 +56,10 @@ class MissionLoop:
         self._greet_at = 0.0
 
     def begin(self) -> None:
-        """Begin where the stream has ended."""
+        """Begin at the end of the stream."""
 
     def step(self) -> Wait | None:
-        """Send what is due, and take the clock."""
+        """Send due chunks and read the clock."""
         now = time.monotonic()
         if now >= self._greet_at:
             self._greet_at = now + GREET_S
@@ -71,18 +71,18 @@ class MissionLoop:
         return None if has_taken else self._for_clock
 
     def deactivate(self) -> None:
-        """Fall silent: the controller holds the last point."""
+        """Stop streaming; the controller holds the last point."""
 
     def close(self) -> None:
         """Keep nothing."""
 
     def health(self) -> Health:
-        """Tell how far the stream has come."""
+        """Report the progress of the stream."""
         values = {"tick": max(self._stamps.last, 0), "rejected: stamp": self._invalid_stamps}
         return Health("nominal", values={**values, **self._clock.counts("rejected")})
 
     def _resend_pending(self) -> None:
-        """Say again what is still needed if somebody has joined."""
+        """Send the current reference again to new subscribers."""
         listeners = self._joints.listener_count + self._base.listener_count
         if listeners > self._listeners:
             self._next = min(self._next, self._chunk_start(max(self._stamps.last, 0)))
@@ -99,7 +99,7 @@ class MissionLoop:
         self._next = chunk.stop
 
     def _take_clock(self) -> bool:
-        """Take what has come of the clock; whether there was anything."""
+        """Read the clock messages; return whether there were any."""
         for count in range(MOST_AT_ONCE):
             data = self._clock.take()
             if data is None:

@@ -1,7 +1,7 @@
 """The control laws, one file each.
 
 Your own: one class derived from `ControlLaw` and one YAML of its gains. A file put in this
-folder is found by its law's ``name``. Wherever a controller's name is asked for, a class in any
+folder is loaded by its law's ``name``. Wherever a controller's name is asked for, a class in any
 other file is named ``path/file.py:Class``, one on PYTHONPATH ``module:Class``.
 """
 

@@ -54,7 +54,7 @@ def force_of(law: ControlLaw, signals: Signals, tick: int) -> Array:
 
 
 def _is_of_user(error: BaseException) -> bool:
-    """Tell whether an error may be Ctrl-C: of a subclass, or by Python's own handler."""
+    """Return whether an error may be Ctrl-C: of a subclass, or by Python's own handler."""
     by_python = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     return isinstance(error, KeyboardInterrupt) and (
         type(error) is not KeyboardInterrupt or by_python

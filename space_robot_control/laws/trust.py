@@ -26,7 +26,7 @@ def is_plain(name: str) -> bool:
 
 
 def check_file(what: str, name: str, where: str = "bag") -> None:
-    """See that a name out of something that is not trusted opens no file but those shipped.
+    """Check that a name out of something that is not trusted opens no file but those shipped.
 
     Args:
         what: the name is of.
@@ -43,7 +43,7 @@ def check_file(what: str, name: str, where: str = "bag") -> None:
 
 
 def check_law(name: str, where: str = "bag") -> None:
-    """See that a law's name out of something that is not trusted imports only what is shipped.
+    """Check that a law's name out of something that is not trusted imports only what is shipped.
 
     Args:
         name: of the law.

@@ -1,1 +1,1 @@
-"""Navigation: from what the sensors report to an estimate of the state."""
+"""Navigation: state estimation from sensor measurements."""

@@ -1,4 +1,4 @@
-"""The numbers of the filter that nobody gave: from the sensors' own file, in the filter's terms."""
+"""Default filter parameters, derived from the sensors' file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from space_robot_msgs_py.config.validation import validate
 from .settings import NavigationFilterSettings
 
 OWNER = "plant"
-"""The node whose parameters the sensors' files are."""
+"""Node whose parameters are in the sensors' files."""
 LEAST_ANGLE = 1e-7
 """rad; no tracker is assumed to be better, for nothing else in the filter is that exact."""
 LEAST = 1e-9
@@ -33,13 +33,13 @@ MAY_BE_ZERO = (
 """Numbers of which 0 says something; where it would say that something is perfect, it counts as
 not given."""
 UNIFORM = 1.0 / math.sqrt(12.0)
-"""Standard deviation of what rounding to whole steps of 1 leaves."""
+"""Standard deviation of the error of rounding to steps of 1."""
 
 
 def completed(
     settings: NavigationFilterSettings, sensors: str, period: float
 ) -> NavigationFilterSettings:
-    """Return the settings with a number for each that the sensors are to say.
+    """Return the settings with missing numbers filled from the sensors.
 
     Args:
         settings: as they were given.
@@ -70,7 +70,7 @@ def read_sensors(name: str) -> SensorSettings:
 
 
 def assumed_numbers(sensors: SensorSettings, period: float) -> Mapping[str, Any]:
-    """Return what the filter is to believe of ``sensors``, by the names of its settings."""
+    """Return the filter parameters for ``sensors``, by the names of its settings."""
     return {
         **_of_tracker(sensors.star_tracker),
         **_of_gyro(sensors.gyro, period),
@@ -89,7 +89,7 @@ def _of_tracker(tracker: StarTrackerSettings) -> dict[str, Any]:
 
 
 def _of_gyro(gyro: GyroSettings, period: float) -> dict[str, Any]:
-    """The noise of single samples is as good as an angle random walk of this density."""
+    """Return the gyro noise, with sample noise as an equivalent angle random walk."""
     sample = norm((gyro.noise, UNIFORM * gyro.step)) * math.sqrt(period)
     return {
         "gyro_angle_walk": max(LEAST, norm((gyro.angle_random_walk, sample))),
@@ -99,7 +99,7 @@ def _of_gyro(gyro: GyroSettings, period: float) -> dict[str, Any]:
 
 
 def _of_encoders(encoders: EncoderSettings) -> dict[str, Any]:
-    """Differenced rates are no news: their noise is that of the angles."""
+    """Return the encoder noise; differenced rates have the noise of the angles."""
     step = 2.0 * math.pi / 2.0**encoders.bits if encoders.bits else 0.0
     rate = norm((encoders.velocity_noise, UNIFORM * encoders.velocity_step))
     return {

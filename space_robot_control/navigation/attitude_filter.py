@@ -1,4 +1,4 @@
-"""A multiplicative extended Kalman filter of the base's attitude: star tracker and gyro.
+"""Multiplicative extended Kalman filter of the base attitude from star tracker and gyro.
 
 Its six states are the attitude's error, a small rotation on the base's axes, and the gyro's bias
 (Lefferts, Markley & Shuster, J. Guidance 5, 1982; Crassidis & Junkins, Optimal Estimation of
@@ -31,7 +31,7 @@ FASTEST = 1.0
 """No body turns by more in a tick, rad on an axis: a sample beyond is cut, so that a single
 wrong one cannot take the filter out of all arithmetic."""
 MOST_REJECTED = 5
-"""So many measurements in a row beyond the gate, and it is the filter that is wrong."""
+"""Rejected measurements in a row after which the filter restarts."""
 
 NOT_STARTED, STARTED, FILTERING = 0.0, 1.0, 2.0
 """The stages: nothing seen; begun with a measurement of unknown age; with one of known age."""
@@ -51,7 +51,7 @@ class Scratch(Record):
 
 
 class AttitudeFilter(Record):
-    """The numbers of the filter: settings, then what it knows and remembers."""
+    """Settings and memory of the attitude filter."""
 
     noise: Array = shaped(lambda n: (3, 3))
     """Covariance of a tracker's measurement on the base's axes, rad2."""
@@ -62,7 +62,7 @@ class AttitudeFilter(Record):
     initial_bias_variance: float = shaped(lambda n: ())
     """rad2/s2."""
     gate: float = shaped(lambda n: ())
-    """Square of the largest innovation that is believed, in standard deviations."""
+    """Square of the largest accepted innovation, in standard deviations."""
     delay: float = shaped(lambda n: ())
     """D, ticks."""
     stage: float = shaped(lambda n: ())
@@ -80,9 +80,9 @@ class AttitudeFilter(Record):
     innovation: Array = shaped(lambda n: (3,))
     """Of the last measurement: measured less estimated attitude on the base's axes, rad."""
     updates: float = shaped(lambda n: ())
-    """Measurements that were used."""
+    """Number of measurements used."""
     rejected: float = shaped(lambda n: ())
-    """Measurements beyond the gate."""
+    """Number of measurements rejected by the gate."""
     rejected_in_a_row: float = shaped(lambda n: ())
     gyro: Array = shaped(lambda n: (RING, 3))
     """Samples of the last ticks, rad/s, by tick modulo `RING`."""
@@ -106,7 +106,7 @@ def start(filter: AttitudeFilter, tick: int, quaternion: Array, gyro: Array, per
 
 @kernel
 def forget(filter: AttitudeFilter) -> None:
-    """Know nothing of the bias but its initial variance."""
+    """Reset the bias estimate to its initial variance."""
     filter.covariance[:] = 0.0
     filter.bias[:] = 0.0
     for i in range(3):
@@ -115,7 +115,7 @@ def forget(filter: AttitudeFilter) -> None:
 
 @kernel
 def drift(filter: AttitudeFilter, duration: float) -> None:
-    """Let ``duration`` s pass of which no gyro tells: the bias walks on."""
+    """Propagate the bias over ``duration`` s without gyro samples."""
     for i in range(3):
         filter.covariance[3 + i, 3 + i] += filter.rate_walk * duration
 
@@ -289,7 +289,7 @@ def update(filter: AttitudeFilter, quaternion: Array) -> bool:
 
 @kernel
 def _restart(filter: AttitudeFilter, tick: int, quaternion: Array, period: float) -> None:
-    """Take a measurement for the attitude of k - D; what is known of the bias is kept."""
+    """Restart from a measurement of the attitude at k - D, keeping the bias."""
     filter.reported[:] = quaternion
     filter.quaternion[:] = quaternion
     filter.rejected_in_a_row = 0.0

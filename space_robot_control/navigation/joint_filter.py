@@ -1,4 +1,4 @@
-"""A Kalman filter of each joint's angle, rate and acceleration, in steady state.
+"""Steady-state Kalman filter of each joint's angle, rate and acceleration.
 
 The joint's jerk is taken for white noise (Singer's model without a time constant), angle and, if
 it is measured by itself, rate are observed: with the angle alone this is the alpha-beta-gamma
@@ -29,7 +29,7 @@ MOST_STEPS = 1_000_000
 
 
 class JointFilter(Record):
-    """Gains, the same for all joints, and what is known of each."""
+    """Gains of the filter, the same for all joints, and the state of each joint."""
 
     is_on: float = shaped(lambda n: ())
     """0: angles and rates are handed on as they are measured."""
@@ -97,7 +97,7 @@ def steady_gains(
 ) -> Array:
     """Step the Riccati equation until it has settled; write the gains.
 
-    By steps in plain arithmetic, for a library's solver gives other last bits on other machines.
+    Plain arithmetic is used since results of library solvers differ between machines.
 
     Returns:
         (3, 3) covariance before an update.

@@ -1,4 +1,4 @@
-"""A low-pass of the base's rate, and of the torque that is held against it.
+"""Low-pass filter of the base's rate and of the paired torque.
 
 Two first-order stages in a row: one alone would leave the noise of a differenced rate as it is
 in the highest frequencies. The time-delay estimate differences the rate and takes the force that
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 def low_pass_weight(corner_hz: float, period: float) -> float:
-    """Weight of a new sample in a first-order low-pass; 0 (for none) where ``corner_hz`` is 0."""
+    """Return the weight of a new sample in a first-order low-pass; 0 without one."""
     return 1.0 - exp(-2.0 * math.pi * corner_hz * period)
 
 
@@ -39,7 +39,7 @@ class LowPass(Record):
 
 @kernel
 def begin_low_pass(low_pass: LowPass, rate: Array, torque: Array) -> None:
-    """Begin at rest in these values."""
+    """Begin in steady state at these values."""
     for i in range(3):
         low_pass.rate_stage[i] = rate[i]
         low_pass.rate[i] = rate[i]
@@ -49,7 +49,7 @@ def begin_low_pass(low_pass: LowPass, rate: Array, torque: Array) -> None:
 
 @kernel
 def pass_low(low_pass: LowPass, rate: Array, torque: Array) -> None:
-    """Take rate and torque (at least 3,) of one tick."""
+    """Filter rate and torque (at least 3,) of one tick."""
     weight = low_pass.weight if low_pass.weight > 0.0 else 1.0
     if weight == 1.0:
         begin_low_pass(low_pass, rate, torque)

@@ -1,4 +1,4 @@
-"""From the measured state to the estimated one, tick by tick."""
+"""Estimation of the state from measurements, tick by tick."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ attitude begins anew."""
 
 
 class Navigation(Record):
-    """The filters, and the state that they estimate."""
+    """Filters, and the estimated state."""
 
     is_filtered: float = shaped(lambda n: ())
     """0: the laws see the measured state itself."""
     is_active: float = shaped(lambda n: ())
     """1 from the first state on."""
     tick: float = shaped(lambda n: ())
-    """Of the last state."""
+    """Tick of the last state."""
     attitude: AttitudeFilter = nested(AttitudeFilter)
     low_pass: LowPass = nested(LowPass)
     joints: JointFilter = nested(JointFilter)
@@ -55,7 +55,7 @@ class Navigation(Record):
         """Read the numbers of the settings, all of them given, for a robot of ``n`` joints.
 
         Raises:
-            InputError: a number that cannot be, or does not fit the period.
+            InputError: a number is invalid or does not fit the period.
         """
         navigation = cls.allocate(n)
         delay = round(settings.tracker_delay / period)
@@ -96,7 +96,7 @@ class Navigation(Record):
 
 @kernel
 def navigate(navigation: Navigation, tick: int, measured: State, period: float) -> None:
-    """Turn what is ``measured`` at ``tick`` into ``navigation.estimate``.
+    """Estimate the state at ``tick`` from ``measured`` into ``navigation.estimate``.
 
     The measured state is usable, see `..kernels.status_of`: others must not come here. Over states
     that were lost (up to `LONGEST_BRIDGE`) the rates are interpolated; after more of them the

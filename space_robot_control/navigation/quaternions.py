@@ -1,4 +1,4 @@
-"""Unit quaternions ``[w, x, y, z]`` that are multiplied and turned a little further."""
+"""Products and small rotations of unit quaternions ``[w, x, y, z]``."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def small_angle(origin: Array, other: Array, out: Array) -> float:
 
 @kernel
 def is_same(one: Array, other: Array) -> bool:
-    """Tell if two quaternions are the same numbers, or the same with the other sign."""
+    """Return True if two quaternions are equal up to sign."""
     as_is, negative = True, True
     for k in range(4):
         as_is = as_is and one[k] == other[k]

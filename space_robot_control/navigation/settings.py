@@ -1,4 +1,4 @@
-"""Settings of navigation: whether there is a filter, and its numbers."""
+"""Settings of navigation and its filter."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from space_robot_msgs_py.config.validation import StrictModel
 
 Mode = Literal["direct", "filtered"]
 AS_THE_SENSORS = -1.0
-"""In place of a number: as the sensors' own settings say."""
+"""Value that selects the number of the sensors' own settings."""
 
 LEAST_SIGMA = 1e-12
 """A noise above 0 that is smaller counts as this: the filter's numbers are of its square."""

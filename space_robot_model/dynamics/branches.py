@@ -1,4 +1,4 @@
-"""What a body that branches begin at keeps for them: a recursion has one branch in registers.
+"""Memory of bodies with several branches; a recursion keeps one branch in registers.
 
 Bodies are visited down each branch in turn (see `Model`). Along it the parent is the body visited
 before, and its numbers are at hand; where a branch begins they are read from memory. On the way

@@ -1,4 +1,4 @@
-"""The nominal model of a robot whose base nothing turns or pushes: its joints alone.
+"""Nominal model of a robot with an unactuated, free-floating base.
 
 Without force and torque on the base all six of its coordinates are eliminated: with blocks
 B = [v0, w0] and M = thetadot of (7), ``H_f = H_MM - H_MB H_BB^-1 H_BM`` and

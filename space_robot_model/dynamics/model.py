@@ -1,4 +1,4 @@
-"""The memory of the algorithms: they read `Model` (constant) and write `Data` (scratch).
+"""Data of the algorithms: `Model` (constant) and `Data` (scratch).
 
 All vectors of `Data` are on inertial axes with the base CoM as origin, so that bodies add up
 without a change of frame; spatial ones have their angular part first. Body 0 is the base,
@@ -26,8 +26,8 @@ class Model(Record):
 
     Joints, and the bodies that they move, are in the order in which they are visited: down each
     branch in turn. For a robot without passive joints that is the order of all joint arrays; with
-    them it is told by ``row``. Joint j moves body j + 1. Of every array only as much is used as the
-    robot has joints.
+    them it is given by ``row``. Joint j moves body j + 1. Only the rows of the robot's joints
+    are used in each array.
     """
 
     joint_count: float = shaped(lambda n: ())
@@ -49,7 +49,7 @@ class Model(Record):
     parent: Array = shaped(lambda n: (MOST_JOINTS,))
     """Number of the body that each joint moves against."""
     row: Array = shaped(lambda n: (MOST_JOINTS,))
-    """Where each joint of the robot's arrays, the actuated ones first, stands in the model's."""
+    """Index in the model of each joint of the robot's arrays (actuated joints first)."""
     continues: Array = shaped(lambda n: (MOST_JOINTS,))
     """1 for a joint whose parent is the body visited before it; 0: a branch begins."""
     branches: Array = shaped(lambda n: (MOST_JOINTS + 1,))
@@ -57,11 +57,11 @@ class Model(Record):
     actuated_count: float = shaped(lambda n: ())
     """Number of joints with a motor; the passive ones are behind them."""
     stiffness: Array = shaped(lambda n: (MOST_JOINTS,))
-    """Of the passive joints' springs, N m/rad, or N/m of prismatic joints."""
+    """Stiffness of the passive joints' springs, N m/rad, or N/m of prismatic joints."""
     damping: Array = shaped(lambda n: (MOST_JOINTS,))
-    """Of the same, N m s/rad or N s/m."""
+    """Damping of the passive joints, N m s/rad or N s/m."""
     rest: Array = shaped(lambda n: (MOST_JOINTS,))
-    """Where the spring of each is at rest, rad or m."""
+    """Rest position of each spring, rad or m."""
     wheel_count: float = shaped(lambda n: ())
     """Reaction wheels of the base, see `space_robot_model.dynamics.wheels`; at most MOST_WHEELS."""
     wheel_axis: Array = shaped(lambda n: (MOST_WHEELS, 3))

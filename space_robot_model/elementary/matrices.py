@@ -1,4 +1,4 @@
-"""Products of small matrices and what comes of them, term by term in one order.
+"""Operations on small matrices, summed term by term in a fixed order.
 
 NumPy hands these to a BLAS and a LAPACK, which sum in another order on another processor.
 """

@@ -1,4 +1,4 @@
-"""Sine and cosine in plain Python, for those who need few of them and no compiler.
+"""Sine and cosine in plain Python, without compilation.
 
 In compiled code and for arrays it is ``@kernel`` of `sine`: the same lines, the same bits.
 """

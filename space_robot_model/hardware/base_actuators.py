@@ -1,4 +1,4 @@
-"""What turns the base: an ideal torque, hardware (wheels, thrusters), or nothing."""
+"""Actuators of the base: ideal torque, hardware (wheels, thrusters), or none."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class BaseActuatorSettings(StrictModel):
 
     @property
     def controls_base(self) -> bool:
-        """True if anything turns the base; else it floats freely."""
+        """True if the base has actuators; else it floats freely."""
         return self.base_actuation != "none"
 
     @property
@@ -56,11 +56,11 @@ class BaseActuatorSettings(StrictModel):
         return (*wheels, *(f"thruster_{i + 1}" for i in range(self.thruster_count)))
 
     def robot_names(self, robot: Robot) -> RobotNames:
-        """Return the names of all that is told of ``robot`` and asked of it."""
+        """Return the names of all measured and commanded quantities of ``robot``."""
         return RobotNames.of(robot.joint_names, self.names, self.wheel_count, robot.passive_names)
 
     def check(self, robot: Robot, file: str) -> None:
-        """See that the numbers fit one another and a robot.
+        """Check that the settings are consistent and fit a robot.
 
         Args:
             robot: whose base they are on.
@@ -92,7 +92,7 @@ class BaseActuatorSettings(StrictModel):
 
 
 def _check_torques(settings: BaseActuatorSettings) -> None:
-    """See that a torque in any direction can be had: wheels push both ways, thrusters one.
+    """Check that a torque in any direction can be had: wheels push both ways, thrusters one.
 
     Raises:
         InputError: says about which axis none can.

@@ -113,7 +113,7 @@ class ThrusterSettings(StrictModel):
         return np.round(self.values(name) / period)
 
     def check(self) -> None:
-        """See that the numbers fit one another.
+        """Check that the numbers fit one another.
 
         Raises:
             InputError: they do not.

@@ -80,7 +80,7 @@ class WheelSettings(StrictModel):
         return speeds * self.values("rotor_inertia")
 
     def check(self, base_inertia: Array) -> None:
-        """See that the numbers fit one another and a base.
+        """Check that the numbers fit one another and a base.
 
         Args:
             base_inertia: (3, 3) kg m2 of the base with its wheels locked, about its CoM.

@@ -1,4 +1,4 @@
-"""A robot told to its user: bodies, joints, tools and shapes, ready for JSON and tables."""
+"""Description of a robot: bodies, joints, tools and shapes, for JSON and tables."""
 
 from __future__ import annotations
 

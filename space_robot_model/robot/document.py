@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 def document_of(robot: Robot) -> dict[str, Any]:
     """Return what `Robot.from_dict` builds the same robot of, but for its visuals.
 
-    Joints keep their numbers. Frames are told in degrees, so that a number may differ in its last
+    Joints keep their numbers. Frames are written in degrees, so a number may differ in its last
     digits from the robot's.
     """
     links = [_link(robot, joint) for joint in range(robot.joint_count)]

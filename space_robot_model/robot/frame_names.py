@@ -41,7 +41,7 @@ def frame_names(robot: Robot) -> FrameNames:
 
 
 def urdf_joint_names(robot: Robot) -> list[str]:
-    """Return the names of the joints, changed only where two of them cannot be told in XML."""
+    """Return the names of the joints, changed only where two are equal in XML."""
     taken: set[str] = set()
     return [distinct(joint, "_", taken) for joint in robot.all_joint_names]
 

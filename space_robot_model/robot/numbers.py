@@ -99,7 +99,7 @@ class Document(StrictModel):
 
 
 def are_numbers(content: dict[str, Any]) -> bool:
-    """Tell whether a robot's mapping holds its own numbers; else it has a file's form."""
+    """Return whether a robot's mapping holds its own numbers; else it has a file's form."""
     robot = content.get("robot")
     return isinstance(robot, dict) and "bodies" in robot
 

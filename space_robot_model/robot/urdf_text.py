@@ -4,7 +4,7 @@ Frames of links are those of `space_robot_model.robot.transforms`: the root is t
 centre of mass, and the z axis of every other one is the axis of its joint. A tool is a link without
 mass on a fixed joint.
 
-URDF has no word for springs (their damping is told as the joint's), for wheels, thrusters and
+URDF has no element for springs (their damping is the joint's), for wheels, thrusters and
 sensors, nor for which of the tools is *the* tool.
 """
 

@@ -1,1 +1,1 @@
-"""Flights on disk: rosbag2 bags in MCAP, written and read without ROS."""
+"""Bags of flights: rosbag2 bags in MCAP, written and read without ROS."""

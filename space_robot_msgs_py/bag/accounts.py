@@ -1,4 +1,4 @@
-"""The counts of each topic that our recorder noted in the bag, read back with care."""
+"""Message counts of each topic that the recorder has written into a bag."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ Count = Annotated[int, Field(ge=0, strict=True)]
 
 
 class Account(BaseModel):
-    """Messages of one topic."""
+    """Counts of messages of one topic."""
 
     received: Count
-    """Distinct ones, whose stamp can be right."""
+    """Distinct messages with a plausible stamp."""
     missing: Count
-    """Sent, but neither received nor left out on purpose."""
+    """Messages sent, but neither received nor excluded on purpose."""
     repeated: Count = 0
-    """Left out, since they had come before."""
+    """Messages excluded because they had arrived before."""
     invalid_stamps: Count = 0
-    """In the bag, too, but their stamp cannot be right."""
+    """Messages in the bag whose stamp is not plausible."""
     foreign: Count = 0
-    """Left out, since a foreign publisher sent them."""
+    """Messages excluded because a foreign publisher sent them."""
     foreign_publishers: list[str] = []
     while_inactive: Count = 0
-    """Left out, since the recorder was inactive when they were sent."""
+    """Messages excluded because the recorder was inactive when they were sent."""
 
 
 _ACCOUNTS = TypeAdapter(dict[str, Account])
 
 
 def noted_accounts(noted: Mapping[str, str]) -> dict[str, Account]:
-    """Read the accounts in a bag's custom data, by topic; empty if none make sense."""
+    """Read the accounts in a bag's custom data, by topic; empty if none is valid."""
     try:
         return _ACCOUNTS.validate_python(json.loads(noted.get(ACCOUNTS_KEY, "{}")))
     except (ValueError, RecursionError, ValidationError):
@@ -43,7 +43,7 @@ def noted_accounts(noted: Mapping[str, str]) -> dict[str, Account]:
 
 
 def foreign(accounts: Mapping[str, Account]) -> list[str]:
-    """Tell whose messages were left out, since they are not of the flight, a sentence each."""
+    """Describe the foreign messages excluded, one sentence per publisher."""
     return [
         f"{account.foreign} messages on {name} were left out: they are from "
         f"{', '.join(account.foreign_publishers) or 'a foreign publisher'}"
@@ -53,7 +53,7 @@ def foreign(accounts: Mapping[str, Account]) -> list[str]:
 
 
 def paused(accounts: Mapping[str, Account]) -> list[str]:
-    """Tell what the recorder left out since it was inactive, in at most one sentence."""
+    """Describe what the inactive recorder excluded, in at most one sentence."""
     inactive = {name: a.while_inactive for name, a in accounts.items() if a.while_inactive}
     each = ", ".join(f"{name} {count}" for name, count in inactive.items())
     return [f"messages were sent while the recorder was inactive: {each}"] if inactive else []

@@ -1,4 +1,4 @@
-"""The base's actuators in a bag: its messages name them, and so tell how many there are."""
+"""Names and number of the base's actuators, from the messages in a bag."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ MOST_ACTUATORS = {
     topics.THRUSTERS_STATE: MOST_THRUSTERS,
     topics.COMMAND: MOST_WHEELS + MOST_THRUSTERS,
 }
-"""Topics whose messages name actuators, and how many of them at most."""
+"""Topics whose messages name actuators, and the largest number of each."""
 ACTUATOR_COLUMNS = (*ACTUATOR_FIELDS, "actuator_commands")
-"""Columns of a log that are as wide as there are actuators."""
+"""Columns of a log with one value per actuator."""
 
 
 def names_in(topic: topics.Topic, batch: Batch, joints: tuple[str, ...]) -> tuple[str, ...] | None:
-    """Find the actuators' names in the first message that tells them; None: none does."""
+    """Return the actuators' names from the first message with them, or None."""
     for i in range(len(batch)):
         try:
             names = tuple(decode(batch.message(i), topic.type).name)
@@ -37,7 +37,7 @@ def names_in(topic: topics.Topic, batch: Batch, joints: tuple[str, ...]) -> tupl
 def described(
     topic: topics.Topic, names: tuple[str, ...], joints: tuple[str, ...], timebase: Timebase
 ) -> MessageDescription | None:
-    """Describe the messages of a topic for actuators of these names; None: there can be no such."""
+    """Describe the messages of a topic for actuators of these names; None: invalid names."""
     describe = description(topic)
     if describe is None or not 0 < len(names) <= MOST_ACTUATORS[topic]:
         return None

@@ -1,4 +1,4 @@
-"""Many messages at once: what a bag is read in."""
+"""Batches of messages, in which a bag is read."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class Batch:
         return len(self.starts)
 
     def message(self, index: int) -> bytes:
-        """The bytes of one message."""
+        """Return the bytes of one message."""
         start = int(self.starts[index])
         return self.data[start : start + int(self.lengths[index])].tobytes()
 
     def select(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Batch:
-        """Some of the messages."""
+        """Select some of the messages."""
         return Batch(
             self.topic,
             self.type,

@@ -1,4 +1,4 @@
-"""Long flights come in blocks: metrics are summed up block by block, in flat memory."""
+"""Blocks of a long flight, so that metrics need constant memory."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ BLOCK_TICKS = 60_000
 
 
 class Metric(ABC):
-    """A number, or several, that tell how well a flight was flown, summed up block by block.
+    """Metric of a flight, computed block by block.
 
     The same blocks give the same bits, and blocks cut elsewhere the same numbers but for rounding:
     what spans two blocks (a difference, a delay) is taken across their border.
@@ -34,7 +34,7 @@ class Metric(ABC):
         """Return the metric of all rows so far, ready for JSON.
 
         Raises:
-            InputError: this flight does not have it.
+            InputError: the flight does not have this metric.
         """
 
 
@@ -60,7 +60,7 @@ def last_rows(log: FlightLog, count: int) -> FlightLog:
 
 
 def joined(before: FlightLog | None, log: FlightLog) -> FlightLog:
-    """Put the rows of ``before`` in front of ``log``; without any it is ``log`` itself."""
+    """Prepend the rows of ``before`` to ``log``; without rows, return ``log``."""
     if before is None:
         return log
     columns: dict[str, Any] = {

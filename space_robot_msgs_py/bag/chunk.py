@@ -1,4 +1,4 @@
-"""Messages on their way into a chunk of an MCAP file.
+"""Messages collected for a chunk of an MCAP file.
 
 Packed here and not by `mcap.Writer`, whose record objects cost the recorder 6 us a message.
 """
@@ -17,7 +17,7 @@ _INDEX = struct.Struct("<BQHI")
 
 
 class OpenChunk:
-    """The records of a chunk that is still filled, and where each message begins."""
+    """Records of a chunk that is still open, and the offset of each message."""
 
     def __init__(self, definitions: bytes = b"") -> None:
         """``definitions``: schema and channel records, in the first chunk of a file."""
@@ -38,7 +38,7 @@ class OpenChunk:
 
     @property
     def counts(self) -> dict[int, int]:
-        """Messages a channel."""
+        """Number of messages by channel."""
         return {channel: len(starts) // 2 for channel, starts in self._starts.items()}
 
     @property

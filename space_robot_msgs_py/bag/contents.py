@@ -1,4 +1,4 @@
-"""The messages of a bag, in batches, whatever it is stored in."""
+"""Messages of a bag, in batches, for all storage formats."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class Storage(Protocol):
     """A file with messages, or a whole folder that rosbag2 compressed."""
 
     counts: Counter[str] | None
-    """Messages a topic, as it has noted itself; None: it has not."""
+    """Messages per topic, from the file itself; None: not recorded."""
     metadata: dict[str, dict[str, str]]
     """The metadata records in it, by name."""
     has_end: bool
-    """True if its writer closed it, as far as it can tell."""
+    """True if its writer closed it, as far as it is known."""
 
     def topics(self) -> dict[str, str]:
         """Return the type by topic."""
@@ -35,11 +35,11 @@ class Storage(Protocol):
 
     @property
     def damage(self) -> list[str]:
-        """The things found broken, a sentence each; all are known after `batches`."""
+        """Damage, one sentence each; complete after `batches`."""
 
 
 class Bag:
-    """The files that a flight is read from, and what rosbag2's metadata says of them."""
+    """Files of a bag, with the metadata of rosbag2."""
 
     def __init__(
         self,
@@ -49,7 +49,7 @@ class Bag:
         closed: bool,
         lacks_files: bool = False,
     ) -> None:
-        """Take what was found in a folder.
+        """Build from the contents of a folder.
 
         Args:
             files: in the order of their writing.
@@ -82,7 +82,7 @@ class Bag:
                 yield batch
 
     def recorded(self) -> dict[str, int] | None:
-        """Return the messages a topic that the bag should hold; None: nobody counted.
+        """Return the number of messages per topic that the bag should hold; None: unknown.
 
         By the files' own statistics; by metadata.yaml, if they have none.
         """
@@ -92,7 +92,7 @@ class Bag:
         return dict(sum((file.counts or Counter() for file in self._files), Counter[str]()))
 
     def custom_data(self) -> dict[str, str]:
-        """Return what our recorder noted; empty for a bag of another recorder.
+        """Return the custom data of this project's recorder; empty for other recorders.
 
         From metadata.yaml, its copy in the file, or what was noted when recording began.
         """
@@ -107,7 +107,7 @@ class Bag:
 
     @property
     def incomplete(self) -> bool:
-        """True if a part of a file was passed over, or a file is missing."""
+        """True if a part of a file was skipped, or a file is missing."""
         return self._lacks_files or any(file.incomplete for file in self._files)
 
     @property
@@ -140,7 +140,7 @@ class Bag:
         return self._counts
 
     def messages(self, *wanted: Topic) -> Iterator[tuple[str, bytes]]:
-        """Yield topic name and bytes of the messages of some topics, each topic's in its order."""
+        """Yield topic name and bytes of messages of some topics, in order for each topic."""
         names = {topic.full_name for topic in wanted}
         for batch in self.batches():
             if batch.topic in names:

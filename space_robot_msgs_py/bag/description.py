@@ -1,7 +1,7 @@
-"""The description of a flight in its bag, checked: a bag may be anybody's, its words anything.
+"""Validation of the description of a flight in a bag, which is untrusted input.
 
-All who read descriptions do so here. Keys that are not known are taken as they are: newer software
-may have noted more.
+All descriptions are read here. Unknown keys are accepted unchanged, since newer software
+may have written more.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from .recorder import FLIGHT_KEY
 
 WHERE = "the description of the flight"
 LONGEST_PERIOD = 10.0
-"""s; with more than that nothing is flown."""
+"""Longest period of a flight, s."""
 _DEEPEST = 32
 """Lists and mappings within one another."""
 _LARGEST = sys.float_info.max
@@ -78,7 +78,7 @@ def read_description(noted: Mapping[str, str]) -> dict[str, Any]:
     """Read what was flown from a bag's ``custom_data``; empty for a bag of another recorder.
 
     Raises:
-        InputError: it is there but cannot be used; one line that names the key.
+        InputError: the description is invalid; one line that names the key.
     """
     if (text := noted.get(FLIGHT_KEY)) is None:
         return {}
@@ -95,7 +95,7 @@ def read_description(noted: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _unwritable(value: Any, key: str, depth: int) -> Iterator[str]:
-    """Find what cannot be written as JSON again, wherever it stands, known key or not."""
+    """Return the first value that cannot be written as JSON, at any key."""
     if depth == 0:
         yield f"{key[:80]}: nested too deeply"
     elif isinstance(value, (dict, list)):

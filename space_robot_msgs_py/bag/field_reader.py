@@ -1,4 +1,4 @@
-"""The numbers of many messages at once, whatever their layout.
+"""Extraction of numbers from many messages at once, for any layout.
 
 The first message of a layout is decoded the general way; it tells where the numbers stand in all
 that are laid out alike.
@@ -21,7 +21,7 @@ Places = NDArray[np.intp]
 
 
 class FieldReader:
-    """Takes the numbers out of the messages of a topic."""
+    """Reader of the numbers in the messages of a topic."""
 
     def __init__(self, description: MessageDescription) -> None:
         self._description = description
@@ -29,9 +29,9 @@ class FieldReader:
         """The columns that the numbers of a row belong to."""
         self._known: Numbers | None = None
         self.misfits = 0
-        """Messages that could not be read."""
+        """Number of messages that could not be read."""
         self.fault = ""
-        """The reason of the first of them."""
+        """Reason why the first of these could not be read."""
 
     def read(self, batch: Batch) -> Iterator[tuple[Places, Array]]:
         """For each layout, the messages' places in the batch and their (M, width) numbers."""

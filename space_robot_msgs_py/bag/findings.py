@@ -23,7 +23,7 @@ def some_of(names: Iterable[str]) -> str:
 
 
 def missing_ticks(whole: NDArray[np.bool_], timebase: Timebase) -> list[str]:
-    """Tell which ticks lack state or reference; (N,) ``whole`` says which do not."""
+    """Describe the ticks without state or reference; ``whole`` (N,) is true for others."""
     edges = np.diff(np.concatenate(([True], whole, [True])).astype(np.int8))
     starts, stops = np.flatnonzero(edges < 0), np.flatnonzero(edges > 0)
     if not len(starts):
@@ -40,7 +40,7 @@ def missing_ticks(whole: NDArray[np.bool_], timebase: Timebase) -> list[str]:
 
 
 def unread_messages(recorded: Mapping[str, int], gone: Mapping[str, int]) -> list[str]:
-    """Tell how many of the recorded messages could not be read."""
+    """Describe how many of the recorded messages could not be read."""
     if not gone:
         return []
     each = ", ".join(f"{name} {count}" for name, count in gone.items())
@@ -50,7 +50,7 @@ def unread_messages(recorded: Mapping[str, int], gone: Mapping[str, int]) -> lis
 
 
 def half_truth(counts: Mapping[str, int]) -> list[str]:
-    """Tell if only one half of the true states is there, so that it is of no use."""
+    """Return True if only one half of the true states exists, so that it is unusable."""
     there = [topic.full_name for topic in TRUTH if counts.get(topic.full_name)]
     if len(there) != 1:
         return []

@@ -1,4 +1,4 @@
-"""A flight as arrays, one row a tick: what the analysis reads, from a bag or from memory."""
+"""Flight log: a flight as arrays with one row per tick, for the analysis."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ Array = NDArray[np.float64]
 REFERENCE = ("reference_joints", "reference_base")
 """The columns the desired motion fills."""
 MEASURED_COLUMNS = STATE_FIELDS + PASSIVE_FIELDS
-"""The columns of a `FlightLog` that `MeasuredStates` has once more."""
+"""Columns that `FlightLog` and `MeasuredStates` have in common."""
 
 
 @dataclass(slots=True)
 class MeasuredStates:
-    """The state columns of a `FlightLog` once more, as the sensors told them."""
+    """Measured states: the state columns of a `FlightLog` as the sensors report them."""
 
     base_position: Array
     """(N, 3) m, inertial frame."""
@@ -81,13 +81,13 @@ class MeasuredStates:
 class FlightLog:
     """True and desired motion and the torque given, tick by tick from 0.
 
-    Where the sensors told something else than the truth, and the truth was recorded beside it,
-    `measured` has what they told. Without it both are one, or only what they told is known.
+    If measurements differ from the true states, and both were recorded, `measured` has the
+    measurements. Without it both are equal, or only the measurements are known.
     """
 
     timebase: Timebase
     joint_names: tuple[str, ...]
-    """Of the joints with motors."""
+    """Names of the joints with motors."""
     base_position: Array
     """(N, 3) m, inertial frame."""
     quaternion: Array
@@ -121,11 +121,11 @@ class FlightLog:
     passive_velocities: Array
     """(N, p) rad/s, of prismatic joints m/s."""
     passive_names: tuple[str, ...] = ()
-    """Of the joints without motors."""
+    """Names of the joints without motors."""
     flight: dict[str, Any] = field(default_factory=dict)
     """The flight as recorded: controller, case, ..."""
     lost: dict[str, int] = field(default_factory=dict)
-    """Missing messages a topic."""
+    """Number of missing messages per topic."""
     unanswered: int = 0
     """Ticks without a command of their own (by the wall clock, or where something failed)."""
     filled: int = 0
@@ -133,11 +133,11 @@ class FlightLog:
     namespace: str = "/"
     """Of the robot's topics in the bag; what is said of topics names them as in the root one."""
     unfinished: str = ""
-    """The end of a bag that nobody finished, as far as it is known; empty for a whole one."""
+    """Description of the end of an unfinished bag; empty for a finished one."""
     damage: tuple[str, ...] = ()
-    """The faults found in the bag, a sentence each."""
+    """Damage of the bag, one sentence each."""
     foreign: tuple[str, ...] = ()
-    """The messages left out since their publishers are not of the flight, a sentence each."""
+    """Foreign messages excluded from the log, one sentence per publisher."""
     commanded_torque: Array | None = None
     """(N, n+3) N m, the controller's answer to the tick (NaN: none); None: not recorded."""
     latency_s: Array | None = None
@@ -149,14 +149,14 @@ class FlightLog:
     first_tick: int = 0
     """Tick of row 0; not 0 in a part of a flight."""
     measured: MeasuredStates | None = None
-    """The states as the sensors told them, and the torque as reported; None: see above."""
+    """Measured states and reported torque; None: see above."""
     believed_error: Array | None = None
     """(N, n+3) e of the telemetry, the tracking error as the law saw it (NaN: not of this tick);
     None without `measured`."""
     trusted: bool = True
-    """True if ``flight`` is the user's own word: files and modules it names may be opened.
+    """True if ``flight`` is trusted: files and modules that it names may be opened.
 
-    A bag may be anybody's: of one it is so only if the user says so.
+    For a bag it is true only if the user says so.
     """
 
     @classmethod
@@ -204,7 +204,7 @@ class FlightLog:
 
     @property
     def defects(self) -> tuple[str, ...]:
-        """What is wrong with the recording, a sentence each: `unfinished` and `damage`."""
+        """Defects of the recording, one sentence each: `unfinished` and `damage`."""
         return (self.unfinished, *self.damage) if self.unfinished else self.damage
 
     @property
@@ -217,7 +217,7 @@ class FlightLog:
         return finite_rows(getattr(self, name) for name in columns)
 
     def longest_stretch(self) -> FlightLog:
-        """The longest stretch of `whole` rows, for what cannot bear a gap; views, not copies."""
+        """Longest stretch of `whole` rows, for methods that need no gaps; views, not copies."""
         edges = np.diff(np.concatenate(([False], self.whole, [False])).astype(np.int8))
         starts, stops = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
         if not len(starts):
@@ -260,12 +260,12 @@ class FlightLog:
         _put(self, start - self.first_tick, states, ALL_FIELDS)
 
     def put_measured(self, start: int, states: Block) -> None:
-        """Copy what the sensors told of each tick from ``start`` on into its row of `measured`."""
+        """Copy the measurements of each tick from ``start`` on into its row of `measured`."""
         if self.measured is not None:
             _put(self.measured, start - self.first_tick, states, MEASURED_COLUMNS)
 
     def put_commands(self, start: int, torques: Array) -> None:
-        """Copy what was commanded (k, n+3+W+T) in each tick from ``start`` on, see `Command`."""
+        """Copy the commands (k, n+3+W+T) of each tick from ``start`` on, see `Command`."""
         assert self.commanded_torque is not None
         row = start - self.first_tick
         rows = slice(row, row + len(torques))
@@ -273,19 +273,19 @@ class FlightLog:
         self.actuator_commands[rows] = torques[:, self.axes :]
 
     def record_measured(self) -> None:
-        """Make room, NaN, for what the sensors tell and the law believes beside the truth."""
+        """Allocate columns of NaN for measured states and the law's error."""
         self.measured = MeasuredStates.unknown(self)
         self.believed_error = np.full_like(self.applied_torque, np.nan)
 
     def as_measured(self) -> FlightLog:
-        """The flight as the flight software was told it: no truth, but `measured` in its place."""
+        """The flight as the flight software knows it, with `measured` as its states."""
         if self.measured is None:
             return self
         columns: dict[str, Any] = self.measured.columns
         return replace(self, **columns, measured=None, believed_error=None)
 
     def state(self, tick: int) -> RobotState:
-        """The state of a tick: the true one, where that is known."""
+        """Return the state of a tick, the true one if it is known."""
         block = State.block(len(self.joint_names))
         for name in ALL_FIELDS:
             row = getattr(self, name)[tick - self.first_tick]

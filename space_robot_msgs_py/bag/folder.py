@@ -1,4 +1,4 @@
-"""The bag in a folder or a file: which files it has, and which are missing."""
+"""Files of a bag in a folder or a single file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _STORAGES = (".mcap", ".db3")
 
 
 def open_bag(path: Path) -> Bag:
-    """The bag in a folder, or in a single file of one; finished or not.
+    """Open the bag in a folder, or a single file of a bag, finished or not.
 
     Raises:
         InputError: no bag is there.
@@ -55,7 +55,7 @@ def open_bag(path: Path) -> Bag:
 def _listed(
     path: Path, information: BagInformation, there: list[Path], damage: list[str]
 ) -> list[Path]:
-    """The files that metadata.yaml names, in its order, so far as they are there."""
+    """Return the existing files that metadata.yaml names, in its order."""
     names = [Path(name).name for name in information.relative_file_paths]
     files = [path / name for name in names if (path / name).exists()]
     missing = [name for name in names if not (path / name).exists()]
@@ -87,7 +87,7 @@ def _open_files(
 
 
 def _check_regular(file: Path) -> None:
-    """See that reading comes to an end: a pipe waits for its other end, a device may give for ever.
+    """Check for a regular file: reading a pipe or a device may never end.
 
     Raises:
         InputError: it is neither a file, nor a folder, nor absent.

@@ -1,4 +1,4 @@
-"""Ticks of a flight whose state was kept back or spoilt: filled as the flight software does."""
+"""Ticks without a usable state, filled as the flight software fills them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def fill_gaps(log: FlightLog) -> None:
     """Give ticks without a usable state the one before, and missing references the last point.
 
     From the first whole tick to the last state; `FlightLog.filled` counts the states. Only what
-    the sensors told is filled in: the truth has no such gaps.
+    the sensors report is filled in: the truth has no such gaps.
     """
     measured = log if log.measured is None else log.measured
     states = finite_rows(getattr(measured, name) for name in STATE_FIELDS)

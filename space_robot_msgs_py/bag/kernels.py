@@ -1,4 +1,4 @@
-"""Compiled loops over the messages of a bag: where they lie, and numbers out of many at once.
+"""Compiled loops over the messages of a bag: positions and numbers of many at once.
 
 Flat arrays in and out, so that each is compiled once for every robot and every layout.
 """
@@ -16,9 +16,9 @@ Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int64]
 
 CHANNEL, START, LENGTH, LOG_NS, PUBLISH_NS = range(5)
-"""Rows of what `walk_messages` finds."""
+"""Rows of the result of `walk_messages`."""
 NO_STAMP = FOREIGN
-"""In place of the stamp of a message that is too short for one."""
+"""Stamp of a message that is too short to have one."""
 _HEAD = 9
 _FIELDS = 22
 _MESSAGE = 5
@@ -32,7 +32,7 @@ def _integer(data: Bytes, at: int, size: int) -> int:
 
 @kernel
 def walk_messages(data: Bytes, start: int, messages: Integers, before: int) -> tuple[int, int]:
-    """MCAP's Message records that stand one behind the other from ``start`` on.
+    """Locate consecutive MCAP Message records from ``start`` on.
 
     Returns:
         How many there are in ``messages``, a column each behind the ``before`` first, and where
@@ -55,7 +55,7 @@ def walk_messages(data: Bytes, start: int, messages: Integers, before: int) -> t
 
 @kernel
 def read_stamps(data: Bytes, starts: Integers, lengths: Integers, stamps: Integers) -> None:
-    """The time, ns, each message begins with, or `NO_STAMP`."""
+    """Read the time, ns, at the begin of each message, or `NO_STAMP`."""
     for i in range(len(starts)):
         stamps[i] = NO_STAMP
         if lengths[i] >= _ENCAPSULATION + 8:
@@ -76,7 +76,7 @@ def gather(
     numbers: NDArray[np.float64],
     fits: NDArray[np.bool_],
 ) -> None:
-    """Copy the numbers of all messages that are laid out alike.
+    """Copy the numbers of all messages with the same layout.
 
     Args:
         data: what the messages lie in, at ``starts`` with ``lengths``.

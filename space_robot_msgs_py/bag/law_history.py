@@ -1,4 +1,4 @@
-"""The laws of a flight one after the other, and what changes from one to the next."""
+"""History of the laws of a flight, and their changes."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from ..samples import LawInForce, Timebase
 from .flight_log import FlightLog
 
 MOST_TOLD = 3
-"""Changes that are told one by one where there is little room."""
+"""Largest number of changes listed one by one in a short text."""
 
 
 class LawChange(NamedTuple):
-    """From one law to another, or to other gains of the same one."""
+    """Change to another law, or to other gains of the same law."""
 
     before: LawInForce | None
     """None: the controller begins."""
@@ -32,7 +32,7 @@ class LawChange(NamedTuple):
 
 
 def same(one: LawInForce, other: LawInForce) -> bool:
-    """Tell if two laws are the same with the same gains, to the last bit."""
+    """Return True if two laws are the same with the same gains, to the last bit."""
     return (
         one.name == other.name
         and one.gains.keys() == other.gains.keys()
@@ -46,19 +46,19 @@ def same(one: LawInForce, other: LawInForce) -> bool:
 
 
 def within(laws: Iterable[LawInForce], start: int, stop: float) -> tuple[LawInForce, ...]:
-    """The laws, by rising tick, in force at the ticks from ``start`` to before ``stop``."""
+    """Return the laws in force from ``start`` to before ``stop``, by increasing tick."""
     laws = tuple(laws)
     begun = [law for law in laws if law.tick <= start]
     return (*begun[-1:], *(law for law in laws if start < law.tick < stop))
 
 
 def laws_of(log: FlightLog) -> tuple[LawInForce, ...]:
-    """Those in force in the rows of ``log``."""
+    """Return the laws in force in the rows of ``log``."""
     return within(log.laws, log.first_tick, log.first_tick + log.ticks)
 
 
 def as_data(laws: Iterable[LawInForce], timebase: Timebase) -> list[dict[str, Any]]:
-    """The laws for JSON: tick, time, name and gains of each."""
+    """Return the laws for JSON: tick, time, name and gains of each."""
     return [
         {
             "tick": law.tick,
@@ -71,7 +71,7 @@ def as_data(laws: Iterable[LawInForce], timebase: Timebase) -> list[dict[str, An
 
 
 def in_words(laws: Sequence[dict[str, Any]]) -> str:
-    """Laws as data in a line, as ``tde_stc -> tde_tsmc at 1.2345 s (other k_1 at 2.0000 s)``."""
+    """Describe laws in one line, as ``tde_stc -> tde_tsmc at 1.2345 s (other k_1 at 2.0000 s)``."""
     if not laws:
         return ""
     words, flown = str(laws[0]["controller"]), [laws[0]]

@@ -1,4 +1,4 @@
-"""One MCAP file of a bag, with the records that rosbag2's own have, in their order."""
+"""One MCAP file of a bag, with records in the same order as rosbag2 writes."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def record_bytes(*records: Any) -> bytes:
 
 
 class McapFile:
-    """Takes whole chunks, each at once with the kernel: what is in the file is always known."""
+    """Writer of whole chunks, each passed to the kernel at once."""
 
     def __init__(
         self, path: Path, definitions: Sequence[Schema | Channel], compression: Compression
@@ -64,7 +64,7 @@ class McapFile:
         self.size = 0
         """Bytes written."""
         self.counts: Counter[int] = Counter()
-        """Messages a channel."""
+        """Number of messages by channel."""
         self.span_ns: tuple[int, int] | None = None
         """First and last log time (None: no message)."""
         self._definitions = definitions
@@ -176,7 +176,7 @@ class McapFile:
         self.path.unlink(missing_ok=True)
 
     def check_in_place(self) -> None:
-        """See that the file is where it was made.
+        """Check that the file is still at its path.
 
         Raises:
             FileNotFoundError: it was removed or moved away.
@@ -187,7 +187,7 @@ class McapFile:
         raise FileNotFoundError(errno.ENOENT, "its file was removed or moved away")
 
     def _put(self, data: bytes) -> None:
-        """Hand bytes to the kernel, all or an error."""
+        """Write all bytes, or raise an error."""
         rest = memoryview(data)
         while rest:
             rest = rest[self._file.write(rest) :]

@@ -1,6 +1,6 @@
-"""Records of an MCAP file, parsed and decompressed by the mcap library, and found where they begin.
+"""Records of an MCAP file, parsed and decompressed by the mcap library.
 
-Lengths are checked before they are believed: those of a broken file would fill the memory.
+Lengths are checked first, since wrong ones in a damaged file would exhaust the memory.
 """
 
 from __future__ import annotations
@@ -52,10 +52,10 @@ _MOST_EXPANDED = 1000
 
 
 def parse(opcode: int, body: bytes) -> Any:
-    """A record from its content.
+    """Parse a record from its content.
 
     Raises:
-        ValueError: or another of `BROKEN`: it makes no sense.
+        ValueError: or another of `BROKEN`: the record is invalid.
     """
     stream = ReadDataStream(BytesIO(body))
     record = _PARSED[opcode].read(stream)
@@ -65,7 +65,7 @@ def parse(opcode: int, body: bytes) -> Any:
 
 
 def decompressed(chunk: Chunk) -> bytes:
-    """The records in a chunk, checked.
+    """Return the records of a chunk, decompressed and checked.
 
     Raises:
         ValueError: or another of `BROKEN`: they cannot be read.
@@ -81,7 +81,7 @@ def decompressed(chunk: Chunk) -> bytes:
 
 
 def whole_messages(piece: bytes) -> int:
-    """Bytes of the whole messages at the beginning of ``piece``."""
+    """Return the length in bytes of the whole messages at the beginning of ``piece``."""
     messages = np.empty((5, len(piece) // LEAST_MESSAGE + 1), np.int64)
     _, end = walk_messages(np.frombuffer(piece, np.uint8), 0, messages, 0)
     if not end:
@@ -90,7 +90,7 @@ def whole_messages(piece: bytes) -> int:
 
 
 def check_index(head: bytes, length: int) -> None:
-    """See that a record of this length may be a message index.
+    """Check that a record of this length may be a message index.
 
     Raises:
         ValueError: it is not.
@@ -100,7 +100,7 @@ def check_index(head: bytes, length: int) -> None:
 
 
 def cause(error: BaseException) -> str:
-    """The cause in one short line."""
+    """Return the cause of an error in one short line."""
     text = " ".join(str(error).split()) or type(error).__name__
     if "crc" in text.lower():
         return "CRC"
@@ -108,7 +108,7 @@ def cause(error: BaseException) -> str:
 
 
 def next_chunk(file: BinaryIO, at: int, size: int) -> int:
-    """Find where a chunk begins at or behind ``at``; ``size``, the file's: nowhere."""
+    """Return the next offset of a chunk from ``at`` on, or ``size`` of the file if none."""
     while at < size:
         file.seek(at)
         piece = file.read(PIECE + _LONGEST_CHUNK_HEAD)

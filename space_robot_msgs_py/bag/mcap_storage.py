@@ -1,7 +1,7 @@
-"""One MCAP file, chunk by chunk: what is broken is passed over and told.
+"""Reader of an MCAP file, chunk by chunk; damaged parts are skipped and reported.
 
-Records are parsed, chunks decompressed and checked by the mcap library. Only the messages, of
-which there are millions, are found in compiled code.
+The mcap library parses records, and decompresses and checks chunks. Only the messages, of
+which there are millions, are located in compiled code.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _BATCH_BYTES = 4 << 20
 
 
 class McapStorage:
-    """The messages and descriptions in a file, as far as they can be read."""
+    """Messages and metadata of a file, as far as they can be read."""
 
     def __init__(self, path: Path) -> None:
         """Read the beginning and the end.
@@ -55,7 +55,7 @@ class McapStorage:
         self.metadata: dict[str, dict[str, str]] = {}
         """The metadata records, by name."""
         self.counts: Counter[str] | None = None
-        """Messages a topic, as the file's statistics have them; None: it has none."""
+        """Number of messages per topic, from the file's statistics; None: no statistics."""
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._index_fault = ""
@@ -71,7 +71,7 @@ class McapStorage:
                 self._read_summary(file)
 
     def batches(self) -> Iterator[Batch]:
-        """All messages, as they were written.
+        """Yield all messages in the order in which they were written.
 
         Raises:
             OSError: the file can no longer be read.
@@ -95,12 +95,12 @@ class McapStorage:
 
     @property
     def incomplete(self) -> bool:
-        """True if something was passed over."""
+        """True if something was skipped."""
         return bool(self._faults or self._of_no_topic)
 
     @property
     def damage(self) -> list[str]:
-        """The things found broken; all are known when `batches` is through."""
+        """Damage of the file; complete after `batches`."""
         texts = [self._index_fault] if self._index_fault else []
         if self._faults:
             at, why = self._faults[0]
@@ -111,7 +111,7 @@ class McapStorage:
         return [f"{self.path.name}: {text}" for text in texts]
 
     def _read_summary(self, file: BinaryIO) -> None:
-        """Channels and counts from the file's end; they are there again if its beginning is not."""
+        """Read channels and counts from the end of the file."""
         try:
             at = self.size - len(MCAP0_MAGIC) - _FOOTER_BYTES
             file.seek(at)
@@ -157,7 +157,7 @@ class McapStorage:
     def _records(self, file: BinaryIO, before_messages: bool = False) -> Iterator[Any]:
         """The data section's records; messages as the bytes of many records.
 
-        Behind one that is not whole it goes on with the next chunk that can be found.
+        After an incomplete record it continues with the next chunk.
         """
         at = len(MCAP0_MAGIC) if self.is_mcap else 0
         while at < self.size:
@@ -206,7 +206,7 @@ class McapStorage:
             yield from self._by_topic(data, messages[:, :count])
 
     def _walk_chunk(self, data: Bytes, at: int, messages: Integers, count: int) -> int:
-        """Find the messages from ``at`` on, note the channels; returns all that are found."""
+        """Locate messages and channels from ``at`` on; return the messages."""
         while at < len(data):
             count, at = walk_messages(data, at, messages, count)
             if at == len(data):

@@ -1,6 +1,6 @@
-"""Counting what arrived and what is missing, from the ticks in the messages themselves.
+"""Accounting of received and missing messages, from the ticks in their stamps.
 
-Nothing else in a bag tells a lost message: header stamps are ticks, so gaps are losses.
+Header stamps are ticks, so gaps are lost messages.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ def message_tick(topic: topics.Topic, data: bytes, timebase: Timebase) -> int:
 
 
 LONGEST_JUMP = 20_000
-"""Ticks from one message to the next that are still believed: 10 s at 2 kHz."""
+"""Largest plausible step in ticks between messages: 10 s at 2 kHz."""
 
 
 @dataclass(slots=True)
 class MessageAccounting:
-    """Ticks of one topic's messages."""
+    """Accounting of the messages of one topic."""
 
     topic: topics.Topic
     received: int = 0
     repeated: int = 0
-    """Messages of a tick that had come already."""
+    """Number of repeated messages of a tick."""
     invalid_stamps: int = 0
     """Messages whose stamp cannot be right, or cannot be read."""
     first: int = 0
@@ -48,7 +48,7 @@ class MessageAccounting:
     """Ticks from one message to the next: the smallest step seen (0: not known yet)."""
     _guard: StampGuard = field(default_factory=lambda: StampGuard(LONGEST_JUMP))
     _holes: set[int] = field(default_factory=set)
-    """Ticks passed over, which may still come late."""
+    """Missing ticks, which may still arrive late."""
     _is_resuming: bool = False
     _left_out: int = 0
     """Ticks from the last message before each pause, or from tick 0, to the first after it."""

@@ -35,7 +35,7 @@ class _Count(BaseModel):
 
 
 class BagInformation(BaseModel):
-    """The notes of rosbag2 about a bag, as far as a reader needs them."""
+    """Metadata of rosbag2 about a bag, as needed by a reader."""
 
     version: int
     storage_identifier: str = ""
@@ -49,7 +49,7 @@ class BagInformation(BaseModel):
 
     @property
     def doubts(self) -> list[str]:
-        """The things that may be misunderstood in it, a sentence each."""
+        """Possible misinterpretations of the metadata, one sentence each."""
         if 1 <= self.version <= NEWEST:
             return []
         return [
@@ -58,12 +58,12 @@ class BagInformation(BaseModel):
 
     @property
     def noted(self) -> dict[str, str]:
-        """The custom data, all of it text."""
+        """Custom data, as texts."""
         return {key: str(value) for key, value in (self.custom_data or {}).items()}
 
     @property
     def counts(self) -> dict[str, int]:
-        """Messages a topic."""
+        """Number of messages per topic."""
         return {t.topic_metadata.name: t.message_count for t in self.topics_with_message_count}
 
     @property
@@ -79,7 +79,7 @@ class BagInformation(BaseModel):
 
 
 def read_information(path: Path) -> BagInformation:
-    """The metadata in a bag's folder.
+    """Read the metadata in a bag's folder.
 
     Raises:
         InputError: there is none, or it is no rosbag2 metadata.

@@ -1,4 +1,4 @@
-"""A bag as a `FlightLog`: ours, or anybody's with the same topics."""
+"""Reader of a bag into a `FlightLog`, also for bags of other recorders."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from .rows import Rows, stamps_of
 from .selection import Selection
 
 DEFAULT_PERIOD = 0.0005
-"""The period of a bag that does not tell it, s."""
+"""Period of a bag without a description, s."""
 _STAMPS_LOOKED_AT = 200
 
 
@@ -44,7 +44,7 @@ def read_flight(
     trust: bool = False,
     namespace: str | None = None,
 ) -> FlightLog:
-    """Read a flight; what is broken is left out and told (`FlightLog.damage`).
+    """Read a flight; damaged parts are left out and reported in `FlightLog.damage`.
 
     Ticks between the first and the last that have no whole state and reference are NaN. Of a bag
     that nobody finished (`FlightLog.unfinished`) what is there is read.
@@ -106,7 +106,7 @@ def _read(bag: Bag, remap: Mapping[str, str], namespace: str | None) -> FlightLo
 
 
 def _description(bag: Bag) -> tuple[dict[str, Any], list[str]]:
-    """Read what was flown, and tell what is wrong with that."""
+    """Read the description of the flight, and report its defects."""
     try:
         return read_description(bag.custom_data()), []
     except InputError as error:
@@ -114,7 +114,7 @@ def _description(bag: Bag) -> tuple[dict[str, Any], list[str]]:
 
 
 def first_states(bag: Bag, selection: Selection) -> tuple[RobotNames, list[int]]:
-    """Names of the joints, and the first stamps in ns.
+    """Return the names of the joints, and the first stamps in ns.
 
     Raises:
         InputError: there is none, or none that can be read.
@@ -186,7 +186,7 @@ def timebase_of(
 
 
 def missing(topic: topics.Topic, bag: Bag, selection: Selection) -> InputError:
-    """Tell why a bag without a topic's messages cannot be read."""
+    """Return the error for a bag without messages of a needed topic."""
     selection.topics()  # a topic to remap that is not there comes first
     if topic.full_name in selection.wrong:
         return InputError(f"{topic.full_name} is {selection.wrong[topic.full_name]}")

@@ -1,4 +1,4 @@
-"""The recorder: every message of a flight into a bag, with the proof that none is missing."""
+"""Recorder of every message of a flight into a bag, with counts of lost messages."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from .writer import BagWriter
 
 FLIGHT_KEY = "space_robot.flight"
 ROBOT_KEY = "robot_file"
-"""The robot's numbers among what was flown."""
+"""Key of the robot's numbers in the description."""
 CHUNK_BYTES = 1 << 16
-"""Ended in 0.2 ms, less than a tick leaves free; read almost as fast as longer ones."""
+"""Size of a chunk: written in 0.2 ms, within the free time of a tick."""
 MOST_CHUNKS = 4
-"""A chunk may become so many times as long where messages pile up."""
+"""Factor by which a chunk may grow when messages pile up."""
 CHUNK_AGE_S = 0.25
-"""A killed recorder loses the open chunk, so none stays open for longer."""
+"""Longest time a chunk stays open, s; a killed recorder loses its open chunk."""
 
 
 class BagRecorder:
-    """Takes serialized messages in any order between topics. Knows no ROS.
+    """Recorder of serialized messages, in any order between topics. Independent of ROS.
 
     The log time of a message is its simulated stamp; its publish time is when it was sent, if
     that is known. A message that came before (a plant that asked again, a mission that started
@@ -72,7 +72,7 @@ class BagRecorder:
         self._written = {
             t.name: t.carries or t._replace(name=names[t.name]) for t in topics.RECORDED
         }
-        """The topics under the names that they have in the bag."""
+        """Topics by their names in the bag."""
         self._writer = BagWriter(
             path,
             self._written.values(),
@@ -90,7 +90,7 @@ class BagRecorder:
         }
         self._plants = Sources(topics.PLANT_DESCRIPTION.name, publishers or Unknown())
         self.failure = ""
-        """The reason why nothing is written any more (empty: all is well)."""
+        """Reason why writing has stopped; empty without failure."""
         self.kept_tick = -1
         """The last tick whose state is in the file for good; -1: none."""
         self._kept = 0
@@ -137,7 +137,7 @@ class BagRecorder:
         self._open_bytes = self._writer.write(
             self._written[topic.name], log_ns, sent_ns or log_ns, tick, data
         )
-        if self._open_bytes > self._most_bytes:  # nobody has found the time to flush
+        if self._open_bytes > self._most_bytes:  # no time to flush so far
             self.flush()
         return True
 
@@ -161,7 +161,7 @@ class BagRecorder:
                 self._fail(error)
 
     def note_sent(self, topic_name: str, publisher: bytes, count: int) -> None:
-        """A node says how many messages it has sent on a topic.
+        """Record how many messages a node reports to have sent on a topic.
 
         Args:
             topic_name: the topic; others than those recorded are ignored.
@@ -173,7 +173,7 @@ class BagRecorder:
 
     @property
     def is_behind(self) -> bool:
-        """True if a node has sent more than has come."""
+        """True if a node has sent more messages than have arrived."""
         return any(sources.is_behind for sources in self.sources.values())
 
     @property
@@ -182,7 +182,7 @@ class BagRecorder:
         return {name: count for name, s in self.sources.items() if (count := s.foreign)}
 
     def foreign_names(self) -> list[str]:
-        """Nodes whose messages are left out."""
+        """Nodes whose messages are excluded."""
         names = set()
         for topic in self.foreign:
             self.sources[topic].find_names()
@@ -190,7 +190,7 @@ class BagRecorder:
         return sorted(names)
 
     def pause(self) -> None:
-        """Leave out on purpose what is sent until the next message recorded."""
+        """Exclude on purpose all messages until the next recorded one."""
         for name, sources in self.sources.items():
             sources.pause()
             self.accounting[name].pause()
@@ -247,7 +247,7 @@ class BagRecorder:
         return sources.tail + (holes if counted.topic.is_event else min(holes, counted.gaps))
 
     def close(self) -> None:
-        """Make the bag whole, with the flight's description and the counts in its metadata.
+        """Close the bag, with the flight's description and the counts in its metadata.
 
         A second call does nothing.
 

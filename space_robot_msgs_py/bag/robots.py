@@ -1,4 +1,4 @@
-"""The robots in a bag, told apart by the namespaces of their topics."""
+"""Robots in a bag, distinguished by the namespaces of their topics."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ REQUIRED = (topics.JOINT_STATES, topics.BASE_STATE, topics.REFERENCE_JOINTS, top
 
 
 def is_type(kind: str, topic: topics.Topic) -> bool:
-    """Tell if a topic's type in a bag is ours, in ROS's or in DDS' spelling."""
+    """Return True if a topic's type in a bag is ours, in ROS's or in DDS' spelling."""
     return kind.replace("/msg/", "/") == topic.type.replace("/msg/", "/")
 
 

@@ -67,9 +67,9 @@ class Rows:
             if describe
         }
         self._unnamed = set(MOST_ACTUATORS)
-        """Those of which no message has told the actuators' names yet."""
+        """Topics whose actuators' names are still unknown."""
         self._apart: MeasuredStates | None = None
-        """The true states, once one has come; after `split_truth` what the sensors told."""
+        """True states, once one has arrived; after `split_truth` the measured states."""
         self._errors: list[tuple[NDArray[np.int64], Array]] = []
         """Ticks and e of the telemetry."""
         self._laws: list[LawInForce] = []

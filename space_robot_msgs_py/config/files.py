@@ -37,7 +37,7 @@ def named_file(kind: str, name: str) -> Path:
 
 
 def is_named(kind: str, name: str) -> bool:
-    """Tell whether there is ``config/<kind>/<name>.yaml``."""
+    """Return whether there is ``config/<kind>/<name>.yaml``."""
     # not Path.is_file, which raises an OSError for a name that is too long
     return "/" not in name and os.path.isfile(config_directory() / kind / f"{name}.yaml")
 

@@ -34,7 +34,7 @@ class NodeSettings(StrictModel):
     selectors: ClassVar[tuple[str, ...]] = ("robot",)
     """Fields that choose configuration files."""
     sends: ClassVar[tuple[Topic, ...]] = ()
-    """Topics whose listeners the node can be told to wait for (parameter ``wait_for``)."""
+    """Topics whose listeners the node can wait for (parameter ``wait_for``)."""
 
     robot: str = Field(
         "paper", description="a robot of config/robots, or a path to its YAML, URDF or folder"

@@ -36,7 +36,7 @@ def nest(flat: Mapping[Any, Any]) -> Tree:
 
 
 def _refuse_both(one: Tree, other: Tree, prefix: str = "") -> None:
-    """See that nothing is a value in one tree, and a group of values in the other."""
+    """Check that nothing is a value in one tree, and a group of values in the other."""
     for key in one.keys() & other.keys():
         first, second = one[key], other[key]
         if isinstance(first, dict) is not isinstance(second, dict):

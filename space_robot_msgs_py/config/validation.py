@@ -68,7 +68,7 @@ def validate(schema: type[Schema], content: Any, where: str) -> Schema:
     """Validate ``content``; ``where`` names its file (and enclosing key) in errors.
 
     Raises:
-        InputError: with the first fault found, in one line.
+        InputError: a value is invalid; the first error, in one line.
     """
     try:
         return schema.model_validate(content)

@@ -57,7 +57,7 @@ def read_file(path: Path) -> str:
 
 
 def check_file(path: Path) -> None:
-    """See that a file can be read.
+    """Check that a file can be read.
 
     Raises:
         InputError: see `read_file`.
@@ -117,7 +117,7 @@ def parse_yaml(text: str) -> Any:
 
 
 def _measure(text: str) -> None:
-    """See that a text may be built, from its events, which come one by one."""
+    """Check that a text may be built, from its events, which come one by one."""
     sizes: dict[str, int] = {}
     opened: list[tuple[str | None, int]] = []
     size = repeated = 0

@@ -1,4 +1,4 @@
-"""Only one of each: in a ROS domain a node's name is its own, and a topic has one publisher.
+"""Exclusive node names and exclusive publishers of topics in a ROS domain.
 
 Two plants or two controllers in one domain would answer each other's ticks. Nodes of this project
 keep each other out with `locks`. Other nodes take none; discovery finds those.
@@ -18,7 +18,7 @@ from .endpoints import full_name_of
 from .locks import FileLock, HeldError, look, node_lock, topic_lock
 
 UNNAMED = "_NODE_NAME_UNKNOWN_"
-"""Name that discovery gives to a publisher's node until its participant has told its own."""
+"""Name that discovery gives to a node until its participant has announced its own."""
 
 
 class TopicClaim:
@@ -79,7 +79,7 @@ class GraphPublishers:
         self._node = node
 
     def claimed(self, topic: str) -> Claimed:
-        """Who has claimed a topic, on this machine."""
+        """Return the owner of the claim of a topic on this machine."""
         domain = self._node.context.get_domain_id()
         is_held, notes = look(topic_lock(domain, self._node.resolve_topic_name(topic)))
         return Claimed(tuple(gid for text in notes if (gid := _gid(text))), is_held)

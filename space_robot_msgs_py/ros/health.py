@@ -1,4 +1,4 @@
-"""How a node is: what it reports of itself in /diagnostics."""
+"""Health of a node, as reported in /diagnostics."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Level(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Health:
-    """A node's state at a moment."""
+    """Health of a node at one moment."""
 
     mode: str
     """The mode in a word or two, then why: ``nominal``, ``safe: no state for 0.5 s``."""

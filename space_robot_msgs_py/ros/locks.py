@@ -1,4 +1,4 @@
-"""Who is in a ROS domain: locks that the kernel releases however their holder ends.
+"""Locks of ROS domains, nodes and topics, released by the kernel when their holder ends.
 
 Discovery would not do: it takes its time, and lists a killed node for another 20 s. Each lock is a
 file in the temporary folder that names its holder; it stays when the lock goes.
@@ -25,7 +25,7 @@ MOST_NOTES = 16
 
 
 class Holder(NamedTuple):
-    """Who has a lock."""
+    """Holder of a lock."""
 
     name: str
     """With the pid."""
@@ -34,7 +34,7 @@ class Holder(NamedTuple):
 
 
 class HeldError(InputError):
-    """Somebody else has a lock."""
+    """Another process holds the lock."""
 
     def __init__(self, path: Path, holder: Holder) -> None:
         super().__init__(f"{path} is held by {holder.name}")
@@ -138,7 +138,7 @@ def _holders(paths: Iterable[Path]) -> list[Holder]:
 
 
 def look(path: Path) -> tuple[bool, list[str]]:
-    """Tell if somebody holds a lock, and the notes of those who took it, the newest last."""
+    """Return True if somebody holds a lock, and the notes of those who took it, the newest last."""
     try:
         descriptor = _open(path)
     except InputError:

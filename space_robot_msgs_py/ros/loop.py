@@ -1,4 +1,4 @@
-"""A node's work, as a loop that its host steps: it never waits itself.
+"""Interface of a node's loop, which its host steps and which never waits itself.
 
 So one host can run one node in a process, or step several in turn.
 """
@@ -44,10 +44,10 @@ class Loop(Protocol):
         """True if the loop has come to its end, and with it the flight."""
 
     def begin(self) -> None:
-        """Get ready to be stepped: called whenever the node has become active."""
+        """Prepare for stepping; called on activate."""
 
     def step(self) -> Wait | None:
-        """Do what can be done now, without waiting.
+        """Run one step without waiting.
 
         Returns:
             What to wait for; None if something was done and there may be more.
@@ -57,11 +57,11 @@ class Loop(Protocol):
         """Leave the graph safe: called on deactivate, and before the end of an active node."""
 
     def close(self) -> None:
-        """Let go of everything: called on cleanup and at the end.
+        """Release all resources; called on cleanup and at the end.
 
         Raises:
             FlightError: something that was promised has not been kept.
         """
 
     def health(self) -> Health:
-        """Tell how the node is; called some times a second."""
+        """Return the health of the node; called some times a second."""

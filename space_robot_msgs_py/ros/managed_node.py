@@ -37,7 +37,7 @@ NO_TIME = Timebase(1)
 
 
 class ManagedNode(LifecycleNode, Generic[Schema]):
-    """Makes, starts, stops and closes a `Loop` in the transitions of the lifecycle."""
+    """Lifecycle node that creates, starts, stops and closes a `Loop`."""
 
     def __init__(
         self,
@@ -62,7 +62,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         self._claim: TopicClaim | None = None
         self._name: FileLock | None = None
         self.error: SpaceRobotError | None = None
-        """Why the last transition failed."""
+        """Reason why the last transition failed."""
         description = ParameterDescriptor(
             description="configure and activate without being told (false: wait for transitions)",
             read_only=True,
@@ -177,7 +177,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         return self._try(configure, undo=self._release)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Let the loop be stepped from here on, unless another node publishes this one's topics."""
+        """Start stepping the loop, unless another node publishes this one's topics."""
 
         def activate() -> None:
             if foreign := self._lasting_foreign_publishers():
@@ -209,7 +209,7 @@ class ManagedNode(LifecycleNode, Generic[Schema]):
         return TransitionCallbackReturn.FAILURE
 
     def _foreign_publishers(self) -> str:
-        """Tell who else publishes this node's topics, in words; empty if nobody."""
+        """Describe foreign publishers of this node's topics; empty if there are none."""
         crowded = [
             topic
             for topic in self._topics

@@ -1,4 +1,4 @@
-"""A process of nodes: ROS up, the lifecycle, the loops of the active nodes stepped, a clean end.
+"""Host of the nodes of a process: startup, lifecycle, stepping of loops, shutdown.
 
 As a rule a process hosts one node; a composed graph is several nodes in one process.
 """
@@ -36,7 +36,7 @@ ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 @dataclass(frozen=True)
 class NodeKind(Generic[Schema]):
-    """How a node is made."""
+    """Definition of a kind of node."""
 
     schema: type[Schema]
     """Its parameters; it tells the node's name, too."""

@@ -1,4 +1,4 @@
-"""/simulation/paused: tells all nodes that time stands still, so that none takes it for silence."""
+"""/simulation/paused: publishes a pause to all nodes, so that watchdogs ignore it."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from .endpoints import PolledCallbackGroup, RawPublisher, RawSubscription
 
 
 class PausedOutput:
-    """Tells the others, also those who join later."""
+    """Publisher of the pause, also for late subscribers."""
 
     def __init__(self, node: Node) -> None:
         self._publisher = RawPublisher(node, topics.SIMULATION_PAUSED)
         self._told: bool | None = None
 
     def tell(self, is_paused: bool) -> None:
-        """Tell whether the simulation is paused, if that is news."""
+        """Return whether the simulation is paused, if that is news."""
         if is_paused is not self._told:
             self._told = is_paused
             self._publisher.publish(serialize_message(Bool(data=is_paused)))
 
 
 class PausedInput:
-    """Hears whether the simulation is paused."""
+    """Subscriber to the pause of the simulation."""
 
     def __init__(self, node: Node) -> None:
         self._input = RawSubscription(node, topics.SIMULATION_PAUSED, PolledCallbackGroup())

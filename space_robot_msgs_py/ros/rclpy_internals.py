@@ -1,4 +1,4 @@
-"""The one module that touches what is private to rclpy: 7.1 of ROS 2 Jazzy, `VERSIONS`.
+"""Access to private parts of rclpy, of the `VERSIONS` 7.1 of ROS 2 Jazzy.
 
 What is used, and for want of which public way: wait sets (the executor's own costs more than a
 loop's whole work), messages taken by hand, the parameters that the user gave for a node,
@@ -22,7 +22,7 @@ VERSIONS = ("7.",)
 
 
 def is_known_version() -> bool:
-    """Tell whether rclpy is one of `VERSIONS`, with its rcl and rmw."""
+    """Return whether rclpy is one of `VERSIONS`, with its rcl and rmw."""
     try:
         return metadata.version("rclpy").startswith(VERSIONS)
     except metadata.PackageNotFoundError:
@@ -30,7 +30,7 @@ def is_known_version() -> bool:
 
 
 def tells_pointers() -> bool:
-    """Tell whether `pointer` works here."""
+    """Return whether `pointer` works here."""
     return hasattr(_rclpy.Subscription, "pointer")
 
 

@@ -31,7 +31,7 @@ def _main() -> None:
     root = os.path.dirname(os.path.dirname(HERE))
     # a script's own folder is put first, and ours holds modules that are no top-level ones
     sys.path[:] = [path for path in sys.path if os.path.abspath(path) != HERE]
-    if root not in sys.path:  # an uninstalled tree, found by its starter's current folder
+    if root not in sys.path:  # an uninstalled tree in the parent's current folder
         sys.path.insert(0, root)
     import runpy
 

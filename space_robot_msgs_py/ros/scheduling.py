@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def ask_for_fifo(priority: int) -> str:
-    """Put all threads of this process under SCHED_FIFO; says what was granted.
+    """Put all threads of this process under SCHED_FIFO; return a message on the result.
 
     The middleware's threads go one above the loop: a loop that waits for a message must not keep
     the thread away that brings it. Linux wakes such threads at once, others when it suits.

@@ -31,9 +31,9 @@ class Received(NamedTuple):
     sent_ns: int
     """When it was sent by its sender's clock, ns since 1970."""
     publisher: bytes
-    """The publisher's GID; of RTPS the first 12 bytes name its participant. Empty: not told."""
+    """GID of the publisher; in RTPS its first 12 bytes identify the participant. Empty: unknown."""
     sequence: int
-    """Its place among all that this publisher has sent, from 1 on; 0: not told."""
+    """Sequence number of the message of this publisher, from 1 on; 0: unknown."""
 
 
 class _Allocator(ctypes.Structure):

@@ -80,7 +80,7 @@ class ServiceCalls(SingleThreadedExecutor):
             callback()
 
     def _is_worth_a_look(self) -> bool:
-        """Tell whether a request waits, or whether it is time for a full look, which is slow."""
+        """Return whether a request waits, or whether it is time for a full look, which is slow."""
         if self._unfinished:
             return True
         if (now := time.monotonic()) < self._full_look_at:

@@ -1,4 +1,4 @@
-"""A subscription that takes what the topic's own publisher sends, and nothing of others."""
+"""Subscription that accepts messages only from the topic's own publisher."""
 
 from __future__ import annotations
 

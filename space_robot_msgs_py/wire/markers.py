@@ -1,4 +1,4 @@
-"""/markers: a robot's shapes in the inertial frame, for viewers that are told no transforms."""
+"""/markers: a robot's shapes in the inertial frame, for viewers without transforms."""
 
 from __future__ import annotations
 

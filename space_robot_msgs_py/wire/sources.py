@@ -36,7 +36,7 @@ class Publishers(Protocol):
 
 
 class Unknown:
-    """Nothing can be found out: every publisher of a topic is taken for its own."""
+    """Sources that cannot be identified: every publisher is accepted as the flight's own."""
 
     def claimed(self, topic: str) -> Claimed:
         """Nobody has."""
@@ -83,7 +83,7 @@ class Source:
 
 
 class Sources:
-    """The publishers of one topic. Knows no ROS."""
+    """The publishers of one topic. Independent of ROS."""
 
     def __init__(self, topic: str, publishers: Publishers) -> None:
         self._topic, self._publishers = topic, publishers
@@ -99,7 +99,7 @@ class Sources:
 
         Args:
             publisher: GID; empty where messages tell none: then all are taken for ours.
-            sequence: the message's place among all of its publisher, from 1 on; 0: not told.
+            sequence: number of the message of its publisher, from 1 on; 0: unknown.
         """
         if not publisher:
             return True
@@ -186,7 +186,7 @@ class Sources:
         return source
 
     def _follows(self, publisher: bytes) -> bool:
-        """Tell if one of a topic that nobody claims is the first, or the first started again."""
+        """Return True for the first publisher of an unclaimed topic, or its restart."""
         ours = [p for p, source in self._sources.items() if source.is_ours]
         if not ours:
             return True

@@ -7,7 +7,7 @@ AGREEING = 5
 
 
 class StampGuard:
-    """Lets stamps pass that rise by no more than a jump. Knows no ROS.
+    """Lets stamps pass that rise by no more than a jump. Independent of ROS.
 
     A single stamp that goes back or jumps is wrong. Several that agree mean a new time: the plant
     has started anew, or this node has slept.
@@ -24,7 +24,7 @@ class StampGuard:
         self._agreeing = 0
 
     def passes(self, tick: int) -> bool:
-        """Tell if a state of ``tick`` is to be believed, which is then the last one."""
+        """Return True if a state of ``tick`` is to be believed, which is then the last one."""
         follows = 0 < tick - self.last <= self._longest_jump
         if not follows and self.last >= 0:
             agrees = self._agreeing and 0 <= tick - self._other <= self._longest_jump

@@ -1,1 +1,1 @@
-"""Actuators turn commands into torques: delay, limits."""
+"""Actuators: delay, limits and errors between command and torque."""

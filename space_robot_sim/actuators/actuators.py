@@ -1,6 +1,6 @@
-"""All actuators of one robot: a new effect is a line in each list.
+"""All actuators of one robot.
 
-What a command passes on its way to the robot, axis by axis:
+Signal path of a command, for each axis:
 
     command -> delay -> limits -+-> quantisation, dead band -> lag -> scale, bias -+-> given
                                 |                                                  |
@@ -8,13 +8,13 @@ What a command passes on its way to the robot, axis by axis:
                                                             |
                                           echo's scale, bias -> reported
 
-What is reported is all that the flight software is told of it. By default that is the command
-behind delay and limits: what the drives make of it stays unknown.
+The flight software receives only the reported torque. By default that is the command after delay
+and limits, so errors of the drives are unknown to it.
 
-That is the way of joints, and of a base whose torque is ideal. A base with hardware is turned by
-its wheels and thrusters, each by a number of the command: limits and drives of base axes do
-nothing. What wheels and thrusters gave is its torque given, which the echo's scale and bias make
-the one reported. A base without actuators gets nothing.
+This path applies to joints, and to a base with ideal torque. A base with hardware is turned by
+its wheels and thrusters, each with its own value in the command; limits and drives of base axes
+have no effect. The torque of wheels and thrusters is then the given torque, from which the echo's
+scale and bias make the reported one. A base without actuators receives no torque.
 """
 
 from __future__ import annotations
@@ -57,10 +57,10 @@ class ActuatorSettings(
     """Settings of the actuators."""
 
     def check(self, robot: Robot, file: str) -> None:
-        """See that the numbers fit, see `BaseActuatorSettings.check`.
+        """Check the settings, see `BaseActuatorSettings.check`.
 
         Raises:
-            InputError: they do not.
+            InputError: the settings do not fit.
         """
         super().check(robot, file)
         if self.base_actuation != "ideal" and self.base_torque_limit:
@@ -71,7 +71,7 @@ class ActuatorSettings(
 
 
 class Actuators(Record):
-    """The actuators of one robot, as the plant's kernels read them."""
+    """Record of the actuators of one robot, for the plant's kernels."""
 
     torque_limit: TorqueLimit = nested(TorqueLimit)
     drive: Drive = nested(Drive)
@@ -79,13 +79,13 @@ class Actuators(Record):
     wheels: Wheels = nested(Wheels)
     thrusters: Thrusters = nested(Thrusters)
     base_is_ideal: float = shaped(lambda n: ())
-    """1 if the base gets the torque that is commanded; 0 if only what its hardware gives."""
+    """1 if the base receives the commanded torque; 0 if it has hardware or no actuators."""
     saturated_ticks: float = shaped(lambda n: ())
-    """Ticks so far in which a torque was at its limit."""
+    """Number of ticks in which a torque was at its limit."""
     latency: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS,))
     """Ticks by which each number of a command is late."""
     due: Array = shaped(lambda n: (n + 3 + MOST_WHEELS + MOST_THRUSTERS,))
-    """The command that is due at the current tick, as long as that is."""
+    """The command due at the current tick."""
     base_wrench: Array = shaped(lambda n: (6,))
     """Force, N, and torque, N m, on base axes, of all that acts on the base but the wheels."""
 
@@ -125,10 +125,10 @@ FAULTS: dict[str, type[PartFault]] = {
 
 
 def check_faults(schedule: Schedule, settings: BaseActuatorSettings) -> None:
-    """See that the actuators of a base can fail as a flight's faults say.
+    """Check that the actuators of a base can have the faults of a flight.
 
     Raises:
-        InputError: the torque of a base that is not ideal is to be limited.
+        InputError: a fault limits the torque of a base that is not ideal.
     """
     if settings.base_actuation != "ideal" and schedule.of(SATURATE_BASE):
         raise InputError(
@@ -138,13 +138,13 @@ def check_faults(schedule: Schedule, settings: BaseActuatorSettings) -> None:
 
 
 def reports_given(actuators: Actuators) -> bool:
-    """Return whether sound actuators report exactly the torque that they give."""
+    """Return whether actuators without faults report exactly the torque that they give."""
     echo = actuators.torque_echo
     return bool(echo.is_exact and (echo.is_of_given or actuators.drive.is_exact))
 
 
 def command_delay_buffer(actuators: Actuators, names: int) -> Array:
-    """Return the ring (ticks, names) of commands of so many numbers that are on their way."""
+    """Return the ring buffer (ticks, names) of commands in transit."""
     return ring_of(actuators.latency[:names])
 
 
@@ -158,18 +158,18 @@ def actuate(
     truth: State,
     measured: State,
 ) -> None:
-    """Write what ``command`` makes the actuators give from ``tick`` to the next.
+    """Write the torque of the actuators from ``tick`` to the next for a ``command``.
 
     Args:
         actuators: of the robot; ``base_wrench`` is written.
-        command_delay_buffer: ring of the commands on their way.
+        command_delay_buffer: ring buffer of commands in transit.
         command: (n+3+A,) N m: base x, y, z (base frame), then joints; then of the base's hardware:
             torques of wheels' motors, N m, forces of thrusters, N.
         tick: at which it is given.
         period: of a tick, s.
         truth: ``wheel_velocities`` at ``tick`` are read; ``applied_torque`` (the one that acts on
             the robot), ``wheel_torques`` and ``thrusts`` are written.
-        measured: the same are written, ``applied_torque`` being what the flight software is told.
+        measured: the same are written; ``applied_torque`` is the reported torque.
     """
     applied, reported = truth.applied_torque, measured.applied_torque
     due, wrench = actuators.due, actuators.base_wrench

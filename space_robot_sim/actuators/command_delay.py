@@ -1,4 +1,4 @@
-"""Commands that take some ticks from the controller to the actuators."""
+"""Delay of commands between controller and actuators."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 class CommandDelaySettings(StrictModel):
-    """How late commands are applied."""
+    """Settings of the delay of commands."""
 
     command_latency_ticks: Annotated[int, Field(ge=0, le=1000)] = Field(
         0, description="ticks by which a command is applied late"
@@ -23,7 +23,7 @@ class CommandDelaySettings(StrictModel):
 
 
 def ring_of(latency: Array) -> Array:
-    """Return the ring (ticks, c) of commands on their way, zeros.
+    """Return a ring buffer (ticks, c) of commands in transit, filled with zeros.
 
     Args:
         latency: (c,) ticks by which each number of a command is late.
@@ -34,7 +34,7 @@ def ring_of(latency: Array) -> Array:
 
 @kernel
 def delay_command(latency: Array, ring: Array, command: Array, tick: int, out: Array) -> None:
-    """Put ``command`` (c,) into the ring at ``tick``; write what is due there into ``out``.
+    """Store ``command`` (c,) in the ring at ``tick``; write the command due into ``out``.
 
     ``latency`` holds the ticks by which each number is late; before the first command is none.
     """

@@ -1,4 +1,4 @@
-"""Drives that do not give the torque they are asked for.
+"""Errors of the drives between commanded and given torque.
 
 A torque ``u`` that has passed the limits is given as the following, axis by axis:
 
@@ -38,7 +38,7 @@ class Drive(Record):
     """The drives of one robot, an axis each: base x, y, z (base frame), then joints."""
 
     scale: Array = shaped(lambda n: (n + 3,))
-    """Torque given per torque asked."""
+    """Torque given per torque commanded."""
     bias: Array = shaped(lambda n: (n + 3,))
     """N m."""
     step: Array = shaped(lambda n: (n + 3,))
@@ -52,7 +52,7 @@ class Drive(Record):
     lagging: Array = shaped(lambda n: (n + 3,))
     """The lag's output at the current tick, N m."""
     is_exact: float = shaped(lambda n: ())
-    """1 if what is asked for is given, so that nothing else need be looked at; see `judge`."""
+    """1 if the drive is exact, so that its kernel is skipped; see `judge`."""
 
     @classmethod
     def build(cls, n: int, settings: DriveSettings, period: float) -> Drive:
@@ -76,7 +76,7 @@ class Drive(Record):
 
 
 def judge(drive: Drive) -> None:
-    """Set ``is_exact``; to be called when any of the numbers have changed."""
+    """Update ``is_exact``; to be called after any parameter has changed."""
     errors = (drive.scale - 1.0, drive.bias, drive.step, drive.dead_band, drive.mean_decay)
     assign(drive, is_exact=not np.any(errors))
 
@@ -128,7 +128,7 @@ DRIVE_BIAS = Kind(
 
 
 class WrongDrive:
-    """Gives some axes another scale or bias for a while."""
+    """Fault: temporary change of scale or bias of some axes."""
 
     KINDS: ClassVar[tuple[Kind, ...]] = (DRIVE_SCALE, DRIVE_BIAS)
 
@@ -137,7 +137,7 @@ class WrongDrive:
         self._bias = TemporaryChange(schedule.of(DRIVE_BIAS))
 
     def apply(self, tick: int, part: Drive) -> None:
-        """Make the drives as wrong as they should be from ``tick`` to the next."""
+        """Apply the faults of the drives from ``tick`` to the next."""
         is_scaled = self._scale.apply(tick, part.scale, _multiply)
         if self._bias.apply(tick, part.bias, _add) or is_scaled:
             judge(part)

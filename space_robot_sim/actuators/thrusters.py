@@ -1,8 +1,8 @@
 """Thrusters on the base, each open or closed.
 
-A thruster that is asked for more than half of its force is opened, a valve's delay later, and is
-closed again at the earliest after its shortest pulse. Open thrusters burn ``F / (I_sp g_0)`` of
-the tank's propellant; what is left in the tick in which it ends is shared alike.
+A thruster commanded more than half of its force opens after the delay of its valve, and closes
+at the earliest after its shortest pulse. Open thrusters burn ``F / (I_sp g_0)`` of the tank's
+propellant; in the tick in which the tank runs empty, the rest is shared equally.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ Array = NDArray[np.float64]
 
 
 class Thrusters(Record):
-    """The thrusters of one base; numbers beyond the last thruster are zero."""
+    """Thrusters of one base; entries beyond the last thruster are zero."""
 
     count: float = shaped(lambda n: ())
     force: Array = shaped(lambda n: (MOST_THRUSTERS,))
-    """Of an open thruster, N."""
+    """Force of an open thruster, N."""
     direction: Array = shaped(lambda n: (MOST_THRUSTERS, 3))
     """Unit vectors of the force on the base, base frame."""
     lever: Array = shaped(lambda n: (MOST_THRUSTERS, 3))
@@ -41,15 +41,15 @@ class Thrusters(Record):
     stuck_on: Array = shaped(lambda n: (MOST_THRUSTERS,))
     """1 for a valve that cannot be closed."""
     stuck_off: Array = shaped(lambda n: (MOST_THRUSTERS,))
-    """1 for a valve that cannot be opened, be it stuck on besides."""
+    """1 for a valve that cannot be opened; overrides `stuck_on`."""
     open: Array = shaped(lambda n: (MOST_THRUSTERS,))
     """1 for a valve that was open over the last tick."""
     remaining: Array = shaped(lambda n: (MOST_THRUSTERS,))
     """Ticks for which a valve must stay open."""
     pulses: Array = shaped(lambda n: (MOST_THRUSTERS,))
-    """Times so far that a valve has opened."""
+    """Number of times that a valve has opened."""
     propellant: float = shaped(lambda n: ())
-    """Left in the tank, kg; inf: it never runs out."""
+    """Propellant in the tank, kg; inf: unlimited."""
     burnt: float = shaped(lambda n: ())
     """Propellant used so far, kg."""
 
@@ -79,7 +79,7 @@ class Thrusters(Record):
 def fire(
     thrusters: Thrusters, asked: Array, period: float, thrusts: Array, base_wrench: Array
 ) -> None:
-    """Open and close valves; write what they give over a tick into ``thrusts``.
+    """Open and close valves; write the mean force over a tick into ``thrusts``.
 
     Args:
         thrusters: whose valves and tank change.
@@ -117,7 +117,7 @@ THRUSTER_STUCK_OFF = Kind("thruster_stuck_off", _THRUSTER, None, "a thruster's v
 
 
 class StuckThruster:
-    """Lets some valves stay open or closed for a while."""
+    """Fault: some valves stay open or closed for a while."""
 
     KINDS: ClassVar[tuple[Kind, ...]] = (THRUSTER_STUCK_ON, THRUSTER_STUCK_OFF)
 
@@ -126,7 +126,7 @@ class StuckThruster:
         self._off = TemporaryChange(schedule.of(THRUSTER_STUCK_OFF))
 
     def apply(self, tick: int, part: Thrusters) -> None:
-        """Let those be stuck that should be from ``tick`` to the next."""
+        """Apply the faults of the valves from ``tick`` to the next."""
         self._on.apply(tick, part.stuck_on, _stick)
         self._off.apply(tick, part.stuck_off, _stick)
 

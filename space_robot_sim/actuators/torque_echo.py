@@ -1,4 +1,4 @@
-"""The torque that is reported as applied, all that the flight software is told of it.
+"""Reported torque: the applied torque as the flight software receives it.
 
     reported = scale * source + bias
 
@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 
 class TorqueEchoSettings(StrictModel):
-    """The torque that is reported as applied."""
+    """Settings of the reported torque."""
 
     torque_echo: Literal["command", "given"] = Field(
         "command",
@@ -44,16 +44,16 @@ class TorqueEchoSettings(StrictModel):
 
 
 class TorqueEcho(Record):
-    """The report of one robot's torques, an axis each: base x, y, z (base frame), then joints."""
+    """Report of torques, one per axis: base x, y, z (base frame), then joints."""
 
     is_of_given: float = shaped(lambda n: ())
     """1 if the torque given is reported, 0 if the command within its limits is."""
     scale: Array = shaped(lambda n: (n + 3,))
-    """Torque reported per torque of its source."""
+    """Reported torque per torque of the source."""
     bias: Array = shaped(lambda n: (n + 3,))
     """N m."""
     is_exact: float = shaped(lambda n: ())
-    """1 if the source itself is reported, so that nothing else need be looked at; see `judge`."""
+    """1 if the source itself is reported, so that the kernel is skipped; see `judge`."""
 
     @classmethod
     def build(cls, n: int, settings: TorqueEchoSettings) -> TorqueEcho:
@@ -74,7 +74,7 @@ class TorqueEcho(Record):
 
 
 def judge(echo: TorqueEcho) -> None:
-    """Set ``is_exact``; to be called when any of the numbers have changed."""
+    """Update ``is_exact``; to be called after any parameter has changed."""
     assign(echo, is_exact=not np.any((echo.scale - 1.0, echo.bias)))
 
 
@@ -106,7 +106,7 @@ TORQUE_BIAS = Kind(
 
 
 class WrongEcho:
-    """Lets some axes report a wrong torque for a while; what is given stays right."""
+    """Fault: some axes report a wrong torque for a while; the given torque is correct."""
 
     KINDS: ClassVar[tuple[Kind, ...]] = (TORQUE_SCALE, TORQUE_BIAS)
 
@@ -115,7 +115,7 @@ class WrongEcho:
         self._bias = TemporaryChange(schedule.of(TORQUE_BIAS))
 
     def apply(self, tick: int, part: TorqueEcho) -> None:
-        """Make the report as wrong as it should be from ``tick`` to the next."""
+        """Apply the faults of the report from ``tick`` to the next."""
         is_scaled = self._scale.apply(tick, part.scale, _divide)
         if self._bias.apply(tick, part.bias, _subtract) or is_scaled:
             judge(part)

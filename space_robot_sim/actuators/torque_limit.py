@@ -1,4 +1,4 @@
-"""The largest torque that the actuators give."""
+"""Torque limits of the actuators."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Limit = Annotated[float, Field(ge=0.0, le=1e9)]
 
 
 class TorqueLimitSettings(StrictModel):
-    """The largest torque of each actuator."""
+    """Settings of the torque limits."""
 
     base_torque_limit: Limit = Field(
         0.0, description="largest torque on each base axis, N m (0: none); of an ideal base"
@@ -47,7 +47,7 @@ class TorqueLimit(Record):
 
 @kernel
 def limit_torque(limits: TorqueLimit, torque: Array) -> float:
-    """Cut ``torque`` (n+3,) N m to the limits in place.
+    """Limit ``torque`` (n+3,) N m in place.
 
     Returns:
         1 if it exceeded one, else 0.
@@ -67,7 +67,7 @@ SATURATE_JOINTS = Kind("saturate_joints", _TORQUE, None, "the joints' motors giv
 
 
 class WeakActuators:
-    """Lowers torque limits for a while."""
+    """Fault: torque limits are lower for a while."""
 
     KINDS: ClassVar[tuple[Kind, ...]] = (SATURATE_BASE, SATURATE_JOINTS)
 
@@ -75,7 +75,7 @@ class WeakActuators:
         self._change = TemporaryChange(schedule.of(*self.KINDS))
 
     def apply(self, tick: int, part: TorqueLimit) -> None:
-        """Make the actuators as weak as they should be from ``tick`` to the next."""
+        """Apply the faults of the limits from ``tick`` to the next."""
         self._change.apply(tick, part.limit, _weaken)
 
 

@@ -1,4 +1,4 @@
-"""Reaction wheels that turn the base; a motor can push a wheel only up to a speed.
+"""Reaction wheels on the base, with limits of torque and momentum.
 
 The motor of wheel k gives the torque ``u_k`` about its axis ``a_k``, the base gets ``-a_k u_k``.
 It gives no more than its largest torque, nor more than would push the wheel past its largest
@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 
 class Wheels(Record):
-    """The motors of one base's wheels; numbers beyond the last wheel are zero."""
+    """Wheel motors of one base; entries beyond the last wheel are zero."""
 
     count: float = shaped(lambda n: ())
     axis: Array = shaped(lambda n: (MOST_WHEELS, 3))
@@ -42,11 +42,11 @@ class Wheels(Record):
     max_momentum: Array = shaped(lambda n: (MOST_WHEELS,))
     """h, N m s."""
     failed: Array = shaped(lambda n: (MOST_WHEELS,))
-    """1 for a wheel whose motor is dead."""
+    """1 for a wheel with a failed motor."""
     saturated: Array = shaped(lambda n: (MOST_WHEELS,))
-    """1 for a wheel that was asked over the last tick for all that it can give, or more."""
+    """1 for a wheel commanded to its limit or beyond in the last tick."""
     saturated_ticks: Array = shaped(lambda n: (MOST_WHEELS,))
-    """Such ticks so far."""
+    """Number of ticks with a saturated wheel."""
 
     @classmethod
     def build(cls, n: int, settings: WheelSettings) -> Wheels:
@@ -65,7 +65,7 @@ class Wheels(Record):
 def drive_wheels(
     wheels: Wheels, asked: Array, velocities: Array, period: float, torques: Array, base: Array
 ) -> float:
-    """Write what the motors give over a tick into ``torques``; add what the base gets of it.
+    """Write the motor torques over a tick into ``torques``; add the reaction on the base.
 
     Args:
         wheels: whose saturation is counted.
@@ -106,7 +106,7 @@ WHEEL_FAIL = Kind(
 
 
 class DeadWheel:
-    """Lets the motors of some wheels give nothing for a while."""
+    """Fault: motors of some wheels give no torque for a while."""
 
     KINDS: ClassVar[tuple[Kind, ...]] = (WHEEL_FAIL,)
 
@@ -114,7 +114,7 @@ class DeadWheel:
         self._change = TemporaryChange(schedule.of(WHEEL_FAIL))
 
     def apply(self, tick: int, part: Wheels) -> None:
-        """Let those be dead that should be from ``tick`` to the next."""
+        """Apply the faults of the motors from ``tick`` to the next."""
         self._change.apply(tick, part.failed, _kill)
 
 

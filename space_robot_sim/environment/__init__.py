@@ -1,1 +1,1 @@
-"""The environment acts on the robot beside its actuators: friction, disturbances, payload."""
+"""Environment of the robot: friction, disturbances, payload, captures."""

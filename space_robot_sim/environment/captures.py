@@ -1,4 +1,4 @@
-"""The captures and releases of a flight: the robot that flies after each, and when they come."""
+"""Captures and releases of a flight, with the resulting robot and the tick of each."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ Array = NDArray[np.float64]
 
 
 class CaptureEvent(NamedTuple):
-    """An event in ticks: the robot before it, the one after it, and which of them holds."""
+    """A capture or release at a tick, with the robot before and after it."""
 
     tick: float
     event: Event
     before: Robot
     after: Robot
     grasp: Grasp
-    """Of what is captured or let go."""
+    """Grasp of the target that is captured or released."""
 
     def impact(
         self, quaternion: Array, joint_positions: Array, wheel_axes: Array, wheel_inertia: Array
     ) -> Impact:
-        """Return what passes over in a configuration, see `Impact`."""
+        """Return the impact in a configuration, see `Impact`."""
         holding = self.after if isinstance(self.event, Capture) else self.before
         return Impact(holding, self.grasp, quaternion, joint_positions, wheel_axes, wheel_inertia)
 
     def velocity_after(self, impact: Impact, velocity: Array) -> Array:
-        """Return the velocities that the event leads to, as in `Impact`."""
+        """Return the velocities after the event, as in `Impact`."""
         if isinstance(self.event, Capture):
             return impact.capture(self.event.target.motion, velocity)
         return impact.release(self.event.speed, velocity)
@@ -52,13 +52,13 @@ class CaptureEvent(NamedTuple):
 
 
 class Captures:
-    """The events of one flight of a robot; what they do depends on nothing but tick and state."""
+    """Events of one flight of a robot; their effect depends only on tick and state."""
 
     def __init__(self, events: Sequence[Event], robot: Robot, period: float) -> None:
         """Place the events in ticks of ``period`` seconds.
 
         Raises:
-            InputError: they cannot follow one another, or name a tool that ``robot`` has not.
+            InputError: the order of events is invalid, or ``robot`` lacks a tool.
         """
         self._robot = robot
         self.exchanges: list[CaptureEvent] = []
@@ -81,24 +81,24 @@ class Captures:
         return np.array([1.0, 0.0, 0.0, 0.0]), joints, np.zeros((0, 3)), np.zeros(0)
 
     def at(self, tick: int) -> list[CaptureEvent]:
-        """Return what happens at the begin of ``tick``."""
+        """Return the event at the begin of ``tick``."""
         return [exchange for exchange in self.exchanges if exchange.tick == tick]
 
     def ticks(self, start: int, stop: int) -> list[int]:
-        """Return the ticks from ``start`` to before ``stop`` at which something happens."""
+        """Return the ticks of events from ``start`` to before ``stop``."""
         return sorted({int(e.tick) for e in self.exchanges if start <= e.tick < stop})
 
     def next_tick(self, tick: int) -> float:
-        """Return the first tick after ``tick`` at which something happens (inf: there is none)."""
+        """Return the first tick after ``tick`` with an event (inf: none)."""
         return next((e.tick for e in self.exchanges if e.tick > tick), math.inf)
 
     def robot_at(self, tick: float) -> Robot:
-        """Return the robot with what it holds once ``tick`` has begun."""
+        """Return the robot, with its captured target, after the begin of ``tick``."""
         past = [exchange for exchange in self.exchanges if exchange.tick <= tick]
         return past[-1].after if past else self._robot
 
     def apply(self, tick: int, model: Model, x: Array) -> bool:
-        """Let the events of ``tick`` change a plant's ``model`` and its state ``x``.
+        """Apply the events of ``tick`` to a plant's ``model`` and its state ``x``.
 
         ``x`` is as in `space_robot_sim.plant.integrator.Stages`. Returns whether there are any.
         """

@@ -36,7 +36,7 @@ class DisturbanceSettings(StrictModel):
 
 
 class Disturbance(Record):
-    """The sines that disturb one robot, in three groups: base, joints 1 to 3, joints 4 and up."""
+    """Sinusoidal disturbances in three groups: base, joints 1 to 3, joints 4 and up."""
 
     amplitude: Array = shaped(lambda n: (3,))
     """N m; on the base about inertial axes."""

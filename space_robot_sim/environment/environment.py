@@ -1,4 +1,4 @@
-"""All that acts on the robot besides its actuators: a new disturbance is a line in each list."""
+"""Environment of the robot: friction, disturbances, payload and events."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class EnvironmentSettings(StrictModel):
 
     @property
     def parsed_events(self) -> list[Event]:
-        """The events, by their times; files of targets are read.
+        """Events in order of time; files of targets are read.
 
         Raises:
             InputError: see `parse_events`.
@@ -41,12 +41,12 @@ class EnvironmentSettings(StrictModel):
 
     @property
     def events_folder(self) -> Path:
-        """The folder in which files of targets are looked for, beside the one we are in."""
+        """Additional folder to search for files of targets."""
         return Path()
 
 
 class Environment(Record):
-    """The environment of one robot, as the plant's kernels read it."""
+    """Record of the environment of one robot, for the plant's kernels."""
 
     friction: Friction = nested(Friction)
     disturbance: Disturbance = nested(Disturbance)

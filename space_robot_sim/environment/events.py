@@ -1,4 +1,4 @@
-"""Events of a mission: something is captured, or let go; at the begin of a tick.
+"""Events of a mission: capture and release of a target, at the begin of a tick.
 
 As text ``capture@T:TARGET`` and ``release@T[:SPEED]``, T in simulated seconds. TARGET is a name of
 ``config/targets``, a path to a YAML file, or the target itself in braces, as JSON has it: so the
@@ -26,12 +26,12 @@ from .target import Target, find_target
 
 _EVENT = re.compile(rf"(?P<kind>[^@]*)@(?P<time>{NUMBER})(?::(?P<argument>.+))?", re.ASCII)
 FASTEST = 100.0
-"""m/s, of a release."""
+"""Largest speed of a release, m/s."""
 
 
 @dataclass(frozen=True)
 class Capture:
-    """The tool grasps a target, which moves with it from then on; ``str`` gives its text."""
+    """Capture of a target by a tool; ``str`` gives its text."""
 
     time_s: float
     """Simulated time, s."""
@@ -48,7 +48,7 @@ class Capture:
 
 @dataclass(frozen=True)
 class Release:
-    """The tool lets go what it holds; ``str`` gives its text."""
+    """Release of the captured target; ``str`` gives its text."""
 
     time_s: float
     """Simulated time, s."""
@@ -70,11 +70,11 @@ FORMS = {
     "capture@T:TARGET": "the tool grasps TARGET, of config/targets, or a path to its YAML",
     "release@T[:SPEED]": "the tool lets go what it holds, at SPEED m/s (0: without a push)",
 }
-"""What is done, by the text of each kind of event."""
+"""Classes of events by the name used in texts."""
 
 
 def parse_events(texts: Iterable[str], folder: Path = Path()) -> list[Event]:
-    """Read the events of several texts, in the order of their times; empty ones are none.
+    """Parse events and sort them by time; empty texts are ignored.
 
     Args:
         texts: as in ``capture@10:small_satellite``.
@@ -87,10 +87,10 @@ def parse_events(texts: Iterable[str], folder: Path = Path()) -> list[Event]:
 
 
 def in_order(events: Sequence[Event]) -> list[Event]:
-    """Return the events by their times.
+    """Return the events in order of time.
 
     Raises:
-        InputError: something is captured while something is held, or released while nothing is.
+        InputError: capture while a target is held, or release without a target.
     """
     ordered = sorted(events, key=lambda event: event.time_s)
     held: Capture | None = None
@@ -110,7 +110,7 @@ def in_order(events: Sequence[Event]) -> list[Event]:
 
 
 def check_events(texts: list[str]) -> list[str]:
-    """Return texts that can be events; no file is opened.
+    """Check texts of events without opening files, and return them.
 
     Raises:
         InputError: see `parse_events`.
@@ -129,7 +129,7 @@ def named_targets(texts: Iterable[str]) -> list[str]:
     """Return the names and paths of targets in texts of events: what `parse_events` would open.
 
     Raises:
-        InputError: a text that can be no event.
+        InputError: a text is not a valid event.
     """
     parts = [_split(text) for text in texts if text.strip()]
     return [name for kind, _, name in parts if kind == "capture" and not name.startswith("{")]
@@ -151,7 +151,7 @@ def _read(text: str, folder: Path) -> Event:
 
 
 def _split(text: str) -> tuple[str, float, str]:
-    """Return kind, time (s) and argument; a capture has one."""
+    """Return kind, time (s) and argument of an event."""
     where = f"event {short(text)}"
     match = _EVENT.fullmatch(text.strip())
     if match is None:

@@ -1,8 +1,8 @@
 """Friction in joints and wheels, the last term of (27), set-valued at rest.
 
-Coulomb's law gives a joint that turns ``f_C sign(thetadot)``, and one that stands any torque from
-``-f_C`` to ``f_C``: whatever holds it (Filippov 1988). Which joints stand is found in
-`space_robot_sim.plant.stick_slip`; here is what friction does once that is known.
+By Coulomb's law the friction torque of a moving joint is ``f_C sign(thetadot)``. At rest it is the
+torque between ``-f_C`` and ``f_C`` that holds the joint (Filippov 1988). Which joints are at rest
+is determined in `space_robot_sim.plant.stick_slip`; this module computes the friction then.
 """
 
 from __future__ import annotations
@@ -55,12 +55,12 @@ def coefficients(robot: Robot, settings: FrictionSettings) -> Array:
 
 
 class Friction(Record):
-    """The friction of one robot's joints, then of its wheels."""
+    """Friction of a robot's joints, then of its wheels."""
 
     count: float = shaped(lambda n: ())
-    """Joints and wheels that there are; the rest of the arrays is unused."""
+    """Number of joints and wheels; the rest of the arrays is unused."""
     row: Array = shaped(lambda n: (MOST_JOINTS,))
-    """Where each joint stands in the others, which are in the order of `Model`."""
+    """Row of each joint in the other arrays, which are in the order of `Model`."""
     coulomb: Array = shaped(lambda n: (MOST_JOINTS + MOST_WHEELS,))
     """f_C, N m."""
     viscous: Array = shaped(lambda n: (MOST_JOINTS + MOST_WHEELS,))
@@ -70,7 +70,7 @@ class Friction(Record):
 
     @classmethod
     def build(cls, robot: Robot, settings: FrictionSettings) -> Friction:
-        """Give each joint its own friction, or the settings', which passive joints do not have."""
+        """Build from each joint's own friction, or the settings (passive joints: own only)."""
         friction = cls.allocate(robot.n)
         assign(friction, count=robot.joint_count, set_valued=settings.set_valued)
         values = coefficients(robot, settings)
@@ -81,7 +81,7 @@ class Friction(Record):
 
     @staticmethod
     def add_wheels(friction: Friction, coulomb: Array, viscous: Array) -> None:
-        """Let wheels of this friction (W,), N m and N m s/rad, stand behind the joints."""
+        """Append wheels with friction (W,), N m and N m s/rad, after the joints."""
         joints = int(friction.count)
         stop = joints + coulomb.size
         assign(friction, count=stop)
@@ -95,8 +95,8 @@ def friction_torque(friction: Friction, velocities: Array, directions: Array, ou
     Args:
         friction: of the joints and wheels.
         velocities: of the joints, then of the wheels, rad/s.
-        directions: 1 or -1, the sense in which each turns or begins to turn; 0 for one that
-            stands: what holds it is not told here.
+        directions: 1 or -1, the sense in which each turns or begins to turn; 0 at rest, where
+            the holding torque is not computed.
         out: as long as they are.
     """
     for i in range(int(friction.count)):
@@ -106,7 +106,7 @@ def friction_torque(friction: Friction, velocities: Array, directions: Array, ou
 
 
 class StuckJoint:
-    """Raises the Coulomb friction of a joint for a while."""
+    """Fault: higher Coulomb friction of a joint for a while."""
 
     KINDS: ClassVar[tuple[Kind, ...]] = (
         Kind(
@@ -121,7 +121,7 @@ class StuckJoint:
         self._change = TemporaryChange(schedule.of(*self.KINDS))
 
     def apply(self, tick: int, part: Friction) -> None:
-        """Make the joints stick as they should from ``tick`` to the next."""
+        """Apply the faults of the joints from ``tick`` to the next."""
         rows = part.row
 
         def stick(coulomb: Array, fault: ScheduledFault) -> None:

@@ -1,4 +1,4 @@
-"""A target in the robot's hand: from then on a part of the body that carries the tool."""
+"""A captured target, rigidly attached to the body that carries the tool."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ Array = NDArray[np.float64]
 
 
 class Grasp(NamedTuple):
-    """Where a body of the robot holds a target, on the axes of that body."""
+    """A target attached to a body of the robot, on the axes of that body."""
 
     body: int
     """Number of the body, 0 for the base."""
     mass: float
-    """kg, of the target."""
+    """Mass of the target, kg."""
     com: Array
-    """(3,) m, of the target's centre of mass."""
+    """(3,) m, position of the target's centre of mass."""
     inertia: Array
     """(3, 3) kg m2, of the target about its centre of mass."""
     tool_axes: Array

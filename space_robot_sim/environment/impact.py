@@ -1,4 +1,4 @@
-"""What a capture or a release does to the velocities: momentum passes over at once, exactly.
+"""Velocities after a capture or a release, by exact exchange of momentum.
 
 The impact is perfectly inelastic. Positions stay; motors, springs and friction are finite, so they
 give no momentum in no time; what the target gives, the robot takes. With H the inertia of the robot

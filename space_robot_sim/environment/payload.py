@@ -1,4 +1,4 @@
-"""A payload on the last link, which no controller knows of."""
+"""A payload on the last link, unknown to the controller."""
 
 from __future__ import annotations
 

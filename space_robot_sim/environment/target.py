@@ -37,7 +37,7 @@ class TargetPlace(StrictModel):
     """``target.place``: where the target is in the frame of the tool that holds it."""
 
     position: Vector = Field([0.0, 0.0, 0.0])
-    """Of its centre of mass, m."""
+    """Position of the centre of mass, m."""
     quaternion: Quaternion = Field([1.0, 0.0, 0.0, 0.0])
     """``[w, x, y, z]`` of its axes; its norm does not count."""
 
@@ -51,7 +51,7 @@ class TargetMotion(StrictModel):
 
     relative_to: Literal["tool", "inertial"] = "tool"
     velocity: Speeds = Field([0.0, 0.0, 0.0])
-    """Of its centre of mass, m/s."""
+    """Velocity of the centre of mass, m/s."""
     angular_velocity: Speeds = Field([0.0, 0.0, 0.0])
     """rad/s."""
 

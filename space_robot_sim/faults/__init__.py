@@ -1,4 +1,4 @@
-"""Faults as text, when each acts, and those of the messages between plant and controller.
+"""Text form and schedule of faults, and faults of messages between plant and controller.
 
-The faults of a sensor, an actuator or the environment stand beside it. Knows no ROS.
+The faults of a sensor, an actuator or the environment stand beside it. Independent of ROS.
 """

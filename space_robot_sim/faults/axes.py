@@ -1,4 +1,4 @@
-"""The axes and actuators that a fault is about, by name."""
+"""Names of the axes and actuators that a fault affects."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from space_robot_msgs_py.topics import BASE_AXES
 
 
 class About(Enum):
-    """The axes, or actuators of the base, that a kind of fault may be about."""
+    """Kind of axes or base actuators that a kind of fault can affect."""
 
     AXIS = "AXIS a name, a joint counted from 1, base, joints or all"
     JOINT = "JOINT a name, counted from 1, or joints"
@@ -22,7 +22,7 @@ class About(Enum):
 
 
 def axes_of(name: str, about: About, names: RobotNames) -> tuple[int, ...]:
-    """Return the places of what a fault's ``name`` means: among all axes, wheels or thrusters.
+    """Return the indices of a fault's ``name`` among all axes, wheels or thrusters.
 
     A thing of that name comes first, then a group of them, then a number.
 
@@ -32,7 +32,7 @@ def axes_of(name: str, about: About, names: RobotNames) -> tuple[int, ...]:
         names: of what there is.
 
     Raises:
-        InputError: there is no such thing; it says which there are.
+        InputError: the name does not exist; the message lists the names.
     """
     base, every = len(BASE_AXES), range(len(names.axes))
     of_base, of_joints = {"base": tuple(every[:base])}, {"joints": tuple(every[base:])}

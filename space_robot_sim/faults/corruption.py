@@ -1,4 +1,4 @@
-"""Messages whose content makes no sense: not finite, not unit, wrongly stamped."""
+"""Corruption of messages: not finite, not unit, wrong stamp."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .schedule import Schedule
 
 QUATERNION_NORMS = (0.9, 1.1)
 STAMP_BACK_TICKS = 10
-"""A stamp goes back by one tick to as many."""
+"""A stamp goes back by 1 to this many ticks."""
 STAMP_JUMP_TICKS = 1_000_000
 MEASURED = (
     "base_position",
@@ -34,7 +34,7 @@ INF_COMMAND = Kind("inf_command", PROBABILITY, 1.0, "one commanded torque is inf
 
 
 class Corruption:
-    """Spoils samples in place; what is spoilt at a tick depends on the tick alone."""
+    """Corruption of samples in place, as a function of the tick alone."""
 
     KINDS = (
         NAN_STATE,
@@ -64,7 +64,7 @@ class Corruption:
         self._jump = schedule.of(STAMP_JUMP)
 
     def corrupt_state(self, state: RobotState, tick: int) -> None:
-        """Spoil the numbers measured at ``tick``, but not the echo of the applied torque."""
+        """Corrupt the measurements of ``tick``, but not the echo of the applied torque."""
         for fault in self._quaternions:
             if fault.happens_at(tick):
                 state.quaternion *= QUATERNION_NORMS[fault.choose(tick, 2)]
@@ -79,7 +79,7 @@ class Corruption:
                     place -= array.size
 
     def corrupt_command(self, command: Command, tick: int) -> None:
-        """Spoil a command that has come to the plant at ``tick``."""
+        """Corrupt a command received by the plant at ``tick``."""
         for fault, value in self._commands:
             if fault.happens_at(tick):
                 command.torque[fault.choose(tick, command.torque.size)] = value

@@ -1,4 +1,4 @@
-"""Faults to be injected, as text: ``KIND@T[-END][:ARGUMENT]``, times in simulated seconds.
+"""Text form of faults: ``KIND@T[-END][:ARGUMENT]``, times in simulated seconds.
 
 A `Kind` is declared beside the class that brings it about; this module knows none by name.
 """
@@ -39,13 +39,13 @@ class Argument(NamedTuple):
 
     @property
     def form(self) -> str:
-        """The argument as it is written."""
+        """Text form of the argument."""
         names = [self.about.name] if self.about else []
         return "=".join([*names, *([self.symbol] if self.symbol else [])])
 
     @property
     def allowed(self) -> str:
-        """The values that may stand there, in words."""
+        """Allowed values, in words."""
         if self.about and not self.symbol:
             return self.about.value
         number = "a whole number" if self.whole else "a number"
@@ -54,7 +54,7 @@ class Argument(NamedTuple):
 
 
 class Kind(NamedTuple):
-    """One way to fail."""
+    """A kind of fault."""
 
     name: str
     argument: Argument | None
@@ -66,7 +66,7 @@ class Kind(NamedTuple):
 
     @property
     def form(self) -> str:
-        """The text of a fault of this kind; what may be left out is in brackets."""
+        """Text form of a fault of this kind; optional parts are in brackets."""
         text = f"{self.name}@T[-END]" if self.lasts else f"{self.name}@T"
         if self.argument is None:
             return text
@@ -77,7 +77,7 @@ class Kind(NamedTuple):
         """Return axis (empty if none is named) and number of an argument's text.
 
         Raises:
-            InputError: says what is allowed instead.
+            InputError: the text is invalid; the message says what is allowed.
         """
         if self.argument is None:
             if argument:
@@ -108,7 +108,7 @@ Kinds = Mapping[str, Kind]
 
 
 def by_name(*kinds: Kind) -> Kinds:
-    """Collect kinds; two of one name are a mistake in the code."""
+    """Collect kinds by name; names must be unique."""
     collected = {kind.name: kind for kind in kinds}
     if len(collected) != len(kinds):
         raise ValueError("two kinds of faults have one name")
@@ -144,7 +144,7 @@ class Fault:
 
 
 def parse_fault(text: str, kinds: Kinds) -> Fault:
-    """Read the fault of a text; ``kinds`` are those allowed here.
+    """Parse the text of a fault of one of ``kinds``.
 
     Raises:
         InputError: names the text, what is wrong with it, what is allowed.
@@ -169,7 +169,7 @@ def parse_fault(text: str, kinds: Kinds) -> Fault:
 
 
 def parse_faults(texts: Iterable[str], kinds: Kinds) -> list[Fault]:
-    """Read the faults of several texts; empty ones are none (ROS has no empty list of strings).
+    """Parse faults; empty texts are ignored (ROS has no empty list of strings).
 
     Raises:
         InputError: see `parse_fault`.
@@ -182,6 +182,6 @@ TICKS = Argument("TICKS", "ticks", 0.0, 1e6, whole=True)
 
 
 def help_lines(kinds: Kinds) -> list[str]:
-    """Describe each kind in a line for the help of a command: its text, what it does."""
+    """Return a help line for each kind: its text form and effect."""
     width = max(len(kind.form) for kind in kinds.values())
     return [f"{kind.form:{width}}  {kind.description}" for kind in kinds.values()]

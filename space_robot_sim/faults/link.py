@@ -1,4 +1,4 @@
-"""A link that loses, repeats and delays what is sent over it, in whole ticks."""
+"""A link that loses, repeats and delays messages, in whole ticks."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Item = TypeVar("Item")
 
 
 class LinkKinds(NamedTuple):
-    """The ways in which one link fails."""
+    """Kinds of faults of a link."""
 
     drop: Kind
     repeat: Kind
@@ -38,19 +38,19 @@ STATE_LINK, COMMAND_LINK = LinkKinds.of("state"), LinkKinds.of("command")
 
 @dataclass(frozen=True, slots=True, order=True)
 class DelayedMessage(Generic[Item]):
-    """A message on its way; messages sort by arrival."""
+    """A message in transit; messages sort by arrival."""
 
     due: int
     """Tick of arrival."""
     serial: int
     """Tells messages of one tick apart, in the order sent."""
     stamp: int = field(compare=False)
-    """Tick that is written on it, right or wrong."""
+    """Tick in its stamp, correct or wrong."""
     item: Item = field(compare=False)
 
 
 class Link(Generic[Item]):
-    """The way of states to the controller (`STATE_LINK`) or of commands back (`COMMAND_LINK`).
+    """Link for states to the controller (`STATE_LINK`) or commands back (`COMMAND_LINK`).
 
     What is sent in one tick shares its fate. Delays add up; where they shrink or scatter, later
     items may overtake earlier ones. Items that arrive in one tick keep the order of sending.
@@ -65,7 +65,7 @@ class Link(Generic[Item]):
         self._sent = 0
 
     def send(self, tick: int, item: Item, stamp: int | None = None) -> None:
-        """Put ``item`` on its way at ``tick``; ``stamp`` is the tick it carries if another."""
+        """Send ``item`` at ``tick``; ``stamp`` is the tick that it carries if it differs."""
         if any(fault.happens_at(tick) for fault in self._drops):
             return
         due = tick + sum(int(fault.value) for fault in self._delays if fault.acts_at(tick))
@@ -79,7 +79,7 @@ class Link(Generic[Item]):
         self._sent += 1
 
     def arrivals(self, tick: int) -> list[DelayedMessage[Item]]:
-        """Hand out what has arrived up to ``tick`` and was not before, in order of arrival."""
+        """Return new arrivals up to ``tick``, in order of arrival."""
         arrived = []
         while self._under_way and self._under_way[0].due <= tick:
             arrived.append(heapq.heappop(self._under_way))

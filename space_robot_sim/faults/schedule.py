@@ -1,4 +1,4 @@
-"""The faults of a flight in ticks, each with random numbers of its own."""
+"""Schedule of the faults of a flight in ticks, each with its own random numbers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 NO_NAMES = RobotNames(())
 BLOCK_TICKS = 256
-"""Random numbers are drawn for that many ticks at once."""
+"""Ticks for which random numbers are drawn at once."""
 
 
 class ScheduledFault:
@@ -84,7 +84,7 @@ class ScheduledFault:
 
 
 class Schedule:
-    """The faults of a flight in the order given, each seeded by ``seed`` and its place."""
+    """Faults of a flight in the order of the user, each seeded by ``seed`` and its index."""
 
     def __init__(
         self, faults: Sequence[Fault], seed: int, period: float, names: RobotNames = NO_NAMES
@@ -104,19 +104,19 @@ class Schedule:
 
 
 class PartFault(Protocol):
-    """One way for a part of the plant to fail: an actuator, or something in its environment."""
+    """Fault of a part of the plant: an actuator, or a part of the environment."""
 
     KINDS: ClassVar[tuple[Kind, ...]]
 
     def __init__(self, schedule: Schedule) -> None:
-        """Take the faults of these kinds from a flight's."""
+        """Select the faults of these kinds from a flight's."""
 
     def apply(self, tick: int, part: Any) -> None:
-        """Spoil the part's record as it should be from ``tick`` to the next, or restore it."""
+        """Apply the faults to the part's record from ``tick`` to the next, or restore it."""
 
 
 class TemporaryChange:
-    """Changes an array of the plant while faults act on it, and takes the changes back after."""
+    """Change of an array of the plant while faults act, restored afterwards."""
 
     def __init__(self, faults: Sequence[ScheduledFault]) -> None:
         self._faults = faults

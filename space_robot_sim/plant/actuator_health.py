@@ -1,4 +1,4 @@
-"""What a plant tells of its base's actuators: saturated and failed ones, momentum, propellant."""
+"""Diagnostics of the base's actuators: saturation, failures, momentum, propellant."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Values = dict[str, float | int | str]
 
 
 class ActuatorHealth:
-    """The base's actuators from one report to the next. Knows no ROS."""
+    """State of the base's actuators from one report to the next. Independent of ROS."""
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
@@ -18,11 +18,11 @@ class ActuatorHealth:
 
     @property
     def values(self) -> Values:
-        """What is told beside the mode, by name with unit; nothing of an ideal base."""
+        """Diagnostic values by name with unit; empty for an ideal base."""
         return {**self._of_wheels(), **self._of_thrusters()}
 
     def saturated(self) -> str:
-        """Name the wheels that were at a limit since this was called last."""
+        """Return the names of wheels that were at a limit since the last call."""
         now = self._saturated_ticks
         names = [
             name

@@ -1,4 +1,4 @@
-"""The command that acts on the robot: the newest good one, held for a while, then none."""
+"""Selection of the acting command: the newest valid one, held for a limited time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from space_robot_msgs_py.samples import Command
 
 
 class CommandGuard:
-    """Keeps the command in force. Knows no ROS.
+    """Guard of the command in force. Independent of ROS.
 
     A command is good if it is finite, and answers a state that has been sent and is newer than the
     one answered before.
@@ -27,11 +27,11 @@ class CommandGuard:
         self.acting = self._none
         """The command that acts at the tick last given to `act`."""
         self.refused: Counter[str] = Counter()
-        """Refused commands by reason."""
+        """Number of refused commands by reason."""
 
     @property
     def answered(self) -> int:
-        """The tick whose command was accepted last; -1 if none."""
+        """Tick of the last accepted command; -1 if none."""
         return self._accepted.tick
 
     @property
@@ -57,11 +57,11 @@ class CommandGuard:
         return True
 
     def refuse(self, reason: str) -> None:
-        """Count a command that could not even be read."""
+        """Count a command that could not be read."""
         self.refused[reason] += 1
 
     def release(self) -> None:
-        """Let no torque act until the next good command."""
+        """Set the torque to zero until the next valid command."""
         self._accepted.torque[:] = 0.0
 
     def act(self, now: int) -> Command:

@@ -1,4 +1,4 @@
-"""The plant's part of a flight's description: what a bag says that was flown. Knows no ROS."""
+"""The plant's part of the flight description in a bag. Independent of ROS."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All faults of one flight that the plant brings about, and the catalogue of their kinds.
+"""Faults of a flight caused by the plant, and the catalogue of their kinds.
 
 Those of parts (sensors, actuators, environment) the plant has itself; those of messages act on the
 way between plant and controller.
@@ -37,7 +37,7 @@ PART_KINDS = by_name(
 )
 """The kinds of faults of sensors, actuators and environment."""
 PLANT_KINDS = by_name(*MESSAGE_KINDS.values(), *PART_KINDS.values())
-"""All kinds of faults that the plant brings about."""
+"""All kinds of faults caused by the plant."""
 
 
 def _readable(texts: list[str]) -> list[str]:
@@ -46,7 +46,7 @@ def _readable(texts: list[str]) -> list[str]:
 
 
 class FaultSettings(StrictModel):
-    """Faults of the plant, and their random numbers."""
+    """Settings of the faults of the plant."""
 
     faults: Annotated[Texts, AfterValidator(_readable)] = Field(
         [""], description="faults to bring about, each `KIND@T[-END][:ARGUMENT]`, see docs/manual"
@@ -62,7 +62,7 @@ class FaultSettings(StrictModel):
 
     @property
     def has_message_faults(self) -> bool:
-        """True if messages between plant and controller are to fail."""
+        """True if messages between plant and controller have faults."""
         return any(fault.kind.name in MESSAGE_KINDS for fault in self.parsed_faults)
 
     def schedule(self, names: RobotNames, period: float) -> Schedule:
@@ -91,10 +91,10 @@ class PartFaults:
         self._schedule = schedule
         acting = schedule.of(*PART_KINDS.values())
         self._turns = sorted({tick for fault in acting for tick in (fault.first, fault.stop)})
-        """Ticks at which something begins or ends."""
+        """Ticks at which a fault begins or ends."""
 
     def __deepcopy__(self, memo: dict[int, Any]) -> PartFaults:
-        """Without any fault there is nothing to copy."""
+        """Copy the faults, or return self if there are none."""
         copied = PartFaults.__new__(PartFaults)
         memo[id(self)] = copied
         held = vars(self)
@@ -102,12 +102,12 @@ class PartFaults:
         return copied
 
     def are_in(self, group: str) -> bool:
-        """Return whether any part of a group ("sensors", ...) fails at some time."""
+        """Return whether any part of a group ("sensors", ...) has a fault."""
         kinds = [kind for fault in PARTS[group].values() for kind in fault.KINDS]
         return bool(self._schedule.of(*kinds))
 
     def apply(self, tick: int, memory: Any) -> float:
-        """Make the parts in a plant's memory fail as they should from ``tick`` on.
+        """Apply the faults to the parts in a plant's memory from ``tick`` on.
 
         Returns:
             The next tick at which that changes (inf: it does not).

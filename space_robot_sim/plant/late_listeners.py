@@ -1,4 +1,4 @@
-"""Those who join a paused graph: a viewer that is opened then has no message of before."""
+"""Late subscribers of a paused graph, which have missed earlier messages."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Output(Protocol):
 
 
 class LateListeners:
-    """Decides when a paused plant repeats what it sent last. Knows no ROS."""
+    """Decision when a paused plant repeats its last messages. Independent of ROS."""
 
     def __init__(self, outputs: Sequence[Output]) -> None:
         """``outputs``: their new listeners are those meant."""
@@ -32,7 +32,7 @@ class LateListeners:
         self._counts = None
 
     def are_due(self, now: float) -> bool:
-        """Tell whether there is somebody to repeat the messages for, at a time in s."""
+        """Return whether messages must be repeated for new listeners, at a time in s."""
         before = self._counts
         self._counts = [output.listener_count for output in self._outputs]
         if before and any(a > b for a, b in zip(self._counts, before, strict=True)):

@@ -45,17 +45,17 @@ GIVE_WAY = Wait(100e-6, is_for_others=True)
 HELD = Wait(0.02)
 """The wait of a paused plant: only a service call ends the pause, and those have their own time."""
 FLUSH_S = 5.0
-"""How long a flight's end waits for its listeners: one may be stopped, or dead."""
+"""Longest wait for listeners at the end of a flight, which may be stopped or dead, s."""
 STOPPED_FLUSH_S = 1.0
-"""How long a plant that was told to stop waits: its listeners may be ending, too."""
+"""Longest wait for listeners of a stopped plant, since they may be ending, too, s."""
 MOST_AT_ONCE = 100
-"""Commands taken before the clock is looked at again: somebody may flood the topic."""
+"""Commands read before the clock is checked again, in case of a flood."""
 HOLDING_TICKS = 20
-"""A command held for longer is worth a word in the diagnostics."""
+"""Ticks after which a held command is reported in the diagnostics."""
 
 
 class PlantLoop:
-    """Sends the state of a tick, takes its command, steps; paced by the graph or the clock.
+    """Loop that sends a state, takes its command and steps, in lockstep or by the clock.
 
     In lockstep a tick waits for its answer. A controller that has fallen silent is not waited
     for: then, and always by the wall clock, a tick lasts its period and the last command is held.
@@ -99,7 +99,7 @@ class PlantLoop:
         self.wait_for = settings.wait_for
         self.is_complete = False
         self.control = RunControl(settings.paused)
-        """For pausing and stepping; each change is to be told by `tell_paused`."""
+        """Pausing and stepping; each change must be announced by `tell_paused`."""
         self._paused_out = PausedOutput(node)
         self._wall_clock = WallClock(settings.period)
         self._silence_s = settings.silence_timeout or math.inf
@@ -138,7 +138,7 @@ class PlantLoop:
         self.tell_paused()
 
     def tell_paused(self) -> None:
-        """Tell the other nodes whether time stands still."""
+        """Publish whether the plant is paused."""
         self._paused_out.tell(self.control.is_paused)
         self._node.report()
 
@@ -165,7 +165,7 @@ class PlantLoop:
         return None
 
     def deactivate(self) -> None:
-        """Leave the actuators at zero, and let the listeners have all that was sent."""
+        """Set the actuators to zero, and wait until listeners have all messages."""
         self._guard.release()
         self._truth.flush()
         elapsed = time.monotonic() - self._began_at
@@ -180,7 +180,7 @@ class PlantLoop:
         """Keep nothing."""
 
     def health(self) -> Health:
-        """Tell the mode, the answers, and what was refused."""
+        """Report the mode, the answers, and refused commands."""
         guard, tick = self._guard, self._plant.tick
         values: dict[str, float | int | str] = {
             "tick": tick,
@@ -271,7 +271,7 @@ class PlantLoop:
         return None
 
     def _hold(self) -> Wait:
-        """Stay at the present tick; show it to those who join meanwhile.
+        """Stay at the present tick; repeat its messages for new listeners.
 
         Of the state only the joints' part: the controller does not answer a part alone.
         """

@@ -1,4 +1,4 @@
-"""Markers for viewers, while one listens."""
+"""Output of markers for viewers, while one subscribes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PERIOD_NS = 33_333_333
 
 
 class MarkerOutput:
-    """Sends the robot's shapes at most 30 times a simulated second, nothing if nobody listens."""
+    """Publisher of the robot's shapes at 30 Hz simulated time, while a viewer subscribes."""
 
     def __init__(self, node: Node, robot: Robot, timebase: Timebase) -> None:
         """Open the topic."""

@@ -1,4 +1,4 @@
-"""What passes between a plant and its controller in a tick, in order or with faults. Knows no ROS.
+"""Messages between plant and controller in a tick, with or without faults. Independent of ROS.
 
 In the order of a tick: `PlantMessages.send` the state, `PlantMessages.take` the commands that come
 for it, `PlantMessages.end`; then `CommandGuard.act` says which command acts.
@@ -61,7 +61,7 @@ class FaultyExchange(PlantMessages):
         """Tick of the newest state that a controller can have answered."""
 
     def send(self, state: RobotState) -> Iterator[SentState]:
-        """See `PlantMessages.send`."""
+        """Return what reaches the controller, with faults."""
         tick, faults = state.tick, self._faults
         measured = faults.measure(state)
         messages = self._codec.encode(measured)
@@ -78,7 +78,7 @@ class FaultyExchange(PlantMessages):
         faults.commands.send(tick, offered.torque.copy(), offered.tick)
 
     def end(self, tick: int) -> None:
-        """See `PlantMessages.end`."""
+        """End the exchange of a tick."""
         guard = self._guard
         for command in self._faults.commands.arrivals(tick):
             guard.offered.tick, guard.offered.torque[:] = command.stamp, command.item

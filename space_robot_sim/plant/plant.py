@@ -1,4 +1,4 @@
-"""The plant: the robot in its environment, stepped tick by tick. Knows no ROS."""
+"""The plant: the robot in its environment, stepped tick by tick. Independent of ROS."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class PlantMemory(Record):
     substeps: float = shaped(lambda n: ())
     """Integration steps in a tick."""
     x: Array = shaped(lambda n: (MOST_NUMBERS,))
-    """The state, see `Stages`."""
+    """State vector, see `Stages`."""
     rotation: Array = shaped(lambda n: (3, 3))
     """Scratch."""
     truth: State = nested(State)
@@ -81,20 +81,20 @@ class PlantMemory(Record):
 
 
 class PlantSnapshot(NamedTuple):
-    """A plant at a tick, see `Plant.save`."""
+    """Saved state of a plant at a tick; made by `Plant.save`."""
 
     tick: int
     block: Block
-    """Of a `PlantMemory`."""
+    """Record of a `PlantMemory`."""
     command_delay_buffer: Array
     next_change: float
     drawn: tuple[int, int]
-    """See `NoiseDraws`."""
+    """Seed and block of the random numbers, see `NoiseDraws`."""
     part_faults: PartFaults
 
 
 class Plant(RecordOwner):
-    """Integrates the robot at a fixed period; a command is held over one tick.
+    """Plant that integrates the robot at a fixed period; a command is held over one tick.
 
     `truth` is the true state at the current tick, `state` what the sensors tell of it; `step`
     applies a command until the next one. Parts fail as ``settings.faults`` says. Momentum and
@@ -122,10 +122,10 @@ class Plant(RecordOwner):
             raise InputError(f"initial_quaternion must have a norm near 1, got {length:g}")
         settings.check(robot, getattr(settings, "actuators", "given"))
         self.names = settings.robot_names(robot)
-        """Those of all that is told of the robot and asked of it."""
+        """Names of all measured and commanded quantities."""
         robot = with_payload(robot, settings.payload)
         self.captures = Captures(settings.parsed_events, robot, period)
-        """What is captured and released in the flight."""
+        """Captures and releases of the flight."""
         self.period = period
         self.block = PlantMemory.block(n)
         """The plant's `PlantMemory`, for compiled loops."""
@@ -140,7 +140,7 @@ class Plant(RecordOwner):
         self.command_delay_buffer = command_delay_buffer(
             memory.actuators, len(self.names.commanded)
         )
-        """Ring of the commands that are still on their way."""
+        """Ring buffer of commands in transit."""
         memory.x[3:7] = np.array(settings.initial_quaternion) / length
         positions = np.concatenate(
             (robot.from_degrees(settings.initial_joints_deg), [s.rest for s in robot.springs])
@@ -180,15 +180,15 @@ class Plant(RecordOwner):
         self.truth = RobotState(0, self.block["truth"])
         """The true state at the current tick."""
         self.state = RobotState(0, self.block["measured"])
-        """What the sensors tell of it."""
+        """Measured state at the current tick."""
         self._draws = NoiseDraws(0, arrays_of_draws(self.memory.sensors))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return all attributes but the views, and what these know beside the block."""
+        """Return all attributes but the views, and their state outside the block."""
         return {**super().__getstate__(), "_tick_and_drawn": (self.tick, self._draws.drawn)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take over attributes, and stand at their tick."""
+        """Restore attributes and the tick."""
         PlantMemory.dtype(len(state["names"].joints))  # that compiled code knows the block's layout
         super().__setstate__({k: v for k, v in state.items() if k != "_tick_and_drawn"})
         tick, drawn = state["_tick_and_drawn"]

@@ -11,7 +11,7 @@ PAUSED = "paused"
 
 
 class RunControl:
-    """Holds the plant at a tick. Knows no ROS.
+    """Holds the plant at a tick. Independent of ROS.
 
     A plant that is held has sent its state and taken the answer to it; it does not integrate. So a
     flight that was paused and stepped has the states and commands of one that was not.
@@ -23,7 +23,7 @@ class RunControl:
         self.tick = 0
         """The present one."""
         self.is_at_rest = False
-        """True if the plant has found that it must not leave the present tick."""
+        """True if the plant must stay at the present tick."""
 
     @property
     def is_paused(self) -> bool:

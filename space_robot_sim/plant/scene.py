@@ -1,4 +1,4 @@
-"""What viewers need to show the robot: its description once, its pose now and then. Knows no ROS.
+"""Description and poses of the robot for viewers. Independent of ROS.
 
 Names of frames are those of the description, in a namespace with that before them
 (``sat1/base_link``), as robot_state_publisher's ``frame_prefix`` does it. All robots share the
@@ -25,7 +25,7 @@ Messages = Iterable[tuple[topics.Topic, bytes]]
 
 
 class SceneWriter:
-    """Makes the messages of `topics.SCENE` of a robot from its true state."""
+    """Writer of the messages of `topics.SCENE` from the true state of a robot."""
 
     def __init__(self, robot: Robot, timebase: Timebase, namespace: str = topics.ROOT) -> None:
         """``namespace``: the robot's."""
@@ -36,14 +36,14 @@ class SceneWriter:
         self._codec = TransformsCodec(self._named(self._poses.frames), timebase)
 
     def lasting(self) -> Messages:
-        """Yield what holds for the whole flight."""
+        """Yield the messages that are valid for the whole flight."""
         frames, poses = tool_poses(self._robot)
         static = TransformsCodec(self._named(frames), self._timebase).encode(0, poses)
         yield topics.ROBOT_DESCRIPTION, robot_description(urdf_text(self._robot))
         yield topics.TRANSFORMS_STATIC, wrap(static)
 
     def is_due(self, tick: int) -> bool:
-        """Tell if the poses of a tick are told."""
+        """Return True if the poses are due at a tick."""
         return tick % self._every == 0
 
     def poses(self, truth: RobotState) -> Messages:

@@ -1,4 +1,4 @@
-"""The robot for viewers: to the recorder always; as /tf and markers where these are installed."""
+"""Output of the robot for viewers: to the recorder, and as /tf and markers if installed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .scene import Messages, SceneWriter
 
 
 class SceneOutput:
-    """Sends the description once, the poses of the robot at most 100 times a simulated second."""
+    """Publisher of the robot's description, once, and poses at 100 Hz simulated time."""
 
     def __init__(self, node: Node, robot: Robot, timebase: Timebase) -> None:
         """Open the topics."""

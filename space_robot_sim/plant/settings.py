@@ -16,7 +16,7 @@ from space_robot_msgs_py.config.settings import NodeSettings, Texts
 from .plant import PlantSettings
 
 MOST_TICKS = 10**10
-"""No flight is longer."""
+"""Largest number of ticks of a flight."""
 
 
 class PlantNodeSettings(PlantSettings, NodeSettings):
@@ -74,7 +74,7 @@ class PlantNodeSettings(PlantSettings, NodeSettings):
 
     @property
     def events_folder(self) -> Path:
-        """The folder of the mission's file; where we are if it has none."""
+        """The folder of the mission's file, or the current folder."""
         return next((file.parent for file in mission_layers(self.robot, self.mission)), Path())
 
     @classmethod

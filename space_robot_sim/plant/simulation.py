@@ -1,4 +1,4 @@
-"""The plant's node as a simulation that is paused, stepped and reset."""
+"""Pause, step and reset of the plant's node."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class SimulationState(Enum):
 
 
 class Simulation:
-    """Pauses, steps and resets the plant of a node, in whatever lifecycle state that is."""
+    """Control of a node's plant: pause, step and reset, in any lifecycle state."""
 
     def __init__(self, node: ManagedNode[PlantNodeSettings]) -> None:
         self._node = node
         self._is_resetting = False
         self._is_stopped = False
-        """True from a reset that was to stop until told anything else."""
+        """True after a reset that stops, until the next request."""
 
     @property
     def state(self) -> SimulationState:

@@ -1,4 +1,4 @@
-"""The services of ROS's simulation_interfaces, as far as a plant has them.
+"""The services of ROS's simulation_interfaces that a plant supports.
 
 https://github.com/ros-simulation/simulation_interfaces (2.1). The package is no requirement.
 """
@@ -60,13 +60,13 @@ class StandardServices:
         }
 
     def get_features(self, request: Any, response: Any) -> Any:
-        """Tell which of the services there are."""
+        """Return the supported features."""
         response.features.features = [getattr(self._features, name) for name in FEATURES]
         response.features.custom_info = ABOUT
         return response
 
     def get_state(self, request: Any, response: Any) -> Any:
-        """Tell the state."""
+        """Return the state of the simulation."""
         response.state.state = self._numbers[self._simulation.state]
         return self._end(response, self._result.RESULT_OK)
 

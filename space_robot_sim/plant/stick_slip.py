@@ -1,13 +1,13 @@
-"""Steps over which joints slide, stand, come to rest and break away, as Coulomb's law has it.
+"""Integration of joints with Coulomb friction: slip, stick, stop and breakaway.
 
 Wheels are joints here. Within a step no friction changes its sign: a joint that slides keeps its
 sense, one that stands is locked. Where a joint comes to rest the step is cut, at the root of its
-velocity; there, and at the begin of every step, those at rest are found that break away. The
-friction torques then solve the box-constrained complementarity problem of the joints at rest:
+velocity; there, and at the begin of every step, joints at rest may break away. The friction
+torques then solve the box-constrained complementarity problem of the joints at rest:
 
     |f_i| <= f_C,   thetadd_i = 0 if |f_i| < f_C,   thetadd_i sign(f_i) >= 0 if |f_i| = f_C
 
-which has one solution since ``H^-1`` is positive definite. It is found by principal pivoting with
+which has one solution since ``H^-1`` is positive definite. It is computed by pivoting with
 the least index first, which cannot cycle (Murty 1974; with two bounds Judice & Pires 1992). What is
 at rest is known from the state alone: its velocity is zero to the last bit.
 
@@ -137,7 +137,7 @@ def cut(
 ) -> float:
     """Return the time after which ``x[velocity]`` is zero, s, and leave that state in the stages.
 
-    It has changed its sign in ``stages.end``, which is ``length`` later. The root is found by the
+    It has changed its sign in ``stages.end``, ``length`` later. The root is computed by the
     Illinois variant of false position (Dowell & Jarratt 1971).
     """
     low, at_low = 0.0, x[velocity]

@@ -1,4 +1,4 @@
-"""The true state as a sample: what sensors without any error would report."""
+"""The true state as a sample, as ideal sensors would report it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The true states as messages, for the recorder: beside the measured ones, where the two differ."""
+"""Output of the true states for the recorder, if they differ from the measured ones."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .plant import Plant
 
 
 class TruthOutput:
-    """Sends the truth of a tick, if what the plant measures can ever be something else."""
+    """Publisher of the true state of a tick, if measurements can differ from it."""
 
     def __init__(self, node: Node, plant: Plant, timebase: Timebase) -> None:
         """Open the topics, or none."""
@@ -29,7 +29,7 @@ class TruthOutput:
             self._publish(self._writer.add(truth))
 
     def flush(self) -> None:
-        """Publish what is kept back."""
+        """Publish the buffered messages."""
         self._publish(self._writer.flush())
 
     def _publish(self, messages: Messages) -> None:

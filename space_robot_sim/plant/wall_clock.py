@@ -1,4 +1,4 @@
-"""The ends of a flight's ticks by the wall clock."""
+"""Deadlines of a flight's ticks by the wall clock."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import time
 SLIP_S = 0.25
 """A flight further behind the wall clock does not catch up."""
 REMARK_S = 5.0
-"""Two remarks on lost time are at least this far apart."""
+"""Least time between two remarks on lost time, s."""
 
 
 class WallClock:
@@ -22,7 +22,7 @@ class WallClock:
         self._remarked_s, self._remarked_at = 0.0, -math.inf
 
     def start(self, tick: int) -> None:
-        """Let ``tick`` begin now."""
+        """Begin ``tick`` now."""
         self._begin = time.monotonic() - tick * self._period
 
     def left(self, tick: int) -> float:

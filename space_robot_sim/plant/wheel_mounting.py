@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 def mount_wheels(
     wheels: WheelSettings, model: Model, friction: Friction, velocities: Array
 ) -> None:
-    """Let a plant's base carry ``wheels``, which turn as they do at tick 0.
+    """Mount ``wheels`` on a plant's base, with their velocities at tick 0.
 
     Args:
         wheels: which fit the base.

@@ -1,1 +1,1 @@
-"""Sensors measure the true state, each with errors of its own; and they fail."""
+"""Sensors: measurements of the true state with errors and faults."""

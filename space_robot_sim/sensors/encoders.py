@@ -1,4 +1,4 @@
-"""An encoder on each joint: its angle in whole steps, its rate measured or differenced.
+"""Joint encoders: angle in whole steps, rate measured or differenced.
 
 The angle of a prismatic joint is its position; m stands in the place of rad there.
 """
@@ -36,10 +36,10 @@ Array = NDArray[np.float64]
 
 
 class Encoders(Record):
-    """The numbers of one robot's encoders, and the angles they have told.
+    """Parameters of a robot's encoders, and their measured angles.
 
-    The angle told is ``step round((theta + sigma n) / step)``, the rate, if it is differenced over
-    N ticks, the difference of angles told N ticks apart over N periods.
+    The measured angle is ``step round((theta + sigma n) / step)``; a rate differenced over N ticks
+    is the difference of two measured angles N ticks apart, divided by N periods.
     """
 
     sigma: Array = shaped(lambda n: (n,))
@@ -53,11 +53,11 @@ class Encoders(Record):
     velocity_step: Array = shaped(lambda n: (n,))
     """Distance of two rates, rad/s (0: none)."""
     stuck: Array = shaped(lambda n: (n,))
-    """1 for each joint whose angle told stands still."""
+    """1 for each joint with a stuck encoder."""
     draws: Array = shaped(lambda n: (BLOCK_TICKS, 2, n))
     """Standard normal numbers, a row a tick: of the angles, of the rates."""
     history: Array = shaped(lambda n: (MOST_DIFFERENCED, n))
-    """The last angles told, by tick modulo `MOST_DIFFERENCED`, rad."""
+    """The last measured angles, by tick modulo `MOST_DIFFERENCED`, rad."""
 
     @classmethod
     def build(
@@ -93,9 +93,9 @@ class Encoders(Record):
 def read_encoders(
     encoders: Encoders, truth: State, tick: int, period: float, measured: State
 ) -> None:
-    """Write the angles and rates told of all joints into ``measured``.
+    """Write the measured angles and rates of all joints into ``measured``.
 
-    A stuck encoder tells the angle of the tick before, and no rate.
+    A stuck encoder reports the angle of the tick before, and rate zero.
     """
     draws, lag = encoders.draws[row_of(tick)], int(encoders.difference_ticks)
     before = encoders.history[(tick - 1) % MOST_DIFFERENCED]
@@ -118,7 +118,7 @@ def _hold(stuck: Array, fault: ScheduledFault) -> None:
 
 
 class EncoderFault(SensorFault):
-    """Encoders that are noisier or coarser, or stuck."""
+    """Faults of encoders: more noise, coarser steps, or stuck."""
 
     CHANGES: ClassVar[Mapping[str, Mapping[Kind, Change]]] = {
         "sigma": {

@@ -1,4 +1,4 @@
-"""Faults of sensors: numbers of a sensor's model that are worse for a while."""
+"""Faults of sensors: temporary changes of the parameters of a sensor's model."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ STEP_RAD_PER_S = Argument("STEP", "rad/s", 1e-12, 1e3)
 
 
 class SensorFault:
-    """The ways in which one sensor's model gets worse; a subclass a sensor."""
+    """Base class of the faults of a sensor, one subclass per sensor."""
 
     CHANGES: ClassVar[Mapping[str, Mapping[Kind, Change]]]
-    """What each kind of fault does to the arrays of the sensor's record, by the array's name."""
+    """Change of the sensor's record by each kind of fault, by the array's name."""
 
     KINDS: ClassVar[tuple[Kind, ...]]
     """All of these kinds."""
@@ -41,7 +41,7 @@ class SensorFault:
         ]
 
     def apply(self, tick: int, part: Any) -> None:
-        """Spoil the sensor's record as it should be at ``tick``, or restore it."""
+        """Apply the faults to the sensor's record at ``tick``, or restore it."""
         for field, change, temporary in self._changes:
             temporary.apply(tick, getattr(part, field), change)
 
@@ -55,10 +55,10 @@ def _change(changes: Mapping[Kind, Change], values: Array, fault: ScheduledFault
 
 
 def add_noise(sigma: Array, fault: ScheduledFault) -> None:
-    """Let a fault's white noise add to what has the standard deviation ``sigma``, in quadrature."""
+    """Add a fault's white noise to the standard deviation ``sigma`` in quadrature."""
     np.sqrt(sigma * sigma + fault.value * fault.value, out=sigma)
 
 
 def coarsen(step: Array, fault: ScheduledFault) -> None:
-    """Let a fault's quantisation replace a finer one."""
+    """Replace a finer quantisation by the fault's."""
     np.maximum(step, fault.value, out=step)

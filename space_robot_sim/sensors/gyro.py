@@ -1,4 +1,4 @@
-"""A gyro on each base axis: white noise, a bias that walks, a scale error, whole steps."""
+"""Gyro on each base axis: white noise, random-walk bias, scale error, quantisation."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 class Gyro(Record):
-    """The numbers of one gyro.
+    """Parameters and state of a gyro.
 
     A period h after the last sample the bias b and the measured rate are (Farrenkopf 1978;
     Crassidis and Junkins, Optimal Estimation of Dynamic Systems)
@@ -42,9 +42,9 @@ class Gyro(Record):
     rate_random_walk: float = shaped(lambda n: ())
     """sigma_u, rad/s^3/2."""
     offset: Array = shaped(lambda n: (3,))
-    """Bias that stands still, rad/s."""
+    """Constant bias, rad/s."""
     bias: Array = shaped(lambda n: (3,))
-    """Bias that walks, rad/s: b without the offset."""
+    """Random-walk bias, rad/s: b without the offset."""
     scale: Array = shaped(lambda n: (3,))
     """1 + e."""
     step: Array = shaped(lambda n: (1,))
@@ -89,7 +89,7 @@ def _add_bias(offset: Array, fault: ScheduledFault) -> None:
 
 
 class GyroFault(SensorFault):
-    """A gyro that is noisier or coarser, or has another bias."""
+    """Faults of the gyro: more noise, coarser steps, or another bias."""
 
     CHANGES: ClassVar[Mapping[str, Mapping[Kind, Change]]] = {
         "sigma": {

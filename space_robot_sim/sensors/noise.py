@@ -1,4 +1,4 @@
-"""The sensors' random numbers: drawn block by block in Python, read by kernels from an array."""
+"""Random numbers of the sensors, drawn in blocks in Python and read by kernels."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 class NoiseDraws:
-    """Fills the sensors' arrays of standard normal numbers, (256, size) each, a row a tick.
+    """Generator of the sensors' standard normal numbers, (256, size) each, a row per tick.
 
     The numbers are a function of seed, sensor and tick alone: a flight repeats exactly, in any
     number of processes, and no sensor's numbers depend on the sensors beside it.
@@ -30,7 +30,7 @@ class NoiseDraws:
         """The seed, and the block of ticks that is in the arrays."""
 
     def refill(self, tick: int) -> int:
-        """See that the row of ``tick`` is drawn; return the first tick that needs other rows."""
+        """Draw the block of ``tick`` if needed; return the first tick of the next block."""
         block, (seed, drawn) = tick // BLOCK_TICKS, self.drawn
         if block != drawn:
             for key, array in self._arrays:

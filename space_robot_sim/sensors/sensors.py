@@ -1,4 +1,4 @@
-"""All sensors of one robot: a new one is a line in each list."""
+"""All sensors of one robot."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ Array = NDArray[np.float64]
 
 
 class Sensors(Record):
-    """The sensors of one robot, as the plant's kernels read them."""
+    """Record of the sensors of one robot, for the plant's kernels."""
 
     star_tracker: StarTracker = nested(StarTracker)
     gyro: Gyro = nested(Gyro)
     encoders: Encoders = nested(Encoders)
     are_ideal: float = shaped(lambda n: ())
-    """1 if they tell the truth."""
+    """1 if all sensors are without error."""
 
     @classmethod
     def build(
@@ -79,7 +79,7 @@ FAULTS: dict[str, type[PartFault]] = {
 
 @kernel
 def sense(sensors: Sensors, truth: State, tick: int, period: float, measured: State) -> None:
-    """Write into ``measured`` what the sensors tell of ``truth`` at ``tick``; call it once a tick.
+    """Write the measurements of ``truth`` at ``tick`` into ``measured``; call once a tick.
 
     The torques in ``measured`` are left alone; position and velocity of the base, the speeds of its
     wheels, and the motion of joints without motors have no error.

@@ -1,4 +1,4 @@
-"""A star tracker: the base's attitude, noisy, now and then, and late."""
+"""Star tracker: sampled, noisy and delayed measurements of the base's attitude."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 class StarTracker(Record):
-    """The numbers of one star tracker, and its measurements.
+    """Parameters of a star tracker, and its measurements.
 
     The noise is a small rotation on base axes, ``n`` (3,) being standard normal numbers and ``b``
     the boresight: ``sigma_across n + (sigma_about - sigma_across) (b . n) b``, so that it has the
@@ -49,7 +49,7 @@ class StarTracker(Record):
     taken: Array = shaped(lambda n: (MOST_UNDER_WAY,))
     """1 for each measurement under way that could be taken."""
     under_way: Array = shaped(lambda n: (MOST_UNDER_WAY, 4))
-    """Measurements not released yet, by number modulo `MOST_UNDER_WAY`."""
+    """Measurements in transit, by number modulo `MOST_UNDER_WAY`."""
     held: Array = shaped(lambda n: (4,))
     """The measurement released last."""
 
@@ -94,7 +94,7 @@ class StarTracker(Record):
 
 @kernel
 def track_stars(tracker: StarTracker, truth: State, tick: int, measured: State) -> None:
-    """Write into ``measured`` the attitude that is released last at ``tick``.
+    """Write the attitude released last at ``tick`` into ``measured``.
 
     Measurement k shows the attitude of tick ``k interval``, is released ``delay`` ticks later and
     held until the next one; while the tracker is blind, none is taken. The robot was at rest
@@ -117,7 +117,7 @@ def track_stars(tracker: StarTracker, truth: State, tick: int, measured: State) 
 
 @kernel
 def expose(tracker: StarTracker, quaternion: Array, draws: Array, out: Array) -> None:
-    """Write into ``out`` (4,) what is measured of ``quaternion`` (4,), with ``draws`` (3,)."""
+    """Write the measurement of ``quaternion`` (4,) with ``draws`` (3,) into ``out`` (4,)."""
     across, about, boresight = tracker.sigma[0], tracker.sigma[1], tracker.boresight
     along = draws[0] * boresight[0] + draws[1] * boresight[1] + draws[2] * boresight[2]
     x = across * draws[0] + (about - across) * along * boresight[0]
@@ -148,7 +148,7 @@ def _blind(blind: Array, fault: ScheduledFault) -> None:
 
 
 class StarTrackerFault(SensorFault):
-    """A star tracker that is noisier or coarser, or blind."""
+    """Faults of the star tracker: more noise, coarser steps, or blind."""
 
     CHANGES: ClassVar[Mapping[str, Mapping[Kind, Change]]] = {
         "sigma": {

@@ -2,7 +2,7 @@
 
 Colours are those of Okabe and Ito, safe for the colour-blind, without their yellow, which is too
 pale for a line. They are ordered so that neighbours differ in brightness too, and every line has a
-marker of its own shape, so that lines are told apart in grey print.
+marker of its own shape, so that lines can be distinguished in grey print.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What is varied in a campaign: which numbers each run draws, and what they change."""
+"""Random draws of a campaign: distributions, and the quantities that they vary."""
 
 from .draws import Draws
 

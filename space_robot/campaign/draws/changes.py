@@ -1,4 +1,4 @@
-"""A law's nominal flight, and what a run changes of it."""
+"""Nominal flight of a law, and the changes of a run."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .robot_arrays import RobotArrays
 
 
 class Nominal(NamedTuple):
-    """The flight of a law when nothing is varied."""
+    """Nominal flight of a law, without variations."""
 
     scenario: Scenario
     robot: Robot
@@ -48,7 +48,7 @@ class Nominal(NamedTuple):
 
 
 class Changes:
-    """What one run changes; variables add to it one after the other."""
+    """Changes of one run, accumulated over the variables."""
 
     def __init__(self, nominal: Nominal) -> None:
         self.nominal = nominal

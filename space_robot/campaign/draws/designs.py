@@ -1,4 +1,4 @@
-"""Designs: which uniform numbers the runs of a campaign get."""
+"""Designs of experiments: uniform numbers of the runs of a campaign."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _BLOCK = 1024
 
 
 class DesignPoint(NamedTuple):
-    """Where a run stands in its design."""
+    """Position of a run in its design."""
 
     draw: int
     """The number of its draw; runs that share it share what they do not vary."""
@@ -56,10 +56,10 @@ class Design(ABC):
 
 
 class Independent(Design):
-    """Every number by itself."""
+    """Independent random numbers."""
 
     def uniform(self, place: DesignPoint, name: str, number: int) -> float:
-        """See `Design`."""
+        """Return the uniform number of a variable for a draw."""
         return keys.uniform(self.seed, name, place.draw)
 
 
@@ -69,7 +69,7 @@ class LatinHypercube(Design):
     needs_all_runs: ClassVar[bool] = True
 
     def uniform(self, place: DesignPoint, name: str, number: int) -> float:
-        """See `Design`."""
+        """Return the uniform number of a variable for a draw."""
         stratum = keys.permutation(self.seed, name, self.draws)[place.draw]
         inside = keys.uniform(self.seed, name, place.draw)
         return min((int(stratum) + inside) / self.draws, 1.0 - 2.0**-53)
@@ -79,7 +79,7 @@ class Sobol(Design):
     """Sobol's sequence, each variable a dimension, shifted by random bits of its own."""
 
     def uniform(self, place: DesignPoint, name: str, number: int) -> float:
-        """See `Design`."""
+        """Return the uniform number of a variable for a draw."""
         return shifted(self.seed, name, place.draw, number)
 
 
@@ -91,7 +91,7 @@ class Saltelli(Design):
     variables: int = 0
 
     def uniform(self, place: DesignPoint, name: str, number: int) -> float:
-        """See `Design`."""
+        """Return the uniform number of a variable for a draw."""
         is_b = place.point in (number + 1, self.variables + 1)
         dimension = number + self.variables * is_b
         return shifted(self.seed, f"{name}:{'B' if is_b else 'A'}", place.draw, dimension)

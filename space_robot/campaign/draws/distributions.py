@@ -1,4 +1,4 @@
-"""How a variable is distributed: its values by their quantiles."""
+"""Distributions of variables, given by their quantiles."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ class Distribution(StrictModel):
 
     is_continuous: ClassVar[bool] = True
     relative: bool = False
-    """What is drawn is a factor of the nominal value."""
+    """True if the drawn value is a factor of the nominal value."""
     offset: bool = False
-    """What is drawn is added to the nominal value."""
+    """True if the drawn value is added to the nominal value."""
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
@@ -95,7 +95,7 @@ class Normal(Distribution):
         return low, high
 
     def quantile(self, u: float) -> float:
-        """See `Distribution`."""
+        """Return the quantile for a share ``u``."""
         low, high = self._probabilities
         share = min(max(low + u * (high - low), LEAST_SHARE), 1.0 - 2.0**-53)
         value = self.normal + self.sigma * quantile(share)
@@ -103,14 +103,14 @@ class Normal(Distribution):
         return value if self.high is None else min(value, self.high)
 
     def at_least(self, low: float) -> Normal:
-        """See `Distribution`."""
+        """Truncate the distribution below ``low``."""
         if self.low is not None and self.low >= low:
             return self
         return type(self).model_validate({**self.model_dump(), "low": low})
 
 
 class Uniform(Distribution):
-    """All values between two alike."""
+    """Uniform distribution between two values."""
 
     uniform: Pair
 
@@ -120,7 +120,7 @@ class Uniform(Distribution):
         return _rising(ends)
 
     def quantile(self, u: float) -> float:
-        """See `Distribution`."""
+        """Return the quantile for a share ``u``."""
         low, high = self.uniform
         return min(max(low + u * (high - low), low), high)
 
@@ -143,7 +143,7 @@ class LogUniform(Distribution):
         return log(high / low)
 
     def quantile(self, u: float) -> float:
-        """See `Distribution`."""
+        """Return the quantile for a share ``u``."""
         low, high = self.log_uniform
         return min(max(low * exp(u * self._span), low), high)
 
@@ -160,7 +160,7 @@ class Categorical(Distribution):
 
     @property
     def ends(self) -> list[Value]:
-        """See `Distribution`."""
+        """Return the least and the largest value."""
         return list(dict.fromkeys(self.values))
 
     @model_validator(mode="after")
@@ -190,11 +190,11 @@ class Choice(Categorical):
 
     @property
     def values(self) -> list[Any]:
-        """See `Categorical`."""
+        """Return the possible values."""
         return self.choice
 
     def quantile(self, u: float) -> Value:
-        """See `Distribution`."""
+        """Return the quantile for a share ``u``."""
         weights = self.weights or [1.0] * len(self.choice)
         left = u * sum(weights)
         for value, weight in zip(self.choice, weights, strict=True):
@@ -211,11 +211,11 @@ class Grid(Categorical):
 
     @property
     def values(self) -> list[Any]:
-        """See `Categorical`."""
+        """Return the possible values."""
         return self.grid
 
     def quantile(self, u: float) -> Value:
-        """See `Distribution`."""
+        """Return the quantile for a share ``u``."""
         return self.grid[int(u * len(self.grid))]
 
 

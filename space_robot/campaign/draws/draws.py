@@ -1,4 +1,4 @@
-"""What each run of a campaign flies."""
+"""Scenario of each run of a campaign."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Draws:
     """The draws of a campaign; each number is a function of seed, run and the variable's name."""
 
     def __init__(self, study: Study, seed: int, runs: int, check: bool = True) -> None:
-        """Look up all that is varied.
+        """Resolve all variables of the campaign.
 
         Args:
             study: the campaign's file.
@@ -70,14 +70,14 @@ class Draws:
         return self._design.needs_all_runs
 
     def values(self, run: int) -> dict[str, float | str]:
-        """Return what a run draws by the variables' names, as the file's distributions have it.
+        """Return the values drawn in a run, by the variables' names.
 
         That is the factor, where they are relative, and what is added, where they are an offset.
         """
         return {name: _told(value) for name, value in zip(self.names, self._raw(run), strict=True)}
 
     def scenario(self, run: int, law: str) -> Scenario:
-        """Return what a law flies in a run; the plant's noise is the same for all laws.
+        """Return the scenario of a law in a run; the plant's noise is the same for all laws.
 
         Raises:
             InputError: the run is none, or its numbers cannot be flown together.
@@ -91,7 +91,7 @@ class Draws:
         )
 
     def nominal(self, law: str) -> Scenario:
-        """Return what a law flies when nothing is varied."""
+        """Return the nominal scenario of a law."""
         return self._nominal(law, {}).scenario
 
     def flights_of_options(self) -> Iterator[tuple[str, Flight]]:
@@ -175,7 +175,7 @@ class Draws:
         return kind(self.seed, draws)
 
     def _check(self) -> None:
-        """See that each variable by itself can be flown at its ends."""
+        """Check that the extreme values of each variable can be flown."""
         for variable in self._variables:
             if variable.is_of_plant_robot:
                 continue

@@ -31,11 +31,11 @@ class OfFault(Variable):
 
     @property
     def place(self) -> Hashable:
-        """See `Variable`."""
+        """Return the key of the changed quantity."""
         return "fault", self.text
 
     def apply(self, value: Value, changes: Changes) -> None:
-        """See `Variable`."""
+        """Apply a value of the variable to a flight."""
         changes.faults.append(self.text.replace("{}", _written(value)))
 
 

@@ -35,7 +35,7 @@ class OfRobot(Variable):
 
     @property
     def is_of_plant_robot(self) -> bool:
-        """See `Variable`."""
+        """Return whether the variable changes the plant's robot alone."""
         return True
 
 
@@ -45,11 +45,11 @@ class Mass(OfRobot):
 
     @property
     def place(self) -> Hashable:
-        """See `Variable`."""
+        """Return the key of the changed quantity."""
         return "mass", self.body
 
     def apply(self, value: Value, changes: Changes) -> None:
-        """See `Variable`."""
+        """Apply a value of the variable to a flight."""
         mass = changes.robot.mass
         mass[self.body] = self.distribution.on(float(mass[self.body]), value)
 
@@ -60,11 +60,11 @@ class InertiaScale(OfRobot):
 
     @property
     def place(self) -> Hashable:
-        """See `Variable`."""
+        """Return the key of the changed quantity."""
         return "inertia", self.body
 
     def apply(self, value: Value, changes: Changes) -> None:
-        """See `Variable`."""
+        """Apply a value of the variable to a flight."""
         changes.robot.inertia[self.body] *= float(value)
 
 
@@ -76,11 +76,11 @@ class InertiaSpread(OfRobot):
 
     @property
     def place(self) -> Hashable:
-        """See `Variable`."""
+        """Return the key of the changed quantity."""
         return "inertia", self.body, self.number
 
     def apply(self, value: Value, changes: Changes) -> None:
-        """See `Variable`."""
+        """Apply a value of the variable to a flight."""
         own = changes.robot.spreads[self.body]
         if self.number < 3:
             own.factors[self.number] = exp(float(value))
@@ -96,11 +96,11 @@ class CentreOfMass(OfRobot):
 
     @property
     def place(self) -> Hashable:
-        """See `Variable`."""
+        """Return the key of the changed quantity."""
         return "com", self.body, self.axis
 
     def apply(self, value: Value, changes: Changes) -> None:
-        """See `Variable`."""
+        """Apply a value of the variable to a flight."""
         com = changes.robot.com[self.body]
         com[self.axis] = self.distribution.on(float(com[self.axis]), value)
 
@@ -113,11 +113,11 @@ class OfJoint(OfRobot):
 
     @property
     def place(self) -> Hashable:
-        """See `Variable`."""
+        """Return the key of the changed quantity."""
         return "joint", self.body, self.field
 
     def apply(self, value: Value, changes: Changes) -> None:
-        """See `Variable`."""
+        """Apply a value of the variable to a flight."""
         robot, joint = changes.robot, self.body - 1
         word, _, field = self.field.rpartition(".")
         if word == "friction":

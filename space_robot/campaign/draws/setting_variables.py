@@ -28,11 +28,11 @@ class OfScenario(Variable):
 
     @property
     def place(self) -> Hashable:
-        """See `Variable`."""
+        """Return the key of the changed quantity."""
         return "scenario", self.option
 
     def apply(self, value: Value, changes: Changes) -> None:
-        """See `Variable`."""
+        """Apply a value of the variable to a flight."""
         nominal = changes.nominal.scenario.given.get(self.option, 0.0)
         changes.options[self.option] = self.distribution.on(nominal, value)
 
@@ -47,16 +47,16 @@ class OfNode(Variable):
 
     @property
     def place(self) -> Hashable:
-        """See `Variable`."""
+        """Return the key of the changed quantity."""
         return self.node, self.parameter, self.element
 
     @property
     def is_of_law(self) -> bool:
-        """See `Variable`."""
+        """Return whether the variable changes the controller."""
         return self.node == "controller"
 
     def apply(self, value: Value, changes: Changes) -> None:
-        """See `Variable`."""
+        """Apply a value of the variable to a flight."""
         nominal = changes.parameter(self.node, self.parameter)
         if self.element is None:
             number = self.distribution.on(nominal, value)
@@ -76,16 +76,16 @@ class OfGains(Variable):
 
     @property
     def place(self) -> Hashable:
-        """See `Variable`."""
+        """Return the key of the changed quantity."""
         return "gains", self.gain, self.axis
 
     @property
     def is_of_law(self) -> bool:
-        """See `Variable`."""
+        """Return whether the variable changes the controller."""
         return True
 
     def apply(self, value: Value, changes: Changes) -> None:
-        """See `Variable`."""
+        """Apply a value of the variable to a flight."""
         if self.gain not in changes.nominal.gains:
             return
         values = changes.gain(self.gain)

@@ -1,4 +1,4 @@
-"""One number that is varied."""
+"""A number that a campaign varies."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Variable(ABC):
     @property
     @abstractmethod
     def place(self) -> Hashable:
-        """What it changes; no two variables may change the same."""
+        """Key of the changed quantity, unique among the variables."""
 
     @abstractmethod
     def apply(self, value: Value, changes: Changes) -> None:

@@ -89,5 +89,5 @@ def _wanted(study: Study, journal: Journal, runs: int) -> Iterator[Task]:
 
 
 def _has_failed(study: Study, row: Row) -> bool:
-    """Tell whether a flight ended early or missed a requirement."""
+    """Return whether a flight ended early or missed a requirement."""
     return not (row.is_complete and all(is_met(row, study.require, name) for name in study.require))

@@ -1,7 +1,7 @@
-"""Campaigns from Python: a file, and what comes of flying it.
+"""Campaigns from Python.
 
-found = Campaign.load("my.yaml").run(runs=10_000, seed=7, out="campaigns/a")
-found.table, found.verdicts, found.rerun(4711).log
+campaign = Campaign.load("my.yaml").run(runs=10_000, seed=7, out="campaigns/a")
+campaign.table, campaign.verdicts, campaign.rerun(4711).log
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from .preparation import Preparation
 
 
 class Campaign:
-    """Many flights of what a study varies, under each of its laws."""
+    """Campaign: flights of a study's variations under each of its laws."""
 
     def __init__(self, study: Study) -> None:
         """Take a study; what it names is looked up by `run`.
@@ -79,7 +79,7 @@ class Campaign:
         progress: Callable[[Progress], object] | None = None,
         warn: Callable[[str], object] = warnings.warn,
     ) -> FlownCampaign:
-        """Fly the campaign, or what is left of it, to its table.
+        """Fly the campaign, or its remaining flights, and write its table.
 
         What is in the table depends on file, seed, runs and software alone: not on workers, nor on
         how often it was interrupted. Ctrl-C (KeyboardInterrupt) leaves the table of what is done.

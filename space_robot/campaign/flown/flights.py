@@ -19,7 +19,7 @@ from .precision import Precision
 
 
 class Progress(NamedTuple):
-    """How far a campaign is."""
+    """Progress of a campaign."""
 
     done: int
     """Flights that have a row."""
@@ -59,7 +59,7 @@ class Flights:
         return self.precision.stop * len(self._laws)
 
     def missing(self) -> Iterator[Task]:
-        """Yield what is to be flown yet, in order, until the precision is reached."""
+        """Yield the missing flights, in order, until the precision is reached."""
         for run in range(self._runs):
             if run >= self.precision.stop:
                 return
@@ -75,7 +75,7 @@ class Flights:
         """Fly what is missing; each row is in the journal as soon as it is there.
 
         Args:
-            on_progress: told at the beginning and after every flight.
+            on_progress: called at the beginning and after every flight.
             options: of `run_many`.
 
         Raises:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 class FlownCampaign:
-    """What is in a campaign's folder."""
+    """A flown campaign, read from its folder."""
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class FlownCampaign:
 
     @classmethod
     def open(cls, folder: str | Path, trust: bool = False) -> Self:
-        """Return the campaign that was flown into a folder, to its end or not.
+        """Open the campaign in a folder, complete or not.
 
         Args:
             folder: of the campaign; it may be anybody's.
@@ -102,7 +102,7 @@ class FlownCampaign:
 
     @cached_property
     def verdicts(self) -> list[Verdict]:
-        """What the table says about each requirement, law by law."""
+        """Verdicts on each requirement, by law."""
         return verdicts(self.table, self.study, self.runs, list(self.manifest.table.grid))
 
     def rerun(self, run: int, law: str | None = None, bag: str | Path | None = None) -> Rerun:

@@ -74,6 +74,6 @@ def is_narrow(demand: Requirement, failures: int, runs: int, half_width: float) 
 
 
 def is_met(row: Row, require: dict[str, Requirement], name: str) -> bool:
-    """Tell whether a row meets a requirement; one that did not come to its end meets none."""
+    """Return whether a row meets a requirement; one that did not come to its end meets none."""
     value = row.require.get(name)
     return row.is_complete and value is not None and require[name].is_met(value)

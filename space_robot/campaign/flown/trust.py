@@ -1,4 +1,4 @@
-"""What a campaign's study may name when its folder is not trusted: only what is shipped."""
+"""Check that an untrusted study names only shipped files and modules."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ CAMPAIGN = "campaign"
 
 
 def check_study(study: Study) -> None:
-    """See that a study imports no module and opens no file but those that are shipped.
+    """Check that a study imports no module and opens no file but those that are shipped.
 
     Raises:
         NotTrustedError: it names one.

@@ -15,7 +15,7 @@ from ...console.files import make_folder
 
 
 def check_replaceable(folder: Path, force: bool, files: Collection[str]) -> None:
-    """See that a folder can be made there, before any work is done for it.
+    """Check that a folder can be made there, before any work is done for it.
 
     Args:
         folder: to be made.

@@ -86,7 +86,7 @@ def make_robot(
         folder: to be made, or replaced, see `check_replaceable`; nothing of it is left if anything
             fails but a flight.
         command: what makes it, for the files.
-        step: told what is being done.
+        step: called with a description of each step.
 
     Raises:
         InputError: no mission can be made, or the folder cannot be written.

@@ -1,1 +1,1 @@
-"""What a campaign's runs say, as tables on a terminal and as one self-contained page."""
+"""Reports of a campaign, as tables on a terminal and as one self-contained page."""

@@ -27,5 +27,5 @@ def number_log_axis(axes: Axes, name: str) -> None:
 
 
 def law_legend(figure: Figure, laws: Sequence[str], dashed: bool = True) -> None:
-    """Name the laws above a figure, as short as they can be told apart."""
+    """Return the shortest distinct names of the laws above a figure."""
     legend_above(figure, list(short_names(laws).values()), dashed=dashed)

@@ -1,4 +1,4 @@
-"""All that a report says of a campaign, found once for terminal, page and JSON."""
+"""Results of a campaign, computed once for terminal, page and JSON."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The folder of a campaign: begun, found again, and held by one process at a time."""
+"""Folder of a campaign: created, resumed, and locked by one process at a time."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def study_changes(file: Path, flown: Mapping[str, Any]) -> str:
 
 
 def _resumed(folder: Path, manifest: Manifest) -> list[str]:
-    """See that a folder was begun with a manifest; return what is damaged of its own.
+    """Check that a folder was begun with a manifest; return what is damaged of its own.
 
     Raises:
         InputError: it was begun with another one, or nothing shows that it was not.
@@ -135,7 +135,7 @@ def _resumed(folder: Path, manifest: Manifest) -> list[str]:
 
 
 def _check_own(folder: Path) -> None:
-    """See that nothing but a campaign is in a folder.
+    """Check that nothing but a campaign is in a folder.
 
     Raises:
         InputError: something else is.

@@ -70,7 +70,7 @@ class Manifest(StrictModel):
             file.write(text.encode() + b"\n")
 
     def check_same(self, other: Manifest, where: Path) -> None:
-        """See that ``other``, what is to be flown now, is what was begun, or more runs of it.
+        """Check that ``other``, what is to be flown now, is what was begun, or more runs of it.
 
         Args:
             other: now.

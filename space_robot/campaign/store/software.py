@@ -50,7 +50,7 @@ def file_digests(values: Any) -> dict[str, str]:
 def flight_digest(flight: Flight) -> str:
     """Return a digest of all that a flight's description says, the numbers of its files included.
 
-    The software, which is told apart from it, is left out.
+    The software, which is compared separately, is left out.
     """
     others = ("versions", "commit", "scenario")  # the scenario says the same once more
     content = {k: v for k, v in flight.description.items() if k not in others}

@@ -29,7 +29,7 @@ SHA256 = ".sha256"
 
 
 def check_tables() -> None:
-    """See that tables can be written, before anything is flown for one.
+    """Check that tables can be written, before anything is flown for one.
 
     Raises:
         InputError: a package is not installed.
@@ -83,7 +83,7 @@ def write_table(path: Path, schema: Schema, campaign: str, rows: Iterable[Row]) 
 
 
 def check_table(path: Path, campaign: str) -> None:
-    """See that a table is as it was written, and of a campaign.
+    """Check that a table is as it was written, and of a campaign.
 
     Raises:
         InputError: it is not, or is missing.
@@ -99,7 +99,7 @@ def check_table(path: Path, campaign: str) -> None:
 
 
 def check_there(path: Path) -> None:
-    """See that a table was written.
+    """Check that a table was written.
 
     Raises:
         InputError: it was not.

@@ -1,10 +1,10 @@
 """Laws compared over the same draws, run by run.
 
-A flight that failed is worse than any number, and two that failed are alike. Whether one law is
-the better one in most cases is told by the exact sign test, how much better by the median of the
-runs' ratios with its interval by order statistics: neither assumes a distribution. (Wilcoxon's test
-does: that differences lie symmetrically about their middle, which errors over decades do not.)
-Whether one law fails more often is told by the same test over the runs in which just one of the two
+A failed flight ranks below any number, and two failed flights are equal. The exact sign test
+decides which law is better in most cases; the median of the runs' ratios, with an interval by order
+statistics, says by how much. Neither assumes a distribution. (Wilcoxon's test assumes that
+differences are symmetric about their median, which errors over decades are not.)
+The same test decides whether one law fails more often, over the runs in which just one of the two
 failed (McNemar's, exact). The p values of all pairs and of both tests are corrected together after
 Holm (1979).
 """

@@ -88,11 +88,11 @@ class FixedSample(ShareTest):
     """
 
     def is_met(self, failures: Numbers, runs: Numbers) -> Bools:
-        """See `ShareTest`."""
+        """Return whether the requirement is met."""
         return np.asarray(binom.cdf(failures, runs, 1.0 - self.share) <= 1.0 - self.confidence)
 
     def is_missed(self, failures: Numbers, runs: Numbers) -> Bools:
-        """See `ShareTest`."""
+        """Return whether the requirement is missed."""
         tail = binom.sf(failures - 1, runs, 1.0 - self.share)
         return np.asarray(tail <= 1.0 - self.confidence)
 
@@ -113,17 +113,17 @@ class Sequential(ShareTest):
         return -float(np.log1p(-self.confidence))
 
     def is_met(self, failures: Numbers, runs: Numbers) -> Bools:
-        """See `ShareTest`."""
+        """Return whether the requirement is met."""
         evidence = log_evidence(failures, runs, 1.0 - self.share)
         return np.asarray(evidence >= self._threshold)
 
     def is_missed(self, failures: Numbers, runs: Numbers) -> Bools:
-        """See `ShareTest`."""
+        """Return whether the requirement is missed."""
         evidence = log_evidence(runs - failures, runs, self.share)
         return np.asarray(evidence >= self._threshold)
 
     def limits(self, failures: int, runs: int) -> Interval:
-        """See `ShareTest`."""
+        """Return the limits of the share."""
         low = 1.0 - self._upper_limit(failures, runs)
         return Interval(low, self._upper_limit(runs - failures, runs))
 

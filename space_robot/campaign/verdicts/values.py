@@ -85,7 +85,7 @@ def turned(table: DataFrame, column: str, sign: float) -> DataFrame:
 
 
 def is_known(table: DataFrame, column: str) -> bool:
-    """Tell whether any flight of the table has a number in that column."""
+    """Return whether any flight of the table has a number in that column."""
     return column in table and bool(np.isfinite(measured(table, column)).any())
 
 

@@ -1,1 +1,1 @@
-"""A flight as a graph of nodes: processes started, watched, disturbed and stopped."""
+"""Flights as a graph of nodes: start, monitor, inject faults, stop."""

@@ -1,4 +1,4 @@
-"""All nodes of a flight in one process, stepped in turn: what ``fly --composed`` starts.
+"""All nodes of a flight in one process, stepped in turn, for ``fly --composed``.
 
 They are the nodes of the other flights: only their process is one, so a tick wakes nobody.
 """
@@ -14,13 +14,13 @@ from .node_server import Program
 from .processes import ros_arguments
 
 NAME = "composed"
-"""The process' name among those of a graph."""
+"""Name of the process in a graph."""
 
 
 def composed_command(
     parameters: Mapping[str, Mapping[str, Any]], namespace: str, folder: Path
 ) -> Program:
-    """The program of the process, with the parameters of each node.
+    """Return the program of the process, with the parameters of each node.
 
     They are written to a file in ``folder``: on a command line, ROS takes a parameter for a node
     that is named for one in the root namespace.
@@ -31,7 +31,7 @@ def composed_command(
 
 
 def write_parameters(parameters: Mapping[str, Mapping[str, Any]], folder: Path) -> Path:
-    """Write the parameters of each node to a ROS parameter file in ``folder``; return that."""
+    """Write a ROS parameter file of all nodes to ``folder``; return its path."""
     content = {
         f"/**/{node}_node": {"ros__parameters": values} for node, values in parameters.items()
     }

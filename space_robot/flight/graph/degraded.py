@@ -1,4 +1,4 @@
-"""The shortcomings of a flight that was flown to its end, by its nodes' last reports."""
+"""Degradations of a complete flight, from the last reports of its nodes."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ _NOT_USED = re.compile(r"(rejected|refused): (another publisher's on /|reference
 
 
 class Degradation(NamedTuple):
-    """In words, each a line."""
+    """Failures and warnings of a flight, as one-line texts."""
 
     failures: list[str]
-    """Reasons why the flight is not the one that was asked for."""
+    """Reasons why the flight differs from the plan."""
     warnings: list[str]
-    """Things that were seen and did no harm."""
+    """Anomalies without consequences."""
 
 
 def degradation(
     nodes: Mapping[str, Mapping[str, str]], fault_kinds: frozenset[str], realtime: bool
 ) -> Degradation:
-    """Judge a flight.
+    """Return the degradations of a flight.
 
     A reference that was held is another motion than the mission's. In lockstep nothing but a fault
     of the mission can bring that about; by the wall clock any delay can.

@@ -1,4 +1,4 @@
-"""A ROS domain of its own for every run, or a namespace in one that the user names.
+"""Separate ROS domain for every run, or a namespace in a domain chosen by the user.
 
 Two runs in one namespace would hear each other; in two they do not.
 """
@@ -33,7 +33,7 @@ UDP_TABLES = (Path("/proc/net/udp"), Path("/proc/net/udp6"))
 PEERS = "ROS_STATIC_PEERS"
 
 _held: set[tuple[int, str]] = set()
-"""Domains and namespaces that this process has already."""
+"""Domains and namespaces held by this process."""
 
 
 @contextmanager
@@ -59,7 +59,7 @@ def ros_domain(number: int | None = None, namespace: str = ROOT) -> Iterator[int
 
 
 def domain_asked_for(domain: int | None) -> int | None:
-    """Return ``domain``, or the user's ROS_DOMAIN_ID; None: the user leaves it open."""
+    """Return ``domain``, or the user's ROS_DOMAIN_ID; None if neither is set."""
     of_user = os.environ.get("ROS_DOMAIN_ID", "")
     return int(of_user) if domain is None and of_user.isdecimal() else domain
 
@@ -78,7 +78,7 @@ def _free_domain(namespace: str) -> tuple[int, FileLock]:
 
 
 def _take(domain: int, namespace: str) -> FileLock | None:
-    """The lock of a domain that the user wants; None: this process has it."""
+    """Lock a domain chosen by the user; return None if this process holds it already."""
     if (domain, namespace) in _held:
         return None
     try:
@@ -94,7 +94,7 @@ def _take(domain: int, namespace: str) -> FileLock | None:
 
 
 def _see_that_nobody_is_there(domain: int, namespace: str) -> None:
-    """Refuse nodes, but wait for those that are ending because their starter has been killed."""
+    """Refuse foreign nodes; wait for nodes that end because their parent was killed."""
     until = time.monotonic() + TIMEOUT_S
     while nodes := nodes_in(domain, namespace):
         for node in nodes:
@@ -112,9 +112,9 @@ def _refusal(domain: int, namespace: str, holder: Holder) -> InputError:
 
 
 def is_quiet(domain: int) -> bool:
-    """Tell if there is certainly nobody in a domain: discovery is local, and no port is taken.
+    """Return True if a domain is certainly empty: local discovery, no port in use.
 
-    Middlewares take their ports as DDS-RTPS 9.6.2 says, 250 to a domain, unless told otherwise.
+    Middlewares use the ports of DDS-RTPS 9.6.2, 250 per domain, unless configured otherwise.
     """
     environment = {**defaults(), **os.environ}
     if environment["ROS_AUTOMATIC_DISCOVERY_RANGE"] != "LOCALHOST" or environment.get(PEERS):
@@ -129,7 +129,7 @@ def is_quiet(domain: int) -> bool:
 
 
 def _is_alive(pid: int) -> bool:
-    """Tell if a process runs; one that has ended and is only waited for (state Z) does not."""
+    """Return True if a process runs and is not a zombie (state Z)."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text("utf-8", errors="replace")
     except OSError:
@@ -138,7 +138,7 @@ def _is_alive(pid: int) -> bool:
 
 
 def _in_use(domain: int) -> bool:
-    """Tell if some participant has the domain's first unicast port (DDS-RTPS 9.6.2)."""
+    """Return True if some participant has the domain's first unicast port (DDS-RTPS 9.6.2)."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.bind(("", PORT_BASE + 10 + PORTS * domain))

@@ -1,4 +1,4 @@
-"""A graph of nodes from their start to the flight's end: brought up, watched, shown, stopped."""
+"""Follow a graph of nodes through a flight: activate, monitor, show, stop."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ POLL_S = 0.1
 INJECTING_POLL_S = 0.01
 STALL_TIMEOUT_S = 60.0
 LISTENER_TIMEOUT_S = 5.0
-"""How long a controller that is started again waits for its listeners."""
+"""Longest wait of a restarted controller for its listeners, s."""
 
 
 class InterruptedFlightError(FlightError):
@@ -48,7 +48,7 @@ def follow(
     stopped: list[int],
     nobody_was_there: bool = False,
 ) -> dict[str, Any]:
-    """Fly on started nodes until the plant has ended the flight; report what happened.
+    """Fly on started nodes until the plant ends the flight; return a report.
 
     Args:
         graph: the processes, not configured yet.
@@ -107,7 +107,7 @@ class _Follower:
         )
         self._events: list[Event] = []
         self._begun_at = 0.0
-        """The time when the first tick was seen; 0 before."""
+        """Time of the first tick; 0 before."""
         self._last_s, self._moved_at = 0.0, time.monotonic()
 
     def bring_up(self, show: FlightProgress, nobody_was_there: bool) -> None:
@@ -127,7 +127,7 @@ class _Follower:
             raise FlightError(f"{name} refused to {transition}:\n{output}")
 
     def until_complete(self, show: FlightProgress) -> None:
-        """Watch, inject, show."""
+        """Monitor the flight, inject faults and show progress."""
         monitor, injector = self._monitor, self._injector
         while not self._watch.is_complete:
             if self._stopped:
@@ -144,14 +144,14 @@ class _Follower:
         show(self.total_s, "")
 
     def _keep(self, news: Sequence[Event], show: FlightProgress) -> None:
-        """Say and keep what happened before the plant's last clock: what ends then is meant to."""
+        """Show and keep events before the plant's last clock message; later ends are normal."""
         for event in news:
             if event.simulated_s < self._last_clock_s:
                 show.say(str(event))
                 self._events.append(event)
 
     def end(self) -> dict[str, Any]:
-        """Stop the other nodes; report what happened."""
+        """Stop the other nodes; return a report."""
         self._graph.stop()
         self._watch.check_recorder_exit()
         if self._stopped:
@@ -205,10 +205,10 @@ def _remark(
 def _restart_command(
     parameters: Mapping[str, Any], namespace: str, absent: Collection[str]
 ) -> Command:
-    """Return the command of a controller that is started again while some nodes are ``absent``.
+    """Return the command to restart a controller while some nodes are ``absent``.
 
-    The recorder must have found it before it begins: the bag would lack what it answered until
-    then. But a recorder may be stopped, and the flight does not wait for that for long.
+    The recorder must discover it before it begins, else its first answers are missing in the
+    bag. The wait is short, since a recorder may be stopped.
     """
     listeners = wait_for("controller", absent)
     again = {"wait_for": listeners, "listener_timeout": LISTENER_TIMEOUT_S}

@@ -1,4 +1,4 @@
-"""Nodes of others in a flight's domain, that would speak or be spoken to in place of its own."""
+"""Detection of foreign nodes in the domain of a flight."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LASTING = 10
 
 
 class ForeignNodes:
-    """Refuses a domain where others publish the flight's topics or have its nodes' names."""
+    """Guard against foreign publishers and duplicate node names in a domain."""
 
     def __init__(self, node: Any, names: Sequence[str]) -> None:
         """``node``: an rclpy node to look with; ``names``: of the flight's in its namespace."""
@@ -30,7 +30,7 @@ class ForeignNodes:
         self._seen: Counter[str] = Counter()
 
     def wait(self, check: Callable[[], None]) -> None:
-        """Return when everybody who was there before should be known.
+        """Wait until all earlier participants should be discovered.
 
         Args:
             check: called while waiting; raises to give up.
@@ -46,7 +46,7 @@ class ForeignNodes:
             time.sleep(LOOK_S)
 
     def watch(self) -> None:
-        """Look again now and then, until they are known for sure; call it often.
+        """Repeat the check until discovery is complete; to be called often.
 
         Raises:
             InputError: there is a foreign publisher.

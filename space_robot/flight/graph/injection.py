@@ -1,4 +1,4 @@
-"""Faults that the orchestrator brings about: nodes killed, or stopped for a while."""
+"""Faults caused by the orchestrator: nodes killed, or stopped for a while."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .processes import Graph
 
 
 class Injector:
-    """Sends the signals of a flight's faults when their time has come."""
+    """Sender of the signals of a flight's faults at their times."""
 
     def __init__(self, faults: Sequence[Fault], graph: Graph) -> None:
         self._waiting = sorted(faults, key=lambda fault: fault.start_s)
@@ -24,11 +24,11 @@ class Injector:
 
     @property
     def is_busy(self) -> bool:
-        """True if something is still to be done."""
+        """True if any fault is pending."""
         return bool(self._waiting or self._stopped)
 
     def poll(self, simulated_s: float) -> list[Event]:
-        """Do what is due at a simulated time."""
+        """Inject the faults due at a simulated time."""
         events = []
         while self._waiting and self._waiting[0].start_s <= simulated_s:
             events.append(self._inject(self._waiting.pop(0), simulated_s))

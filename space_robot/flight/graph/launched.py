@@ -1,4 +1,4 @@
-"""A flight whose nodes a launch file starts: the parameters that `fly` would give them."""
+"""Parameters of a flight whose nodes are started by a launch file."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from .orchestrator import flight_parameters
 
 
 def launched_parameters(flight: Flight, bag: Path, autostart: bool, folder: Path) -> Path:
-    """Write a ROS parameter file for the nodes of a flight to ``folder``; return that.
+    """Write a ROS parameter file for the nodes of a flight to ``folder``; return its path.
 
-    With all kernels compiled: else the nodes would do that side by side.
+    All kernels are compiled first; else every node would compile them.
 
     Args:
         flight: a checked plan.

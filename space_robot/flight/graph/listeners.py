@@ -1,4 +1,4 @@
-"""The listeners to each topic in a flight, for whom the nodes wait."""
+"""Subscribers of each topic in a flight that the nodes wait for."""
 
 from __future__ import annotations
 

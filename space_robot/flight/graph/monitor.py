@@ -1,4 +1,4 @@
-"""Following a flight from outside, on the topics any tool can read."""
+"""Monitor of a flight through its public topics."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from .temporary_node import TemporaryNode
 Array = NDArray[np.float64]
 
 CLOCK_DEPTH = 1_000
-"""All of a plant's messages are needed to tell them from another's."""
+"""Queue depth; all messages of a plant are needed to distinguish it from another."""
 MOST_AT_ONCE = 1_000
-"""Messages of a topic looked at in one poll: somebody may flood it."""
+"""Messages of a topic read in one poll, in case of a flood."""
 
 
 class Event(NamedTuple):
     """Something that happened in a flight."""
 
     simulated_s: float
-    """That of its tick, if the node tells one; else when it was heard of."""
+    """Time of its tick, if the node reports one; else time of reception."""
     node: str
     what: str
 
@@ -80,7 +80,7 @@ class Monitor:
         """The time of each node's last report, by the monotonic clock."""
 
     def poll(self) -> list[Event]:
-        """Take the newest messages; the nodes' changes of mode that are worth a word."""
+        """Take the newest messages; return the nodes' relevant changes of mode."""
         events: list[Event] = []
         for take, read in (
             (self._clock.take, self._read_clock),
@@ -123,12 +123,12 @@ class Monitor:
         return [Event(self._time_of(name), name, mode)] if is_news else []
 
     def _time_of(self, name: str) -> float:
-        """Return the simulated time of a node's last report, by the tick that it tells."""
+        """Return the simulated time of a node's last report, from its tick."""
         tick = self.tick_of(name)
         return tick * self._period if tick > 0 and self._period else self.simulated_s
 
     def tick_of(self, name: str) -> int:
-        """Return the tick that a node told last; 0 if it has told none."""
+        """Return the tick that a node reported last; 0 if none."""
         with suppress(ValueError):  # somebody else's words
             return int(self.values.get(name, {}).get("tick", 0))
         return 0
@@ -143,7 +143,7 @@ class Monitor:
 
     @property
     def complaints(self) -> dict[str, str]:
-        """The modes of nodes that are not well, by their names."""
+        """Modes of nodes with problems, by name."""
         return {name: mode for name, mode in self.modes.items() if self._levels[name] > 0}
 
     def close(self) -> None:

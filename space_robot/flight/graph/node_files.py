@@ -1,4 +1,4 @@
-"""Files for nodes of a flight whose robot or assumed actuators are numbers, not names of files."""
+"""Files for the nodes of a flight whose robot or actuators are given as numbers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Parameters = Mapping[str, Mapping[str, Any]]
 
 
 def with_files(parameters: Parameters, flight: Flight, folder: Path) -> dict[str, dict[str, Any]]:
-    """Write what nodes read as files into a folder, and return parameters that name them.
+    """Write the files that nodes read, and return parameters that name them.
 
     Args:
         parameters: of every node.

@@ -1,4 +1,4 @@
-"""Programs of nodes, forked from a process that has already loaded what they need.
+"""Fork server for nodes, with all modules and kernels preloaded.
 
 A node of its own makes 1.5 s of imports and of reading compiled kernels. The server does that
 once, while the command that starts the nodes still looks at its options.
@@ -79,7 +79,7 @@ def _server_of(pid: int) -> ForkServer:
 
 
 def run_program(connection: Connection, descriptors: Sequence[int], server: int) -> None:
-    """Be the program that comes through the connection, until it ends."""
+    """Run the program received through the connection until it ends."""
     os.setsid()
     accept_signals(ignored=())
     program, environment, folder = connection.recv()

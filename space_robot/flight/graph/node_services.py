@@ -1,4 +1,4 @@
-"""Calls of the nodes' services: their lifecycle, and their parameters."""
+"""Calls of lifecycle and parameter services of the nodes."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ class _Repeated:
         self._ask_at = 0.0
 
     def ask(self) -> None:
-        """Call the service if it is there, and if it is time again."""
+        """Call the service if it is available and a call is due."""
         now = time.monotonic()
         if not self.is_answered and now >= self._ask_at and self._client.service_is_ready():
             self._ask_at = now + ASK_AGAIN_S
@@ -171,12 +171,12 @@ class _Repeated:
 
     @property
     def is_asked(self) -> bool:
-        """True if it has been called."""
+        """True if the service has been called."""
         return bool(self._futures)
 
     @property
     def is_answered(self) -> bool:
-        """True if an answer has come."""
+        """True if an answer has arrived."""
         return any(future.done() for future in self._futures)
 
     @property
@@ -185,5 +185,5 @@ class _Repeated:
         return next(future.result() for future in self._futures if future.done())
 
     def close(self) -> None:
-        """Ask no more."""
+        """Stop calling the service."""
         self._node.destroy_client(self._client)

@@ -43,8 +43,8 @@ def fly(
 ) -> dict[str, Any]:
     """Fly on a ROS 2 graph and return the report of the recorded bag.
 
-    ``graph`` in the report says what happened in the graph; its ``failures`` are what keeps the
-    flight from being whole though it was flown to its end.
+    ``graph`` in the report lists the events in the graph; its ``failures`` are reasons why the
+    flight is not whole although it is complete.
 
     Args:
         flight: a checked plan.
@@ -97,7 +97,7 @@ def fly(
 def _commands(
     flight: Flight, parameters: Mapping[str, Mapping[str, Any]], folder: Path
 ) -> Mapping[str, Command]:
-    """The processes: one a node, or one for all; their files go to ``folder``."""
+    """Return the commands of the processes; files are written to ``folder``."""
     started = {node: {**values, "autostart": False} for node, values in parameters.items()}
     namespace = flight.scenario.options.namespace
     if flight.scenario.options.composed:
@@ -106,10 +106,10 @@ def _commands(
 
 
 def _claim(bag: Path) -> None:
-    """Make the bag's folder, so that what is in it is of this flight alone.
+    """Create the folder of the bag for this flight alone.
 
     Raises:
-        InputError: it is there: another flight was quicker.
+        InputError: the folder exists, created by another flight.
     """
     try:
         bag.mkdir(parents=True)
@@ -119,7 +119,7 @@ def _claim(bag: Path) -> None:
 
 
 def _has_states(bag: Path, namespace: str) -> bool:
-    """Tell if a tick was flown."""
+    """Return True if at least one tick was flown."""
     try:
         batches = Selection(open_bag(bag), {}, namespace).batches()
         return any(topic is topics.JOINT_STATES for topic, _ in batches)
@@ -128,7 +128,7 @@ def _has_states(bag: Path, namespace: str) -> bool:
 
 
 def require_ros() -> None:
-    """See that nodes can be started here.
+    """Check that ROS nodes can be started on this machine.
 
     Raises:
         FlightError: rclpy cannot be imported.
@@ -143,7 +143,7 @@ def require_ros() -> None:
 
 
 def flight_parameters(flight: Flight, bag: Path) -> dict[str, dict[str, Any]]:
-    """The parameters of every node of a flight that is recorded to ``bag``."""
+    """Return the parameters of every node of a flight that is recorded to ``bag``."""
     parameters = {node: dict(values) for node, values in flight.scenario.parameters.items()}
     parameters["plant"] |= {
         "ticks": flight.ticks,

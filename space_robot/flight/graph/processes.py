@@ -1,4 +1,4 @@
-"""The nodes as processes: started, watched, stopped, never left behind."""
+"""Processes of the nodes: start, monitoring, stop and cleanup."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ ERROR = ": error: "
 
 
 def has_ros2_run() -> bool:
-    """Tell if the ``ros2`` command is there and knows this package's executables."""
+    """Return True if the ``ros2`` command is there and knows this package's executables."""
     prefixes = os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
     return shutil.which("ros2") is not None and any(
         (Path(prefix) / "share/ament_index/resource_index/packages" / PACKAGE).exists()
@@ -56,7 +56,7 @@ def node_environment(domain: int) -> dict[str, str]:
 
 
 def node_command(node: str, parameters: Mapping[str, Any], namespace: str = ROOT) -> Command:
-    """How a node is started: through ``ros2 run`` where that works, else directly."""
+    """Return the command of a node: ``ros2 run`` where it is available, else Python."""
     arguments = ros_arguments(parameters, namespace)
     if has_ros2_run():
         return ["ros2", "run", PACKAGE, f"{node}_node", *arguments]
@@ -64,7 +64,7 @@ def node_command(node: str, parameters: Mapping[str, Any], namespace: str = ROOT
 
 
 def ros_arguments(parameters: Mapping[str, Any], namespace: str = ROOT) -> list[str]:
-    """Parameters and namespace as a node's command line takes them."""
+    """Return parameters and namespace as ROS command-line arguments."""
     arguments = [] if namespace == ROOT else ["-r", f"__ns:={namespace}"]
     for name, value in parameters.items():
         # JSON is YAML, which ROS reads
@@ -119,18 +119,18 @@ class NodeProcess:
         return self._process.poll()
 
     def exit_summary(self) -> str:
-        """Say how it ended, once it has."""
+        """Describe how the process ended."""
         time.sleep(0.1)  # let it finish its last line
         code = self.exit_code or 0
         how = f"with exit code {code}" if code >= 0 else f"by signal {-code}"
         return f"{self.node} ended {how}"
 
     def early_end(self) -> FlightError:
-        """The error to raise when it has ended too early."""
+        """Return the error for a process that ended too early."""
         return FlightError(f"{self.exit_summary()} before the flight did:\n{self.output_tail()}")
 
     def output_tail(self) -> str:
-        """The end of what it printed, and errors of before, after which other nodes had ended."""
+        """Return the end of its output, and earlier errors."""
         self._output.seek(0)
         lines = self._output.read().decode(errors="replace").strip().splitlines()
         errors = [line for line in lines[:-TAIL_LINES] if ERROR in line]
@@ -152,7 +152,7 @@ class NodeProcess:
         self.signal(signal.SIGINT)
 
     def stop(self, patience_s: float = 10.0) -> None:
-        """Ask it to end, insist, then force; returns when its group is gone."""
+        """Stop the process: SIGINT, SIGTERM, SIGKILL; return when its group is gone."""
         if self._stopped:
             return
         self._stopped = True
@@ -177,7 +177,7 @@ class NodeProcess:
 
 
 class Graph:
-    """The processes of one flight; leaving the context leaves none behind."""
+    """Processes of one flight; all are stopped when the context ends."""
 
     def __init__(self, commands: Mapping[str, Command], environment: Mapping[str, str]):
         """``commands``: the command line of each node, or of the process that hosts them all."""
@@ -200,7 +200,7 @@ class Graph:
             node.close()
 
     def stop(self) -> None:
-        """End all nodes that have not ended, the recorder last: it takes what they still say."""
+        """Stop all running nodes, the recorder last, to record their last messages."""
         plant, recorder = self.nodes.get("plant"), self.nodes.get("recorder")
         if plant:
             plant.stop()  # first: what it asks must still be answered
@@ -220,7 +220,7 @@ class Graph:
         return self.nodes.get(node, self.leader)
 
     def restart(self, name: str, command: Command) -> None:
-        """Put a new process in the place of one that is dead or hangs."""
+        """Replace a process that is dead or hangs."""
         old = self.nodes[name]
         old.signal(signal.SIGKILL)
         old.stop()
@@ -228,7 +228,7 @@ class Graph:
         self.nodes[name] = NodeProcess(name, command, self._environment)
 
     def check(self) -> bool:
-        """Tell if the plant has flown to its end.
+        """Return True if the plant has completed the flight.
 
         Raises:
             FlightError: a process has ended too early; with the end of its output.

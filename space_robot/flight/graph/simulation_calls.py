@@ -16,12 +16,12 @@ from .node_services import call_trigger, set_parameters
 from .temporary_node import TemporaryNode
 
 FIND_S = 5.0
-"""A node that is there is discovered in 0.1 to 1.8 s."""
+"""Discovery of a running node takes 0.1 to 1.8 s."""
 LOOK_S = 0.02
 
 
 def call_simulation(action: str, domain: int | None, namespace: str, ticks: int = 1) -> str:
-    """Have a plant ``pause``, ``resume``, ``step`` or ``reset``; return what it says once it has.
+    """Call ``pause``, ``resume``, ``step`` or ``reset`` of a plant; return its message.
 
     Args:
         action: one of these.

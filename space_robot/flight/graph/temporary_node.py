@@ -1,4 +1,4 @@
-"""A node of a command in the graph it started: beside the flight's nodes, and gone with it."""
+"""Temporary node of a command in the graph that it started."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from space_robot_msgs_py.topics import ROOT
 
 
 class TemporaryNode:
-    """Joins a domain as ``<name>_<pid>``, without services or logs of its own."""
+    """Node ``<name>_<pid>`` in a domain, without services or logs."""
 
     def __init__(self, name: str, domain: int, namespace: str = ROOT) -> None:
         """Join.

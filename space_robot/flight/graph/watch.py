@@ -1,4 +1,4 @@
-"""Looking after a flight's processes: what is done when one ends or hangs."""
+"""Supervision of a flight's processes: reactions when one ends or hangs."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from .node_names import PLANT
 from .processes import Command, Graph, NodeProcess
 
 HUNG_S = 2.0
-"""Without a word for this long a controller hangs; its diagnostics come every second."""
+"""Silence after which a controller counts as hung; diagnostics arrive every second."""
 MOST_RESTARTS = 20
 
 
 class Watch:
-    """Keeps the flight going where that makes sense.
+    """Supervisor that keeps a flight going where possible.
 
     Without its plant a flight is over. A controller is restarted if that is wanted. Without
     recorder or mission the flight goes on: the one costs the bag's end, without the other the last
@@ -49,7 +49,7 @@ class Watch:
         """Reasons why the flight is not whole."""
 
     def poll(self, simulated_s: float) -> list[Event]:
-        """Look after all processes.
+        """Check all processes and react.
 
         Raises:
             FlightError: the flight cannot go on.
@@ -75,14 +75,14 @@ class Watch:
         return events
 
     def check_recorder_exit(self) -> None:
-        """See, once all nodes have been stopped, whether the recorder kept everything."""
+        """Check, after all nodes have stopped, that the recorder kept everything."""
         recorder = self._graph.host_of("recorder")
         if recorder.exit_code != 0 and "recorder" not in self._gone:
             self.failures.append(recorder.output_tail().splitlines()[-1].strip())
 
     @property
     def is_complete(self) -> bool:
-        """True if the plant has flown to its end."""
+        """True if the plant has completed the flight."""
         return self._graph.leader.exit_code == 0 or self._has_flown
 
     def _hangs(self, name: str) -> bool:

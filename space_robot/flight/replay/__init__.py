@@ -1,1 +1,1 @@
-"""A recorded flight played again to a live controller, its commands compared with the recorded."""
+"""Replay: a recorded flight played to a live controller, with commands compared."""

@@ -123,7 +123,7 @@ class ControllerChoice:
         return {"controller": law.name, **(kept if self.is_as_flown else {})}
 
     def _check_laws(self, named: str, flown: Mapping[str, Any]) -> None:
-        """See that no law but those shipped, or given by the user, is imported."""
+        """Check that no law but those shipped, or given by the user, is imported."""
         if "controller" not in self._said:
             check_law(named)
         if "swaps" not in self._said:
@@ -131,7 +131,7 @@ class ControllerChoice:
                 check_law(swap.partition(":")[2].strip())
 
     def _check_files(self, flown: Mapping[str, Any]) -> None:
-        """See that no file is read whose path the bag tells."""
+        """Check that no file is read whose path the bag tells."""
         for what in ("robot", "gains", "navigation_sensors", "actuators"):
             if what not in self._said and self.parameters.get(what) == flown.get(what, ""):
                 check_file(what, str(flown[what]))
@@ -158,7 +158,7 @@ class ControllerChoice:
         return {"actuators": str(path)}
 
     def _gains_folder(self, law: type[ControlLaw], recorded: Mapping[str, Any]) -> str:
-        """The recorded gains, beside those of the other laws as far as they are found here."""
+        """The recorded gains, and those of other laws that exist on this machine."""
         folder = self._folder / "gains"
         folder.mkdir()
         files: dict[str, Path] = {}

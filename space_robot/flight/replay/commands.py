@@ -55,7 +55,7 @@ class ReplayedCommands(NamedTuple):
 
 
 class CommandList:
-    """Takes serialized /command messages; a long flight's are some 90 bytes each. Knows no ROS."""
+    """List of serialized /command messages, about 90 bytes each. Independent of ROS."""
 
     def __init__(self, axis_names: tuple[str, ...], timebase: Timebase) -> None:
         self._names, self._timebase = axis_names, timebase

@@ -1,4 +1,4 @@
-"""Recorded commands beside those of the replay, tick by tick and bit by bit. Knows no ROS."""
+"""Comparison of recorded and replayed commands, bit by bit. Independent of ROS."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .commands import Array, Form, ReplayedCommands, Ticks, number
 
 
 class Difference(NamedTuple):
-    """A field that is not the same in both."""
+    """A field that differs between recording and replay."""
 
     field: str
     recorded: float | str
@@ -20,14 +20,14 @@ class Difference(NamedTuple):
 
     @property
     def amount(self) -> float | None:
-        """Replayed less recorded; None where that makes no sense."""
+        """Replayed less recorded; None for fields without a difference."""
         if isinstance(self.recorded, str) or isinstance(self.replayed, str):
             return None
         return self.replayed - self.recorded
 
 
 class Stretch(NamedTuple):
-    """Ticks one after the other, of which each was compared."""
+    """A stretch of consecutive ticks that were compared."""
 
     first: int
     last: int
@@ -51,7 +51,7 @@ class Comparison:
         replayed: ReplayedCommands,
         forces: Collection[str] = (),
     ) -> None:
-        """Compare them.
+        """Compare recorded and replayed commands.
 
         Args:
             axis_names: of all that is commanded.
@@ -67,11 +67,11 @@ class Comparison:
         self._played = np.unique(played)
         is_played = np.isin(recorded.ticks, self._played)
         self.without_state = int(np.count_nonzero(~is_played))
-        """Commands recorded, though not the state they answer."""
+        """Number of commands recorded without the state that they answer."""
         self.ticks, at, again = np.intersect1d(
             recorded.ticks[is_played], replayed.ticks, assume_unique=True, return_indices=True
         )
-        """(K,) Ticks with both."""
+        """(K,) Ticks with both commands."""
         self._at, self._again = np.flatnonzero(is_played)[at], again
         self.recorded: Array = recorded.torque[self._at]
         """(K, m) in `units`."""

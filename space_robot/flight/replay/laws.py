@@ -1,4 +1,4 @@
-"""The laws and gains of a flight, put in force again at their ticks."""
+"""Recorded laws and gains, put in force again at their ticks."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from space_robot_msgs_py.samples import LawInForce
 
 
 class RecordedLaws:
-    """Tells the live controller, before each state, which law and gains it had in flight.
+    """Sets, before each state, the law and gains that the live controller had in flight.
 
     In flight they changed between two states, too, so the replayed controller takes over, and
-    remembers, as the flown one did. Knows no ROS.
+    remembers, as the flown one did. Independent of ROS.
     """
 
     def __init__(
@@ -33,7 +33,7 @@ class RecordedLaws:
         self._has_begun = False
 
     def before(self, tick: int) -> None:
-        """See to it that the state of ``tick`` is answered as in flight; call for each in turn."""
+        """Put in force the law of ``tick`` before its state is sent; call it for each tick."""
         if not self._coming or self._coming[0].tick > tick:
             self._has_begun = True
             return

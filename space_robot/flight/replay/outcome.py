@@ -19,13 +19,13 @@ from .recording import Recording
 
 @dataclass(frozen=True)
 class ReplayOptions:
-    """A choice of what to replay, and how."""
+    """Options of a replay."""
 
     bag: Path
     controller: str = ""
     """Law that answers (empty: the recorded one)."""
     gains: str = ""
-    """Its gains (empty: the recorded ones)."""
+    """Gains of the law (empty: the recorded ones)."""
     parameters: Mapping[str, Any] = field(default_factory=dict)
     """Further parameters of the controller."""
     rate: float | None = None
@@ -37,7 +37,7 @@ class ReplayOptions:
     remap: Mapping[str, str] = field(default_factory=dict)
     """Our topic by the bag's."""
     namespace: str | None = None
-    """Of the robot in the bag (None: the only one)."""
+    """Namespace of the robot in the bag (None: the only one)."""
     domain: int | None = None
     trust: bool = False
     """True if modules and files that the bag names may be opened."""
@@ -52,12 +52,12 @@ class Replay:
     recording: Recording
     comparison: Comparison
     laws: tuple[LawInForce, ...]
-    """In force in flight in the part that was replayed."""
+    """Laws in force in the replayed part of the flight."""
     skipped: int
     """States that the controller did not answer in flight, and was not sent now."""
     elapsed_s: float
     error: FlightError | None
-    """The error that ended it before its time."""
+    """Error that ended the replay early."""
 
     @property
     def is_judged(self) -> bool:
@@ -83,7 +83,7 @@ class Replay:
         return first is not None and first[0] < self.recording.first_gap
 
     def report(self) -> dict[str, Any]:
-        """Everything, for JSON and the table."""
+        """The report, for JSON and the table."""
         flight, options = self.recording.flight, self.options
         numbers = self.comparison.report(self.recording.timebase.period)
         return {
@@ -123,7 +123,7 @@ class Replay:
         return round(tick * self.recording.timebase.period, 9) if math.isfinite(tick) else None
 
     def _reasons(self) -> Iterator[str]:
-        """Yield what can keep an unchanged controller from giving the recorded bits again."""
+        """Yield reasons why an unchanged controller may give different bits."""
         flight, has_laws = self.recording.flight, bool(self.laws)
         if self.options.start_s > 0.0:
             yield (

@@ -1,4 +1,4 @@
-"""The plant's and the mission's part of the graph, played from a recording."""
+"""Player of recorded messages, in place of plant and mission."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ASK_AGAIN_S = 0.5
 GIVE_UP_S = 10.0
 """Without an answer for this long a tick counts as unanswered."""
 MOST_UNANSWERED = 3
-"""So many unanswered ticks in a row, and the controller counts as silent."""
+"""Unanswered ticks in a row after which the controller counts as silent."""
 LISTENER_TIMEOUT_S = 30.0
 LAST_ANSWER_S = 1.0
 
@@ -42,7 +42,7 @@ class _Stream(NamedTuple):
 
 
 class Player:
-    """Publishes recorded messages as a node ``replay_node``, and keeps the answers."""
+    """Node ``replay_node`` that publishes recorded messages and keeps the answers."""
 
     def __init__(self, domain: int, answers: CommandList, parts: Sequence[topics.Topic]) -> None:
         """Join the graph; `node` is for calling services.
@@ -120,7 +120,7 @@ class Player:
             )
 
     def resend_pending(self) -> None:
-        """Send again what is still needed of the reference, as a mission does for who joins."""
+        """Send the current reference again, as a mission does for new subscribers."""
         self.wait_for_controller()
         for stream in self._references:
             for reference in stream.needed:
@@ -133,7 +133,7 @@ class Player:
         before: Callable[[int], None],
         show: Callable[[int], None],
     ) -> None:
-        """Send state after state, each when the one before has its answer.
+        """Send the states, each after the answer to the previous one.
 
         Args:
             states: in their order; those that were not answered in flight left out.
@@ -212,7 +212,7 @@ class Player:
                 needed.append(reference)
 
     def _is_answered(self, state: StateMessages) -> bool:
-        """Wait for the answer to the state just sent; whether it has come."""
+        """Wait for the answer to the state just sent; return whether it arrived."""
         begin = time.monotonic()
         ask_again = begin + ASK_AGAIN_S
         while True:

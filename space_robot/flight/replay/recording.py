@@ -1,4 +1,4 @@
-"""A bag as a replay reads it: messages as bytes, streamed, so that long flights need no memory."""
+"""Recorded messages for a replay, streamed as bytes to save memory."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ COMPARED = (
     topics.COMMAND,
     topics.LAW,
 )
-"""Topics of what a controller is sent and answers."""
+"""Topics that a controller receives and sends."""
 
 
 class StateMessages(NamedTuple):
@@ -57,7 +57,7 @@ class ReferenceMessage(NamedTuple):
 
 
 class Recording:
-    """The messages of a bag that a controller has seen, and its answers. Knows no ROS."""
+    """Messages of a bag received and sent by the controller. Independent of ROS."""
 
     def __init__(
         self, path: Path, remap: Mapping[str, str] | None = None, namespace: str | None = None
@@ -91,13 +91,13 @@ class Recording:
             if doubts:
                 raise InputError(doubts[0])
         self.namespace = self._selection.namespace
-        """Of the robot that flew."""
+        """Namespace of the robot."""
         self.flight: dict[str, Any] = flight
         """The flight as recorded; empty for a bag of another recorder."""
         self.parts = tuple(topic for topic in topics.STATES if counts[topic])
         """The parts of states that are there."""
         self.states_count = counts[topics.JOINT_STATES]
-        """Ticks, about."""
+        """Approximate number of ticks."""
         self.has_commands = bool(counts[topics.COMMAND])
         account = noted_accounts(self._bag.custom_data()).get(topics.COMMAND.full_name)
         self.lost_commands = account.missing if account else 0

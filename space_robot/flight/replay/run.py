@@ -1,4 +1,4 @@
-"""A replay from its start to its report: a controller's process, the player, the comparison."""
+"""Replay of a bag: start a controller, play, compare, report."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SHOW_S = 0.2
 
 
 def replay(options: ReplayOptions) -> Replay:
-    """Play the bag to a controller of its own and compare its commands with the recorded.
+    """Play a bag to a new controller and compare its commands with the recorded ones.
 
     Raises:
         InputError: bag or options cannot be used; nothing was started.
@@ -74,7 +74,7 @@ class _Run:
         self._shown_at = 0.0
 
     def _choose_parts(self) -> tuple[Topic, ...]:
-        """The parts of a state that the controller needs."""
+        """Return the parts of a state that the controller needs."""
         parts = StateCodec(self._choice.names, self._recording.timebase).control_topics
         if lacking := [topic.full_name for topic in parts if topic not in self._recording.parts]:
             raise InputError(
@@ -84,7 +84,7 @@ class _Run:
         return parts
 
     def _read_commands(self) -> ReplayedCommands:
-        """Those to compare with; nobody knows what came after an unfinished bag's last one."""
+        """Return the commands to compare with, up to the last one of an unfinished bag."""
         recording = self._recording
         commands = recording.commands(self._choice.names.commanded)
         if recording.has_commands and not recording.is_finished and len(commands.ticks):
@@ -152,7 +152,7 @@ class _Run:
             player.by_the_clock(states, references, laws.before, show, period)
 
     def _states(self) -> Iterator[StateMessages]:
-        """The states that the controller took; where it did not answer all, those answered."""
+        """Return the states that the controller answered."""
         recording = self._recording
         states = recording.states(self._parts, self._start, self._stop)
         if not recording.has_commands or recording.answers_are_complete:
@@ -188,14 +188,14 @@ def _bring_up(controller: NodeProcess, player: Player) -> None:
 
 
 def _start_again(player: Player) -> None:
-    """Let the controller forget everything, as the one that was started again in flight."""
+    """Reset the controller, as a restart in flight does."""
     if refused := _change_state(player, "deactivate", "cleanup", "configure", "activate"):
         raise FlightError(f"{CONTROLLER} refused to {refused}")
     player.resend_pending()
 
 
 def _change_state(player: Player, *transitions: str) -> str:
-    """Put the controller through these transitions; return the one it refuses, if any."""
+    """Request transitions of the controller; return the first refused one, or None."""
     for transition in transitions:
         if change_state(player.node, [CONTROLLER], transition, player.check):
             return transition
@@ -213,7 +213,7 @@ def _check(controller: NodeProcess, stopped: list[int]) -> None:
 
 @contextmanager
 def _frozen() -> Iterator[None]:
-    """Keep the garbage collector from what lives now while the replay lasts."""
+    """Exclude existing objects from garbage collection during the replay."""
     gc.collect()
     gc.freeze()
     try:

@@ -124,7 +124,7 @@ class Result:
     row: TableRow
     variant: Variant
     parameters: dict[str, Any]
-    """All that plant, controller and mission were told."""
+    """Settings of plant, controller and mission."""
     diverged_tick: int | None = None
     rms: dict[str, dict[str, float]] | None = None
     """By definition and column; None if the flight diverged."""
@@ -178,7 +178,7 @@ def fly(
 
 
 def parameters(flight: Flight) -> dict[str, Any]:
-    """Return all that plant, controller and mission are told in a flight."""
+    """Return the settings of plant, controller and mission in a flight."""
     navigation = flight.controller_settings.filter_settings
     return {
         "period_s": flight.period,

@@ -32,7 +32,7 @@ FULL_DURATION = 30.0
 
 
 def check_folder(folder: Path) -> None:
-    """See that the results may be written there.
+    """Check that the results may be written there.
 
     Raises:
         InputError: something else is there.

@@ -18,7 +18,7 @@ from .time_delay_error import ErrorDerivative
 
 
 def report(study: StabilityStudy) -> dict[str, Any]:
-    """Everything found; lists hold one entry an axis, in the order of ``axes``."""
+    """Results of the stability check; lists hold one entry per axis, in the order of ``axes``."""
     flight, lemma_1 = study.flight, study.lemma_1
     content = {
         **{key: flight.description[key] for key in ("controller", "case", "gains", "robot")},

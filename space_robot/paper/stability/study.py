@@ -40,7 +40,7 @@ class StabilityStudy:
 
 
 def check_law(flight: Flight) -> None:
-    """See that the study has something to say of the flight's law.
+    """Check that the study has something to say of the flight's law.
 
     Raises:
         InputError: the law does without time-delay estimation, or the flight is too short.

@@ -1,4 +1,4 @@
-"""One way to run many: in this process, in processes beside it, or on a Dask cluster."""
+"""Run many items: in this process, in worker processes, or on a Dask cluster."""
 
 from .cluster import check_scheduler
 from .done import Done, OutOfTimeError, WorkerDiedError

@@ -1,4 +1,4 @@
-"""Many items on a Dask cluster.
+"""Run many items on a Dask cluster.
 
 What is waited for, and how long: for the scheduler `CONNECT_S`, when its connection is lost, too;
 for workers `WORKERS_S`, at the beginning and when none is left. An item whose worker is lost is
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 CONNECT_S = 5.0
-"""For the scheduler to answer."""
+"""Longest wait for an answer of the scheduler, s."""
 WORKERS_S = 60.0
-"""How long there may be no worker."""
+"""Longest time without a worker, s."""
 LOOK_S = 1.0
-"""Time between two looks at how many workers there are."""
+"""Interval between checks of the number of workers, s."""
 AHEAD = 2
-"""Items under way for each thread of the workers."""
+"""Items in progress for each thread of the workers."""
 
 
 class ClusterError(SpaceRobotError):
@@ -48,14 +48,14 @@ def on_cluster(
     timeout_s: float | None,
     attempts: int,
 ) -> Generator[Any, None, None]:
-    """Yield None when the scheduler is there, then what comes of every item; see `run_many`."""
+    """Yield None when the scheduler answers, then every outcome; see `run_many`."""
     with _connected(address) as client:
         yield
         yield from _Job(client, address, function, timeout_s, attempts).run(items)
 
 
 def check_scheduler(address: str) -> None:
-    """See that there is a scheduler at an address.
+    """Check that a scheduler answers at an address.
 
     Raises:
         InputError: there is none, or no client here.
@@ -65,7 +65,7 @@ def check_scheduler(address: str) -> None:
 
 
 class _Job:
-    """A run of many on a cluster."""
+    """A run of many items on a cluster."""
 
     def __init__(
         self,
@@ -86,7 +86,7 @@ class _Job:
         self._threads, self._looked, self._seen = 0, float("-inf"), time.monotonic()
 
     def run(self, items: Iterable[Any]) -> Iterator[Done[Any, Any]]:
-        """Yield what comes of every item, in the order in which they end."""
+        """Yield the outcome of every item, in order of completion."""
         rest = iter(items)
         try:
             while True:
@@ -111,7 +111,7 @@ class _Job:
         future.add_done_callback(self._over.put)
 
     def _look(self) -> None:
-        """Count the workers' threads; see that the scheduler is there and has workers."""
+        """Count the workers' threads; check that the scheduler answers and has workers."""
         now = time.monotonic()
         if now < self._looked + LOOK_S:
             return
@@ -126,7 +126,7 @@ class _Job:
             raise ClusterError(f"scheduler {self._address}: no worker for {WORKERS_S:g} s")
 
     def _done(self, future: Future[Any]) -> Done[Any, Any] | None:
-        """Return what has come of an item; None: it was lost on its way and comes again."""
+        """Return the outcome of an item; None: it was lost and will come again."""
         from distributed import KilledWorker
 
         if future.cancelled():
@@ -152,7 +152,7 @@ class _Job:
         return ClusterError(f"scheduler {self._address}: the connection to it is lost")
 
     def _leave(self) -> None:
-        """Take back what is under way and end the processes of this job."""
+        """Cancel items in progress and end the processes of this job."""
         if self._client.status == "running":
             with suppress(Exception):
                 self._client.cancel(list(self._under_way), force=True)
@@ -161,7 +161,7 @@ class _Job:
 
 @contextmanager
 def _connected(address: str) -> Iterator[Client]:
-    """Give a client of the scheduler at an address.
+    """Return a client of the scheduler at an address.
 
     Raises:
         InputError: there is none, or no client here.

@@ -1,4 +1,4 @@
-"""What happens on a Dask worker: items go to processes of its own, as they do at home.
+"""Run items on a Dask worker, in processes of its own.
 
 So an item that crashes, hangs or ends its process does the same on a cluster as in processes, and
 a Dask worker is lost only if somebody ends it.
@@ -20,7 +20,7 @@ _pools: dict[tuple[str, int], Pool] = {}
 
 
 class OtherVersionsError(SpaceRobotError):
-    """A Dask worker has other versions of what flies than the one who asks, so other bits."""
+    """The software versions of a Dask worker differ from the client's."""
 
 
 def run_there(

@@ -1,4 +1,4 @@
-"""What comes of an item: its result, or the error in its place."""
+"""Outcome of an item: its result or its error."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ Result = TypeVar("Result")
 
 
 class WorkerDiedError(SpaceRobotError):
-    """The process that was at an item ended, and did so in every attempt."""
+    """The process of an item died in every attempt."""
 
 
 class OutOfTimeError(SpaceRobotError):
-    """An item took longer than it may; its process was killed."""
+    """An item exceeded its time limit; its process was killed."""
 
 
 @dataclass(frozen=True)
 class Done(Generic[Item, Result]):
-    """An item that is over."""
+    """Outcome of a completed item."""
 
     item: Item
     result: Result | None

@@ -1,4 +1,4 @@
-"""Many items in processes beside this one.
+"""Run many items in worker processes.
 
 Every worker has a pipe of its own, so a worker that is killed in the middle of a message spoils
 nobody else's (pools with one queue for all, as in `concurrent.futures` and pebble, wait forever
@@ -39,23 +39,23 @@ Dones = Iterator[Done[Any, Any]]
 
 @dataclass
 class PoolTask:
-    """An item on its way."""
+    """An item in progress."""
 
     item: Any
     packed: bytes
     deaths: int = 0
-    """Processes that have died at it."""
+    """Number of processes that have died while running the item."""
 
 
 @dataclass
 class Worker:
-    """A process, what it is at, and what it goes on with."""
+    """A worker process and its current and next tasks."""
 
     pid: int
     connection: Connection
     tasks: deque[PoolTask] = field(default_factory=deque)
     began: float = 0.0
-    """When it got to the first of its tasks."""
+    """Time when it began the first of its tasks."""
 
 
 def in_processes(
@@ -65,7 +65,7 @@ def in_processes(
     timeout_s: float | None,
     attempts: int,
 ) -> Generator[Any, None, None]:
-    """Yield None when all is ready, then what comes of every item; see `run_many`."""
+    """Yield None when all is ready, then every outcome; see `run_many`."""
     pool = Pool(workers, function, timeout_s, attempts)
     try:
         yield
@@ -75,7 +75,7 @@ def in_processes(
 
 
 class Pool:
-    """Workers that are forked when there is something to do, and replaced when they die."""
+    """Pool of workers, forked on demand and replaced when they die."""
 
     def __init__(
         self, size: int, function: Callable[[Any], Any], timeout_s: float | None, attempts: int
@@ -85,10 +85,10 @@ class Pool:
         self._server = ForkServer.of_this_process(worker_of(function))
         self._workers: dict[Connection, Worker] = {}
         self._again: deque[PoolTask] = deque()
-        """Tasks to be given out before any new item."""
+        """Tasks to assign again before any new item."""
 
     def run(self, items: Iterable[Any]) -> Dones:
-        """Yield what comes of every item, in the order in which they end."""
+        """Yield the outcome of every item, in order of completion."""
         rest = iter(items)
         while True:
             yield from self._give_out(rest)
@@ -101,7 +101,7 @@ class Pool:
         self._server.close()
 
     def _give_out(self, rest: Iterator[Any]) -> Dones:
-        """Give every worker something to do, then something small to go on with."""
+        """Assign a task to every idle worker, then a small one in advance."""
         for ahead in (0, 1):
             while (worker := self._free(ahead)) or (not ahead and len(self._workers) < self._size):
                 if not self._again:
@@ -146,7 +146,7 @@ class Pool:
                 end.shutdown(socket.SHUT_RDWR)
 
     def _take_in(self) -> Dones:
-        """Wait until something has ended, and yield what."""
+        """Wait for completed tasks and yield their outcomes."""
         for connection in wait(list(self._workers), self._time_left()):
             assert isinstance(connection, Connection)
             yield from self._receive(self._workers[connection])
@@ -160,7 +160,7 @@ class Pool:
                     self._again.extendleft(reversed(worker.tasks))
 
     def _time_left(self) -> float | None:
-        """Return how long none of the items at work is out of time (None: forever)."""
+        """Return the time until the next item exceeds its limit (None: never)."""
         if self._timeout_s is None:
             return None
         began = min(worker.began for worker in self._workers.values() if worker.tasks)
@@ -198,7 +198,7 @@ class Pool:
 
 @contextmanager
 def _as_socket(connection: Connection) -> Iterator[socket.socket]:
-    """Give the socket that a connection is made of."""
+    """Return the socket of a connection."""
     end = socket.socket(fileno=connection.fileno())
     try:
         yield end
@@ -207,7 +207,7 @@ def _as_socket(connection: Connection) -> Iterator[socket.socket]:
 
 
 def _manner(code: int | None) -> str:
-    """Return how a process ended, for a person."""
+    """Describe how a process ended."""
     if code is None:
         return "the last time with the server of the workers"
     if code >= 0:

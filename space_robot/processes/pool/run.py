@@ -1,4 +1,4 @@
-"""Runs a function over many items, wherever that is to happen."""
+"""Run a function over many items, in processes or on a cluster."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def run_many(
     timeout_s: float | None = None,
     attempts: int = 3,
 ) -> Generator[Done[Item, Result], None, None]:
-    """Yield what comes of every item, in the order in which they end.
+    """Yield the outcome of every item, in order of completion.
 
     Processes are forked, or the cluster is connected to, before this returns. Closing the iterator
     ends them; whatever ends this process ends them, too. Items are taken as workers need them: no
@@ -39,7 +39,7 @@ def run_many(
         attempts: how often an item is tried whose process dies.
 
     Raises:
-        InputError: an argument cannot be, or the scheduler is not there.
+        InputError: an argument is invalid, or the scheduler does not answer.
     """
     if workers < 0 or attempts < 1 or (timeout_s is not None and not timeout_s > 0.0):
         raise InputError(

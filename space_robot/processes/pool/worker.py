@@ -1,4 +1,4 @@
-"""What a worker does: it calls the function with one item after the other."""
+"""Worker process: calls the function with one item after the other."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from space_robot_msgs_py.config.text import one_line_of
 from ..fork_server import Target, accept_signals
 
 IGNORED = (signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
-"""Signals of the terminal, which are for the process that has started it all."""
+"""Terminal signals, which only the parent process handles."""
 PR_SET_PDEATHSIG = 1
-"""Of prctl(2): the signal that a process gets when the one that forked it ends."""
+"""Option of prctl(2): signal sent to a process when its parent ends."""
 
 
 class WorkerTraceback(Exception):  # noqa: N818 - shown as the cause of an error, never raised
     """The traceback of an error that was raised in a worker."""
 
     def __str__(self) -> str:
-        """Return it as Python prints it."""
+        """Return the traceback as Python prints it."""
         return f"\n{self.args[0]}"
 
 
 def worker_of(function: Callable[[Any], Any]) -> Target:
-    """What a forked worker does: `work` for as long as the process lives that forked it."""
+    """Return the function of a forked worker: `work` until its parent ends."""
 
     def run(connection: Connection, descriptors: Sequence[int], server: int) -> None:
         accept_signals(ignored=IGNORED)
@@ -79,7 +79,7 @@ def answer(function: Callable[[Any], Any], item: bytes) -> bytes:
 
 
 def as_exception(error: BaseException) -> Exception:
-    """Return an error of a function; one that would end the process that raises it, as a text."""
+    """Return an error of a function, as a text if raising it would end the process."""
     return error if isinstance(error, Exception) else RuntimeError(one_line_of(error))
 
 

@@ -1,4 +1,4 @@
-"""Where a robot flies: the domain and the namespace of a living plant."""
+"""Discovery of running plants: domain and namespace."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class FlightPlace(NamedTuple):
 
 
 class Finder:
-    """Looks for a plant: in a domain if one is given, else on this machine.
+    """Finder of a plant in a given domain, or on this machine.
 
     In a domain the topics tell, wherever their nodes run. Without one the locks of this machine's
     nodes tell, for `fly` takes a free domain unless it is told one.
@@ -58,7 +58,7 @@ class Finder:
         return FlightPlace(*newest) if newest else None
 
     def describe(self) -> str:
-        """Say where is looked, and what is there."""
+        """Describe where the search runs, and its results."""
         if self._domain is None:
             return "no plant runs on this machine"
         assert self._node is not None
@@ -69,7 +69,7 @@ class Finder:
         return f"ROS domain {self._domain} has {seen}"
 
     def is_there(self, place: FlightPlace) -> bool:
-        """Tell whether a plant that was found still is."""
+        """Return whether a discovered plant still runs."""
         if self._domain is not None:
             return place.namespace in self._publishing()
         return any(PLANT in node.name for node in nodes_in(place.domain, place.namespace))

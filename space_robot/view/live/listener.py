@@ -1,4 +1,4 @@
-"""What a flying robot tells of itself, as often as it is asked and no oftener."""
+"""Listener to the state of a running robot."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ TRUE: tuple[type[MessageDescription], ...] = (TruthJoints, TruthBase)
 
 
 class Sample(NamedTuple):
-    """The newest that is known of the robot."""
+    """Newest known state of the robot."""
 
     time: float
     """s, simulated."""
@@ -46,11 +46,11 @@ class Sample(NamedTuple):
     torque: Array
     """(n+3,) N m applied over the last tick; base, then joints."""
     error: Array | None
-    """(n+3,) tracking error as the law sees it; None: not told yet."""
+    """(n+3,) tracking error as the law sees it; None: not received yet."""
 
 
 class Listener:
-    """Listens to the newest state only: the truth where it is sent, else what the sensors tell."""
+    """Subscriber of the newest state: the true one if published, else the measured one."""
 
     def __init__(self, place: FlightPlace, robot: str, check: Callable[[], None]) -> None:
         """Join the graph; ask the plant which robot it is, and for its period.
@@ -61,7 +61,7 @@ class Listener:
             check: called while waiting for the plant; raises to give up.
 
         Raises:
-            InputError: its robot is not to be found here.
+            InputError: the files of its robot do not exist on this machine.
             FlightError: the plant does not answer.
         """
         from space_robot_msgs_py.ros.endpoints import PolledCallbackGroup, RawSubscription
@@ -86,7 +86,7 @@ class Listener:
         self._stamp_ns: int | None = None
         """The newest sample's time."""
         self.law = ""
-        """The law that commands; empty: not told yet."""
+        """Name of the law in force; empty: not received yet."""
 
     def _ask_plant(self, robot: str, check: Callable[[], None]) -> tuple[Robot, float]:
         name = period = None
@@ -141,7 +141,7 @@ class Listener:
         return {**faults, **self._monitor.complaints}
 
     def _choose_topics(self, with_states: bool) -> None:
-        """Listen to the truth where it is sent, else to what the sensors tell, or to neither."""
+        """Subscribe to the true states if they are published, else to the measured ones."""
         for topic in self._topics.values():
             topic.take()
         heard = TruthBase in self._topics and bool(self._topics[TruthBase].rows)

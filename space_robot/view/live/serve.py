@@ -1,4 +1,4 @@
-"""Serving the scene of what flies now, one flight after the other, until the user ends it."""
+"""Server of live scenes, one flight after the other, until the user ends it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ MISSED = "the flight was over before it could be shown; view shows its bag"
 
 @dataclass(frozen=True)
 class LiveOptions:
-    """What may be asked of a live scene."""
+    """Options of a live scene."""
 
     domain: int | None = None
     """ROS domain; None: ROS_DOMAIN_ID, or that of the flight on this machine that began last."""
@@ -52,7 +52,7 @@ class LiveOptions:
 
 
 class OverError(FlightError):
-    """The flight that was followed is over."""
+    """The followed flight is over."""
 
 
 def serve(options: LiveOptions, say: Callable[[str], None], ready: Callable[[str], None]) -> None:
@@ -60,11 +60,11 @@ def serve(options: LiveOptions, say: Callable[[str], None], ready: Callable[[str
 
     Args:
         options: what is asked.
-        say: told what happens, a line each.
-        ready: told the page's address.
+        say: called with a line for each event.
+        ready: called with the page's address.
 
     Raises:
-        InputError: viser is not installed, or a robot is not to be found.
+        InputError: viser is not installed, or the files of a robot do not exist.
         Interrupted: the user has ended it.
     """
     with (
@@ -114,12 +114,12 @@ class Follower:
 
         Args:
             place: where it is.
-            say: told what is waited for.
+            say: called with a description of the wait.
 
         Raises:
             OverError: it is over.
             FlightError: its plant does not answer.
-            InputError: its robot is not to be found here.
+            InputError: the files of its robot do not exist on this machine.
         """
 
         def check() -> None:

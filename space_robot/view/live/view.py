@@ -106,7 +106,7 @@ class LiveView:
             self._curves.draw()
 
     def note(self, events: Sequence[Event]) -> None:
-        """Keep what happened to be told."""
+        """Store an event to be shown."""
         self._events.extend(events)
 
     def close(self) -> None:

@@ -94,7 +94,7 @@ class Visual:
     position: Array
     """(3,) m, on the axes of its body."""
     mesh: str = ""
-    """File of the mesh; its name as it was given if that file was not found."""
+    """File of the mesh; its name unchanged if the file does not exist."""
     colour: tuple[float, float, float, float] | None = None
     """Red, green, blue, alpha, from 0 to 1."""
     body: int = 0

@@ -99,7 +99,7 @@ def check_kinds(tree: Tree, report: Report) -> None:
 
 
 def mend_inertias(links: Mapping[str, UrdfLink], tree: Tree, report: Report) -> None:
-    """See that every link that has a mass can be made of matter.
+    """Check that every link that has a mass can be made of matter.
 
     A point's inertia, zero, will do for a link that is fixed to one with an inertia.
     """

@@ -165,7 +165,7 @@ def _all_elements(root: Element) -> list[Element]:
 
 
 def _check_moving(tree: Tree, report: Report) -> None:
-    """See that joints move, under names that are free."""
+    """Check that joints move, under names that are free."""
     moving = [edge.joint for edge in tree.edges.values() if edge.moves]
     if not moving:
         raise InputError(f"{report.where}: no joint moves: a robot needs one at least")

@@ -51,7 +51,7 @@ def test_tables() -> None:
         "20 N",
         "0.3, 0.4",
         "hand",
-        "(not there)",
+        "(missing)",
         "cylinder",
     ):
         assert words in result.stdout
