@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betaincinv, gammaln, xlog1py, xlogy
 
-from space_robot.campaign.verdicts.projection import projected_decision
+from space_robot.campaign.verdicts.requirements import projected_decision
 from space_robot.campaign.verdicts.share_test import (
     FixedSample,
     Sequential,

@@ -95,7 +95,7 @@ def run(
     try:
         with rated_progress("flights") as show:
 
-            def show(progress: Progress) -> None:
+            def show_progress(progress: Progress) -> None:
                 if not latest and progress.kept:
                     said = f"{out}: {progress.kept} of {progress.total} flights are there"
                     click.echo(f"{said}; going on", err=True)
@@ -110,7 +110,7 @@ def run(
                 workers,
                 scheduler,
                 timeout_s,
-                progress=show,
+                progress=show_progress,
                 warn=lambda text: click.echo(text, err=True),
             )
     except KeyboardInterrupt:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from space_robot_msgs_py.compiled.records import assign
 from space_robot_msgs_py.config.arguments import as_numbers, as_path
 from space_robot_msgs_py.config.validation import read_yaml, short, validate
 from space_robot_msgs_py.errors import InputError
@@ -19,8 +20,7 @@ from ..dynamics.model import Model
 from ..elementary.matrices import product
 from ..elementary.series import plain_sin_cos
 from .file import _RobotDocument
-from .inertia import inertia_tensor
-from .model import model_of
+from .inertia import inertia_elements, inertia_tensor
 from .numbers import Document, are_numbers, numbers_of
 from .tree import Joint, TreeArrays
 
@@ -171,3 +171,27 @@ def _locked(joint: Joint, position: float) -> Joint:
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         offset, rotation = product(turn.T, offset), product(rotation, turn)
     return Joint(joint.name, "fixed", rotation, offset)
+
+
+def model_of(robot: TreeArrays) -> Model:
+    """Fill a `Model`, whose joints are in the order of visits."""
+    model, count, order = Model.allocate(robot.n), robot.joint_count, list(robot.order)
+    bodies = [0, *(joint + 1 for joint in order)]
+    row_of_body = {body: row for row, body in enumerate(bodies)}
+    assign(model, joint_count=count, actuated_count=robot.n)
+    model.mass[: count + 1] = robot.mass[bodies]
+    model.inertia[: count + 1] = inertia_elements(robot.inertia[bodies])
+    model.com[: count + 1] = robot.com[bodies]
+    model.rotation[:count] = robot.rotation[order].reshape(count, 9)
+    model.offset[:count] = robot.offset[order]
+    model.is_prismatic[:count] = robot.is_prismatic[order]
+    for row, joint in enumerate(order):
+        parent = row_of_body[int(robot.parent[joint])]
+        model.row[joint], model.parent[row] = row, parent
+        model.continues[row] = parent == row
+        if parent != row:
+            model.branches[parent] = 1.0
+        if joint >= robot.n:
+            spring = robot.springs[joint - robot.n]
+            model.stiffness[row], model.damping[row], model.rest[row] = spring
+    return model

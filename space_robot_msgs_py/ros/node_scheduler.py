@@ -7,11 +7,11 @@ import os
 import time
 from collections.abc import Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from .loop import Loop, Wait
 from .managed_node import ManagedNode
-from .scheduling import ask_for_fifo
 from .upkeep import PERIOD_S, Upkeep
 from .waiting import SPIN_S, Waiter
 
@@ -187,3 +187,20 @@ class ScheduledNode:
         self._loop = loop
         loop.begin()
         return True
+
+
+def ask_for_fifo(priority: int) -> str:
+    """Put all threads of this process under SCHED_FIFO; return a message on the result.
+
+    The middleware's threads go one above the loop: a loop that waits for a message must not keep
+    the thread away that brings it. Linux wakes such threads at once, others when it suits.
+    """
+    loop = os.getpid()
+    try:
+        for entry in Path("/proc/self/task").iterdir():
+            thread = int(entry.name)
+            level = priority if thread == loop else priority + 1
+            os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(level))
+    except (OSError, AttributeError) as error:  # no permission; not Linux
+        return f"SCHED_FIFO {priority} was not granted ({error}): the usual scheduling"
+    return f"SCHED_FIFO {priority}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -9,22 +10,22 @@ from typing import TYPE_CHECKING
 
 from typing_extensions import Self
 
+from space_robot_control.laws.trust import check_file, check_law
 from space_robot_msgs_py.bag.blocks import blocks_of
 from space_robot_msgs_py.config.arguments import as_path
 from space_robot_msgs_py.config.validation import one_of, validate
 from space_robot_msgs_py.errors import InputError
 
+from ...api import FlownFlight
 from ...api.in_process import fly_in_process
 from ..row.fly import RowFlyer
 from ..row.row import Task
 from ..store.folder import MANIFEST, STUDY, TABLE, study_changes
 from ..store.manifest import Manifest, read_manifest
-from ..store.software import software
+from ..store.software import software, texts_of
 from ..store.table import check_table, read_table
-from ..study import Study
+from ..study import Law, Study
 from ..verdicts.requirements import Verdict, verdicts
-from .rerun import Rerun
-from .trust import check_study
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -143,3 +144,61 @@ class FlownCampaign:
     def __repr__(self) -> str:
         laws = ", ".join(self.study.laws)
         return f"<FlownCampaign: {self.folder}, {len(self.table)} flights of {laws}>"
+
+
+CAMPAIGN = "campaign"
+
+
+def check_study(study: Study) -> None:
+    """Check that a study imports no module and opens no file but those that are shipped.
+
+    Raises:
+        NotTrustedError: it names one.
+    """
+    controller = study.scenario.get("parameters", {}).get("controller", {})
+    named = [Law.parse(law).controller for law in study.laws]
+    for name in (*named, *filter(None, [controller.get("controller")])):
+        check_law(str(name), CAMPAIGN)
+    laws = [Law.parse(law).gains for law in study.laws]
+    for text in texts_of([laws, study.scenario, study.vary]):
+        check_file("value of an option", text, CAMPAIGN)
+
+
+class Rerun(FlownFlight):
+    """A `FlownFlight` that knows whether it is the one of the campaign's table."""
+
+    def __init__(
+        self,
+        flown: FlownFlight,
+        task: Task,
+        digest: str,
+        digest_of_row: str,
+        other_software: Sequence[str],
+    ) -> None:
+        """Take the flight, what it is of, and its digest and that of the row.
+
+        Args:
+            flown: with its log.
+            task: run and law.
+            digest: of this flight.
+            digest_of_row: of the table; empty if the row has no flight.
+            other_software: what differs from the software that flew the campaign.
+        """
+        super().__init__(flown.flight, flown.ending, flown.bag, flown.log)
+        self.task, self.digest, self.digest_of_row = task, digest, digest_of_row
+        self._other_software = other_software
+
+    @property
+    def is_same(self) -> bool:
+        """True if the flight has the digest of its row: then it is the same to the last bit."""
+        return self.digest == self.digest_of_row
+
+    @property
+    def verdict(self) -> str:
+        """What there is to say of that, in a line."""
+        if self.is_same:
+            return f"same digest as the row: {self.digest}"
+        if not self.digest_of_row:
+            return "the row has no digest: its flight was not flown to an end of its own"
+        why = "; ".join(self._other_software) or "the software is the same: is the machine?"
+        return f"digest {self.digest} differs from the row's {self.digest_of_row} ({why})"

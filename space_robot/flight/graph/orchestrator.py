@@ -11,12 +11,15 @@ from pathlib import Path
 from typing import Any
 
 import click
+import yaml
 
+from space_robot_control.allocation.assumed_actuators import OWNER
 from space_robot_msgs_py import topics
 from space_robot_msgs_py.bag.flight_log import FlightLog
 from space_robot_msgs_py.bag.folder import open_bag
 from space_robot_msgs_py.bag.reader import read_flight
 from space_robot_msgs_py.bag.selection import Selection
+from space_robot_msgs_py.config.files import GIVEN
 from space_robot_msgs_py.errors import FlightError, InputError, SpaceRobotError
 
 from ...processes.interruption import handled_signals
@@ -28,7 +31,6 @@ from .composed import NAME, composed_command
 from .domain import is_quiet, ros_domain
 from .following import follow
 from .listeners import RESET_WITH, wait_for
-from .node_files import with_files
 from .processes import Command, Graph, node_command, node_environment
 
 COMPOSED_DRAIN_S = 0.002
@@ -177,3 +179,32 @@ def stop_signals() -> Iterator[list[int]]:
 
 def _say(text: str) -> None:
     click.echo(text, err=True)
+
+
+Parameters = Mapping[str, Mapping[str, Any]]
+
+
+def with_files(parameters: Parameters, flight: Flight, folder: Path) -> dict[str, dict[str, Any]]:
+    """Write the files that nodes read, and return parameters that name them.
+
+    Args:
+        parameters: of every node.
+        flight: their numbers.
+        folder: for the files.
+    """
+    named = {node: dict(values) for node, values in parameters.items()}
+    numbers = flight.scenario.tree
+    for node in ("plant", "controller", "mission"):
+        if named[node].get("robot") == GIVEN:
+            option = "plant_robot" if node == "plant" and "plant_robot" in numbers else "robot"
+            named[node]["robot"] = _write(folder / f"{option}.yaml", numbers[option])
+    if named["controller"].get("actuators") == GIVEN or "assumed_actuators" in numbers:
+        assumed = flight.scenario.assumed_actuators.model_dump(mode="json")
+        content = {f"{OWNER}_node": {"ros__parameters": assumed}}
+        named["controller"]["actuators"] = _write(folder / "assumed_actuators.yaml", content)
+    return named
+
+
+def _write(path: Path, content: Any) -> str:
+    path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+    return str(path)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from space_robot_msgs_py.config.validation import one_of, short
-from space_robot_msgs_py.config.yaml_text import read_file
+from space_robot_msgs_py.config.yaml_text import check_file, read_file
 from space_robot_msgs_py.errors import InputError
 from space_robot_msgs_py.topics import BASE_AXES
 
@@ -21,7 +23,6 @@ from .graph import Tree, build_tree
 from .joints import read_joints
 from .links import read_links
 from .visuals import read_colours
-from .xacro import expand_xacro
 
 XACRO = ".xacro"
 MOST_LINKS = 4000
@@ -172,3 +173,28 @@ def _check_moving(tree: Tree, report: Report) -> None:
     for joint in moving:
         if joint.name in BASE_AXES:
             raise report.error(joint.line, joint.part, "that is the name of a base axis")
+
+
+def expand_xacro(path: Path) -> str:
+    """Return the URDF text that a xacro file stands for, every argument at its default.
+
+    Raises:
+        InputError: the package is not installed, or does not like the file.
+    """
+    check_file(path)
+    try:
+        import xacro
+    except ImportError:
+        raise InputError(
+            f"{path}: xacro is not installed: `pip install 'space_robot[xacro]'` or `apt install "
+            "ros-jazzy-xacro`, or expand the file elsewhere to a .urdf"
+        ) from None
+    said = io.StringIO()  # warnings, and where it was when it failed
+    try:
+        with contextlib.redirect_stderr(said):
+            document = xacro.process_file(str(path))
+        return str(document.toprettyxml(indent="  "))
+    except (Exception, SystemExit) as error:  # whatever the expressions in a file come to
+        words, more = (" ".join(text.split()) for text in (str(error), said.getvalue()))
+        words += "" if more in words else f" {more}"
+        raise InputError(f"{path}: xacro cannot expand it ({words[:300]})") from None

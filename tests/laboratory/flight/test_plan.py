@@ -75,7 +75,7 @@ def test_a_parameter_is_the_same_as_its_option() -> None:
         assert one.description == other.description, options
         assert one.plant_settings == other.plant_settings
         assert one.controller_settings == other.controller_settings
-        assert one.scenario.recorder == other.recorder_settings
+        assert one.scenario.recorder == other.scenario.recorder
         assert topics_with_allowed_gaps(one.description) == topics_with_allowed_gaps(
             other.description
         )

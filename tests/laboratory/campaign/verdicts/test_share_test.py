@@ -12,7 +12,7 @@ from paths import DOCS
 from scipy.integrate import quad
 from scipy.stats import beta, binom
 
-from space_robot.campaign.verdicts.projection import projected_decision
+from space_robot.campaign.verdicts.requirements import projected_decision
 from space_robot.campaign.verdicts.share_test import (
     FixedSample,
     Sequential,

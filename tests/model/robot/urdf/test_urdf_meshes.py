@@ -8,7 +8,7 @@ import pytest
 from paths import DATA
 
 from space_robot_model.robot import Robot
-from space_robot_model.robot.urdf.meshes import mesh_path
+from space_robot_model.robot.urdf.visuals import mesh_path
 
 
 @pytest.fixture
