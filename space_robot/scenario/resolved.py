@@ -144,6 +144,11 @@ class ResolvedScenario:
         return [*in_plant, *self.options.faults_of(PROCESS_KINDS)]
 
     @property
+    def swap_texts(self) -> list[str]:
+        """Return the swaps of laws as they are written."""
+        return [text for text in self.controller.swaps if text.strip()]
+
+    @property
     def has_friction(self) -> bool:
         """True if the joints have friction."""
         return bool(coefficients(self.robots.plant, self.plant.friction).any())
@@ -167,7 +172,6 @@ class ResolvedScenario:
         assumed = actuators(self.assumed_actuators)
         is_other = self.plant.base_actuation != "ideal" and assumed != actuators(self.plant)
         numbers = controller.filter_settings
-        swaps = [text for text in controller.swaps if text.strip()]
         return {
             "controller": self.law.name,
             **plant_description(self.robots.plant, robots["robot_file"], plant, self.plant),
@@ -181,7 +185,7 @@ class ResolvedScenario:
                 else {}
             ),
             **({"faults": self.faults} if self.faults else {}),
-            **({"swaps": swaps} if swaps else {}),
+            **({"swaps": self.swap_texts} if self.swap_texts else {}),
             **({"restart_controller": True} if self.options.restart_controller else {}),
             "parameters": self.parameters,
             "scenario": {k: v for k, v in self.tree.items() if k not in ROBOTS},
@@ -204,7 +208,6 @@ def _tree(scenario: ResolvedScenario) -> dict[str, Any]:
         navigation = {"navigation_filter": filtered.model_dump(mode="json")}
     own = scenario.assumed_actuators.model_dump(mode="json")
     differs = own != {key: sections["actuators"][key] for key in own}
-    swaps = [text for text in controller.swaps if text.strip()]
     events = [text for text in plant.events if text.strip()]
     return {
         "controller": controller.controller,
@@ -223,7 +226,7 @@ def _tree(scenario: ResolvedScenario) -> dict[str, Any]:
         "navigation": controller.navigation,
         "seed": plant.fault_seed,
         **({"faults": list(scenario.faults)} if scenario.faults else {}),
-        **({"swaps": swaps} if swaps else {}),
+        **({"swaps": scenario.swap_texts} if scenario.swap_texts else {}),
         **{name: numbers[name] for name in OF_THE_GRAPH if numbers[name]},
         **({"restart_controller": True} if scenario.options.restart_controller else {}),
         "parameters": {
