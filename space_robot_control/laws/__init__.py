@@ -1,8 +1,8 @@
 """The control laws, one file each.
 
-Your own: one class derived from `ControlLaw` and one YAML of its gains. A file put in this
-folder is loaded by its law's ``name``. Wherever a controller's name is asked for, a class in any
-other file is named ``path/file.py:Class``, one on PYTHONPATH ``module:Class``.
+A new law is a class derived from `ControlLaw` and a YAML file of its gains. The law of a file in
+this folder is selected by its ``name``, a class in any other file as ``path/file.py:Class``, one
+on PYTHONPATH as ``module:Class``.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ __all__ = [
 ]
 
 LONGEST_REASON = 200
-"""Characters of what a law's own code raises that are shown."""
+"""Maximum length, in characters, of an error of a law's own code in a message."""
 
 
 @cache
 def laws() -> dict[str, type[ControlLaw]]:
-    """Every law of this folder by name."""
+    """Return every law of this folder by name."""
     laws: dict[str, type[ControlLaw]] = {}
     for module in pkgutil.iter_modules(__path__):
         for value in vars(importlib.import_module(f"{__name__}.{module.name}")).values():
@@ -51,7 +51,7 @@ def laws() -> dict[str, type[ControlLaw]]:
 
 
 def find_law(name: str) -> type[ControlLaw]:
-    """Return the law of a name, of a ``path/file.py:Class``, or of a ``module:Class``.
+    """Return the law class by name, by ``path/file.py:Class``, or by ``module:Class``.
 
     Raises:
         InputError: there is no such law.
@@ -74,7 +74,7 @@ def find_law(name: str) -> type[ControlLaw]:
     except InputError as error:
         where = "" if file is None or file.is_absolute() else " (paths are from the current folder)"
         raise InputError(f"controller {short(name)}: {error}{where}") from None
-    except (Exception, SystemExit) as error:  # the module is the user's, and may raise anything
+    except (Exception, SystemExit) as error:  # a user's module may raise anything
         why = one_line_of(error)
         why = why if len(why) <= LONGEST_REASON else f"{why[:LONGEST_REASON]}..."
         advice = _advice(module, attribute, error) or advice
@@ -86,7 +86,7 @@ def find_law(name: str) -> type[ControlLaw]:
 
 
 def _advice(module: str, attribute: str, error: BaseException) -> str:
-    """Return what to do about a module that is not installed; empty if that is not the error."""
+    """Return advice for a module that was not found; empty for any other error."""
     if not isinstance(error, ModuleNotFoundError):
         return ""
     own = f"{module.replace('.', '/')}{ENDING}"

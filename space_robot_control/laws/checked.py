@@ -1,4 +1,4 @@
-"""The force of a law whose code may be anybody's: of the right shape, or one clear error."""
+"""Calls of control laws, including user code: a force of the right shape, or one clear error."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from .base import Array, ControlLaw, Signals
 
 
 class LawError(SpaceRobotError):
-    """The code of a law raised an error, ended its process, or returned no force."""
+    """The code of a law raised an error, called ``sys.exit``, or returned an invalid force."""
 
 
 def force_of(law: ControlLaw, signals: Signals, tick: int) -> Array:
     """Return the generalised force F_S (m,) of a law.
 
     Args:
-        law: in force.
+        law: the active law.
         signals: of the tick.
-        tick: for the error.
+        tick: number of the tick, for error messages.
 
     Raises:
-        LawError: its code raised an error, or called ``sys.exit``; or what it returned is not one
-            number an axis.
+        LawError: its code raised an error or called ``sys.exit``, or the returned value is not
+            an array with one number per axis.
     """
     try:
         force = law.force(signals)
@@ -54,7 +54,7 @@ def force_of(law: ControlLaw, signals: Signals, tick: int) -> Array:
 
 
 def _is_of_user(error: BaseException) -> bool:
-    """Return whether an error may be Ctrl-C: of a subclass, or by Python's own handler."""
+    """Return True for a KeyboardInterrupt from Ctrl-C: a subclass, or Python's own handler."""
     by_python = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     return isinstance(error, KeyboardInterrupt) and (
         type(error) is not KeyboardInterrupt or by_python

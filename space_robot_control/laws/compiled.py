@@ -1,4 +1,4 @@
-"""Laws whose equation is a kernel, so that whole flights run in compiled code."""
+"""Control laws whose equation is a kernel, so that whole flights run in compiled code."""
 
 from __future__ import annotations
 
@@ -14,49 +14,49 @@ from .base import Array, ControlLaw, LawMemory, Signals, per_axis
 
 
 class SomeGains(Record):
-    """The gains of a law that is not known: there is one at least."""
+    """Common layout of the gains of any law: at least one gain."""
 
-    first: Array = per_axis("of the gains")
+    first: Array = per_axis("first gain")
 
 
 class LawCode(NamedTuple):
-    """A law as compiled loops take it, the same type for every law."""
+    """A law for compiled loops; the type is the same for every law."""
 
     run: Any
     """The kernel as a function of `Signals`, `SomeGains`, `LawMemory` and the period."""
     gains: Block
-    """Of `SomeGains`."""
+    """A block of `SomeGains`."""
     memory: Block
-    """Of `LawMemory`."""
+    """A block of `LawMemory`."""
     h_bar: Array
-    """See `ControlLaw`."""
+    """(m,) h_bar of the time-delay estimate, kg m2; empty if the law has none."""
     uses_model: bool
 
 
 class CompiledLaw(ControlLaw):
-    """A law with a ``kernel`` (and a ``memory_type``, if it remembers anything)."""
+    """A law with a ``kernel`` (and a ``memory_type``, if it has internal states)."""
 
     @staticmethod
     @abstractmethod
     def kernel(signals: Signals, gains: Any, memory: Any, period: float) -> None:
-        """Write ``memory.s``, ``memory.u`` and ``memory.force`` of a tick; a `kernel`.
+        """Compute ``memory.s``, ``memory.u`` and ``memory.force`` of a tick; a `kernel`.
 
         Args:
-            signals: of this tick; not to be changed.
+            signals: of this tick; read only.
             gains: a record of ``gains_type``.
             memory: a record of ``memory_type``.
-            period: s.
+            period: of the controller, s.
         """
 
     @property
     def function(self) -> RecordFunction:
         """The kernel, compiled for this law's records."""
-        own: list[Any] = [self.gains_type, self.memory_type]  # classes, which can be hashed
+        own: list[Any] = [self.gains_type, self.memory_type]  # classes are hashable
         return _compiled(type(self).kernel, *own)
 
     @property
     def code(self) -> LawCode:
-        """The law for compiled loops; it shares gains and memory."""
+        """The law for compiled loops; gains and memory are shared, not copied."""
         n = len(self.memory.s) - 3
         gains = prefix(self.gains_block, SomeGains.dtype(n))
         memory = prefix(self.memory_block, LawMemory.dtype(n))

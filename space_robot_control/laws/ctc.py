@@ -18,7 +18,7 @@ class Gains(LawGains):
 
 @kernel
 def computed_torque(signals: Signals, gains: Gains, memory: LawMemory, period: float) -> None:
-    """(31), (30)."""
+    """Compute one tick: u of (31), force of (30)."""
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
     for i in range(e.size):
         memory.u[i] = rhodd_d[i] + gains.k_d[i] * edot[i] + gains.k_p[i] * e[i]

@@ -23,7 +23,7 @@ class Gains(LawGains):
 def computed_torque_sliding_mode(
     signals: Signals, gains: Gains, memory: LawMemory, period: float
 ) -> None:
-    """(38), the acceleration wanted, (57)."""
+    """Compute one tick: s of (38), u, force of (57)."""
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
     lam, s, u, force = gains.lambda_, memory.s, memory.u, memory.force
     for i in range(e.size):
@@ -36,7 +36,7 @@ def computed_torque_sliding_mode(
 
 @kernel
 def saturation(s: float, delta: float) -> float:
-    """(58): the sign outside the boundary layer of half-width ``delta``, linear inside."""
+    """Return (58): the sign outside the boundary layer of half-width ``delta``, linear inside."""
     return np.sign(s) if abs(s) > delta else s / delta
 
 

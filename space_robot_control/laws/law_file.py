@@ -1,7 +1,7 @@
-"""A control law in a Python file of the user's, named by the file's path: ``./my_laws.py:ADRC``.
+"""Control laws in a user's Python file, selected by path and class: ``./my_laws.py:ADRC``.
 
-The file is imported under a name of its own, so that no module of another folder is taken for it;
-its folder is not searched for the modules that it imports.
+The file is imported under a unique module name, so that it cannot be confused with a module of
+another folder; its folder is not added to the search path.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from space_robot_msgs_py.config.yaml_text import check_file
 
 ENDING = ".py"
 _NAMES: dict[str, str] = {}
-"""Of each module imported here, by its name: the path it was imported by."""
+"""Path of each module imported here, by the module's name."""
 
 
 def law_file(name: str) -> Path | None:
-    """Return the file that a law's name, ``PATH.py:Class``, refers to; None if it names none."""
+    """Return the file of a law's name ``PATH.py:Class``; None for a name of another form."""
     path, colon, _ = name.rpartition(":")
     return Path(path) if colon and path.endswith(ENDING) else None
 
 
 def import_file(path: Path) -> ModuleType:
-    """Import a Python file, once a process.
+    """Import a Python file, once per process.
 
     Raises:
         InputError: there is no such file.
@@ -50,5 +50,5 @@ def import_file(path: Path) -> ModuleType:
 
 
 def importable_name(law: type) -> str:
-    """Return the name by which another process imports a law: ``module:Class`` or a file's."""
+    """Return the name by which another process imports a law: ``module:Class`` or with a path."""
     return f"{_NAMES.get(law.__module__, law.__module__)}:{law.__qualname__}"

@@ -22,7 +22,7 @@ class Gains(LawGains):
 def time_delay_sliding_mode(
     signals: Signals, gains: Gains, memory: LawMemory, period: float
 ) -> None:
-    """(38), the acceleration wanted, (59)."""
+    """Compute one tick: s of (38), u, force of (59)."""
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
     h_bar, lam, s, u = gains.h_bar, gains.lambda_, memory.s, memory.u
     for i in range(e.size):

@@ -29,7 +29,7 @@ class Memory(LawMemory):
 def time_delay_super_twisting(
     signals: Signals, gains: Gains, memory: Memory, period: float
 ) -> None:
-    """(38), psi of (40) advanced by one tick, (42), (41)."""
+    """Compute one tick: s of (38), psi of (40), u of (42), force of (41)."""
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
     lam, k_1, s, u, psi = gains.lambda_, gains.k_1, memory.s, memory.u, memory.psi
     for i in range(e.size):

@@ -20,16 +20,16 @@ class Gains(LawGains):
 
 
 class Memory(LawMemory):
-    """What the integral of (60) goes on from, beside s itself."""
+    """Internal state of (60), beside the integral s itself."""
 
-    last_edot: Array = per_axis("edot of the last tick; NaN: none", "rad/s (eps: 1/s)")
+    last_edot: Array = per_axis("edot of the last tick; NaN at the first", "rad/s (eps: 1/s)")
 
 
 @kernel
 def time_delay_terminal_sliding_mode(
     signals: Signals, gains: Gains, memory: Memory, period: float
 ) -> None:
-    """Advance ``s`` by one tick, the acceleration wanted, (60)."""
+    """Compute one tick: s, u, force of (60)."""
     e, edot, rhodd_d = signals.error, signals.error_rate, signals.acceleration_desired
     k_p, k_d, s, u, last_edot = gains.k_p, gains.k_d, memory.s, memory.u, memory.last_edot
     for i in range(e.size):
@@ -44,7 +44,7 @@ def time_delay_terminal_sliding_mode(
 class TimeDelayTerminalSlidingMode(CompiledLaw):
     """``F_S = h_bar (u_PD + K_1 |s|^1/2 sign(s)) + N_hat``.
 
-    ``s = integral of (edd + K_D edot + K_P e)`` from when the law is switched on, so s(0) = 0.
+    ``s = integral of (edd + K_D edot + K_P e)`` since the law was activated, so s(0) = 0.
     """
 
     name = "tde_tsmc"
@@ -52,6 +52,6 @@ class TimeDelayTerminalSlidingMode(CompiledLaw):
     kernel = staticmethod(time_delay_terminal_sliding_mode)
 
     def reset(self) -> None:
-        """Start the surface anew."""
+        """Restart the integral surface at zero."""
         super().reset()
         self.memory.last_edot[:] = np.nan

@@ -1,8 +1,7 @@
-"""Which names are followed: a bag or a campaign's folder may be anybody's, and names files.
+"""Checks of file and module names in bags and campaign folders, which may come from anyone.
 
-Names of what is shipped are looked up whoever says them. A path to a file, or a ``module:Class`` or
-``file.py:Class`` that would be imported, is opened only if the user names it, or trusts the bag or
-campaign.
+Names of shipped files and laws are always allowed. A path to a file, or a ``module:Class`` or
+``file.py:Class`` to import, is opened only if the user gave it, or trusts the bag or campaign.
 """
 
 from __future__ import annotations
@@ -16,46 +15,46 @@ FILES = (".yaml", ".yml", ".urdf", ".xacro")
 
 
 class NotTrustedError(InputError):
-    """A bag or campaign names a file or module, which is opened only if it is trusted."""
+    """A bag or campaign that is not trusted refers to a file or module."""
 
 
 def is_plain(name: str) -> bool:
-    """True if a name is looked up among what is shipped; else it is a path to somewhere."""
+    """Return True if a name can only be that of a shipped file, and False for a path."""
     is_path = "/" in name or name.endswith(FILES) or name in (".", "..")
     return name.isprintable() and not is_path and len(name) <= _LONGEST_NAME
 
 
 def check_file(what: str, name: str, where: str = "bag") -> None:
-    """Check that a name out of something that is not trusted opens no file but those shipped.
+    """Check that a name from an untrusted source refers to a shipped file.
 
     Args:
-        what: the name is of.
+        what: kind of file, for the error.
         name: to be checked.
-        where: the name was read, for the error.
+        where: source of the name, for the error.
 
     Raises:
         NotTrustedError: it is a path.
     """
     if not is_plain(name):
         raise NotTrustedError(
-            f"the {where} names a file as its {what}, {_short(name)}: read only with --trust"
+            f"the {where} refers to a file as its {what}, {_short(name)}: read only with --trust"
         )
 
 
 def check_law(name: str, where: str = "bag") -> None:
-    """Check that a law's name out of something that is not trusted imports only what is shipped.
+    """Check that a law's name from an untrusted source is that of a shipped law.
 
     Args:
         name: of the law.
-        where: it was read, for the error.
+        where: source of the name, for the error.
 
     Raises:
         NotTrustedError: it is not the name of a shipped law.
     """
     if name not in laws():
         raise NotTrustedError(
-            f"the {where} names the law {_short(name)}, which is none of those shipped: if it is "
-            "module:Class or file.py:Class, --trust imports it, which runs its code"
+            f"the {where} uses the law {_short(name)}, which is not a shipped one: --trust imports "
+            "a module:Class or file.py:Class, which runs its code"
         )
 
 

@@ -71,7 +71,7 @@ def test_a_replay_imports_no_module_that_a_bag_names(
 ) -> None:
     flight = described(**changes)
     flight.pop("gains_used")
-    with pytest.raises(NotTrustedError, match="--trust imports it, which runs its code"):
+    with pytest.raises(NotTrustedError, match="--trust imports a module:Class"):
         ControllerChoice(flight, tmp_path)
     assert not ran()
     assert "this" not in sys.modules

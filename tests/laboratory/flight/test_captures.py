@@ -120,7 +120,7 @@ def test_a_file_that_a_bag_names_is_opened_only_if_it_is_trusted(
     log.flight["events"] = [f"capture@0.1:{tmp_path / 'target.yaml'}"]
     report = analyze(log)
     assert report["momentum"] is None
-    assert "the bag names a file as its target" in report["unavailable"]["momentum"]
+    assert "the bag refers to a file as its target" in report["unavailable"]["momentum"]
 
 
 def test_a_mission_has_events_and_files_beside_it(tmp_path: Path) -> None:

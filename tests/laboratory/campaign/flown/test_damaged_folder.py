@@ -274,7 +274,7 @@ def test_a_folder_imports_and_opens_nothing_unless_it_is_trusted(
     mine = Campaign.of({**CONTENT, "require": {}, "laws": ["law_of_somebody:Free"]})
     flown = mine.run(1, 7, tmp_path / "mine", workers=0)
     assert flown.rerun(0).is_same
-    with pytest.raises(NotTrustedError, match="the campaign names the law"):
+    with pytest.raises(NotTrustedError, match="the campaign uses the law"):
         FlownCampaign.open(tmp_path / "mine").rerun(0)
     assert FlownCampaign.open(tmp_path / "mine", trust=True).rerun(0).is_same
 
